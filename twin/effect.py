@@ -1,0 +1,163 @@
+"""What an effect is: one physical law with its parameters, states and fingerprint.
+
+A law is one function ``law(p, s, io)`` of three arrays of doubles:
+
+* ``p``  the effect's parameters, in the order of ``Effect.parameters``;
+* ``s``  its internal states, zero at the start, advanced by the law once per sample;
+* ``io`` the axis at this sample, indexed by the constants below.
+
+The law reads what it needs from ``io`` and writes one result: a force effect writes OUT (the force
+on the axis, N); a friction writes OUT (the force opposing motion, N); an actuation changes U; a
+modifier multiplies DRY, STATIC or VISCOUS; a sensing effect changes READING.
+It is plain Python and also compiles, once, to native code (see twin.native).
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+# Slots of ``io``. Compiled laws freeze these numbers.
+INDEX = 0  # sample index, 0 at the first sample
+TIME = 1  # s
+DT = 2  # s, sample period
+X = 3  # m, true position
+V = 4  # m/s, true velocity
+U = 5  # N, actuator force; commanded on entry, actual after the actuation effects
+MASS = 6  # kg, moved mass of the axis
+X_OTHER = 7  # m, position of the other axis
+V_OTHER = 8  # m/s
+A_OTHER = 9  # m/s^2
+FRICTION = 10  # N, friction of the previous sample (opposing motion)
+DRY = 11  # 1, factor on the dry friction level (Coulomb, Stribeck)
+STATIC = 12  # 1, further factor on the static level only
+VISCOUS = 13  # 1, factor on the viscous part
+HOLD = 14  # N, friction that would bring the axis to rest within this sample
+READING = 15  # m, encoder reading
+OUT = 16  # N, result of a force or friction law
+IO_SIZE = 17
+
+Law = Callable[[Any, Any, Any], None]
+
+
+class Kind(Enum):
+    """What a law acts on; the values give the order of computation within a sample."""
+
+    SENSING = 0
+    ACTUATION = 1
+    FORCE = 2
+    MODIFIER = 3
+    FRICTION = 4
+    STRUCTURE = 5
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What a log's motion covers; start rules and scans are computed from it.
+
+    position_low, position_high (m), speed_max (m/s), dry_level (N, half the gap between the force
+    in the two directions), duration (s), period (s, sample period).
+    """
+
+    position_low: float
+    position_high: float
+    speed_max: float
+    dry_level: float
+    duration: float
+    period: float
+
+    @property
+    def travel(self) -> float:
+        """Distance covered, m."""
+        return self.position_high - self.position_low
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a law.
+
+    unit: SI unit text ("1" for a ratio). start: value before anything is known; start_rule gives a
+    better one from the data. lower, upper: bounds, same unit. strength: the effect is absent when
+    every strength is zero. fixed: known by design, held by a fit. at_least: name of a parameter of
+    the same effect below which this one may not fall. scan: values that the diagnosis tries, from
+    the data.
+    """
+
+    name: str
+    unit: str
+    start: float
+    lower: float
+    upper: float
+    meaning: str
+    strength: bool = False
+    fixed: bool = False
+    at_least: str | None = None
+    start_rule: Callable[[Excitation], float] | None = None
+    scan: Callable[[Excitation], Sequence[float]] | None = None
+
+    def start_from(self, excitation: Excitation) -> float:
+        """Start value for this motion, inside the bounds."""
+        value = self.start_rule(excitation) if self.start_rule else self.start
+        return min(max(value, self.lower), self.upper)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One physical effect.
+
+    equation and source: as printed in `twin effects NAME`. states: names of internal states.
+    fingerprint: what is left in the residual when the effect is missing. excited_by: the motion
+    that shows it. replaces: this friction is a richer form of those kinds of friction.
+    """
+
+    kind: Kind
+    summary: str
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    law: Law
+    fingerprint: str
+    excited_by: str
+    states: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [p.name for p in self.parameters]
+        if len(set(names)) != len(names):
+            raise ValueError(f"effect {self.name}: a parameter name is used twice")
+        for p in self.parameters:
+            if not p.unit:
+                raise ValueError(
+                    f"effect {self.name}: parameter {p.name} has no unit; use '1' for a ratio"
+                )
+            if not p.lower <= p.start <= p.upper:
+                raise ValueError(
+                    f"effect {self.name}: start {p.start} {p.unit} of {p.name} is outside its "
+                    f"bounds [{p.lower}, {p.upper}]"
+                )
+            if p.at_least is not None and p.at_least not in names:
+                raise ValueError(f"effect {self.name}: {p.name} refers to unknown {p.at_least}")
+
+    @property
+    def name(self) -> str:
+        """The name of the file that holds the law."""
+        return Path(inspect.getfile(self.law)).stem
+
+    @property
+    def strengths(self) -> tuple[Parameter, ...]:
+        """Parameters that are all zero when the effect is absent."""
+        return tuple(p for p in self.parameters if p.strength)
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of that name; KeyError where there is none."""
+        return {p.name: p for p in self.parameters}[name]
+
+    def starts(self, excitation: Excitation | None = None) -> dict[str, float]:
+        """Start values by parameter name; from the motion where one is given."""
+        return {
+            p.name: p.start if excitation is None else p.start_from(excitation)
+            for p in self.parameters
+        }

@@ -1,0 +1,81 @@
+"""THE CATALOGUE: every file in this folder is one physical effect; nothing else names it.
+
+A file defines ``EFFECT``, a twin.effect.Effect, and takes its name from the file.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import importlib.util
+import pkgutil
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+
+from twin.effect import Effect
+from twin.errors import InputError
+
+
+class Catalogue(Mapping[str, Effect]):
+    """Effects by name, in alphabetical order."""
+
+    def __init__(self, effects: Sequence[Effect]) -> None:
+        self._effects = {e.name: e for e in sorted(effects, key=lambda e: e.name)}
+
+    def __getitem__(self, name: str) -> Effect:
+        try:
+            return self._effects[name]
+        except KeyError:
+            raise InputError(self._unknown(name)) from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._effects
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._effects)
+
+    def __len__(self) -> int:
+        return len(self._effects)
+
+    def _unknown(self, name: str) -> str:
+        near = difflib.get_close_matches(name, self._effects, n=1, cutoff=0.4)
+        hint = f"did you mean '{near[0]}'? " if near else ""
+        return f"unknown effect '{name}'; {hint}`twin effects` lists the {len(self)} that exist"
+
+
+def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:
+    """The catalogue of this package, and the effects of the user's own files.
+
+    Raises InputError where a user's file is missing, cannot be run or defines no EFFECT.
+    """
+    names = (m.name for m in pkgutil.iter_modules(__path__))
+    modules = [importlib.import_module(f"{__name__}.{name}") for name in names]
+    return Catalogue([m.EFFECT for m in modules] + [_user_effect(Path(f)) for f in user_files])
+
+
+def _user_effect(path: Path) -> Effect:
+    if not path.is_file():
+        raise InputError(f"{path}: no such effect file; give a Python file that defines EFFECT")
+    module = _import_file(path)
+    effect = getattr(module, "EFFECT", None)
+    if not isinstance(effect, Effect):
+        raise InputError(
+            f"{path}: defines no EFFECT of type twin.effect.Effect; "
+            "see the worked example in examples/my_effect.py"
+        )
+    return effect
+
+
+def _import_file(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"user_effect_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{path}: is not a Python file; an effect is one .py file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise InputError(f"{path}: cannot be loaded as an effect: {error}") from error
+    return module

@@ -1,0 +1,30 @@
+"""Force of the cable slab: smooth in position and conservative.
+
+F(x) = -(offset + k1 x + k2 x^2 + k3 x^3); it falls with x because the fold of the slab widens
+(L. Jia 2023, cable measurement: F_cable = -(F_pos + F_neg)/2). The polynomial is this project's
+choice: the thesis prints a measured curve, no formula.
+"""
+
+from twin.effect import OUT, Effect, Kind, Parameter, X
+
+
+def law(p, s, io):
+    x = io[X]
+    io[OUT] = -(p[0] + x * (p[1] + x * (p[2] + x * p[3])))
+
+
+EFFECT = Effect(
+    kind=Kind.FORCE,
+    summary="conservative force of the cable slab, smooth in position",
+    equation="F = -(offset + k1 x + k2 x^2 + k3 x^3)",
+    source="L. Jia 2023, cable pass; the polynomial form is an assumption",
+    parameters=(
+        Parameter("offset", "N", 0.0, -1e4, 1e4, "force at x = 0", strength=True),
+        Parameter("k1", "N/m", 0.0, -1e5, 1e5, "stiffness", strength=True),
+        Parameter("k2", "N/m^2", 0.0, -1e6, 1e6, "quadratic term", strength=True),
+        Parameter("k3", "N/m^3", 0.0, -1e7, 1e7, "cubic term", strength=True),
+    ),
+    law=law,
+    fingerprint="residual is one smooth curve of position, the same in both directions",
+    excited_by="slow passes over the whole travel in both directions",
+)

@@ -1,0 +1,46 @@
+"""Cogging of the linear motor: a force periodic in position, independent of current.
+
+F = sum_{k=1..3} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p), p the magnet pitch.
+J. F. Gieras, Z. J. Piech, B. Tomczuk, "Linear Synchronous Motors", 2nd ed. (2011): the cogging
+force is a Fourier series in position with period set by pole pitch and slot pitch.
+"""
+
+from math import cos, pi, sin
+
+from twin.effect import OUT, Effect, Excitation, Kind, Parameter, X
+
+
+def law(p, s, io):
+    phase = 2.0 * pi * io[X] / p[0]
+    sin1 = sin(phase)
+    cos1 = cos(phase)
+    sin2 = 2.0 * sin1 * cos1
+    cos2 = cos1 * cos1 - sin1 * sin1
+    sin3 = sin2 * cos1 + cos2 * sin1
+    cos3 = cos2 * cos1 - sin2 * sin1
+    io[OUT] = p[1] * sin1 + p[2] * cos1 + p[3] * sin2 + p[4] * cos2 + p[5] * sin3 + p[6] * cos3
+
+
+def pitches(e: Excitation) -> tuple[float, ...]:
+    """Pitches to try: equally spaced in cycles over the travel, half a cycle apart."""
+    cycles = int(min(e.travel / 2e-3, 120.0))
+    return tuple(2.0 * e.travel / k for k in range(4, 2 * cycles + 1))
+
+
+EFFECT = Effect(
+    kind=Kind.FORCE,
+    summary="force periodic in position at the magnet pitch, harmonics 1 to 3",
+    equation="F = sum_{k=1..3} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)",
+    source="Gieras, Piech, Tomczuk, Linear Synchronous Motors, 2011 (cogging as a Fourier series)",
+    parameters=(
+        Parameter("p", "m", 0.024, 1e-4, 1.0, "magnet pitch", scan=pitches),
+        *(
+            Parameter(f"{c}{k}", "N", 0.0, -1e4, 1e4, f"{f} term of harmonic {k}", strength=True)
+            for k in (1, 2, 3)
+            for c, f in (("a", "sine"), ("b", "cosine"))
+        ),
+    ),
+    law=law,
+    fingerprint="residual repeats along the track, the same in both directions and at every force",
+    excited_by="constant-speed passes over many magnet pitches",
+)

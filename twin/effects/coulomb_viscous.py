@@ -1,0 +1,49 @@
+"""Coulomb and viscous friction with stiction.
+
+While sliding F = Fc sgn(v) + sigma2 v; at rest any force up to Fs is held (thesis eq. 2.1-2.2 and
+section 2.1.3). Stepped as an impulse (Moreau, "Unilateral contact and dry friction in finite
+freedom dynamics", 1988): HOLD is the friction that would stop the axis within this sample; if the
+level allows it, exactly that force acts and the axis is at rest to rounding, so it never creeps.
+"""
+
+from math import copysign
+
+from twin.effect import DRY, HOLD, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
+
+
+def law(p, s, io):
+    viscous = p[2] * io[VISCOUS] * io[V]
+    sliding = p[0] * io[DRY]
+    level = sliding
+    if s[0] > 0.5:  # at rest: the static level holds
+        level = max(sliding, p[1] * io[DRY] * io[STATIC])
+    needed = io[HOLD] - viscous
+    if abs(needed) <= level:
+        s[0] = 1.0
+        io[OUT] = io[HOLD]
+    else:
+        s[0] = 0.0
+        io[OUT] = copysign(sliding, needed) + viscous
+
+
+EFFECT = Effect(
+    kind=Kind.FRICTION,
+    summary="Coulomb and viscous friction, sticks at rest",
+    equation="F = Fc sgn(v) + sigma2 v;  |F| <= Fs at rest",
+    source="L. Jia 2023, eq. 2.1-2.2, section 2.1.3",
+    parameters=(
+        Parameter(
+            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True,
+            start_rule=lambda e: e.dry_level,
+        ),
+        Parameter(
+            "Fs", "N", 0.3, 0.0, 1e4, "static friction", strength=True, fixed=True,
+            at_least="Fc", start_rule=lambda e: e.dry_level,
+        ),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
+    ),
+    states=("at_rest",),
+    law=law,
+    fingerprint="force steps at every reversal, and grows in proportion to speed",
+    excited_by="constant-speed passes in both directions at several speeds",
+)  # fmt: skip

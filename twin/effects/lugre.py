@@ -1,0 +1,64 @@
+"""LuGre friction: bristles of stiffness sigma0 that deflect before the axis slides.
+
+dz/dt = v - sigma0 |v| z / g(v),  g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n)
+F = sigma0 z + sigma1 dz/dt + sigma2 v
+C. Canudas de Wit et al., "A new model for control of systems with friction", IEEE TAC 40 (1995),
+eq. 2-4; thesis eq. 2.6-2.9. The state is integrated exactly over the sample for constant v, so any
+stiffness is stable.
+"""
+
+from math import copysign, exp, expm1
+
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
+
+
+def law(p, s, io):
+    coulomb, static, stribeck, viscous, sigma0, sigma1 = p[0], p[1], p[2], p[3], p[4], p[5]
+    v = io[V]
+    q = abs(v) / stribeck
+    fall = exp(-q * q) if p[6] == 2.0 else exp(-(q ** p[6]))
+    level = io[DRY] * (coulomb + (static * io[STATIC] - coulomb) * fall)
+    if level <= 0.0:
+        s[0] = 0.0
+        io[OUT] = viscous * io[VISCOUS] * v
+    else:
+        grown = -expm1(-sigma0 * abs(v) / level * io[DT])
+        change = (copysign(level / sigma0, v) - s[0]) * grown
+        s[0] += change
+        io[OUT] = sigma0 * s[0] + sigma1 * change / io[DT] + viscous * io[VISCOUS] * v
+
+
+EFFECT = Effect(
+    kind=Kind.FRICTION,
+    summary="bristle friction: Stribeck curve, pre-sliding stiffness and damping",
+    equation="dz/dt = v - sigma0 |v| z / g(v);  F = sigma0 z + sigma1 dz/dt + sigma2 v;  "
+    "g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n)",
+    source="Canudas de Wit et al. 1995, eq. 2-4; L. Jia 2023, eq. 2.6-2.9",
+    parameters=(
+        Parameter(
+            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True,
+            start_rule=lambda e: e.dry_level,
+        ),
+        Parameter(
+            "Fs", "N", 0.35, 0.0, 1e4, "static friction", strength=True, at_least="Fc",
+            start_rule=lambda e: 1.15 * e.dry_level,
+        ),
+        Parameter(
+            "v0", "m/s", 0.01, 1e-5, 1.0, "Stribeck velocity",
+            start_rule=lambda e: 0.05 * e.speed_max,
+            scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
+        ),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
+        Parameter(
+            "sigma0", "N/m", 300.0, 1.0, 1e9, "bristle stiffness",
+            start_rule=lambda e: 1e3 * e.dry_level,
+            scan=lambda e: tuple(e.dry_level / z for z in (1e-3, 1e-4, 1e-5)),
+        ),
+        Parameter("sigma1", "N s/m", 0.5, 0.0, 1e5, "bristle damping"),
+        Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
+    ),
+    states=("z",),
+    law=law,
+    fingerprint="residual after every reversal over a few bristle deflections of travel",
+    excited_by="slow reversals of a few micrometres to millimetres, and a velocity staircase",
+)  # fmt: skip

@@ -1,0 +1,47 @@
+"""Dry friction level that varies along the track (lubrication, preload).
+
+Fc, Fs -> (1 + P(x)) Fc, Fs with the smooth profile P(x) = sum_k c_k cos(k pi (x - start) / length).
+A cosine series has zero mean over the track, so that it does not compete with Fc. L. Jia 2023,
+section on the velocity maps: Fc and Fs fall along the track, v0 and sigma2 show no trend.
+"""
+
+from math import cos, pi
+
+from twin.effect import DRY, Effect, Kind, Parameter, X
+
+
+def law(p, s, io):
+    phase = pi * (io[X] - p[0]) / p[1]
+    profile = (
+        p[2] * cos(phase)
+        + p[3] * cos(2.0 * phase)
+        + p[4] * cos(3.0 * phase)
+        + p[5] * cos(4.0 * phase)
+        + p[6] * cos(5.0 * phase)
+    )
+    io[DRY] *= max(1.0 + profile, 0.01)  # friction cannot turn negative
+
+
+EFFECT = Effect(
+    kind=Kind.MODIFIER,
+    summary="dry friction level varies smoothly along the track",
+    equation="Fc, Fs -> (1 + P(x)) Fc, Fs;  P(x) = sum_k c_k cos(k pi (x - start)/length)",
+    source="L. Jia 2023, velocity maps at nine positions",
+    parameters=(
+        Parameter(
+            "start", "m", -0.17, -1e3, 1e3, "where the profile begins", fixed=True,
+            start_rule=lambda e: e.position_low,
+        ),
+        Parameter(
+            "length", "m", 0.34, 1e-6, 1e3, "length of the profile", fixed=True,
+            start_rule=lambda e: max(e.travel, 1e-6),
+        ),
+        *(
+            Parameter(f"c{k}", "1", 0.0, -2.0, 2.0, f"cosine term {k} of the profile", strength=True)
+            for k in range(1, 6)
+        ),
+    ),
+    law=law,
+    fingerprint="residual flips with direction and has the same shape along the track",
+    excited_by="constant-speed passes over the whole travel in both directions",
+)  # fmt: skip

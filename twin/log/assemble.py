@@ -1,0 +1,193 @@
+"""Series of samples -> Log: what belongs together, and what must be there."""
+
+from __future__ import annotations
+
+import difflib
+import zlib
+from collections.abc import Mapping, Sequence
+
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Metadata
+
+from twin.errors import InputError
+from twin.log.container import Damaged, Record, at
+from twin.log.layout import Block
+from twin.log.log import AxisLog, Log
+from twin.log.series import Series, seconds
+from twin.log.topics import AXIS_PREFIX, Topics, positive_number
+
+METADATA_NAME = "twin"
+SCHEMA_VERSION = "1"
+
+
+class Extras:
+    """Metadata and attachments."""
+
+    def __init__(self) -> None:
+        self.metadata: dict[str, str] = {}
+        self.attachments: dict[str, bytes] = {}
+
+    def add(self, record: Record) -> None:
+        """Take what a record holds of them; raises Damaged, InputError."""
+        if record.opcode == Opcode.METADATA:
+            metadata = record.parsed(Metadata)
+            if metadata.name == METADATA_NAME:
+                self._check_version(metadata.metadata)
+                self.metadata = metadata.metadata
+        elif record.opcode == Opcode.ATTACHMENT:
+            attachment = record.parsed(Attachment)
+            crc = int.from_bytes(record.content[-4:], "little")
+            if crc not in (0, zlib.crc32(record.content[:-4])):
+                raise Damaged(f"attachment at byte {record.offset}: wrong checksum")
+            self.attachments[attachment.name] = attachment.data
+
+    @staticmethod
+    def _check_version(metadata: Mapping[str, str]) -> None:
+        version = metadata.get("schema_version", SCHEMA_VERSION)
+        if version != SCHEMA_VERSION:
+            raise InputError(
+                f"log schema version is {version!r}, this program reads {SCHEMA_VERSION!r}; "
+                "install a newer proton-twin"
+            )
+
+
+class Run:
+    """Samples of all topics without a gap between them.
+
+    axes: those wanted, None for all; capacities: channel -> samples expected.
+    """
+
+    def __init__(
+        self, topics: Topics, axes: Sequence[str] | None, capacities: Mapping[int, int]
+    ) -> None:
+        self._topics = topics
+        self._axes = axes
+        self._capacities = capacities
+        self._series: dict[int, Series | None] = {}
+
+    def append(self, block: Block) -> None:
+        """Take the next samples of one channel; raises InputError."""
+        if block.channel not in self._series:
+            self._series[block.channel] = self._open(block.channel)
+        series = self._series[block.channel]
+        if series is not None:
+            series.append(block)
+
+    def _open(self, channel: int) -> Series | None:
+        topic = self._topics.topic(channel, b"")
+        if topic is None or (self._axes is not None and topic.axis not in self._axes):
+            return None
+        if any(s.topic.name == topic.name for s in self._opened()):
+            raise InputError(f"two channels have the topic {topic.name}; write one a topic")
+        with at(topic.name):
+            return Series(topic, self._capacities.get(channel, 0))
+
+    def _opened(self) -> list[Series]:
+        return [s for s in self._series.values() if s is not None]
+
+    def check_counts(self, counts: Mapping[int, int]) -> None:
+        """Compare with the number of messages the file announces; raises Damaged."""
+        for channel, series in self._series.items():
+            if series is not None and series.count != counts.get(channel, 0):
+                raise Damaged(
+                    f"{series.topic.name}: {series.count} samples where the statistics "
+                    f"announce {counts.get(channel, 0)}"
+                )
+
+    def spans(self) -> dict[str, slice]:
+        """Topic -> the samples of it that all topics have in common."""
+        series = self._opened()
+        if not series:
+            return {}
+        rate = series[0].sample_rate()
+        first = [round(s.start * 1e-9 * rate) for s in series]
+        begin = max(first)
+        end = max(begin, min(f + s.count for f, s in zip(first, series, strict=True)))
+        return {
+            s.topic.name: slice(begin - f, end - f) for f, s in zip(first, series, strict=True)
+        }
+
+    def start(self) -> int:
+        """Time in ns of the first sample that all topics have in common."""
+        return max((s.start for s in self._opened()), default=0)
+
+    def common_count(self) -> int:
+        """Number of samples that all topics have in common."""
+        return next((s.stop - s.start for s in self.spans().values()), 0)
+
+    def log(self, extras: Extras) -> Log:
+        """The log; raises InputError where topics differ in time or something is missing."""
+        spans = self.spans()
+        for series in self._opened():
+            if spans[series.topic.name] != slice(0, series.count):
+                end = series.start + (series.count - 1) * 1e9 / series.sample_rate()
+                raise InputError(
+                    f"{series.topic.name} has {series.count} samples from "
+                    f"{seconds(series.start)} to {seconds(end)}, other topics differ; "
+                    "keep what they have in common with: twin recover"
+                )
+        return self.trimmed_log(extras)
+
+    def trimmed_log(self, extras: Extras) -> Log:
+        """The log of the samples all topics have in common; raises InputError."""
+        self._check_axes()
+        rate = self._sample_rate(extras)
+        spans = self.spans()
+        axes, truth = {}, {}
+        for series in self._opened():
+            topic = series.topic
+            columns = series.columns(spans[topic.name])
+            if topic.is_truth:
+                truth[topic.axis] = columns
+                continue
+            with at(topic.name):
+                axes[topic.axis] = AxisLog(columns, topic.units, topic.force_constant)
+        return Log(rate, axes, extras.metadata, truth, extras.attachments)
+
+    def _sample_rate(self, extras: Extras) -> float:
+        rates = {s.topic.name: s.sample_rate() for s in self._opened()}
+        stated = positive_number(extras.metadata, "sample_rate_hz")
+        if stated is not None:
+            rates["the metadata"] = stated
+        rate = next(iter(rates.values()))
+        for name, other in rates.items():
+            if abs(other - rate) > 1e-9 * rate:
+                raise InputError(
+                    f"{next(iter(rates))} is sampled at {rate:.9g} Hz, {name} says {other:.9g} Hz; "
+                    "write all axes at one rate, or convert with: twin import"
+                )
+        return rate
+
+    def _check_axes(self) -> None:
+        axes = [s for s in self._opened() if not s.topic.is_truth and s.count]
+        names = [s.topic.axis for s in axes]
+        for wanted in self._axes if self._axes is not None else ():
+            if wanted not in names:
+                self._refuse_axis(wanted)
+        if not axes:
+            topics = ", ".join(sorted(c.topic for c in self._topics.channels.values())) or "none"
+            raise InputError(
+                f"no samples on a topic {AXIS_PREFIX}<name>; topics in the file: {topics}; "
+                "rename them, or convert the log with: twin import"
+            )
+        for series in axes:
+            fields = series.topic.fields
+            if "position" in fields and ("current" in fields or "force" in fields):
+                continue
+            missing = "position" if "position" not in fields else "current or force"
+            raise InputError(
+                f"{series.topic.name} has no {missing}; fields in its messages: "
+                f"{', '.join(series.topic.codec.fields) or 'none'}; rename or add the field, "
+                "or convert the log with: twin import"
+            )
+
+    def _refuse_axis(self, wanted: str) -> None:
+        topics = [c.topic for c in self._topics.channels.values()]
+        near = difflib.get_close_matches(AXIS_PREFIX + wanted, topics, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"name one of {AXIS_PREFIX}..."
+        raise InputError(
+            f"no samples on topic {AXIS_PREFIX}{wanted}; topics in the file: "
+            f"{', '.join(sorted(topics)) or 'none'}; {hint}"
+        )
+
+

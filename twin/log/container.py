@@ -1,0 +1,227 @@
+"""An MCAP file as records: framing, magic and checksums, nothing about what is in them."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO, TypeVar
+
+import lz4.frame
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Chunk, DataEnd, Footer, Statistics
+
+from twin.errors import InputError
+
+MAGIC = b"\x89MCAP0\r\n"
+RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
+LOOSE_BYTES = 1 << 20  # messages outside chunks are decoded in batches of this size
+MAX_CHUNK_BYTES = 1 << 32
+_FOOTER_SIZE = RECORD_HEAD.size + 20
+_IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+
+T = TypeVar("T")
+
+
+class Damaged(InputError):
+    """The bytes are not what the writer wrote: cut off, flipped, or not framed as MCAP."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """One record: its opcode, the byte where it begins in the file, and its content."""
+
+    opcode: int
+    offset: int
+    content: bytes
+
+    @property
+    def end(self) -> int:
+        """Byte after the record."""
+        return self.offset + RECORD_HEAD.size + len(self.content)
+
+    def parsed(self, kind: type[T]) -> T:
+        """The content as a record class of ``mcap.records``; raises Damaged."""
+        return parse(kind, self.content, f"{kind.__name__} record at byte {self.offset}")
+
+
+@dataclass(frozen=True)
+class Payload:
+    """Schema, channel and message records as they stand in a chunk, decompressed."""
+
+    place: str
+    data: bytes
+
+
+@contextmanager
+def at(place: str) -> Iterator[None]:
+    """Prefix the message of an InputError with where it happened."""
+    try:
+        yield
+    except InputError as error:
+        raise type(error)(f"{place}: {error}") from error
+
+
+def parse(kind: type[T], content: bytes, place: str) -> T:
+    """Parse ``content`` with the stock record class; whatever it raises becomes Damaged."""
+    try:
+        return kind.read(ReadDataStream(BytesIO(content)))  # type: ignore[attr-defined]
+    except (McapError, struct.error, ValueError, OverflowError) as error:
+        raise Damaged(f"{place}: cannot be parsed") from error
+
+
+class McapFile:
+    """An open MCAP file whose closing magic and summary are verified.
+
+    statistics: message counts by channel, or None where the writer left them out.
+    """
+
+    def __init__(self, stream: BinaryIO, size: int) -> None:
+        self.size = size
+        self._stream = stream
+        self._check_magic()
+        self._data_end, self.statistics = self._read_summary()
+
+    def _read_at(self, offset: int, length: int) -> bytes:
+        self._stream.seek(offset)
+        return self._stream.read(length)
+
+    def _check_magic(self) -> None:
+        if self.size == 0:
+            raise Damaged("the file is empty")
+        if self._read_at(0, len(MAGIC)) != MAGIC:
+            raise InputError(
+                "not an MCAP file (wrong magic in bytes 0 to 7); convert it with: twin import"
+            )
+        if (
+            self.size < 2 * len(MAGIC) + _FOOTER_SIZE
+            or self._read_at(self.size - len(MAGIC), len(MAGIC)) != MAGIC
+        ):
+            raise Damaged(f"truncated: ends at byte {self.size} without the closing MCAP magic")
+
+    def _read_summary(self) -> tuple[int, Statistics | None]:
+        start = self.size - len(MAGIC) - _FOOTER_SIZE
+        record = self._record(start, self.size - len(MAGIC))
+        if record.opcode != Opcode.FOOTER or len(record.content) != 20:
+            raise Damaged(f"no footer record at byte {start}")
+        footer = record.parsed(Footer)
+        if footer.summary_start == 0:
+            return start, None
+        if not len(MAGIC) <= footer.summary_start <= start:
+            raise Damaged(f"footer at byte {start} points outside the file")
+        summary = self._read_at(footer.summary_start, self.size - footer.summary_start)
+        covered = summary[: -len(MAGIC) - 4]
+        if footer.summary_crc not in (0, zlib.crc32(covered)):
+            raise Damaged(f"summary section at byte {footer.summary_start}: wrong checksum")
+        return footer.summary_start, self._find_statistics(footer.summary_start, start)
+
+    def _find_statistics(self, offset: int, end: int) -> Statistics | None:
+        while offset < end:
+            record = self._record(offset, end)
+            if record.opcode == Opcode.STATISTICS:
+                return record.parsed(Statistics)
+            offset = record.end
+        return None
+
+    def _record(self, offset: int, end: int) -> Record:
+        head = self._read_at(offset, RECORD_HEAD.size)
+        if len(head) < RECORD_HEAD.size or offset + len(head) > end:
+            raise Damaged(f"a record is cut off at byte {offset}")
+        opcode, length = RECORD_HEAD.unpack(head)
+        if length > end - offset - len(head):
+            raise Damaged(f"the record at byte {offset} claims {length} bytes, more than follow")
+        return Record(opcode, offset, self._stream.read(length))
+
+    def records(self) -> Iterator[Record]:
+        """Records of the data section, its checksum verified at the end."""
+        offset, crc = len(MAGIC), zlib.crc32(MAGIC)
+        while True:
+            record = self._record(offset, self._data_end)
+            if record.opcode == Opcode.DATA_END:
+                break
+            yield record
+            head = RECORD_HEAD.pack(record.opcode, len(record.content))
+            crc = zlib.crc32(record.content, zlib.crc32(head, crc))
+            offset = record.end
+        if record.end != self._data_end or len(record.content) != 4:
+            raise Damaged(f"the data section ends at byte {record.offset}, before the summary")
+        if record.parsed(DataEnd).data_section_crc not in (0, crc):
+            raise Damaged(
+                f"data section (bytes 0 to {offset}): wrong checksum though every chunk is intact; "
+                "metadata, an attachment or an index is damaged"
+            )
+
+
+@contextmanager
+def open_mcap(path: Path) -> Iterator[McapFile]:
+    """Open ``path`` for strict reading; every failure is an InputError that names the file."""
+    with at(str(path)):
+        try:
+            with open(path, "rb") as stream:
+                yield McapFile(stream, os.fstat(stream.fileno()).st_size)
+        except Damaged as error:
+            raise Damaged(
+                f"{error}; copy it again, or keep what is intact: twin recover {path} -o GOOD"
+            ) from error
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror}; check the name") from error
+        except MemoryError as error:
+            raise InputError("does not fit into memory; split the log") from error
+
+
+def open_chunk(record: Record) -> Payload:
+    """Decompress a chunk and verify its size and checksum; raises Damaged."""
+    place = f"chunk at byte {record.offset}"
+    chunk = record.parsed(Chunk)
+    with at(place):
+        data = _decompress(chunk)
+        if len(data) != chunk.uncompressed_size:
+            raise Damaged(f"{len(data)} bytes where {chunk.uncompressed_size} are announced")
+        if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
+            raise Damaged("wrong checksum")
+    return Payload(place, data)
+
+
+def _decompress(chunk: Chunk) -> bytes:
+    size = chunk.uncompressed_size
+    if size > MAX_CHUNK_BYTES:
+        raise Damaged(f"announces {size} bytes; at most {MAX_CHUNK_BYTES} are read")
+    try:
+        match chunk.compression:
+            case "":
+                return chunk.data
+            case "zstd":
+                if zstandard.frame_content_size(chunk.data) not in (-1, size):
+                    raise Damaged("its size and that of its zstd frame differ")
+                return zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
+            case "lz4":
+                return lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size)
+    except (zstandard.ZstdError, RuntimeError, EOFError) as error:
+        raise Damaged(f"the {chunk.compression} data cannot be decompressed") from error
+    raise Damaged(f"compression {chunk.compression!r} is not one of zstd, lz4 or none")
+
+
+def payloads(records: Iterator[Record], other: Callable[[Record], None]) -> Iterator[Payload]:
+    """Chunks, and messages outside chunks joined to batches; the rest goes to ``other``."""
+    batch, start = bytearray(), 0
+    for record in records:
+        if record.opcode in _IN_CHUNKS:
+            start = start if batch else record.offset
+            batch += RECORD_HEAD.pack(record.opcode, len(record.content)) + record.content
+        if batch and (record.opcode == Opcode.CHUNK or len(batch) >= LOOSE_BYTES):
+            yield Payload(f"messages from byte {start}", bytes(batch))
+            batch.clear()
+        if record.opcode == Opcode.CHUNK:
+            yield open_chunk(record)
+        elif record.opcode not in _IN_CHUNKS:
+            other(record)
+    if batch:
+        yield Payload(f"messages from byte {start}", bytes(batch))

@@ -1,0 +1,142 @@
+"""The samples of one topic as they arrive, block by block, and what they must satisfy."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.log.layout import Block, sample_times
+from twin.log.log import Array
+from twin.log.topics import Topic
+
+JITTER = 0.1  # of a period: how far a time may be off the even grid
+_TIME = ".log_time"  # ns since the first sample, kept only where the rate is not stated
+
+
+class Series:
+    """Columns of one topic; ``append`` refuses what is not evenly spaced and finite.
+
+    start: time of the first sample in ns. capacity: samples expected; more are taken too.
+    """
+
+    def __init__(self, topic: Topic, capacity: int) -> None:
+        self.topic = topic
+        self.start = 0
+        self.count = 0
+        self._first_sequence = 0
+        self._rate = topic.sample_rate
+        names = topic.fields if self._rate else (*topic.fields, _TIME)
+        self._columns = {name: np.empty(capacity) for name in names}
+
+    def append(self, block: Block) -> None:
+        """Take the next samples; raises InputError for a gap, a NaN or a time out of place."""
+        times = block.log_time.astype(np.int64)
+        if self.count == 0:
+            self.start = int(times[0])
+            self._first_sequence = int(block.sequence[0])
+        self._check_sequence(block.sequence)
+        if self._rate:
+            self._check_times(times - self.start, self.count, self._rate)
+        self._reserve(len(times))
+        span = slice(self.count, self.count + len(times))
+        for name in self.topic.fields:
+            part = self._columns[name][span]
+            part[:] = block.columns.get(name, 0.0)
+            self._check_finite(name, part, times)
+        if not self._rate:
+            self._columns[_TIME][span] = times - self.start
+        self.count = span.stop
+
+    def sample_rate(self) -> float:
+        """Sample rate in Hz, stated or counted; raises InputError where times are uneven."""
+        if self._rate is None:
+            elapsed = self._columns.pop(_TIME)[: self.count].astype(np.int64)
+            self._rate = self._counted_rate(elapsed)
+            self._check_times(elapsed, 0, self._rate)
+        return self._rate
+
+    def columns(self, span: slice) -> dict[str, Array]:
+        """The samples in ``span`` of every field; releases the buffers."""
+        out = {}
+        for name in self.topic.fields:
+            column = self._columns.pop(name)
+            part = column[span]
+            out[name] = part if len(part) == len(column) else part.copy()
+        return out
+
+    def _reserve(self, more: int) -> None:
+        need = self.count + more
+        for name, column in self._columns.items():
+            if need > len(column):
+                grown = np.empty(max(need, 2 * len(column)))
+                grown[: self.count] = column[: self.count]
+                self._columns[name] = grown
+
+    def _check_sequence(self, sequence: NDArray[np.uint32]) -> None:
+        """Sequence numbers count the samples, or are 0 where the writer does not use them."""
+        first = self._first_sequence + self.count
+        expected = np.arange(first, first + len(sequence)).astype(np.uint32)
+        wrong = sequence != expected
+        if wrong.any() and sequence.any():
+            i = int(np.argmax(wrong))
+            raise InputError(
+                f"{self.topic.name}: message {self.count + i} has sequence number {sequence[i]}, "
+                f"expected {expected[i]}: messages are missing or out of order"
+            )
+
+    def _check_times(self, elapsed: NDArray[np.int64], first: int, rate: float) -> None:
+        """``elapsed``: ns since the start, of the samples from number ``first``."""
+        expected = sample_times(first, len(elapsed), rate)
+        off = np.abs(elapsed - expected) > JITTER * 1e9 / rate
+        if off.any():
+            i = int(np.argmax(off))
+            before = elapsed[i - 1] if i else expected[0] - 1e9 / rate
+            self._refuse_time(first + i, float(before), float(elapsed[i]), rate)
+
+    def _refuse_time(self, sample: int, before: float, elapsed: float, rate: float) -> None:
+        period = 1e9 / rate
+        times = f"{seconds(self.start + before)} is followed by {seconds(self.start + elapsed)}"
+        if elapsed <= before:
+            fault = f"time does not increase: {times}"
+        elif elapsed - before > 1.5 * period:
+            fault = f"gap: {times}"
+        else:
+            fault = f"uneven time: {times}"
+        raise InputError(
+            f"{self.topic.name}: {fault} at sample {sample}, expected a sample every "
+            f"{period / 1e9:.9g} s ({rate:.9g} Hz); correct the rate or the times, "
+            "or keep the longest even part with: twin recover"
+        )
+
+    def _counted_rate(self, elapsed: NDArray[np.int64]) -> float:
+        """Rate from first and last time; the integer nearest to it where jitter allows that."""
+        steps = np.diff(elapsed)
+        if not (steps > 0).any():
+            raise InputError(
+                f"{self.topic.name}: {len(elapsed)} samples do not tell the sample rate; "
+                "state sample_rate_hz (Hz) in the channel metadata"
+            )
+        period = float(np.median(steps[steps > 0]))
+        bad = (steps <= 0) | (steps > 1.5 * period)
+        if bad.any():
+            i = int(np.argmax(bad))
+            self._refuse_time(i + 1, float(elapsed[i]), float(elapsed[i + 1]), 1e9 / period)
+        rate = len(steps) * 1e9 / float(elapsed[-1])
+        nearest = round(rate)
+        return float(nearest) if abs(nearest - rate) * len(steps) < JITTER * rate else rate
+
+    def _check_finite(self, name: str, part: Array, times: NDArray[np.int64]) -> None:
+        finite = np.isfinite(part)
+        if not finite.all():
+            i = int(np.argmin(finite))
+            raise InputError(
+                f"{self.topic.name}: {name} is {part[i]} at {seconds(float(times[i]))} "
+                f"(sample {self.count + i}); leave out a signal that was not recorded, "
+                "or keep the longest part without it with: twin recover"
+            )
+
+
+def seconds(nanoseconds: float) -> str:
+    """A time for a message."""
+    return f"{nanoseconds * 1e-9:.9f}".rstrip("0").rstrip(".") + " s"

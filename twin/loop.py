@@ -1,0 +1,137 @@
+"""The compiled control loop: sense, control, step, log, once per sample.
+
+The same loop drives MuJoCo and the reduced model; only the step differs. Both integrate as MuJoCo's
+Euler does: v += dt a, then x += dt v with the new v. That x leads the exact motion under a force
+held over the sample by dt v/2, so the true position at t_k is x - dt v/2: a log of the twin then
+shows no delay that the machine would not have.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from twin.control import RESOLUTION, command, measure
+from twin.effect import (
+    A_OTHER,
+    DT,
+    INDEX,
+    IO_SIZE,
+    MASS,
+    TIME,
+    U,
+    V,
+    V_OTHER,
+    X,
+    X_OTHER,
+)
+from twin.mujoco_link import call_step, doubles_at, word_at
+from twin.native import LAST_ACCELERATION, axis_force, sense
+
+# Columns of the logged signals of one axis.
+READING_COLUMN, COMMAND_COLUMN, POSITION_COLUMN, VELOCITY_COLUMN = range(4)
+N_SIGNALS = 4
+
+
+@numba.njit(cache=True, inline="always", error_model="numpy")
+def control_axis(a, k, dt, x, v, table, sensing_states, gains, states, setpoint, noise, io, out):
+    """Read the encoder, compute the command, log both with the true motion; returns the command."""
+    entries, axes, parameters = table
+    io[INDEX] = k
+    io[TIME] = k * dt
+    io[DT] = dt
+    io[X] = x
+    io[V] = v
+    position = x - 0.5 * dt * v
+    reading = position
+    if axes[a, 4] > axes[a, 3]:
+        reading = sense(
+            entries, axes[a, 3], axes[a, 4], parameters, sensing_states, io, position
+        )
+    reading = measure(reading, noise, gains[a, RESOLUTION])
+    force = command(gains[a], states[a], setpoint, reading, dt, k == 0)
+    out[READING_COLUMN] = reading
+    out[COMMAND_COLUMN] = force
+    out[POSITION_COLUMN] = position
+    out[VELOCITY_COLUMN] = v
+    return force
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def run_mujoco(
+    step, model, data, off, where, user_at, first_sample, dt, table, sensing_states, gains,
+    controller_states, setpoints, noise, watched, signals, forces, states,
+):  # fmt: skip
+    """Run some samples in MuJoCo.
+
+    where (n_axes, 3): qpos, dof and actuator index. setpoints (n, n_axes, 4), noise (n, n_axes) m.
+    watched: indices of the states to log. Filled: signals (n, n_axes, 4), forces (n, n_entries),
+    states (n, n_watched).
+    """
+    n, n_axes = noise.shape
+    n_entries = forces.shape[1]
+    n_states = sensing_states.shape[0]
+    io = np.zeros(IO_SIZE)
+    time, userdata, qpos_at, qvel_at, ctrl_at = off
+    qpos = doubles_at(word_at(data + qpos_at))
+    qvel = doubles_at(word_at(data + qvel_at))
+    ctrl = doubles_at(word_at(data + ctrl_at))
+    user = doubles_at(word_at(data + userdata))
+    after = user_at + 1 + n_states
+    for k in range(n):
+        for a in range(n_axes):
+            ctrl[where[a, 2]] = control_axis(
+                a, first_sample + k, dt, qpos[where[a, 0]], qvel[where[a, 1]], table,
+                sensing_states, gains, controller_states, setpoints[k, a], noise[k, a], io,
+                signals[k, a],
+            )  # fmt: skip
+        call_step(step, model, data)
+        for i in range(n_entries):
+            forces[k, i] = user[after + n_states + i]
+        for i in range(watched.shape[0]):
+            states[k, i] = user[after + watched[i]]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def run_reduced(
+    motion, effect_states, masses, first_sample, dt, table, sensing_states, gains,
+    controller_states, setpoints, noise, watched, signals, forces, states,
+):  # fmt: skip
+    """Run some samples of the reduced model; motion (n_axes, 2) holds x m and v m/s.
+
+    The other arrays are those of run_mujoco.
+    """
+    n, n_axes = noise.shape
+    n_entries = forces.shape[1]
+    entries, axes, parameters = table
+    io = np.zeros(IO_SIZE)
+    force = np.zeros(n_axes)
+    coupled = np.zeros((n_axes, 3))
+    for k in range(n):
+        for a in range(n_axes):
+            force[a] = control_axis(
+                a, first_sample + k, dt, motion[a, 0], motion[a, 1], table, sensing_states, gains,
+                controller_states, setpoints[k, a], noise[k, a], io, signals[k, a],
+            )  # fmt: skip
+            coupled[a, 0] = motion[a, 0]
+            coupled[a, 1] = motion[a, 1]
+            coupled[a, 2] = effect_states[axes[a, 2] + LAST_ACCELERATION]
+        for a in range(n_axes):
+            io[INDEX] = first_sample + k
+            io[TIME] = (first_sample + k) * dt
+            io[X] = coupled[a, 0]
+            io[V] = coupled[a, 1]
+            io[U] = force[a]
+            io[MASS] = masses[a]
+            if n_axes == 2:
+                io[X_OTHER] = coupled[1 - a, 0]
+                io[V_OTHER] = coupled[1 - a, 1]
+                io[A_OTHER] = coupled[1 - a, 2]
+            passive = axis_force(
+                entries, axes[a, 0], axes[a, 1], parameters, effect_states, axes[a, 2], io,
+                forces[k],
+            )  # fmt: skip
+            motion[a, 1] += dt * ((passive + force[a]) / masses[a])
+            motion[a, 0] += dt * motion[a, 1]
+        for i in range(watched.shape[0]):
+            states[k, i] = effect_states[watched[i]]

@@ -1,0 +1,233 @@
+"""The stage model: for each axis its mass, its hardware and the effects it has, with their values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.effect import Effect, Kind, Parameter
+from twin.errors import InputError
+from twin.native import Table, build_table
+
+MASS = Parameter("mass", "kg", 1.0, 1e-6, 1e6, "moved mass")
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """What surrounds an axis' mechanics.
+
+    travel (m, low and high), force_constant (N/A), force_limit (N), encoder_resolution (m),
+    encoder_noise (m rms), current_noise (A rms), velocity (m/s), acceleration (m/s^2) and jerk
+    (m/s^3) limits of its moves, bandwidth (Hz) of its position loop.
+    """
+
+    travel: tuple[float, float] = (-1.0, 1.0)
+    force_constant: float = 1.0
+    force_limit: float = math.inf
+    encoder_resolution: float = 0.0
+    encoder_noise: float = 0.0
+    current_noise: float = 0.0
+    velocity: float = 0.25
+    acceleration: float = 2.0
+    jerk: float = 200.0
+    bandwidth: float = 30.0
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """An effect with its parameter values (name -> SI value); ``fixed`` are held by a fit."""
+
+    effect: Effect
+    values: Mapping[str, float]
+    fixed: frozenset[str]
+
+    @classmethod
+    def at_start(cls, effect: Effect, values: Mapping[str, float] | None = None) -> Fitted:
+        """The effect at its start values, or those given; checks names and bounds (InputError)."""
+        merged = {**effect.starts(), **(values or {})}
+        for name, value in merged.items():
+            _check_value(effect, name, value)
+        fixed = frozenset(p.name for p in effect.parameters if p.fixed)
+        return cls(effect, merged, fixed)
+
+    def vector(self) -> list[float]:
+        """Values in the order of the effect's parameters."""
+        return [self.values[p.name] for p in self.effect.parameters]
+
+
+def _check_value(effect: Effect, name: str, value: float) -> None:
+    known = [p.name for p in effect.parameters]
+    if name not in known:
+        raise InputError(
+            f"effect '{effect.name}' has no parameter '{name}'; it has {', '.join(known)}"
+        )
+    p = effect.parameter(name)
+    if not (isinstance(value, int | float) and math.isfinite(value)):
+        raise InputError(
+            f"{effect.name}.{name} = {value}: is not a finite number; give it in {p.unit}"
+        )
+    if not p.lower <= value <= p.upper:
+        raise InputError(
+            f"{effect.name}.{name} = {value:g} {p.unit}: outside [{p.lower:g}, {p.upper:g}] "
+            f"{p.unit} ({p.meaning})"
+        )
+
+
+@dataclass(frozen=True)
+class AxisModel:
+    """One axis: moved mass (kg), hardware, and its effects in the order they were added."""
+
+    mass: float
+    hardware: Hardware = Hardware()
+    effects: tuple[Fitted, ...] = ()
+    mass_fixed: bool = False
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.mass) and self.mass > 0):
+            raise InputError(f"mass = {self.mass} kg: must be a positive number of kg")
+        frictions = [f.effect.name for f in self.effects if f.effect.kind is Kind.FRICTION]
+        if len(frictions) > 1:
+            raise InputError(
+                f"an axis has one friction model, given {' and '.join(frictions)}; remove one"
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the axis' effects."""
+        return tuple(f.effect.name for f in self.effects)
+
+    def __getitem__(self, effect: str) -> Fitted:
+        return next(f for f in self.effects if f.effect.name == effect)
+
+    def with_effect(self, new: Fitted) -> AxisModel:
+        """This axis with the effect added, or exchanged where it is there already.
+
+        A friction takes the place of the friction that was there.
+        """
+        friction = new.effect.kind is Kind.FRICTION
+        kept = tuple(
+            f
+            for f in self.effects
+            if f.effect.name != new.effect.name
+            and not (friction and f.effect.kind is Kind.FRICTION)
+        )
+        return replace(self, effects=(*kept, new))
+
+    def without(self, effect: str) -> AxisModel:
+        """This axis less one effect; InputError where it has no such effect."""
+        if effect not in self.names:
+            raise InputError(
+                f"the axis has no effect '{effect}' to remove; it has {', '.join(self.names)}"
+            )
+        return replace(self, effects=tuple(f for f in self.effects if f.effect.name != effect))
+
+
+@dataclass(frozen=True)
+class HistoryStep:
+    """One step of the model's growth: errors are RMS force errors in N; None where not measured."""
+
+    action: str
+    effect: str
+    axis: str
+    fit_error_before: float
+    fit_error_after: float
+    holdout_error_before: float | None
+    holdout_error_after: float | None
+    unit: str = "N"
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class StageModel:
+    """A stage: axes by name, the rate it is sampled at (Hz), its MuJoCo file and its history.
+
+    mjcf: MJCF text of the stage, or None for a drive of one or two plain slides.
+    """
+
+    name: str
+    axes: Mapping[str, AxisModel]
+    sample_rate: float = 10_000.0
+    mjcf: str | None = None
+    mjcf_name: str | None = None
+    history: tuple[HistoryStep, ...] = field(default=())
+
+    @property
+    def period(self) -> float:
+        """Sample period in s."""
+        return 1.0 / self.sample_rate
+
+    def axis(self, name: str) -> AxisModel:
+        """The axis of that name; InputError where there is none."""
+        if name not in self.axes:
+            raise InputError(f"the model has no axis '{name}'; it has {', '.join(self.axes)}")
+        return self.axes[name]
+
+    def with_axis(self, name: str, axis: AxisModel) -> StageModel:
+        """This stage with one axis exchanged."""
+        return replace(self, axes={**self.axes, name: axis})
+
+    def with_history(self, step: HistoryStep) -> StageModel:
+        """This stage with one more step of history."""
+        return replace(self, history=(*self.history, step))
+
+    def table(self) -> Table:
+        """The native table of all axes."""
+        return axis_table(self.axes)
+
+
+def axis_table(axes: Mapping[str, AxisModel]) -> Table:
+    """Native table of some axes."""
+    return build_table(
+        {name: [(f.effect, f.vector()) for f in axis.effects] for name, axis in axes.items()},
+        [axis.mass for axis in axes.values()],
+    )
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One number of an axis model that a fit may change; effect "" is the axis' own mass."""
+
+    effect: str
+    parameter: Parameter
+
+    @property
+    def label(self) -> str:
+        """E.g. ``lugre.Fc`` or ``mass``."""
+        return f"{self.effect}.{self.parameter.name}" if self.effect else self.parameter.name
+
+
+def coordinates(axis: AxisModel) -> tuple[Coordinate, ...]:
+    """The free numbers of an axis: its mass unless fixed, then those of its effects."""
+    mass = () if axis.mass_fixed else (Coordinate("", MASS),)
+    return mass + tuple(
+        Coordinate(f.effect.name, p)
+        for f in axis.effects
+        for p in f.effect.parameters
+        if p.name not in f.fixed
+    )
+
+
+def read(axis: AxisModel, where: Iterable[Coordinate]) -> NDArray[np.float64]:
+    """Values of those coordinates, in SI units."""
+    return np.array(
+        [axis[c.effect].values[c.parameter.name] if c.effect else axis.mass for c in where]
+    )
+
+
+def write(axis: AxisModel, where: Iterable[Coordinate], values: Iterable[float]) -> AxisModel:
+    """The axis with those coordinates set."""
+    by_effect: dict[str, dict[str, float]] = {}
+    for c, value in zip(where, values, strict=True):
+        by_effect.setdefault(c.effect, {})[c.parameter.name] = float(value)
+    mass = by_effect.pop("", {}).get("mass", axis.mass)
+    effects = tuple(
+        replace(f, values={**f.values, **by_effect[f.effect.name]})
+        if f.effect.name in by_effect
+        else f
+        for f in axis.effects
+    )
+    return replace(axis, mass=mass, effects=effects)

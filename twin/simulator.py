@@ -1,0 +1,223 @@
+"""Run an experiment on the twin, in MuJoCo or in the reduced model, and log it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.control import Controller, gain_table
+from twin.errors import InputError
+from twin.loop import N_SIGNALS, run_mujoco, run_reduced
+from twin.model import StageModel
+from twin.mujoco_link import attach, offsets, passive_callback, step_address
+from twin.native import Table
+from twin.setpoint import Setpoint
+
+CHUNK = 20_000  # samples between two reports of progress
+WATCHED_STATES = 8  # an effect with more states than this is not logged state by state
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What a simulation leaves behind.
+
+    signals (n, n_axes, 4): encoder reading m, command N, true position m, true velocity m/s.
+    forces (n, n_entries): N, by the table's labels. states (n, n_watched), by ``state_names``.
+    """
+
+    signals: Array
+    forces: Array
+    states: Array
+    table: Table
+    state_names: tuple[tuple[str, str], ...]
+
+
+class Stepper(Protocol):
+    """A simulation that can be run on by some samples."""
+
+    def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
+        """Run setpoints.shape[0] samples and fill ``out``: signals, forces, states."""
+
+
+class MujocoStage:
+    """The stage in MuJoCo with its effects attached; steps only under passive_callback()."""
+
+    def __init__(self, model: StageModel, table: Table) -> None:
+        spec = stage_spec(model)
+        axes = tuple(model.axes)
+        self.user_at = attach(spec, table, model.period, axes)
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self._where = np.array(
+            [
+                (
+                    self.model.joint(a).qposadr[0],
+                    self.model.joint(a).dofadr[0],
+                    self.model.actuator(f"motor_{a}").id,
+                )
+                for a in axes
+            ]
+        )
+        self._step = step_address()
+
+    def place(self, position: Array) -> None:
+        """Put the axes at rest at these positions (n_axes,) m."""
+        self.data.qpos[self._where[:, 0]] = position
+
+    def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
+        """See Stepper."""
+        run_mujoco(
+            self._step, self.model._address, self.data._address, tuple(offsets()[2:7]),
+            self._where, self.user_at, first, *shared[:-1], setpoints, noise, shared[-1], *out,
+        )  # fmt: skip
+
+
+class ReducedStage:
+    """The same axes as point masses: what fitting simulates with."""
+
+    def __init__(self, model: StageModel, table: Table) -> None:
+        self._motion = np.zeros((len(model.axes), 2))
+        self._states = np.zeros(table.n_states)
+        self._masses = table.masses
+
+    def place(self, position: Array) -> None:
+        """Put the axes at rest at these positions (n_axes,) m."""
+        self._motion[:, 0] = position
+
+    def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
+        """See Stepper."""
+        run_reduced(
+            self._motion, self._states, self._masses, first, *shared[:-1], setpoints, noise,
+            shared[-1], *out,
+        )  # fmt: skip
+
+
+def stage_spec(model: StageModel) -> mujoco.MjSpec:
+    """The MuJoCo spec of a stage with its moved masses set.
+
+    A stage without MJCF becomes plain slides. On a stacked stage the axis that carries the other
+    moves both masses. Raises InputError where the file lacks a joint or motor of an axis.
+    """
+    spec = mujoco.MjSpec.from_string(model.mjcf) if model.mjcf else _plain_slides(model)
+    spec.option.timestep = model.period
+    carried: dict[str, float] = {}
+    for name in reversed(list(model.axes)):
+        joint = spec.joint(name)
+        if joint is None or spec.actuator(f"motor_{name}") is None:
+            raise InputError(
+                f"{model.mjcf_name}: has no joint '{name}' with a motor 'motor_{name}'; "
+                "an axis needs both"
+            )
+        inside = sum(m for other, m in carried.items() if _carries(joint.parent, other))
+        mass = model.axes[name].mass - inside
+        if mass <= 0:
+            raise InputError(
+                f"axis {name}: mass {model.axes[name].mass:g} kg is not above the {inside:g} kg of "
+                "the axis that it carries; give the whole moved mass"
+            )
+        joint.parent.mass = mass
+        carried[name] = mass
+    return spec
+
+
+def _carries(body: mujoco.MjsBody, joint: str) -> bool:
+    return any(j.name == joint for child in body.bodies for j in child.joints) or any(
+        _carries(child, joint) for child in body.bodies
+    )
+
+
+def _plain_slides(model: StageModel) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec()
+    directions = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    for name, direction in zip(model.axes, directions, strict=False):
+        body = spec.worldbody.add_body(name=name)
+        body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=direction)
+        body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
+        motor = spec.add_actuator(
+            name=f"motor_{name}", target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT
+        )
+        motor.gear[0] = 1.0
+    return spec
+
+
+def run(
+    model: StageModel,
+    setpoint: Setpoint,
+    rng: np.random.Generator,
+    *,
+    stage: type[MujocoStage] | type[ReducedStage] = MujocoStage,
+    controllers: Mapping[str, Controller] | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """Run a setpoint on the twin, from rest at its first position.
+
+    rng draws the encoder noise. controllers: by axis; the model's own bandwidths where None.
+    """
+    table = model.table()
+    setpoints = np.stack(
+        [setpoint.position, setpoint.velocity, setpoint.acceleration, setpoint.force], axis=2
+    )
+    n, n_axes = setpoint.position.shape
+    if n_axes != len(model.axes):
+        raise InputError(f"the setpoint has {n_axes} axes, the model {len(model.axes)}")
+    scale = np.array([a.hardware.encoder_noise for a in model.axes.values()])
+    noise = rng.standard_normal((n, n_axes)) * scale
+    controllers = controllers or {a: Controller.for_axis(m) for a, m in model.axes.items()}
+    watched, names = _watched(model, table)
+    shared = (
+        model.period,
+        (table.entries, table.axes, table.parameters),
+        np.zeros(table.n_states),
+        gain_table(controllers, model.axes, model.period),
+        np.zeros((n_axes, 3)),
+        watched,
+    )
+    out = (
+        np.empty((n, n_axes, N_SIGNALS)),
+        np.zeros((n, len(table.entries))),
+        np.empty((n, len(watched))),
+    )
+    simulation: Stepper
+    with passive_callback():
+        simulation = stage(model, table)
+        simulation.place(setpoint.position[0])
+        for first in range(0, n, CHUNK):
+            part = slice(first, first + CHUNK)
+            simulation.run(
+                first, shared, setpoints[part], noise[part], tuple(o[part] for o in out)
+            )
+            if progress:
+                progress(min(first + CHUNK, n), n)
+    _require_finite(out[0], model)
+    return Run(*out, table=table, state_names=names)
+
+
+def _watched(
+    model: StageModel, table: Table
+) -> tuple[NDArray[np.int64], tuple[tuple[str, str], ...]]:
+    effects = {(a, f.effect.name): f.effect for a, m in model.axes.items() for f in m.effects}
+    indices: list[int] = []
+    names: list[tuple[str, str]] = []
+    for label, entry in zip(table.labels, table.entries, strict=True):
+        states = effects[label].states
+        if 0 < len(states) <= WATCHED_STATES:
+            indices += [int(entry[3]) + i for i in range(len(states))]
+            names += [(label[0], f"{label[1]}.{s}") for s in states]
+    return np.array(indices, dtype=np.int64), tuple(names)
+
+
+def _require_finite(signals: Array, model: StageModel) -> None:
+    bad = np.flatnonzero(~np.isfinite(signals).all(axis=(1, 2)))
+    if len(bad):
+        raise InputError(
+            f"the simulation became unstable at t = {bad[0] * model.period:.4f} s; lower the "
+            "bandwidth (Hz) or the damping parameters, or raise sample_rate (Hz)"
+        )
