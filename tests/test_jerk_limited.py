@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from ruckig import InputParameter, Ruckig, Synchronization, Trajectory
 
-from twin.jerk_limited import join, move, rest, sample
-from twin.limits import Limits
+from twin.trajectory.jerk_limited import join, move, rest, sample
+from twin.trajectory.limits import Limits
 
 LIMITS = (
     Limits((-0.15, 0.15), velocity=0.25, acceleration=5.0, jerk=500.0),

@@ -83,10 +83,15 @@ def test_four_arrays_of_one_shape(name: str) -> None:
         lambda s: replace(s, acceleration=s.acceleration * 1.01),
         lambda s: replace(s, position=s.position + 1e-8 * (s.position > 0.05)),
         lambda s: replace(s, sample_rate=s.sample_rate * 1.001),
-        lambda s: Setpoint(*(a[:2000] for a in (s.position, s.velocity, s.acceleration, s.force)),
-                           s.sample_rate),
+        lambda s: replace(
+            s,
+            position=s.position[:2000],
+            velocity=s.velocity[:2000],
+            acceleration=s.acceleration[:2000],
+            force=s.force[:2000],
+        ),
     ],
-)  # fmt: skip
+)
 def test_the_laws_notice_a_planted_fault(fault: Callable[[Setpoint], Setpoint]) -> None:
     setpoint = point_to_point(LIMITS, [[0.0, 0.0], [0.1, 0.1]], dwell=0.05)
     assert_lawful(setpoint)
@@ -131,6 +136,12 @@ def test_passes_hold_the_speed_both_ways_and_leave_the_other_axis_alone() -> Non
     assert np.ptp(setpoint.position[:, 0]) == pytest.approx(0.3, abs=1e-12)
     assert (setpoint.position[:, 1] == 0.07).all()
     assert not setpoint.velocity[:, 1].any()
+
+
+def test_rounding_does_not_carry_a_pass_out_of_the_travel() -> None:
+    assert 0.1 + 0.05 > 0.15  # in floating point
+    setpoint = constant_speed_passes(LIMITS, 0, span=0.1, speed=0.05, repeats=1, at=(0.1, 0.0))
+    assert setpoint.position[:, 0].max() == 0.15
 
 
 def test_staircase_holds_every_speed_over_half_of_its_move() -> None:

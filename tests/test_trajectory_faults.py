@@ -45,7 +45,10 @@ FAULTS = {
     "nan speed": (lambda: constant_speed_passes(LIMITS, 0, speed=NAN), "speed nan m/s"),
     "no run-up": (lambda: constant_speed_passes(LIMITS, 0, span=0.01, speed=0.2), r"0\.1351 m/s"),
     "no repeats": (lambda: constant_speed_passes(LIMITS, 0, repeats=0), "repeats 0"),
-    "half repeats": (lambda: constant_speed_passes(LIMITS, 0, repeats=1.5), "whole number"),
+    "half repeats": (
+        lambda: constant_speed_passes(LIMITS, 0, repeats=1.5),  # type: ignore[arg-type]
+        "whole number",
+    ),
     "endless": (lambda: constant_speed_passes(LIMITS, 0, repeats=10**12), "change the duration"),
     "negative dwell 2": (lambda: constant_speed_passes(LIMITS, 0, dwell=-0.1), "dwell -0.1 s"),
     "place": (lambda: constant_speed_passes(LIMITS, 0, at=(0.0,)), "do not fit 2 axes"),

@@ -19,11 +19,11 @@ from twin.effect import (
     IO_SIZE,
     MASS,
     TIME,
+    V_OTHER,
+    X_OTHER,
     U,
     V,
-    V_OTHER,
     X,
-    X_OTHER,
 )
 from twin.mujoco_link import call_step, doubles_at, word_at
 from twin.native import LAST_ACCELERATION, axis_force, sense
@@ -45,9 +45,7 @@ def control_axis(a, k, dt, x, v, table, sensing_states, gains, states, setpoint,
     position = x - 0.5 * dt * v
     reading = position
     if axes[a, 4] > axes[a, 3]:
-        reading = sense(
-            entries, axes[a, 3], axes[a, 4], parameters, sensing_states, io, position
-        )
+        reading = sense(entries, axes[a, 3], axes[a, 4], parameters, sensing_states, io, position)
     reading = measure(reading, noise, gains[a, RESOLUTION])
     force = command(gains[a], states[a], setpoint, reading, dt, k == 0)
     out[READING_COLUMN] = reading
@@ -72,7 +70,7 @@ def run_mujoco(
     n_entries = forces.shape[1]
     n_states = sensing_states.shape[0]
     io = np.zeros(IO_SIZE)
-    time, userdata, qpos_at, qvel_at, ctrl_at = off
+    userdata, qpos_at, qvel_at, ctrl_at = off
     qpos = doubles_at(word_at(data + qpos_at))
     qvel = doubles_at(word_at(data + qvel_at))
     ctrl = doubles_at(word_at(data + ctrl_at))
@@ -102,7 +100,6 @@ def run_reduced(
     The other arrays are those of run_mujoco.
     """
     n, n_axes = noise.shape
-    n_entries = forces.shape[1]
     entries, axes, parameters = table
     io = np.zeros(IO_SIZE)
     force = np.zeros(n_axes)

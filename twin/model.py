@@ -1,4 +1,4 @@
-"""The stage model: for each axis its mass, its hardware and the effects it has, with their values."""
+"""The stage model: for each axis its mass, its hardware, its effects and their values."""
 
 from __future__ import annotations
 

@@ -30,11 +30,11 @@ from twin.effect import (
     IO_SIZE,
     MASS,
     TIME,
+    V_OTHER,
+    X_OTHER,
     U,
     V,
-    V_OTHER,
     X,
-    X_OTHER,
 )
 from twin.native import DOUBLES, LAST_ACCELERATION, Table, axis_force
 

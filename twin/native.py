@@ -32,15 +32,15 @@ from twin.effect import (
     READING,
     STATIC,
     TIME,
-    U,
-    V,
-    VISCOUS,
     V_OTHER,
-    X,
+    VISCOUS,
     X_OTHER,
     Effect,
     Kind,
     Law,
+    U,
+    V,
+    X,
 )
 from twin.errors import InputError
 
@@ -98,7 +98,8 @@ def call_law(typingctx, address, p, s, io):
 def axis_force(entries, first, last, parameters, states, at, io, rows):
     """Force of one axis' effects, in N, beyond the command; states advance one sample.
 
-    entries (n, 4); parameters, states, io, rows: flat doubles; at: where this axis' states begin. io holds INDEX, TIME, DT, X, V, U, MASS and the other axis on entry. rows[i] receives the
+    entries (n, 4); parameters, states, io, rows: flat doubles; at: where this axis' states begin.
+    io holds INDEX, TIME, DT, X, V, U, MASS and the other axis on entry. rows[i] receives the
     force entry i puts on the axis.
     """
     command = io[U]

@@ -16,7 +16,7 @@ from twin.loop import N_SIGNALS, run_mujoco, run_reduced
 from twin.model import StageModel
 from twin.mujoco_link import attach, offsets, passive_callback, step_address
 from twin.native import Table
-from twin.setpoint import Setpoint
+from twin.trajectory.setpoint import Setpoint
 
 CHUNK = 20_000  # samples between two reports of progress
 WATCHED_STATES = 8  # an effect with more states than this is not logged state by state
@@ -75,7 +75,7 @@ class MujocoStage:
     def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
         """See Stepper."""
         run_mujoco(
-            self._step, self.model._address, self.data._address, tuple(offsets()[2:7]),
+            self._step, self.model._address, self.data._address, tuple(offsets()[3:7]),
             self._where, self.user_at, first, *shared[:-1], setpoints, noise, shared[-1], *out,
         )  # fmt: skip
 
@@ -191,9 +191,7 @@ def run(
         simulation.place(setpoint.position[0])
         for first in range(0, n, CHUNK):
             part = slice(first, first + CHUNK)
-            simulation.run(
-                first, shared, setpoints[part], noise[part], tuple(o[part] for o in out)
-            )
+            simulation.run(first, shared, setpoints[part], noise[part], tuple(o[part] for o in out))
             if progress:
                 progress(min(first + CHUNK, n), n)
     _require_finite(out[0], model)

@@ -54,7 +54,7 @@ EFFECT = Effect(
             start_rule=lambda e: 1e3 * e.dry_level,
             scan=lambda e: tuple(e.dry_level / z for z in (1e-3, 1e-4, 1e-5)),
         ),
-        Parameter("sigma1", "N s/m", 0.5, 0.0, 1e5, "bristle damping"),
+        Parameter("sigma1", "N s/m", 0.5, 1e-6, 1e5, "bristle damping"),
         Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
     ),
     states=("z",),

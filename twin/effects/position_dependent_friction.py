@@ -37,7 +37,7 @@ EFFECT = Effect(
             start_rule=lambda e: max(e.travel, 1e-6),
         ),
         *(
-            Parameter(f"c{k}", "1", 0.0, -2.0, 2.0, f"cosine term {k} of the profile", strength=True)
+            Parameter(f"c{k}", "1", 0.0, -2.0, 2.0, f"cosine term {k}", strength=True)
             for k in range(1, 6)
         ),
     ),

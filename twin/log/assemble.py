@@ -103,9 +103,7 @@ class Run:
         first = [round(s.start * 1e-9 * rate) for s in series]
         begin = max(first)
         end = max(begin, min(f + s.count for f, s in zip(first, series, strict=True)))
-        return {
-            s.topic.name: slice(begin - f, end - f) for f, s in zip(first, series, strict=True)
-        }
+        return {s.topic.name: slice(begin - f, end - f) for f, s in zip(first, series, strict=True)}
 
     def start(self) -> int:
         """Time in ns of the first sample that all topics have in common."""
@@ -189,5 +187,3 @@ class Run:
             f"no samples on topic {AXIS_PREFIX}{wanted}; topics in the file: "
             f"{', '.join(sorted(topics)) or 'none'}; {hint}"
         )
-
-

@@ -161,20 +161,22 @@ class McapFile:
 
 
 @contextmanager
-def open_mcap(path: Path) -> Iterator[McapFile]:
-    """Open ``path`` for strict reading; every failure is an InputError that names the file."""
+def reading(path: Path) -> Iterator[None]:
+    """Name the file in every failure of reading it, and make each an InputError."""
     with at(str(path)):
         try:
-            with open(path, "rb") as stream:
-                yield McapFile(stream, os.fstat(stream.fileno()).st_size)
-        except Damaged as error:
-            raise Damaged(
-                f"{error}; copy it again, or keep what is intact: twin recover {path} -o GOOD"
-            ) from error
+            yield
         except OSError as error:
             raise InputError(f"cannot be read: {error.strerror}; check the name") from error
         except MemoryError as error:
             raise InputError("does not fit into memory; split the log") from error
+
+
+@contextmanager
+def open_mcap(path: Path) -> Iterator[McapFile]:
+    """Open ``path``; every failure is an InputError that names the file."""
+    with reading(path), open(path, "rb") as stream:
+        yield McapFile(stream, os.fstat(stream.fileno()).st_size)
 
 
 def open_chunk(record: Record) -> Payload:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from mcap.opcode import Opcode
 
-from twin.errors import InputError
 from twin.log.assemble import Extras, Run
 from twin.log.container import RECORD_HEAD, Damaged, McapFile, at, open_mcap, payloads
 from twin.log.layout import Block, MessageLayout, RowLayout
@@ -25,7 +24,17 @@ def read_log(path: str | Path, axes: Sequence[str] | None = None) -> Log:
     Every checksum is verified, and the samples must be complete, evenly spaced and finite.
     Raises InputError otherwise, and where no axis has position and one of current and force.
     """
-    with open_mcap(Path(path)) as file:
+    try:
+        return read_strictly(Path(path), axes)
+    except Damaged as error:
+        raise Damaged(
+            f"{error}; copy the file again, or keep what is intact: twin recover {path} -o GOOD"
+        ) from error
+
+
+def read_strictly(path: Path, axes: Sequence[str] | None = None) -> Log:
+    """``read_log`` without the remedy in its messages."""
+    with open_mcap(path) as file:
         topics, extras = Topics(), Extras()
         run = Run(topics, axes, _capacities(file))
         decoder = Decoder(topics)

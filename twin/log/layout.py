@@ -102,6 +102,10 @@ class RowLayout:
         """Packed structure of a row; its fields are the message records "0", "1", ..."""
         return np.dtype([(str(i), m.dtype) for i, m in enumerate(self.messages)])
 
+    def offset(self, message: int) -> int:
+        """Byte of a row where its message number ``message`` begins."""
+        return sum(m.dtype.itemsize for m in self.messages[:message])
+
     def parts(self, rows: np.ndarray) -> Iterator[tuple[MessageLayout, np.ndarray]]:
         """Each message layout with its records, a view into ``rows``."""
         return ((m, rows[str(i)]) for i, m in enumerate(self.messages))
@@ -114,6 +118,8 @@ class RowLayout:
     def rows(self, data: bytes, offset: int) -> np.ndarray | None:
         """As many whole rows as ``data`` holds from ``offset``, or None where they differ."""
         count = (len(data) - offset) // self.dtype.itemsize
+        if count == 0:
+            return None
         rows = np.frombuffer(data, self.dtype, count, offset)
         return rows if all(m.matches(r) for m, r in self.parts(rows)) else None
 

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from twin.errors import InputError
-from twin.jerk_limited import Phases, join, sample
-from twin.limits import FloatArray, axis_name, require_positive
+from twin.trajectory.jerk_limited import Phases, join, sample
+from twin.trajectory.limits import FloatArray, axis_name, require_positive
 
 SAMPLE_RATE = 10_000.0  # Hz, of the motion platform
 

@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from twin.errors import InputError
-from twin.jerk_limited import Phases, move, rest
-from twin.limits import (
+from twin.trajectory.jerk_limited import Phases, move, rest
+from twin.trajectory.limits import (
     FloatArray,
     Limits,
     as_positions,
@@ -29,27 +29,13 @@ from twin.limits import (
     require_plateau,
     require_positive,
 )
-from twin.random_tracking import random_tracking
-from twin.setpoint import (
+from twin.trajectory.setpoint import (
     SAMPLE_RATE,
     Setpoint,
     closed_loop,
-    concatenate,
     require_length,
     whole_motion,
 )
-
-__all__ = [
-    "Limits",
-    "Setpoint",
-    "concatenate",
-    "constant_speed_passes",
-    "micro_reversals",
-    "open_loop_sine",
-    "point_to_point",
-    "random_tracking",
-    "velocity_staircase",
-]
 
 
 def point_to_point(

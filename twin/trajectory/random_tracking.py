@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from twin.errors import InputError
-from twin.jerk_limited import Phases, join, move, rest
-from twin.limits import (
+from twin.trajectory.jerk_limited import Phases, join, move, rest
+from twin.trajectory.limits import (
     FloatArray,
     Limits,
     axis_name,
@@ -15,7 +15,7 @@ from twin.limits import (
     require_positive,
     travel_box,
 )
-from twin.setpoint import SAMPLE_RATE, Setpoint, closed_loop, require_length
+from twin.trajectory.setpoint import SAMPLE_RATE, Setpoint, closed_loop, require_length
 
 _CLOSING_REST = 0.05  # s, too short for another move
 

@@ -18,7 +18,7 @@ import numpy as np
 from ruckig import InputParameter, Profile, Result, Ruckig, RuckigError, Trajectory
 
 from twin.errors import InputError
-from twin.limits import FloatArray, Limits
+from twin.trajectory.limits import FloatArray, Limits
 
 # Samples worked on at once: the temporary arrays stay in the cache.
 _BLOCK = 16_384
@@ -74,17 +74,17 @@ def move(limits: Sequence[Limits], start: FloatArray, target: FloatArray) -> Pha
         return float((np.array(of_axes)[moving] / np.abs(step[moving])).min())
 
     jerk = along_path([axis.jerk for axis in limits])
-    second = jerk ** (1.0 / 3.0)  # the unit of time is 1 / second, in which the jerk limit is 1
+    pace = jerk ** (1.0 / 3.0)  # 1 / s; with 1 / pace as unit of time the jerk limit is 1
     profile = _unit_profile(
-        along_path([axis.velocity for axis in limits]) / second,
-        along_path([axis.acceleration for axis in limits]) / second**2,
+        along_path([axis.velocity for axis in limits]) / pace,
+        along_path([axis.acceleration for axis in limits]) / pace**2,
     )
     return Phases(
-        np.array(profile.t) / second,
+        np.array(profile.t) / pace,
         start + np.outer(profile.p[:7], step),
-        np.outer(profile.v[:7], step * second),
-        np.outer(profile.a[:7], step * second**2),
-        np.outer(profile.j, step * second**3),
+        np.outer(profile.v[:7], step * pace),
+        np.outer(profile.a[:7], step * pace**2),
+        np.outer(profile.j, step * pace**3),
     )
 
 

@@ -1,0 +1,162 @@
+"""What a log becomes in the file: schemas, channels and rows; the log is verified on the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from mcap.records import Channel, Schema
+from mcap.well_known import MessageEncoding, SchemaEncoding
+
+from twin.errors import InputError
+from twin.log.assemble import SCHEMA_VERSION
+from twin.log.container import at
+from twin.log.layout import MessageLayout, RowLayout
+from twin.log.log import Array, AxisLog, Log
+from twin.log.schema import (
+    AXIS_SAMPLE,
+    AXIS_TRUTH,
+    FIELD_NUMBERS,
+    file_descriptor_set,
+    protobuf_segments,
+)
+from twin.log.series import seconds
+from twin.log.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_units
+
+_TRUTH_UNITS = ("position", "velocity")  # what truth columns of these names are measured in
+
+
+@dataclass(frozen=True)
+class Signals:
+    """One topic to be written: numbers gives field -> protobuf number, in the order written."""
+
+    topic: str
+    message: str
+    columns: Mapping[str, Array]
+    numbers: Mapping[str, int]
+    metadata: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Everything but the samples, and the columns the samples come from (one set a message)."""
+
+    count: int
+    metadata: dict[str, str]
+    schemas: tuple[Schema, ...]
+    channels: tuple[Channel, ...]
+    layout: RowLayout
+    columns: tuple[Mapping[str, Array], ...]
+
+
+def outline(log: Log) -> Outline:
+    """Plan the file; raises InputError for a log that could not be read back."""
+    _check_log(log)
+    topics = [*_axis_signals(log), *_truth_signals(log)]
+    for signals in topics:
+        with at(signals.topic):
+            _check_columns(signals, len(log), log.sample_rate)
+    schemas: dict[bytes, Schema] = {}
+    channels, messages = [], []
+    for number, signals in enumerate(topics, 1):
+        data = file_descriptor_set(signals.message, signals.numbers)
+        new = Schema(len(schemas) + 1, data, SchemaEncoding.Protobuf, signals.message)
+        schema = schemas.setdefault(data, new)
+        channels.append(
+            Channel(
+                number,
+                signals.topic,
+                MessageEncoding.Protobuf,
+                dict(signals.metadata),
+                schema.id,
+            )
+        )
+        messages.append(MessageLayout(number, protobuf_segments(signals.numbers)))
+    return Outline(
+        count=len(log),
+        metadata=_metadata(log),
+        schemas=tuple(schemas.values()),
+        channels=tuple(channels),
+        layout=RowLayout(tuple(messages)),
+        columns=tuple(s.columns for s in topics),
+    )
+
+
+def _axis_signals(log: Log) -> Iterator[Signals]:
+    for name, axis in log.axes.items():
+        topic = AXIS_PREFIX + name
+        with at(topic):
+            _check_axis(axis)
+            units = complete_units(axis.units)
+        numbers = {field: n for field, n in FIELD_NUMBERS.items() if field in axis.columns}
+        metadata = {**_common(name, log), **{f"unit.{field}": units[field] for field in numbers}}
+        if axis.force_constant is not None:
+            metadata["force_constant"] = repr(float(axis.force_constant))
+        yield Signals(topic, AXIS_SAMPLE, axis.columns, numbers, metadata)
+
+
+def _truth_signals(log: Log) -> Iterator[Signals]:
+    for name, columns in log.truth.items():
+        numbers = {column: n for n, column in enumerate(columns, 1)}
+        units = complete_units(log.axes[name].units) if name in log.axes else {}
+        known = {f"unit.{c}": units[c] for c in _TRUTH_UNITS if c in columns and c in units}
+        metadata = {**_common(name, log), **known}
+        yield Signals(TRUTH_PREFIX + name, AXIS_TRUTH, columns, numbers, metadata)
+
+
+def _common(axis: str, log: Log) -> dict[str, str]:
+    return {"axis": axis, "sample_rate_hz": repr(float(log.sample_rate))}
+
+
+def _metadata(log: Log) -> dict[str, str]:
+    return {
+        **log.metadata,
+        "schema_version": SCHEMA_VERSION,
+        "sample_rate_hz": repr(float(log.sample_rate)),
+        "axes": ",".join(log.axes),
+    }
+
+
+def _check_log(log: Log) -> None:
+    if not log.axes or len(log) == 0:
+        raise InputError("the log has no samples; record or import at least one")
+    if not 0.0 < log.sample_rate < math.inf:
+        raise InputError(f"sample rate is {log.sample_rate} Hz; give a number above 0")
+    for name in (*log.axes, *log.truth):
+        if not IDENTIFIER.fullmatch(name):
+            raise InputError(f"axis name {name!r}: use letters, digits and underscores, as in x")
+    for key, value in log.metadata.items():
+        if not isinstance(value, str):
+            raise InputError(f"metadata {key} is {value!r}; metadata values are text")
+
+
+def _check_axis(axis: AxisLog) -> None:
+    unknown = set(axis.columns) - set(FIELD_NUMBERS)
+    if unknown:
+        raise InputError(
+            f"unknown signal {', '.join(sorted(unknown))}; allowed: {', '.join(FIELD_NUMBERS)}"
+        )
+    if "position" not in axis.columns or not {"current", "force"} & set(axis.columns):
+        raise InputError("a log needs position and one of current and force; add what is missing")
+    constant = axis.force_constant
+    if constant is not None and not 0.0 < constant < math.inf:
+        raise InputError(f"force constant is {constant} N/A; give a number above 0")
+
+
+def _check_columns(signals: Signals, count: int, sample_rate: float) -> None:
+    for name, column in signals.columns.items():
+        if not IDENTIFIER.fullmatch(name):
+            raise InputError(f"column name {name!r}: use letters, digits and underscores")
+        if np.shape(column) != (count,):
+            raise InputError(
+                f"{name} has shape {np.shape(column)}, expected ({count},): one value a sample"
+            )
+        finite = np.isfinite(column)
+        if not finite.all():
+            i = int(np.argmin(finite))
+            raise InputError(
+                f"{name} is {column[i]} at {seconds(i * 1e9 / sample_rate)} (sample {i}); "
+                "leave out a signal that was not recorded"
+            )

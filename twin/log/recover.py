@@ -1,0 +1,148 @@
+"""Keep what is intact of a damaged log: the longest run of samples without a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap.opcode import Opcode
+
+from twin.errors import InputError
+from twin.log.assemble import Extras, Run
+from twin.log.container import MAGIC, RECORD_HEAD, Payload, Record, at, payloads, reading
+from twin.log.decode import Decoder, read_strictly
+from twin.log.log import Log
+from twin.log.series import seconds
+from twin.log.topics import Topics
+
+_OPCODES = frozenset(Opcode)
+_BEFORE_COMPRESSION = RECORD_HEAD.size + 28  # bytes of a chunk record before its compression
+_COMPRESSIONS = (b"\x04\0\0\0zstd", b"\x03\0\0\0lz4")
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """What was kept of a log, and one sentence for each loss (none: the log was intact)."""
+
+    kept: str
+    lost: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return "\n".join((f"kept {self.kept}", *(self.lost or ("nothing was lost",))))
+
+
+def recover_log(path: str | Path) -> tuple[Log, Recovery]:
+    """Read the longest run of intact chunks without a gap between them.
+
+    Chunks are kept only where their checksum holds. Metadata has no checksum of its own; where
+    it contradicts the chunks it gives way. Raises InputError where nothing is left.
+    """
+    path = Path(path)
+    try:
+        log = read_strictly(path)
+    except InputError as error:
+        reason = str(error).removeprefix(f"{path}: ")
+    else:
+        return log, Recovery(f"all {len(log)} samples", ())
+    with reading(path):
+        salvage = _Salvage(path.read_bytes())
+        log = salvage.log()
+        return log, Recovery(salvage.kept, tuple(dict.fromkeys([reason, *salvage.lost])))
+
+
+class _Salvage:
+    """One pass over the bytes of a damaged log."""
+
+    def __init__(self, data: bytes) -> None:
+        self.lost: list[str] = []
+        self.kept = ""
+        self._extras = Extras()
+        self._topics = Topics()
+        self._decoder = Decoder(self._topics)
+        self._best = self._run = Run(self._topics, None, {})
+        records = self._records(data)
+        while True:
+            try:
+                for payload in payloads(records, self._add_extra):
+                    self._take(payload)
+                break
+            except InputError as error:  # a damaged chunk: go on with the record after it
+                self.lost.append(str(error))
+        self._close()
+
+    def log(self) -> Log:
+        """The longest run; raises InputError where it is empty or not fit to be a log."""
+        count = self._best.common_count()
+        if count == 0:
+            raise InputError(f"nothing can be recovered ({'; '.join(self.lost)})")
+        # the rate is stated in every chunk too, and there a checksum protects it
+        self._extras.metadata.pop("sample_rate_hz", None)
+        self.kept = f"{count} samples from {seconds(self._best.start())}"
+        self._extras.metadata["recovered"] = self.kept
+        return self._best.trimmed_log(self._extras)
+
+    def _add_extra(self, record: Record) -> None:
+        try:
+            self._extras.add(record)
+        except InputError as error:
+            self.lost.append(str(error))
+
+    def _take(self, payload: Payload) -> None:
+        with at(payload.place):
+            blocks = list(self._decoder.blocks(payload.data))
+            try:
+                for block in blocks:
+                    self._run.append(block)
+            except InputError:
+                self._close()
+                self._run = Run(self._topics, None, {})
+                for block in blocks:
+                    self._run.append(block)
+
+    def _close(self) -> None:
+        """Keep the longer of the run at hand and the best so far, and report the other."""
+        best, other = self._best, self._run
+        if best is other:
+            return
+        if other.common_count() > best.common_count():
+            best, other = other, best
+        if other.common_count():
+            self.lost.append(
+                f"{other.common_count()} intact samples from {seconds(other.start())} are "
+                "left out: a gap separates them from the longer run"
+            )
+        self._best = best
+
+    def _records(self, data: bytes) -> Iterator[Record]:
+        """Records one after the other; behind unreadable bytes, from the next chunk on."""
+        previous, offset = 0, len(MAGIC)
+        while offset < len(data) and data[offset:] != MAGIC:
+            record = _record_at(data, offset)
+            if record is not None:
+                yield record
+                previous, offset = offset, record.end
+                continue
+            found = _next_chunk(data, previous + 1)
+            if found is None:
+                self.lost.append(f"bytes {offset} to {len(data) - 1}: cut off or unreadable")
+                return
+            self.lost.append(f"bytes {previous} to {found - 1}: unreadable")
+            previous = offset = found
+
+
+def _record_at(data: bytes, offset: int) -> Record | None:
+    start = offset + RECORD_HEAD.size
+    if start > len(data):
+        return None
+    opcode, length = RECORD_HEAD.unpack_from(data, offset)
+    if opcode not in _OPCODES or length > len(data) - start:
+        return None
+    return Record(opcode, offset, data[start : start + length])
+
+
+def _next_chunk(data: bytes, start: int) -> int | None:
+    """Where the next compressed chunk record may begin; its checksum will tell."""
+    found = (data.find(c, start + _BEFORE_COMPRESSION) for c in _COMPRESSIONS)
+    candidates = [f - _BEFORE_COMPRESSION for f in found if f >= 0]
+    return min(candidates, default=None)
