@@ -1,5 +1,18 @@
 """Logs: columns with units, the MCAP codec, importers and checks."""
 
+from twin.log.decode import read_log
+from twin.log.encode import write_log
 from twin.log.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, AxisLog, Log
+from twin.log.recover import Recovery, recover_log
 
-__all__ = ["FIELDS", "LINEAR_UNITS", "ROTARY_UNITS", "AxisLog", "Log"]
+__all__ = [
+    "FIELDS",
+    "LINEAR_UNITS",
+    "ROTARY_UNITS",
+    "AxisLog",
+    "Log",
+    "Recovery",
+    "read_log",
+    "recover_log",
+    "write_log",
+]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import zlib
 from collections.abc import Mapping, Sequence
 
@@ -115,6 +114,8 @@ class Run:
 
     def log(self, extras: Extras) -> Log:
         """The log; raises InputError where topics differ in time or something is missing."""
+        self._check_axes()
+        self._sample_rate(extras)
         spans = self.spans()
         for series in self._opened():
             if spans[series.topic.name] != slice(0, series.count):
@@ -180,10 +181,9 @@ class Run:
             )
 
     def _refuse_axis(self, wanted: str) -> None:
-        topics = [c.topic for c in self._topics.channels.values()]
-        near = difflib.get_close_matches(AXIS_PREFIX + wanted, topics, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"name one of {AXIS_PREFIX}..."
+        topics = sorted(c.topic for c in self._topics.channels.values())
+        axes = [t.removeprefix(AXIS_PREFIX) for t in topics if t.startswith(AXIS_PREFIX)]
         raise InputError(
             f"no samples on topic {AXIS_PREFIX}{wanted}; topics in the file: "
-            f"{', '.join(sorted(topics)) or 'none'}; {hint}"
+            f"{', '.join(topics) or 'none'}; name an axis of these: {', '.join(axes) or 'none'}"
         )

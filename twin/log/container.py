@@ -63,11 +63,11 @@ class Payload:
 
 @contextmanager
 def at(place: str) -> Iterator[None]:
-    """Prefix the message of an InputError with where it happened."""
+    """Prefix the message of an InputError with where it happened, and keep it one line."""
     try:
         yield
     except InputError as error:
-        raise type(error)(f"{place}: {error}") from error
+        raise type(error)(" ".join(f"{place}: {error}".splitlines())) from error
 
 
 def parse(kind: type[T], content: bytes, place: str) -> T:

@@ -66,11 +66,22 @@ class Decoder:
         Rows of the same layout are taken as they lie; whatever else there is, message by message.
         """
         offset = self._register_leading(data)
-        rows = self._rows(data, offset)
-        if rows is not None and self._layout is not None:
-            yield from self._layout.blocks(rows)
-            offset += rows.nbytes
+        for layout in self._layouts(data, offset):
+            rows = layout.rows(data, offset)
+            if rows is not None:
+                yield from layout.blocks(rows)
+                offset += rows.nbytes
+                self._layout = layout
+                break
         yield from self._message_blocks(data, offset)
+
+    def _layouts(self, data: bytes, offset: int) -> Iterator[RowLayout]:
+        """Layouts to try: the one of the chunk before, and what the first messages look like."""
+        if self._layout is not None:
+            yield self._layout
+        inferred = self._infer(data, offset)
+        if inferred is not None:
+            yield inferred
 
     def _register_leading(self, data: bytes) -> int:
         offset = 0
@@ -82,14 +93,6 @@ class Decoder:
                 self._topics.register(opcode, content)
             offset = end
         return offset
-
-    def _rows(self, data: bytes, offset: int) -> np.ndarray | None:
-        """Rows of the layout seen last, or of the one that begins at ``offset``, or None."""
-        rows = self._layout.rows(data, offset) if self._layout else None
-        if rows is None:
-            self._layout = self._infer(data, offset)
-            rows = self._layout.rows(data, offset) if self._layout else None
-        return rows
 
     def _infer(self, data: bytes, offset: int) -> RowLayout | None:
         """Layout of the messages up to the one whose channel comes a second time."""
@@ -124,9 +127,9 @@ class Decoder:
         for channel, rows in samples.items():
             topic = self._topics.topic(channel, b"")
             assert topic is not None
-            sequence, time, values = zip(*rows, strict=True)
+            numbers, times, values = zip(*rows, strict=True)
             columns = dict(zip(topic.codec.fields, np.array(values).T, strict=True))
-            yield Block(channel, np.array(sequence, "u4"), np.array(time, "u8"), columns)
+            yield Block(channel, np.array(numbers, "u4"), np.array(times, "u8"), columns)
 
 
 def _record(data: bytes, offset: int) -> tuple[int, bytes, int]:

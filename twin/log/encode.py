@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.errors import InputError
+from twin.log.assemble import METADATA_NAME
 from twin.log.layout import sample_times
 from twin.log.log import Log
 from twin.log.outline import Outline, outline
-from twin.log.writer import McapWriter, encoded
+from twin.log.writer import McapWriter, PackedChunk, encoded, pack
 
 CHUNK_BYTES = 1 << 20
+WORKERS = 2
+
+T = TypeVar("T")
 
 Progress = Callable[[int, int], None]
 """Called with the samples written so far and their total."""
@@ -31,7 +38,7 @@ def write_log(log: Log, path: str | Path, progress: Progress | None = None) -> N
     plan = outline(log)
     with replacing(Path(path)) as stream:
         writer = McapWriter(stream)
-        writer.add_metadata("twin", plan.metadata)
+        writer.add_metadata(METADATA_NAME, plan.metadata)
         for name, data in log.attachments.items():
             writer.add_attachment(name, data)
         for written in _write_chunks(writer, plan, log.sample_rate):
@@ -46,23 +53,41 @@ def _write_chunks(writer: McapWriter, plan: Outline, sample_rate: float) -> Iter
     Every chunk begins with all schemas and channels: any one of them can be read alone.
     """
     head = encoded([*plan.schemas, *plan.channels])
+    most = max(1, CHUNK_BYTES // plan.layout.dtype.itemsize)
+
+    def chunk(first: int) -> PackedChunk:
+        times = sample_times(first, min(most, plan.count - first), sample_rate)
+        return _pack_rows(plan, head, first, times)
+
+    written = 0
+    for packed in _ordered(chunk, range(0, plan.count, most)):
+        writer.add_chunk(packed)
+        written += len(packed.times)
+        yield written
+
+
+def _pack_rows(plan: Outline, head: bytes, first: int, times: NDArray[np.int64]) -> PackedChunk:
     size = plan.layout.dtype.itemsize
-    most = min(max(1, CHUNK_BYTES // size), plan.count)
-    buffer = np.empty(len(head) + most * size, np.uint8)
+    buffer = np.empty(len(head) + len(times) * size, np.uint8)
     buffer[: len(head)] = np.frombuffer(head, np.uint8)
     rows = buffer[len(head) :].view(plan.layout.dtype)
     plan.layout.fill_constants(rows)
-    for first in range(0, plan.count, most):
-        count = min(most, plan.count - first)
-        times = sample_times(first, count, sample_rate)
-        _fill(rows[:count], plan, first, times)
-        row_starts = len(head) + size * np.arange(count)
-        offsets = {
-            message.channel: row_starts + plan.layout.offset(i)
-            for i, message in enumerate(plan.layout.messages)
-        }
-        writer.add_chunk(buffer[: len(head) + count * size].data, times, offsets)
-        yield first + count
+    _fill(rows, plan, first, times)
+    row_starts = len(head) + size * np.arange(len(times))
+    offsets = {m.channel: row_starts + o for m, o in plan.layout.offsets()}
+    return pack(buffer.data, times, offsets)
+
+
+def _ordered(function: Callable[[int], T], items: Iterable[int]) -> Iterator[T]:
+    """Results in the order of ``items``, a few of them computed ahead on other threads."""
+    with ThreadPoolExecutor(WORKERS) as pool:
+        pending: deque[Future[T]] = deque()
+        for item in items:
+            pending.append(pool.submit(function, item))
+            if len(pending) > WORKERS:
+                yield pending.popleft().result()
+        while pending:
+            yield pending.popleft().result()
 
 
 def _fill(rows: np.ndarray, plan: Outline, first: int, times: np.ndarray) -> None:

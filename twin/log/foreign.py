@@ -6,6 +6,7 @@ import json
 import re
 import struct
 from collections.abc import Sequence
+from typing import Any
 
 from mcap.records import Channel, Schema
 
@@ -57,7 +58,7 @@ class JsonCodec:
             raise InputError("a JSON message has a field that is no number") from error
 
     @staticmethod
-    def _load(payload: bytes) -> dict[str, object]:
+    def _load(payload: bytes) -> dict[str, Any]:
         try:
             message = json.loads(payload)
         except (ValueError, RecursionError) as error:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -102,9 +103,10 @@ class RowLayout:
         """Packed structure of a row; its fields are the message records "0", "1", ..."""
         return np.dtype([(str(i), m.dtype) for i, m in enumerate(self.messages)])
 
-    def offset(self, message: int) -> int:
-        """Byte of a row where its message number ``message`` begins."""
-        return sum(m.dtype.itemsize for m in self.messages[:message])
+    def offsets(self) -> Iterator[tuple[MessageLayout, int]]:
+        """Each message layout with the byte of a row where its records begin."""
+        sizes = (m.dtype.itemsize for m in self.messages)
+        return zip(self.messages, accumulate(sizes, initial=0), strict=False)
 
     def parts(self, rows: np.ndarray) -> Iterator[tuple[MessageLayout, np.ndarray]]:
         """Each message layout with its records, a view into ``rows``."""

@@ -153,6 +153,8 @@ def _check_columns(signals: Signals, count: int, sample_rate: float) -> None:
             raise InputError(
                 f"{name} has shape {np.shape(column)}, expected ({count},): one value a sample"
             )
+        if np.asarray(column).dtype.kind not in "fiu":
+            raise InputError(f"{name} holds {np.asarray(column).dtype} values; give real numbers")
         finite = np.isfinite(column)
         if not finite.all():
             i = int(np.argmin(finite))

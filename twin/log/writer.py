@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import PurePath
 from typing import BinaryIO
@@ -46,12 +47,38 @@ def encoded(records: Iterable[McapRecord]) -> bytes:
     return builder.end()
 
 
+@dataclass(frozen=True)
+class PackedChunk:
+    """A chunk ready to be written.
+
+    times: (n,) in ns; offsets: channel -> (n,) byte of each of its messages in the chunk.
+    """
+
+    chunk: Chunk
+    times: NDArray[np.int64]
+    offsets: Mapping[int, NDArray]
+
+
+def pack(
+    payload: memoryview, times: NDArray[np.int64], offsets: Mapping[int, NDArray]
+) -> PackedChunk:
+    """Compress a chunk; takes most of the time of writing, and may run on any thread."""
+    chunk = Chunk(
+        compression="zstd",
+        data=zstandard.ZstdCompressor(level=COMPRESSION_LEVEL).compress(payload),
+        message_start_time=int(times[0]),
+        message_end_time=int(times[-1]),
+        uncompressed_crc=zlib.crc32(payload),
+        uncompressed_size=len(payload),
+    )
+    return PackedChunk(chunk, times, offsets)
+
+
 class McapWriter:
     """Writes to ``stream`` from its beginning: metadata and attachments, chunks, ``finish``."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
-        self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
         self._offset = 0
         self._crc = 0
         self._metadata: list[MetadataIndex] = []
@@ -72,31 +99,21 @@ class McapWriter:
         offset, length = self._write(encoded([Attachment(0, 0, name, media_type, data)]))
         self._attachments.append(AttachmentIndex(offset, length, 0, 0, len(data), name, media_type))
 
-    def add_chunk(
-        self, payload: memoryview, times: NDArray[np.int64], offsets: Mapping[int, NDArray]
-    ) -> None:
-        """Write a chunk of records and its message indexes.
-
-        times: (n,) in ns; offsets: channel -> (n,) byte of each of its messages in ``payload``.
-        """
-        compressed = self._compressor.compress(payload)
-        chunk = Chunk(
-            compression="zstd",
-            data=compressed,
-            message_start_time=int(times[0]),
-            message_end_time=int(times[-1]),
-            uncompressed_crc=zlib.crc32(payload),
-            uncompressed_size=len(payload),
-        )
+    def add_chunk(self, packed: PackedChunk) -> None:
+        """Write a chunk and its message indexes."""
+        chunk = packed.chunk
         start, length = self._write(encoded([chunk]))
         index_start = self._offset
-        index_offsets = {c: self._write_index(c, times, o) for c, o in offsets.items()}
+        index_offsets = {
+            channel: self._write_index(channel, packed.times, offsets)
+            for channel, offsets in packed.offsets.items()
+        }
         self._chunks.append(
             ChunkIndex(
                 chunk_length=length,
                 chunk_start_offset=start,
                 compression=chunk.compression,
-                compressed_size=len(compressed),
+                compressed_size=len(chunk.data),
                 message_end_time=chunk.message_end_time,
                 message_index_length=self._offset - index_start,
                 message_index_offsets=index_offsets,

@@ -1,0 +1,152 @@
+"""A log seen as motion of one axis: equally spaced means, so that nothing is differentiated twice.
+
+The command u_k is held over [t_k, t_k + dt), so the force belongs to the middle of the sample; the
+position there is (x_k + x_{k+1})/2 and the velocity (x_{k+1} - x_k)/dt. Means over blocks of whole
+samples keep these relations exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.effect import Excitation
+from twin.errors import InputError
+from twin.log import Log
+
+Array = NDArray[np.float64]
+
+SHORTEST_BLOCK = 1e-3  # s
+LONGEST_BLOCK = 1e-2  # s
+SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
+SHORTEST_LOG = 1.0  # s
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Motion of one axis over one log, in blocks.
+
+    name: of the log. signals (3, n): position m, velocity m/s, command N. others (3, n): position,
+    velocity, acceleration of the other axis (zero where there is none). period: s, of a block.
+    start: s, middle of the first block. sample_period: s, of the log. position_noise: m rms.
+    raw (2, m): at the log's own rate, mean command N over two samples and second difference of the
+    position m/s^2, which belong to the same instants; only the noise floor is taken from them.
+    """
+
+    name: str
+    axis: str
+    signals: Array
+    others: Array
+    period: float
+    start: float
+    sample_period: float
+    position_noise: float
+    raw: Array
+
+    @property
+    def time(self) -> Array:
+        """(n,) s."""
+        return self.start + self.period * np.arange(self.signals.shape[1])
+
+    @property
+    def position(self) -> Array:
+        """(n,) m."""
+        return self.signals[0]
+
+    @property
+    def velocity(self) -> Array:
+        """(n,) m/s."""
+        return self.signals[1]
+
+    @property
+    def command(self) -> Array:
+        """(n,) N."""
+        return self.signals[2]
+
+
+def white_noise(signal: Array) -> float:
+    """RMS of the white part of a smooth signal: its fourth difference holds little else."""
+    difference = np.diff(signal, 4)
+    return float(np.median(np.abs(difference)) / 0.6745 / np.sqrt(70.0))
+
+
+def motion_of(log: Log, axis: str, name: str) -> Motion:
+    """The motion of one axis of a log.
+
+    Raises InputError where the axis is not in the log, does not move or is shorter than 1 s.
+    """
+    if axis not in log.axes:
+        raise InputError(f"{name}: has no axis '{axis}'; it has {', '.join(log.axes)}")
+    position = log.axes[axis].position
+    if len(log) * log.period < SHORTEST_LOG:
+        raise InputError(
+            f"{name}: lasts {len(log) * log.period:.3g} s; identification needs {SHORTEST_LOG:g} s"
+        )
+    if np.ptp(position) == 0.0:
+        raise InputError(f"{name}: axis {axis} stands still; give a log in which it moves")
+    noise = white_noise(position)
+    block = _block_samples(position, noise, log.period)
+    force = log.axes[axis].force
+    signals = _blocks(*_midpoints(position, force, log.period), block)
+    other = next((a for a in log.axes if a != axis), None)
+    others = np.zeros_like(signals)
+    if other is not None:
+        x = log.axes[other].position
+        others[:2] = _blocks(*_midpoints(x, x, log.period), block)[:2]
+        others[2] = np.gradient(others[1], block * log.period)
+    return Motion(
+        name=name,
+        axis=axis,
+        signals=signals,
+        others=others,
+        period=block * log.period,
+        start=0.5 * block * log.period,
+        sample_period=log.period,
+        position_noise=noise,
+        raw=np.stack([0.5 * (force[1:-1] + force[:-2]), np.diff(position, 2) / log.period**2]),
+    )
+
+
+def _block_samples(position: Array, noise: float, period: float) -> int:
+    """Samples a block: 1 ms, or longer where the encoder's noise asks for it."""
+    span = max(round(SHORTEST_BLOCK / period), 1)
+    fastest = np.abs(position[span:] - position[:-span]).max() / (span * period)
+    quiet = np.sqrt(2.0) * noise / (SPEED_NOISE * fastest)
+    return max(round(min(max(SHORTEST_BLOCK, quiet), LONGEST_BLOCK) / period), 1)
+
+
+def _midpoints(position: Array, force: Array, period: float) -> tuple[Array, Array, Array]:
+    return (
+        0.5 * (position[1:] + position[:-1]),
+        np.diff(position) / period,
+        force[:-1],
+    )
+
+
+def _blocks(position: Array, velocity: Array, force: Array, samples: int) -> Array:
+    whole = len(position) // samples * samples
+    stacked = np.stack([position[:whole], velocity[:whole], force[:whole]])
+    return np.ascontiguousarray(stacked.reshape(3, -1, samples).mean(axis=2))
+
+
+def excitation(motions: list[Motion]) -> Excitation:
+    """What the motions of one axis cover together."""
+    position = np.concatenate([m.position for m in motions])
+    velocity = np.concatenate([m.velocity for m in motions])
+    command = np.concatenate([m.command for m in motions])
+    fast = 0.02 * np.abs(velocity).max()
+    ahead, behind = command[velocity > fast], command[velocity < -fast]
+    if len(ahead) and len(behind):
+        gap = np.median(ahead) - np.median(behind)
+    else:
+        gap = 2.0 * np.median(np.abs(command))
+    return Excitation(
+        position_low=float(position.min()),
+        position_high=float(position.max()),
+        speed_max=float(np.abs(velocity).max()),
+        dry_level=float(max(abs(gap) / 2.0, 1e-9)),
+        duration=float(sum(len(m.time) * m.period for m in motions)),
+        period=motions[0].period,
+    )

@@ -1,0 +1,54 @@
+"""The noise floor of a force residual, from the data alone.
+
+The raw residual u - m a, with a from second differences, is all noise at high frequency: white
+noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 cos(w dt))/dt^2)^2. A and B
+are fitted to its spectrum above the band of the windows, and give what passes the windows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from scipy.signal import welch
+
+from identify.motion import Motion
+from identify.weak import Window
+
+Array = NDArray[np.float64]
+
+LOWEST = 2.0  # lowest frequency of the fit, over the reciprocal of the window
+
+
+def noise_floor(mass: float, logs: Sequence[tuple[Motion, Window]]) -> float:
+    """RMS in N of what measurement noise leaves in the windowed residual of these logs."""
+    parts = [_variance(mass, motion, window) for motion, window in logs]
+    weights = [motion.signals.shape[1] for motion, _ in logs]
+    return float(np.sqrt(np.average(parts, weights=weights)))
+
+
+def _variance(mass: float, motion: Motion, window: Window) -> float:
+    dt = motion.sample_period
+    force, acceleration = motion.raw
+    raw = force - mass * acceleration
+    # The median over segments passes by those with spikes and reversals.
+    segment = min(4096, len(raw))
+    frequency, power = welch(raw, 1.0 / dt, nperseg=segment, average="median")
+    half = np.cos(np.pi * frequency * dt) ** 2
+    bend = ((2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * dt)) * mass / dt**2) ** 2
+    band = (frequency > LOWEST / window.length) & (frequency < 0.45 / dt)
+    levels = _fit_levels(np.stack([half, bend], axis=1)[band], power[band])
+    passed = levels[0] + levels[1] * bend
+    return float(np.trapezoid(passed * window.response(dt, segment), frequency))
+
+
+def _fit_levels(shapes: Array, power: Array) -> Array:
+    """Non-negative levels by least squares on the relative error, repeated: a Whittle fit."""
+    model = power.copy()
+    levels = np.zeros(shapes.shape[1])
+    for _ in range(6):
+        levels, _ = nnls(shapes / model[:, None], power / model)
+        model = np.maximum(shapes @ levels, 1e-12 * power.max())
+    return levels

@@ -1,0 +1,75 @@
+"""The weak form: forces averaged by smooth windows, the acceleration integrated by parts.
+
+With a window phi that vanishes at its ends, integral(phi m a) = -integral(phi' m v), so that only
+the velocity of the log is needed. D. A. Messenger, D. M. Bortz, "Weak SINDy", Multiscale Model.
+Simul. 19 (2021). The window is (1 - r^2)^2, normalised to unit sum: a windowed force is a mean, N.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+
+Array = NDArray[np.float64]
+
+OVERLAP = 4  # windows that cover one instant
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """One window over blocks of ``period`` (s): weights (w,) 1, slope (w,) 1/s, stride in blocks."""
+
+    period: float
+    weights: Array
+    slope: Array
+    stride: int
+
+    @property
+    def length(self) -> float:
+        """Full length in s."""
+        return len(self.weights) * self.period
+
+    @classmethod
+    def of_length(cls, length: float, period: float) -> Window:
+        """Window of that length (s); InputError where it spans fewer than 8 blocks."""
+        n = round(length / period)
+        if n < 8:
+            raise InputError(
+                f"window = {length:g} s: shorter than 8 blocks of {period:g} s; give at least "
+                f"{8 * period:g} s"
+            )
+        r = (np.arange(n) + 0.5) / n * 2.0 - 1.0
+        phi = (1.0 - r**2) ** 2
+        edges = (1.0 - (np.arange(n + 1) / n * 2.0 - 1.0) ** 2) ** 2
+        return cls(
+            period=period,
+            weights=phi / phi.sum(),
+            slope=np.diff(edges) / phi.sum() / period,
+            stride=max(n // OVERLAP, 1),
+        )
+
+    def mean(self, signals: Array) -> Array:
+        """Windowed means of signals (..., n) -> (..., n_windows)."""
+        return self._apply(signals, self.weights)
+
+    def acceleration(self, velocity: Array) -> Array:
+        """Windowed mean acceleration (n_windows,) m/s^2 of a velocity (n,) m/s."""
+        return -self._apply(velocity, self.slope)
+
+    def _apply(self, signals: Array, kernel: Array) -> Array:
+        views = sliding_window_view(signals, len(kernel), axis=-1)
+        return views[..., :: self.stride, :] @ kernel
+
+    def response(self, period: float, segment: int) -> Array:
+        """Squared magnitude of the mean's frequency response for samples of ``period`` (s).
+
+        At the frequencies of a Fourier transform over ``segment`` samples, (segment // 2 + 1,).
+        """
+        weights = Window.of_length(self.length, period).weights
+        fold = -(-len(weights) // segment)
+        return np.abs(np.fft.rfft(weights, fold * segment)[::fold]) ** 2
