@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from identify.evidence import LEAST_BIC, LEAST_T, Gain, delta_bic, held_out_gain, left_out
-from identify.fit import RIDGE, Fit, fit_axis, sticks
+from identify.fit import Fit, fit_axis, sticks
 from identify.residual import jacobian, moving, residual
 from identify.study import Study
 from twin.effect import Effect, Kind
@@ -20,6 +20,7 @@ from twin.model import AxisModel, Coordinate, Fitted
 
 Array = NDArray[np.float64]
 
+RIDGE = 1e-4  # keeps the linear step finite along directions that the base explains already
 REFINED_STARTS = 2  # best shapes of the scan that are refitted in full
 
 
@@ -81,7 +82,7 @@ def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
         axis=study.axis,
         fit=fit,
         delta_bic=delta_bic(before, after, added),
-        gain=held_out_gain(*pair),
+        gain=held_out_gain(pair[0], pair[1], fit.floor),
     )
 
 

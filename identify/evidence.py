@@ -54,13 +54,19 @@ class Gain:
     t: float
 
 
-def held_out_gain(before: Array, after: Array) -> Gain:
-    """Compare two models on the same held-out residual samples (n,) N."""
+def held_out_gain(before: Array, after: Array, floor: float) -> Gain:
+    """Compare two models on the same held-out residual samples (n,) N, with noise floor (N).
+
+    t is taken from the logarithm of the squared errors of each block, over the floor: a few blocks
+    of hard motion then do not decide alone.
+    """
     blocks = min(BLOCKS, len(before))
-    edges = np.linspace(0, len(before), blocks + 1).astype(int)[:-1]
-    difference = np.add.reduceat(before**2 - after**2, edges)
-    spread = difference.std(ddof=1) / np.sqrt(blocks) if blocks > 1 else np.inf
-    t = difference.mean() / spread if spread > 0 else 0.0
+    edges = np.linspace(0, len(before), blocks + 1).astype(int)
+    quiet = floor**2 * np.diff(edges)
+    sums = [np.add.reduceat(r**2, edges[:-1]) + quiet for r in (before, after)]
+    gains = np.log(sums[0] / sums[1])
+    spread = gains.std(ddof=1) / np.sqrt(blocks) if blocks > 1 else np.inf
+    t = gains.mean() / spread if spread > 0 else 0.0
     return Gain(float(np.sqrt(np.mean(before**2))), float(np.sqrt(np.mean(after**2))), float(t))
 
 
@@ -76,7 +82,6 @@ def left_out(residual: Array, jacobian: Array, scale: Array) -> Array:
     for a, b in zip(edges[:-1], edges[1:], strict=True):
         block = jacobian[a:b]
         gradient = block.T @ residual[a:b]
-        # Normal equations without the block: theta moves by -(A - J'J)^-1 J' r ... applied to r_b.
         without = information - block.T @ block
         move = np.linalg.lstsq(without, gradient, rcond=1e-12)[0]
         out[a:b] = residual[a:b] + block @ move

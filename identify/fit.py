@@ -14,15 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from identify.evidence import effective_samples
 from identify.noise import noise_floor
 from identify.residual import Windowed, jacobian, moving, residual
 from identify.scaling import Scaling
 from twin.effect import Kind
-from twin.model import AxisModel, coordinates
+from twin.model import AxisModel, Coordinate, coordinates
 
 Array = NDArray[np.float64]
 
-RIDGE = 1e-4  # pull of collinear strengths towards zero, relative to their own columns
+PRIOR_FORCE = 0.1  # expected force of what is added to the friction, over that to be explained
 PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
 MOST_EVALUATIONS = 60
 
@@ -43,8 +44,7 @@ class Fit:
     """A fitted axis.
 
     error: RMS force residual in N over the logs. floor: RMS noise floor in N. residual (n,) N and
-    jacobian (n, k) N per unit at the end, over the windows that carry information (kept). prior
-    (k,): information that the priors add, as squared columns.
+    jacobian (n, k) N per unit at the end, over the windows that carry information (kept).
     """
 
     axis: AxisModel
@@ -67,28 +67,53 @@ def sticks(axis: AxisModel) -> bool:
     return any(f.effect.kind is Kind.FRICTION and "at_rest" in f.effect.states for f in axis.effects)
 
 
+def _is_added(axis: AxisModel, c: Coordinate) -> bool:
+    """Whether zero means the absence of an effect beside mass and friction."""
+    return (
+        bool(c.effect)
+        and c.parameter.strength
+        and axis[c.effect].effect.kind is not Kind.FRICTION
+    )
+
+
 def rms(values: Array) -> float:
     """Root of the mean square."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
 
 
 class _Problem:
-    """Residual and Jacobian of one fit in internal variables, with priors as extra rows."""
+    """Residual and Jacobian of one fit in internal variables, with priors as extra rows.
 
-    def __init__(self, axis: AxisModel, logs: Sequence[Windowed], floor: float) -> None:
+    The prior on what is added to the friction is a force of a tenth of what is to be explained; it
+    matters only along directions that the data cannot tell apart, such as a constant force and a
+    Coulomb asymmetry, where it shares the force out instead of opposing large ones to each other.
+    """
+
+    def __init__(self, axis: AxisModel, logs: Sequence[Windowed]) -> None:
         self.axis = axis
         self.logs = logs
         self.scaling = Scaling(coordinates(axis))
         self.kept = moving(logs, sticks(axis))
-        self.start = self.scaling.inside(axis)
-        low, high = self.scaling.bounds()
-        self.start = np.clip(self.start, low, high)
-        columns = self.columns(self.start)
-        strength = self.scaling.is_strength()
-        norms = np.linalg.norm(columns, axis=0)
-        self.pull = np.where(strength, RIDGE * norms, 0.0)
-        self.pull[self.scaling.is_logarithm()] += floor / PRIOR_SPREAD
-        self.centre = np.where(strength, 0.0, self.start)
+        low, high = self.bounds = self.scaling.bounds()
+        margin = 1e-9 * np.minimum(high - low, 1.0)
+        self.start = np.clip(self.scaling.inside(axis), low + margin, high - margin)
+        self.added = np.array([_is_added(axis, c) for c in self.scaling.where], dtype=bool)
+        self.centre = np.where(self.added, 0.0, self.start)
+        self.pull = np.zeros(len(self.start))
+
+    def set_priors(self, internal: Array) -> None:
+        """Weigh the priors by the residual's size, its colour, and the force to be explained."""
+        axis = self.scaling.outside(self.axis, internal)
+        left = residual(axis, self.logs)[self.kept]
+        inertia = axis.mass * np.concatenate([log.acceleration for log in self.logs])
+        command = np.concatenate([log.command for log in self.logs])
+        explained = rms((command - inertia)[self.kept])
+        noise = rms(left) * np.sqrt(len(left) / effective_samples(left))
+        columns = self.columns(internal)
+        size = np.linalg.norm(columns, axis=0) / np.sqrt(len(left))
+        expected = max(PRIOR_FORCE * explained, noise)
+        self.pull = np.where(self.added, noise * size / expected, 0.0)
+        self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD
 
     def columns(self, internal: Array) -> Array:
         axis = self.scaling.outside(self.axis, internal)
@@ -102,28 +127,25 @@ class _Problem:
     def slopes(self, internal: Array) -> Array:
         return np.vstack([self.columns(internal), np.diag(self.pull)])
 
+    def solve(self, internal: Array, tolerance: float) -> tuple[Array, bool]:
+        """Least squares from these values; the solution and whether it converged."""
+        solution = least_squares(
+            self.rows, internal, jac=self.slopes, bounds=self.bounds, x_scale="jac",
+            ftol=tolerance, xtol=tolerance, max_nfev=MOST_EVALUATIONS,
+        )  # fmt: skip
+        return solution.x, solution.status > 0
+
 
 def fit_axis(axis: AxisModel, logs: Sequence[Windowed]) -> Fit:
     """Fit the free parameters of an axis from its present values."""
-    floor = noise_floor(axis.mass, [(log.motion, log.window) for log in logs])
-    problem = _Problem(axis, logs, floor)
-    if not len(problem.start):
-        return _finish(problem, problem.start, Outcome.CONVERGED)
-    low, high = problem.scaling.bounds()
-    margin = 1e-9 * np.minimum(high - low, 1.0)
-    solution = least_squares(
-        problem.rows,
-        np.clip(problem.start, low + margin, high - margin),
-        jac=problem.slopes,
-        bounds=(low, high),
-        x_scale="jac",
-        method="trf",
-        ftol=1e-9,
-        xtol=1e-9,
-        max_nfev=MOST_EVALUATIONS,
-    )
-    outcome = Outcome.CONVERGED if solution.status > 0 else Outcome.NOT_CONVERGED
-    return _finish(problem, solution.x, outcome)
+    problem = _Problem(axis, logs)
+    internal, converged = problem.start, True
+    if len(internal):
+        problem.set_priors(internal)
+        internal, _ = problem.solve(internal, 1e-3)
+        problem.set_priors(internal)
+        internal, converged = problem.solve(internal, 1e-9)
+    return _finish(problem, internal, Outcome.CONVERGED if converged else Outcome.NOT_CONVERGED)
 
 
 def _finish(problem: _Problem, internal: Array, outcome: Outcome) -> Fit:

@@ -2,7 +2,7 @@
 
 The raw residual u - m a, with a from second differences, is all noise at high frequency: white
 noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 cos(w dt))/dt^2)^2. A and B
-are fitted to its spectrum above the band of the windows, and give what passes the windows.
+are fitted to its spectrum above the band of the effects, and give what passes the windows.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from identify.weak import Window
 
 Array = NDArray[np.float64]
 
-LOWEST = 2.0  # lowest frequency of the fit, over the reciprocal of the window
+BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 
 
 def noise_floor(mass: float, logs: Sequence[tuple[Motion, Window]]) -> float:
@@ -38,7 +38,7 @@ def _variance(mass: float, motion: Motion, window: Window) -> float:
     frequency, power = welch(raw, 1.0 / dt, nperseg=segment, average="median")
     half = np.cos(np.pi * frequency * dt) ** 2
     bend = ((2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * dt)) * mass / dt**2) ** 2
-    band = (frequency > LOWEST / window.length) & (frequency < 0.45 / dt)
+    band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < BAND[2] / dt)
     levels = _fit_levels(np.stack([half, bend], axis=1)[band], power[band])
     passed = levels[0] + levels[1] * bend
     return float(np.trapezoid(passed * window.response(dt, segment), frequency))

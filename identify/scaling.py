@@ -6,7 +6,6 @@ its excess over it, so that every inequality holds by construction.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,17 +93,9 @@ class Scaling:
                 high.append(p.upper)
         return np.array(low), np.array(high)
 
-    def is_strength(self) -> NDArray[np.bool_]:
-        """Which variables are strengths; those where zero means that the effect is absent."""
-        return np.array([bool(c.effect) and c.parameter.strength for c in self.where])
-
     def is_logarithm(self) -> NDArray[np.bool_]:
         """Which variables are logarithms."""
         return np.array(
             [c.parameter.lower > 0 and c.parameter.at_least is None for c in self.where]
         )
 
-
-def scaling_of(where: Sequence[Coordinate]) -> Scaling:
-    """Scaling of those coordinates."""
-    return Scaling(tuple(where))

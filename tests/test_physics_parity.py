@@ -1,0 +1,93 @@
+"""MuJoCo and the reduced model give one answer; a held force moves a mass as Newton says."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effect_runs import CATALOGUE, moderate, with_all
+
+from twin.control import Controller
+from twin.effect import Effect
+from twin.experiments import simulate
+from twin.log import Log
+from twin.loop import COMMAND_COLUMN, POSITION_COLUMN, VELOCITY_COLUMN
+from twin.model import AxisModel, Fitted, StageModel
+from twin.model_file import load_model
+from twin.simulator import MujocoStage, ReducedStage, run
+from twin.trajectory import Setpoint
+
+STAGE = load_model("proton_xy", CATALOGUE)
+Stepper = type[MujocoStage] | type[ReducedStage]
+BOTH = pytest.mark.parametrize("stage", [MujocoStage, ReducedStage])
+
+
+def tracked(model: StageModel, stage: Stepper, duration: float = 2.0) -> Log:
+    return simulate(model, "tracking", seed=5, duration=duration, stage=stage)
+
+
+def columns(log: Log) -> Mapping[str, np.ndarray]:
+    """Everything logged, and the truth."""
+    named = {f"{a} {n}": c for a, log_a in log.axes.items() for n, c in log_a.columns.items()}
+    return named | {f"{a} true {n}": c for a, true in log.truth.items() for n, c in true.items()}
+
+
+def require_parity(model: StageModel) -> Log:
+    """Both simulations agree to rounding in every column; returns MuJoCo's log."""
+    log, reduced = tracked(model, MujocoStage), columns(tracked(model, ReducedStage))
+    for name, column in columns(log).items():
+        size = np.abs(column).max()
+        np.testing.assert_allclose(reduced[name], column, rtol=0, atol=1e-9 * size, err_msg=name)
+    return log
+
+
+@pytest.fixture(scope="module")
+def plain() -> Log:
+    return require_parity(STAGE)
+
+
+@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda e: e.name)
+def test_both_simulations_agree_with_every_effect_and_it_acts(effect: Effect, plain: Log) -> None:
+    fitted = Fitted.at_start(effect, moderate(effect, np.random.default_rng(21)))
+    log = require_parity(STAGE.with_axis("x", STAGE.axes["x"].with_effect(fitted)))
+    command = plain.axes["x"].force
+    changed = np.abs(log.axes["x"].force - command).max()
+    assert changed > 1e-3 * np.abs(command).max(), "the stage moves as without the effect"
+
+
+def test_both_simulations_agree_with_all_effects_on_both_axes() -> None:
+    require_parity(with_all(STAGE, np.random.default_rng(22)))
+
+
+def test_both_simulations_agree_without_a_mujoco_file() -> None:
+    model = replace(STAGE, mjcf=None, mjcf_name=None)
+    require_parity(with_all(model, np.random.default_rng(23)))
+
+
+@BOTH
+@pytest.mark.parametrize("held", [1, 7])
+def test_true_position_is_the_closed_form_of_a_force_held_over_samples(
+    stage: Stepper, held: int
+) -> None:
+    mass, rate, n = 3.7, 1000.0, 7000
+    levels = np.random.default_rng(24).normal(0.0, 5.0, n // held)
+    force = np.repeat(levels, held)[:, None]
+    still = np.zeros_like(force)
+    done = run(
+        StageModel("slide", {"x": AxisModel(mass)}, sample_rate=rate),
+        Setpoint(still, still, still, force, rate),
+        np.random.default_rng(0),
+        stage=stage,
+        controllers={"x": Controller()},
+    ).signals[:, 0]
+
+    # Piecewise parabolas from one level to the next: exact, at samples between them too.
+    into = (np.arange(n) % held) / rate
+    a = np.repeat(levels, held) / mass
+    v0 = np.cumsum(np.r_[0.0, levels[:-1] * held / rate / mass])
+    x0 = np.cumsum(np.r_[0.0, (v0 * held / rate + levels / mass * (held / rate) ** 2 / 2)[:-1]])
+    v = np.repeat(v0, held) + a * into
+    x = np.repeat(x0, held) + np.repeat(v0, held) * into + a * into**2 / 2
+    np.testing.assert_array_equal(done[:, COMMAND_COLUMN], force[:, 0])
+    np.testing.assert_allclose(done[:, VELOCITY_COLUMN], v, rtol=0, atol=1e-12 * np.ptp(v))
+    np.testing.assert_allclose(done[:, POSITION_COLUMN], x, rtol=0, atol=1e-12 * np.ptp(x))
