@@ -109,9 +109,7 @@ def _scan(base: Fit, study: Study, effect: Effect) -> Iterator[_Start]:
     for shape in shapes(effect, study):
         first = Fitted.at_start(effect, _clipped(effect, study, shape))
         axis = rest.with_effect(first)
-        where = [
-            Coordinate(effect.name, p) for p in effect.strengths if p.name not in first.fixed
-        ]
+        where = [Coordinate(effect.name, p) for p in effect.strengths if p.name not in first.fixed]
         silent = all(first.values[p.name] == 0.0 for p in effect.strengths)
         force = unchanged if silent else residual(axis, study.fit)[base.kept]
         columns = jacobian(axis, study.fit, where)[base.kept]
@@ -122,9 +120,7 @@ def _scan(base: Fit, study: Study, effect: Effect) -> Iterator[_Start]:
 
 def _clipped(effect: Effect, study: Study, shape: dict[str, float]) -> dict[str, float]:
     values = {**effect.starts(study.excitation), **shape}
-    return {
-        p.name: float(min(max(values[p.name], p.lower), p.upper)) for p in effect.parameters
-    }
+    return {p.name: float(min(max(values[p.name], p.lower), p.upper)) for p in effect.parameters}
 
 
 def _belongs(c: Coordinate, axis: AxisModel) -> bool:

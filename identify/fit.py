@@ -64,15 +64,15 @@ class Fit:
 
 def sticks(axis: AxisModel) -> bool:
     """Whether the axis' friction is a static one, whose force at rest can be anything."""
-    return any(f.effect.kind is Kind.FRICTION and "at_rest" in f.effect.states for f in axis.effects)
+    return any(
+        f.effect.kind is Kind.FRICTION and "at_rest" in f.effect.states for f in axis.effects
+    )
 
 
 def _is_added(axis: AxisModel, c: Coordinate) -> bool:
     """Whether zero means the absence of an effect beside mass and friction."""
     return (
-        bool(c.effect)
-        and c.parameter.strength
-        and axis[c.effect].effect.kind is not Kind.FRICTION
+        bool(c.effect) and c.parameter.strength and axis[c.effect].effect.kind is not Kind.FRICTION
     )
 
 

@@ -12,7 +12,7 @@ from identify.motion import Motion
 from identify.weak import Window
 from twin.effect import Kind
 from twin.model import AxisModel, Coordinate, axis_table, read, write
-from twin.native import AXIS_STATES, walk
+from twin.native import walk
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def forces(axis: AxisModel, motion: Motion) -> dict[str, Array]:
     first, last, state, _, _ = table.axes[0]
     walk(
         table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
-        motion.signals, motion.others, motion.period, axis.mass, True, rows,
+        motion.signals, motion.others, motion.period, 0, rows,
     )  # fmt: skip
     return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
 

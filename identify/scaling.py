@@ -98,4 +98,3 @@ class Scaling:
         return np.array(
             [c.parameter.lower > 0 and c.parameter.at_least is None for c in self.where]
         )
-

@@ -157,14 +157,16 @@ def test_a_damaged_chunk_in_the_middle_keeps_the_longer_side(tmp_path, intact, s
     assert_same_log(read_log(tmp_path / "good.mcap"), log)
 
 
-def test_a_damaged_record_length_costs_at_most_that_side(tmp_path, intact, small_log):
-    place = chunk_offsets(tmp_path / "intact.mcap")[8]
-    for bit in (8 * (place + 1), 8 * (place + 2), 8 * (place + 6)):
-        path = tmp_path / "damaged.mcap"
+def test_a_damaged_record_length_hides_no_later_chunk(tmp_path, intact, small_log):
+    place = chunk_offsets(tmp_path / "intact.mcap")[2]
+    path = tmp_path / "damaged.mcap"
+    for bit in (8 * (place + 1) + 7, 8 * (place + 2), 8 * (place + 6)):
         path.write_bytes(flip(intact, bit))
-        log, _ = recover_log(path)
-        assert len(log) in (96, 120)  # a length one too large leaves the chunk itself readable
-        assert_same_samples(log, small_log, slice(0, len(log)))
+        log, recovery = recover_log(path)
+        # a length that became too large leaves the chunk itself readable
+        assert len(log) in (84, 120)
+        assert_same_samples(log, small_log, slice(120 - len(log), 120))
+        assert any("unreadable" in loss for loss in recovery.lost)
 
 
 def test_damage_outside_the_chunks_costs_no_sample(tmp_path, intact, small_log):

@@ -137,23 +137,23 @@ def axis_force(entries, first, last, parameters, states, at, io, rows):
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def walk(entries, first, last, parameters, states, at, motion, others, dt, mass, prescribed, rows):
-    """Forces along a given motion: the laws stepped over every sample.
+def walk(entries, first, last, parameters, states, at, motion, others, dt, begin, rows):
+    """Forces along a measured motion: the laws stepped over every sample, the first being ``begin``.
 
     motion (3, n): position m, velocity m/s, command N; others (3, n): position, velocity,
-    acceleration of the other axis. Where ``prescribed``, friction slides wherever v != 0: the
-    motion is measured, so what holds the axis at rest cannot be told. rows (n_entries, n): N.
+    acceleration of the other axis. Friction slides wherever v != 0, by an infinite mass: what holds
+    a measured axis at rest cannot be told. rows (n_entries, n): N.
     """
     io = np.zeros(IO_SIZE)
     row = np.zeros(entries.shape[0])
     io[DT] = dt
     for k in range(motion.shape[1]):
-        io[INDEX] = k
-        io[TIME] = k * dt
+        io[INDEX] = begin + k
+        io[TIME] = (begin + k) * dt
         io[X] = motion[0, k]
         io[V] = motion[1, k]
         io[U] = motion[2, k]
-        io[MASS] = 1e300 if prescribed else mass
+        io[MASS] = 1e300
         io[X_OTHER] = others[0, k]
         io[V_OTHER] = others[1, k]
         io[A_OTHER] = others[2, k]

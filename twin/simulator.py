@@ -41,7 +41,10 @@ class Run:
 
 
 class Stepper(Protocol):
-    """A simulation that can be run on by some samples."""
+    """A simulation that can be placed and run on by some samples."""
+
+    def place(self, position: Array, velocity: Array, states: Array, first: int) -> None:
+        """Set the axes' motion (n_axes,) and the effects' states before sample ``first``."""
 
     def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
         """Run setpoints.shape[0] samples and fill ``out``: signals, forces, states."""
@@ -68,9 +71,16 @@ class MujocoStage:
         )
         self._step = step_address()
 
-    def place(self, position: Array) -> None:
-        """Put the axes at rest at these positions (n_axes,) m."""
+    def place(self, position: Array, velocity: Array, states: Array, first: int) -> None:
+        """Put the axes at positions (n_axes,) m and velocities m/s, with effect states, at sample."""
+        self.data.time = first * self.model.opt.timestep
         self.data.qpos[self._where[:, 0]] = position
+        self.data.qvel[self._where[:, 1]] = velocity
+        user = self.data.userdata[self.user_at :]
+        n = len(states)
+        user[0] = self.data.time
+        user[1 : 1 + n] = states
+        user[1 + n : 1 + 2 * n] = states
 
     def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
         """See Stepper."""
@@ -88,9 +98,11 @@ class ReducedStage:
         self._states = np.zeros(table.n_states)
         self._masses = table.masses
 
-    def place(self, position: Array) -> None:
-        """Put the axes at rest at these positions (n_axes,) m."""
+    def place(self, position: Array, velocity: Array, states: Array, first: int) -> None:
+        """Put the axes at positions (n_axes,) m and velocities m/s, with effect states, at sample."""
         self._motion[:, 0] = position
+        self._motion[:, 1] = velocity
+        self._states[:] = states
 
     def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
         """See Stepper."""
@@ -188,7 +200,7 @@ def run(
     simulation: Stepper
     with passive_callback():
         simulation = stage(model, table)
-        simulation.place(setpoint.position[0])
+        simulation.place(setpoint.position[0], np.zeros(n_axes), np.zeros(table.n_states), 0)
         for first in range(0, n, CHUNK):
             part = slice(first, first + CHUNK)
             simulation.run(first, shared, setpoints[part], noise[part], tuple(o[part] for o in out))

@@ -6,11 +6,13 @@ A. Janot et al., "Data Set and Reference Models of EMPS" (2019), where each dire
 Fc and Fv.
 """
 
-from twin.effect import DRY, HOLD, VISCOUS, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, HOLD, MASS, VISCOUS, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
-    direction = io[V] if io[V] != 0.0 else io[HOLD]  # at rest: the way it is being pushed
+    # At rest the axis has the speed that rounding left; what counts is the way it is being pushed.
+    moves = abs(io[MASS] * io[V] / io[DT]) > 1e-9 * abs(io[HOLD])
+    direction = io[V] if moves else io[HOLD]
     if direction > 0.0:
         io[DRY] *= 1.0 + p[0]
         io[VISCOUS] *= 1.0 + p[1]

@@ -1,0 +1,185 @@
+"""How far model and measurement are apart, in numbers, and where: misfit by region."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.fit import rms, sticks
+from identify.freerun import free_run, rms_error
+from identify.noise import noise_floor
+from identify.residual import Windowed, moving, residual
+from identify.structure import UNITS, gathered
+from identify.study import Study
+from twin.effect import Kind
+from twin.log import Log
+from twin.model import AxisModel, StageModel
+
+Array = NDArray[np.float64]
+
+REGIONS = 24  # bins along a coordinate
+PITCH = 0.034  # m, of the rollers, where the model has no other
+
+
+@dataclass(frozen=True, eq=False)
+class MisfitMap:
+    """Misfit along one coordinate: bin centres (n,), mean and RMS force error (n,) N, share (n,).
+
+    share: part of the whole squared force error in each bin.
+    """
+
+    coordinate: str
+    unit: str
+    centre: Array
+    low: Array
+    high: Array
+    mean: Array
+    rms: Array
+    share: Array
+
+
+@dataclass(frozen=True)
+class Region:
+    """A bad place: a bin of a coordinate with its error (N), ratio to floor and share of error."""
+
+    coordinate: str
+    unit: str
+    low: float
+    high: float
+    rms: float
+    ratio: float
+    share: float
+
+    def in_words(self) -> str:
+        """E.g. "position between 12 and 26 mm: 0.12 N, 14 times the noise floor, ..."."""
+        what = self.coordinate.replace("_", " ")
+        span = f"{what} between {self.low:.4g} and {self.high:.4g} {self.unit}"
+        if self.coordinate == "direction":
+            span = "moving forwards" if self.low > -0.5 else "moving backwards"
+        return (
+            f"{span}: {self.rms:.3g} N RMS, {self.ratio:.1f} times the noise floor, "
+            f"{100 * self.share:.0f} % of the squared error"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class AxisComparison:
+    """One axis over some logs.
+
+    force_error: N RMS of the windowed residual, by log. floor: N. position_error: m RMS of the free
+    run, by log. residual (n,) N, time (n,) s in its log, coordinates name -> (n,). maps, worst.
+    """
+
+    axis: str
+    force_error: Mapping[str, float]
+    floor: float
+    position_error: Mapping[str, float]
+    position_floor: float
+    residual: Array
+    logs: Sequence[Windowed]
+    coordinates: Mapping[str, Array]
+    maps: Sequence[MisfitMap]
+    worst: Sequence[Region]
+
+    @property
+    def total_error(self) -> float:
+        """RMS force error over all logs, N."""
+        return rms(self.residual)
+
+    @property
+    def ratio(self) -> float:
+        """Force error over the noise floor."""
+        return self.total_error / self.floor
+
+
+def compare_axis(
+    model: StageModel, study: Study, logs: Mapping[str, Log], position_error: Mapping[str, float]
+) -> AxisComparison:
+    """Force errors of one axis over the study's fit logs, with maps of where they are."""
+    axis = model.axes[study.axis]
+    kept = moving(study.fit, sticks(axis))
+    force = residual(axis, study.fit)
+    floor = noise_floor(axis.mass, [(w.motion, w.window) for w in study.fit])
+    where = gathered(study.fit)
+    where["roller_phase"] = np.mod(where["position"], roller_pitch(axis))
+    force, where = force[kept], {k: v[kept] for k, v in where.items()}
+    maps = [misfit_map(name, force, values) for name, values in where.items()]
+    noise = float(np.mean([w.motion.position_noise for w in study.fit]))
+    return AxisComparison(
+        axis=study.axis,
+        force_error=_by_log(axis, study),
+        floor=floor,
+        position_error=position_error,
+        position_floor=noise,
+        residual=force,
+        logs=study.fit,
+        coordinates=where,
+        maps=maps,
+        worst=worst_regions(maps, floor),
+    )
+
+
+def _by_log(axis: AxisModel, study: Study) -> dict[str, float]:
+    return {w.motion.name: rms(residual(axis, [w])[moving([w], sticks(axis))]) for w in study.fit}
+
+
+def position_errors(model: StageModel, logs: Mapping[str, Log]) -> dict[str, dict[str, float]]:
+    """Free-running position error, axis -> log name -> m RMS."""
+    out: dict[str, dict[str, float]] = {a: {} for a in model.axes}
+    for name, log in logs.items():
+        run = free_run(model, log)
+        for axis in model.axes:
+            out[axis][name] = rms_error(run, axis)
+    return out
+
+
+def roller_pitch(axis: AxisModel) -> float:
+    """The roller pitch of the model (m), or that of the Proton stage."""
+    for f in axis.effects:
+        if f.effect.kind is Kind.FORCE and "pitch" in f.values:
+            return f.values["pitch"]
+    return PITCH
+
+
+def misfit_map(name: str, residual: Array, coordinate: Array) -> MisfitMap:
+    """Misfit of a residual (n,) N over bins of equal width of a coordinate (n,)."""
+    if name == "direction":
+        edges = np.array([-1.5, 0.0, 1.5])
+    else:
+        edges = np.linspace(coordinate.min(), coordinate.max() + 1e-15, REGIONS + 1)
+    index = np.clip(np.searchsorted(edges, coordinate, side="right") - 1, 0, len(edges) - 2)
+    bins = len(edges) - 1
+    count = np.maximum(np.bincount(index, minlength=bins), 1)
+    square = np.bincount(index, residual**2, bins)
+    return MisfitMap(
+        coordinate=name,
+        unit="m" if name == "roller_phase" else UNITS[name],
+        centre=0.5 * (edges[1:] + edges[:-1]),
+        low=edges[:-1],
+        high=edges[1:],
+        mean=np.bincount(index, residual, bins) / count,
+        rms=np.sqrt(square / count),
+        share=square / max(square.sum(), np.finfo(float).tiny),
+    )
+
+
+def worst_regions(maps: Sequence[MisfitMap], floor: float, count: int = 3) -> list[Region]:
+    """The regions that concentrate most error against their width, one a coordinate."""
+    found = []
+    for m in maps:
+        excess = m.share - 1.0 / len(m.share)
+        i = int(np.argmax(excess))
+        found.append(
+            (
+                float(excess[i]),
+                Region(
+                    m.coordinate, m.unit, float(m.low[i]), float(m.high[i]), float(m.rms[i]),
+                    float(m.rms[i] / floor), float(m.share[i]),
+                ),
+            )
+        )  # fmt: skip
+    found.sort(key=lambda pair: -pair[0])
+    return [region for _, region in found[:count]]

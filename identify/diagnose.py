@@ -1,0 +1,101 @@
+"""Which physical effect is missing: every absent effect is added in turn, refitted and judged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.candidates import Candidate, absent_effects, try_effect
+from identify.evidence import held_out_gain
+from identify.fit import Fit, sticks
+from identify.residual import moving, residual
+from identify.structure import Structure, find_structure
+from identify.study import Study
+from twin.effects import Catalogue
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+AT_FLOOR = 1.5  # ratio of error to noise floor below which a residual is noise
+TIE = 2.0  # |t| of the held-out difference below which two explanations cannot be told apart
+
+
+class Verdict(Enum):
+    """The answer of a diagnosis, as a sentence."""
+
+    MISSING_EFFECT = "One effect explains what the model lacks, on the fit logs and held out."
+    NOTHING_MISSING = "Nothing is missing: the force error is at its noise floor."
+    AMBIGUOUS = "Several effects explain the error equally well; this data cannot tell them apart."
+    UNEXPLAINED = (
+        "The error stands above the noise floor, and no effect of the catalogue explains it."
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class AxisDiagnosis:
+    """Diagnosis of one axis: the fitted base, candidates by falling evidence, and the answer."""
+
+    study: Study
+    base: Fit
+    ranking: tuple[Candidate, ...]
+    verdict: Verdict
+    ambiguous_with: tuple[str, ...]
+    unexplained: Structure | None
+
+    @property
+    def best(self) -> Candidate | None:
+        """The candidate that is named, where one is supported."""
+        named = self.verdict in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS)
+        return self.ranking[0] if named else None
+
+
+def diagnose_axis(
+    base: Fit, study: Study, catalogue: Catalogue, progress: Progress | None = None
+) -> AxisDiagnosis:
+    """Try every absent effect on one fitted axis and decide."""
+    effects = absent_effects(base.axis, catalogue)
+    candidates = []
+    for i, effect in enumerate(effects):
+        candidates.append(try_effect(base, study, effect))
+        if progress:
+            progress(i + 1, len(effects))
+    ranking = tuple(sorted(candidates, key=_merit))
+    return decide(base, study, ranking)
+
+
+def _merit(c: Candidate) -> tuple[bool, float]:
+    """Supported first, then by evidence."""
+    return (not c.supported, -c.delta_bic)
+
+
+def decide(base: Fit, study: Study, ranking: tuple[Candidate, ...]) -> AxisDiagnosis:
+    """The verdict from the ranked candidates."""
+    supported = [c for c in ranking if c.supported]
+    tied = tuple(c.effect.name for c in supported[1:] if _tie(study, supported[0], c))
+    structure = None
+    if supported:
+        verdict = Verdict.AMBIGUOUS if tied else Verdict.MISSING_EFFECT
+    elif base.ratio < AT_FLOOR:
+        verdict = Verdict.NOTHING_MISSING
+    else:
+        verdict = Verdict.UNEXPLAINED
+        structure = find_structure(base, study)
+    return AxisDiagnosis(study, base, ranking, verdict, tied, structure)
+
+
+def _tie(study: Study, best: Candidate, other: Candidate) -> bool:
+    """Whether the evidence and the held-out error both fail to separate two candidates."""
+    if best.delta_bic - other.delta_bic > LEAST_SEPARATION:
+        return False
+    logs = study.holdout or study.fit
+    either = sticks(best.fit.axis) or sticks(other.fit.axis)
+    kept = moving(logs, either)
+    pair = [residual(c.fit.axis, logs)[kept] for c in (other, best)]
+    return abs(held_out_gain(pair[0], pair[1], best.fit.floor).t) < TIE
+
+
+LEAST_SEPARATION = 10.0  # difference of BIC that separates two explanations

@@ -1,0 +1,102 @@
+"""Intervals that survive coloured residuals, and are refused on a wrong model.
+
+Sandwich covariance with blocks: (J'J)^-1 [sum_b J_b' r_b r_b' J_b] (J'J)^-1, where the blocks are
+longer than the residual's memory. H. White, Econometrica 48 (1980); K.-Y. Liang, S. L. Zeger,
+Biometrika 73 (1986) for blocks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from identify.fit import Fit
+from twin.model import read
+
+Array = NDArray[np.float64]
+
+BLOCKS = 30
+CONFIDENCE = 0.90
+LARGEST_RATIO = 3.0  # of error to noise floor; above it the model is wrong and no interval holds
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter: value with its unit and 90 % interval, or the reason why there is none."""
+
+    label: str
+    value: float
+    unit: str
+    low: float | None
+    high: float | None
+    free: bool
+    reason: str | None = None
+
+
+def estimates(fit: Fit) -> tuple[Estimate, ...]:
+    """Estimates of all parameters of a fitted axis, free ones first."""
+    values = read(fit.axis, fit.scaling.where)
+    half = half_widths(fit)
+    reason = refusal(fit)
+    free = []
+    for c, value, width in zip(fit.scaling.where, values, half, strict=True):
+        p = c.parameter
+        low: float | None = None
+        high: float | None = None
+        why = reason
+        if why is None and not np.isfinite(width):
+            why = "this motion does not show the parameter"
+        if why is None:
+            low, high = max(value - width, p.lower), min(value + width, p.upper)
+        free.append(Estimate(c.label, float(value), p.unit, low, high, True, why))
+    return (*free, *_held(fit))
+
+
+def refusal(fit: Fit) -> str | None:
+    """Why the fit has no intervals, or None where it has."""
+    if fit.ratio <= LARGEST_RATIO:
+        return None
+    return (
+        f"no interval: the force error {fit.error:.3g} N stands {fit.ratio:.1f} times above the "
+        f"noise floor {fit.floor:.3g} N, so the model is wrong by more than noise"
+    )
+
+
+def half_widths(fit: Fit) -> Array:
+    """Half widths (k,) of the 90 % intervals, in the parameters' units; inf where unseen."""
+    norms = np.linalg.norm(fit.jacobian, axis=0)
+    seen = norms > 0
+    out = np.full(len(norms), np.inf)
+    if not seen.any():
+        return out
+    columns = fit.jacobian[:, seen] / norms[seen]
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-12, hermitian=True)
+    edges = np.linspace(0, len(fit.residual), BLOCKS + 1).astype(int)
+    scores = np.stack(
+        [columns[a:b].T @ fit.residual[a:b] for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    )
+    # Residuals are smaller than errors, by the degrees of freedom that the fit took.
+    spread = len(fit.residual) / max(len(fit.residual) - OVERCOUNT * seen.sum(), 1.0)
+    covariance = inverse @ (scores.T @ scores * spread * BLOCKS / (BLOCKS - 1)) @ inverse
+    quantile = student.ppf(0.5 + CONFIDENCE / 2.0, BLOCKS - 1)
+    out[seen] = quantile * np.sqrt(np.maximum(np.diag(covariance), 0.0)) / norms[seen]
+    return out
+
+
+OVERCOUNT = 4.0  # windows overlap fourfold, so each parameter takes about four of them
+
+
+def _held(fit: Fit) -> list[Estimate]:
+    free = {c.label for c in fit.scaling.where}
+    out = []
+    if "mass" not in free:
+        out.append(Estimate("mass", fit.axis.mass, "kg", None, None, False))
+    for f in fit.axis.effects:
+        for p in f.effect.parameters:
+            label = f"{f.effect.name}.{p.name}"
+            if label not in free:
+                out.append(Estimate(label, f.values[p.name], p.unit, None, None, False))
+    return out
