@@ -104,7 +104,7 @@ def _scan(base: Fit, study: Study, effect: Effect) -> Iterator[_Start]:
     """Best strengths for each shape, by one linear step with the base parameters free."""
     rest = _without_friction(base.axis) if effect.kind is Kind.FRICTION else base.axis
     kept_columns = [i for i, c in enumerate(base.scaling.where) if _belongs(c, rest)]
-    basis = _orthonormal(base.jacobian[:, kept_columns])
+    basis = orthonormal(base.jacobian[:, kept_columns])
     unchanged = residual(base.axis, study.fit)[base.kept]
     for shape in shapes(effect, study):
         first = Fitted.at_start(effect, _clipped(effect, study, shape))
@@ -133,7 +133,7 @@ def _without_friction(axis: AxisModel) -> AxisModel:
     )
 
 
-def _orthonormal(columns: Array) -> Array:
+def orthonormal(columns: Array) -> Array:
     """Orthonormal basis (n, r) of the columns' span."""
     norms = np.linalg.norm(columns, axis=0)
     scaled = columns[:, norms > 0] / norms[norms > 0]

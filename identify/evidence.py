@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +80,7 @@ def left_out(residual: Array, jacobian: Array, scale: Array) -> Array:
     information = jacobian.T @ jacobian + np.diag(scale**2)
     edges = np.linspace(0, len(residual), min(BLOCKS, len(residual)) + 1).astype(int)
     out = residual.copy()
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         block = jacobian[a:b]
         gradient = block.T @ residual[a:b]
         without = information - block.T @ block

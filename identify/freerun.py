@@ -83,7 +83,7 @@ def _as_logged(model: StageModel, log: Log) -> StageModel:
 
 
 def _states_at(
-    table: Table, position: Array, command: Array, period: float, starts: Array
+    table: Table, position: Array, command: Array, period: float, starts: NDArray[np.int64]
 ) -> Array:
     """Effect states (n_starts, n_states) after following the measured motion up to each start."""
     middle = 0.5 * (position[1:] + position[:-1]).T

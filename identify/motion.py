@@ -48,7 +48,7 @@ class Motion:
     @property
     def time(self) -> Array:
         """(n,) s."""
-        return self.start + self.period * np.arange(self.signals.shape[1])
+        return np.asarray(self.start + self.period * np.arange(self.signals.shape[1]))
 
     @property
     def position(self) -> Array:

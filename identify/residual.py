@@ -69,7 +69,7 @@ def total_force(axis: AxisModel, motion: Motion) -> Array:
 
 
 def residual(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
-    """Unexplained force: command + effects - mass x acceleration, windowed, all logs in a row, N."""
+    """Unexplained force (n,) N: windowed command + effects - mass x acceleration, log after log."""
     return np.concatenate(
         [
             log.command + log.window.mean(total_force(axis, log.motion))

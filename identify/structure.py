@@ -1,4 +1,4 @@
-"""What an unexplained residual depends on: the coordinate that accounts for most of its variance."""
+"""What an unexplained residual depends on: the coordinate that accounts for most of it."""
 
 from __future__ import annotations
 

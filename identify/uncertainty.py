@@ -8,6 +8,7 @@ Biometrika 73 (1986) for blocks.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,9 +76,7 @@ def half_widths(fit: Fit) -> Array:
     columns = fit.jacobian[:, seen] / norms[seen]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-12, hermitian=True)
     edges = np.linspace(0, len(fit.residual), BLOCKS + 1).astype(int)
-    scores = np.stack(
-        [columns[a:b].T @ fit.residual[a:b] for a, b in zip(edges[:-1], edges[1:], strict=True)]
-    )
+    scores = np.stack([columns[a:b].T @ fit.residual[a:b] for a, b in pairwise(edges)])
     # Residuals are smaller than errors, by the degrees of freedom that the fit took.
     spread = len(fit.residual) / max(len(fit.residual) - OVERCOUNT * seen.sum(), 1.0)
     covariance = inverse @ (scores.T @ scores * spread * BLOCKS / (BLOCKS - 1)) @ inverse

@@ -22,7 +22,7 @@ OVERLAP = 4  # windows that cover one instant
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """One window over blocks of ``period`` (s): weights (w,) 1, slope (w,) 1/s, stride in blocks."""
+    """A window over blocks of ``period`` (s): weights (w,) 1, slope (w,) 1/s, stride in blocks."""
 
     period: float
     weights: Array

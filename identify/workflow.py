@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -151,7 +152,7 @@ def diagnose(
             fitted,
             result.studies[axis],
             catalogue,
-            lambda done, total, axis=axis: progress(f"trying effects on {axis}", done, total),
+            partial(progress, f"trying effects on {axis}"),
         )
         for axis, fitted in result.fits.items()
     }

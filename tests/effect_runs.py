@@ -89,6 +89,12 @@ def absent(effect: Effect) -> dict[str, float]:
     return {p.name: 0.0 if p.strength else p.start for p in effect.parameters}
 
 
+def companion(friction: Effect) -> Fitted:
+    """A friction for modifiers to act on, every part of it present."""
+    values = {p.name: p.start or 0.3 if p.strength else p.start for p in friction.parameters}
+    return Fitted.at_start(friction, legal(friction, values))
+
+
 def moderate(effect: Effect, rng: np.random.Generator, wanted: float = 0.3) -> dict[str, float]:
     """Drawn values with which the effect's action is about ``wanted`` N rms, or its most."""
     share = dict(zip(effect.starts(), rng.random(len(effect.parameters)), strict=True))
@@ -125,7 +131,7 @@ def forces(effects: Sequence[Fitted], motion: Motion) -> dict[str, Array]:
     walk(
         table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
         np.stack([motion.x, motion.v, motion.u]), np.stack([motion.x, motion.v, motion.u]),
-        motion.dt, 1.0, True, rows,
+        motion.dt, 0, rows,
     )  # fmt: skip
     return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
 
@@ -191,7 +197,7 @@ def action(effect: Effect, values: Values) -> float:
         return float(np.sqrt(np.mean(forces([own], motion)[effect.name] ** 2)))
     changes = []
     for friction in FRICTIONS:
-        plain = Fitted.at_start(friction)
+        plain = companion(friction)
         changed = forces([plain, own], motion)[friction.name]
         changes.append(np.mean((changed - forces([plain], motion)[friction.name]) ** 2))
     return float(np.sqrt(max(changes)))

@@ -17,6 +17,7 @@ from effect_runs import (
     Values,
     absent,
     action,
+    companion,
     forces,
     legal,
     moderate,
@@ -59,7 +60,7 @@ def check_zero_is_absent(effect: Effect) -> None:
     motion = replace(Motion.cycles(), u=Motion.cycles().u + 0.3)
     nothing = absent(effect)
     for friction in FRICTIONS if effect.kind is not Kind.FRICTION else (None,):
-        around = [Fitted.at_start(friction)] if friction else []
+        around = [companion(friction)] if friction else []
         found = forces([*around, Fitted.at_start(effect, nothing)], motion)
         assert not found.pop(effect.name).any(), "a force is left at zero strength"
         for name, row in forces(around, motion).items():

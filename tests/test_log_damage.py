@@ -180,6 +180,26 @@ def test_damage_outside_the_chunks_costs_no_sample(tmp_path, intact, small_log):
     assert "metadata, an attachment or an index is damaged" in recovery.lost[0]
 
 
+def test_the_longer_side_is_kept_though_no_rate_is_stated(tmp_path):
+    log = Log(RATE, {"x": two_axes(300).axes["x"]})
+    schema, make = protobuf_encoder(FIELDS)
+    path = tmp_path / "a.mcap"
+    write_foreign(
+        path,
+        log,
+        make,
+        schema=("twin.AxisSample", "protobuf", schema),
+        encoding="protobuf",
+        chunk_size=2000,
+    )
+    place = chunk_offsets(path)[4]
+    path.write_bytes(flip(path.read_bytes(), 8 * (place + 300)))
+    got, recovery = recover_log(path)
+    assert 150 < len(got) < 250
+    assert_same_samples(got, log, slice(300 - len(got), 300))
+    assert len(recovery.lost) == 2
+
+
 def test_a_damaged_attachment_is_not_kept(tmp_path, intact, small_log):
     place = intact.find(b'name = "proton"')
     path = tmp_path / "damaged.mcap"

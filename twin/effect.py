@@ -39,7 +39,8 @@ VISCOUS = 13  # 1, factor on the viscous part
 HOLD = 14  # N, friction that would bring the axis to rest within this sample
 READING = 15  # m, encoder reading
 OUT = 16  # N, result of a force or friction law
-IO_SIZE = 17
+WHEN = 17  # 1, where in the sample states are wanted: 1 its end (stepping), 1/2 its middle (walk)
+IO_SIZE = 18
 
 Law = Callable[[Any, Any, Any], None]
 

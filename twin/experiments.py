@@ -21,9 +21,9 @@ from twin.log import AxisLog, Log
 from twin.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
 from twin.model import StageModel
 from twin.model_file import format_model
-from twin.trajectory.setpoint import Setpoint
 from twin.simulator import MujocoStage, Progress, ReducedStage, Run, run
 from twin.trajectory import Limits
+from twin.trajectory.setpoint import Setpoint
 
 MAP_SPEEDS = (0.0005, 0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.02, 0.04, 0.08)  # m/s
 

@@ -20,6 +20,7 @@ from twin.effect import (
     MASS,
     TIME,
     V_OTHER,
+    WHEN,
     X_OTHER,
     U,
     V,
@@ -102,6 +103,7 @@ def run_reduced(
     n, n_axes = noise.shape
     entries, axes, parameters = table
     io = np.zeros(IO_SIZE)
+    io[WHEN] = 1.0
     force = np.zeros(n_axes)
     coupled = np.zeros((n_axes, 3))
     for k in range(n):

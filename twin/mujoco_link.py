@@ -31,6 +31,7 @@ from twin.effect import (
     MASS,
     TIME,
     V_OTHER,
+    WHEN,
     X_OTHER,
     U,
     V,
@@ -198,6 +199,7 @@ def passive_forces(block, data, off):
         io[INDEX] = np.rint(time / dt)
         io[TIME] = time
         io[DT] = dt
+        io[WHEN] = 1.0
         io[X] = qpos[int(axes[a, 4])]
         io[V] = qvel[int(axes[a, 5])]
         io[U] = ctrl[int(axes[a, 6])]

@@ -34,6 +34,7 @@ from twin.effect import (
     TIME,
     V_OTHER,
     VISCOUS,
+    WHEN,
     X_OTHER,
     Effect,
     Kind,
@@ -147,6 +148,7 @@ def walk(entries, first, last, parameters, states, at, motion, others, dt, begin
     io = np.zeros(IO_SIZE)
     row = np.zeros(entries.shape[0])
     io[DT] = dt
+    io[WHEN] = 0.5
     for k in range(motion.shape[1]):
         io[INDEX] = begin + k
         io[TIME] = (begin + k) * dt

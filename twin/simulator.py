@@ -220,7 +220,7 @@ def _watched(
         states = effects[label].states
         if 0 < len(states) <= WATCHED_STATES:
             indices += [int(entry[3]) + i for i in range(len(states))]
-            names += [(label[0], f"{label[1]}.{s}") for s in states]
+            names += [(label[0], f"{label[1]}_{s}") for s in states]
     return np.array(indices, dtype=np.int64), tuple(names)
 
 

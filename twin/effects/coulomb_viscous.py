@@ -8,21 +8,21 @@ level allows it, exactly that force acts and the axis is at rest to rounding, so
 
 from math import copysign
 
-from twin.effect import DRY, HOLD, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
+from twin.effect import DRY, HOLD, INDEX, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
     viscous = p[2] * io[VISCOUS] * io[V]
     sliding = p[0] * io[DRY]
     level = sliding
-    if s[0] == 0.0:  # at rest, as at the start: the static level holds
+    if s[0] > 0.5 or io[INDEX] == 0.0:  # at rest, as at the start: the static level holds
         level = max(sliding, p[1] * io[DRY] * io[STATIC])
     needed = io[HOLD] - viscous
     if abs(needed) <= level:
-        s[0] = 0.0
+        s[0] = 1.0
         io[OUT] = io[HOLD]
     else:
-        s[0] = 1.0
+        s[0] = 0.0
         io[OUT] = copysign(sliding, needed) + viscous
 
 
@@ -42,7 +42,7 @@ EFFECT = Effect(
         ),
         Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
     ),
-    states=("sliding",),
+    states=("at_rest",),
     law=law,
     fingerprint="force steps at every reversal, and grows in proportion to speed",
     excited_by="constant-speed passes in both directions at several speeds",

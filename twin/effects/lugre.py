@@ -9,7 +9,7 @@ stiffness is stable.
 
 from math import copysign, exp, expm1
 
-from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -24,8 +24,9 @@ def law(p, s, io):
     else:
         grown = -expm1(-sigma0 * abs(v) / level * io[DT])
         change = (copysign(level / sigma0, v) - s[0]) * grown
+        z = s[0] + io[WHEN] * change
         s[0] += change
-        io[OUT] = sigma0 * s[0] + sigma1 * change / io[DT] + viscous * io[VISCOUS] * v
+        io[OUT] = sigma0 * z + sigma1 * change / io[DT] + viscous * io[VISCOUS] * v
 
 
 EFFECT = Effect(

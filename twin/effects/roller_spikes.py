@@ -10,22 +10,25 @@ has no jump at rest. L. Jia 2023: rollers 34 mm apart make force spikes every 34
 
 from math import copysign, expm1, floor
 
-from twin.effect import DT, OUT, Effect, Kind, Parameter, V, X
+from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V, X
 
 TURN = 2e-5  # m of travel over which a reversal turns the braking part round
 
 
 def law(p, s, io):
     pitch = p[0]
+    direction = s[0]
     if io[V] != 0.0:
-        s[0] -= (copysign(1.0, io[V]) - s[0]) * expm1(-abs(io[V]) * io[DT] / TURN)
+        change = -(copysign(1.0, io[V]) - s[0]) * expm1(-abs(io[V]) * io[DT] / TURN)
+        direction += io[WHEN] * change
+        s[0] += change
     turns = (io[X] - p[2]) / pitch
     distance = (turns - floor(turns + 0.5)) * pitch
     r = 2.0 * distance / p[1]
     bump = 0.0
     if abs(r) < 1.0:
         bump = (1.0 - r * r) * (1.0 - r * r)
-    io[OUT] = -0.5 * ((p[3] + p[4]) * s[0] + (p[3] - p[4])) * bump
+    io[OUT] = -0.5 * ((p[3] + p[4]) * direction + (p[3] - p[4])) * bump
 
 
 EFFECT = Effect(

@@ -98,8 +98,8 @@ class Run:
         series = self._opened()
         if not series:
             return {}
-        rate = series[0].sample_rate()
-        first = [round(s.start * 1e-9 * rate) for s in series]
+        rate, zero = series[0].sample_rate(), min(s.start for s in series)
+        first = [round((s.start - zero) * 1e-9 * rate) for s in series]
         begin = max(first)
         end = max(begin, min(f + s.count for f, s in zip(first, series, strict=True)))
         return {s.topic.name: slice(begin - f, end - f) for f, s in zip(first, series, strict=True)}

@@ -167,7 +167,9 @@ def reading(path: Path) -> Iterator[None]:
         try:
             yield
         except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror}; check the name") from error
+            raise InputError(
+                f"cannot be read: {error.strerror or error}; check the name"
+            ) from error
         except MemoryError as error:
             raise InputError("does not fit into memory; split the log") from error
 

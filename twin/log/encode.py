@@ -105,14 +105,15 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
     Raises InputError where the folder or the disk refuses.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part = path.parent / f".{path.name}.{os.getpid()}.part"
     try:
         with open(part, "wb") as stream:
             yield stream
         os.replace(part, path)
     except OSError as error:
+        reason = error.strerror or error
         raise InputError(
-            f"{path}: cannot be written: {error.strerror}; check folder, rights and free space"
+            f"{path}: cannot be written: {reason}; check folder, rights and free space"
         ) from error
     finally:
         with suppress(OSError):

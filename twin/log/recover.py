@@ -73,7 +73,7 @@ class _Salvage:
 
     def log(self) -> Log:
         """The longest run; raises InputError where it is empty or not fit to be a log."""
-        count = self._best.common_count()
+        count = self._count(self._best)
         if count == 0:
             raise InputError(f"nothing can be recovered ({'; '.join(self.lost)})")
         # the rate is stated in every chunk too, and there a checksum protects it
@@ -105,14 +105,21 @@ class _Salvage:
         best, other = self._best, self._run
         if best is other:
             return
-        if other.common_count() > best.common_count():
+        if self._count(other) > self._count(best):
             best, other = other, best
-        if other.common_count():
+        if self._count(other):
             self.lost.append(
-                f"{other.common_count()} intact samples from {seconds(other.start())} are "
+                f"{self._count(other)} intact samples from {seconds(other.start())} are "
                 "left out: a gap separates them from the longer run"
             )
         self._best = best
+
+    def _count(self, run: Run) -> int:
+        try:
+            return run.common_count()
+        except InputError as error:
+            self.lost.append(str(error))
+            return 0
 
     def _records(self, data: bytes) -> Iterator[Record]:
         """Records one after the other; behind unreadable bytes, from the next chunk on."""

@@ -36,24 +36,28 @@ class Series:
             self.start = int(times[0])
             self._first_sequence = int(block.sequence[0])
         self._check_sequence(block.sequence)
+        elapsed = times - self.start
         if self._rate:
-            self._check_times(times - self.start, self.count, self._rate)
+            self._check_times(elapsed, self.count, self._rate)
+        elif self.count > 1:
+            self._check_step(float(elapsed[0]))
         self._reserve(len(times))
         span = slice(self.count, self.count + len(times))
         for name in self.topic.fields:
             part = self._columns[name][span]
             part[:] = block.columns.get(name, 0.0)
             self._check_finite(name, part, times)
-        if not self._rate:
-            self._columns[_TIME][span] = times - self.start
+        if _TIME in self._columns:
+            self._columns[_TIME][span] = elapsed
         self.count = span.stop
 
     def sample_rate(self) -> float:
         """Sample rate in Hz, stated or counted; raises InputError where times are uneven."""
         if self._rate is None:
-            elapsed = self._columns.pop(_TIME)[: self.count].astype(np.int64)
-            self._rate = self._counted_rate(elapsed)
-            self._check_times(elapsed, 0, self._rate)
+            elapsed = self._columns[_TIME][: self.count].astype(np.int64)
+            rate = self._counted_rate(elapsed)
+            self._check_times(elapsed, 0, rate)
+            self._rate = rate
         return self._rate
 
     def columns(self, span: slice) -> dict[str, Array]:
@@ -93,6 +97,13 @@ class Series:
             i = int(np.argmax(off))
             before = elapsed[i - 1] if i else expected[0] - 1e9 / rate
             self._refuse_time(first + i, float(before), float(elapsed[i]), rate)
+
+    def _check_step(self, elapsed: float) -> None:
+        """The step from the last sample to the next, where the rate is not known yet."""
+        last = float(self._columns[_TIME][self.count - 1])
+        period = last / (self.count - 1)
+        if elapsed - last > 1.5 * period > 0.0:
+            self._refuse_time(self.count, last, elapsed, 1e9 / period)
 
     def _refuse_time(self, sample: int, before: float, elapsed: float, rate: float) -> None:
         period = 1e9 / rate

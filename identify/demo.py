@@ -1,0 +1,153 @@
+"""The whole loop on a machine with an effect that the analysis is not told of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from identify import workflow
+from identify.candidates import orthonormal
+from identify.fit import Fit, fit_axis, rms
+from identify.planting import draw_effect, other_machine
+from identify.report import write_report
+from identify.residual import residual
+from identify.study import Study, studies
+from identify.workflow import Addition, Diagnosis
+from twin.effect import Effect, Kind
+from twin.effects import Catalogue
+from twin.errors import InputError
+from twin.experiments import simulate
+from twin.log import Log, write_log
+from twin.model import Fitted, StageModel
+from twin.model_file import save_model
+
+DURATION = 20.0  # s of each log
+FORCE = 0.05  # N RMS of the hidden effect, about 50 times the noise floor
+VISIBLE = 0.5  # part of the hidden force that the baseline must not be able to absorb
+AXIS = "x"
+
+
+@dataclass(frozen=True, eq=False)
+class Demo:
+    """What the demonstration did: the hidden effect, the diagnosis and the addition."""
+
+    hidden: Fitted
+    diagnosis: Diagnosis
+    addition: Addition | None
+    report: Path
+
+    @property
+    def named(self) -> bool:
+        """Whether the diagnosis named the hidden effect."""
+        effect = self.diagnosis.effect
+        return effect is not None and effect.name == self.hidden.effect.name
+
+
+def demo(
+    model: StageModel,
+    catalogue: Catalogue,
+    folder: Path,
+    seed: int,
+    say: Callable[[str], None] = print,
+    progress: workflow.Progress = workflow.silent,
+) -> Demo:
+    """Make a machine with a hidden effect, log it, and let the tools find the effect.
+
+    Writes machine_*.mcap, better.toml and report.html into the folder. Raises InputError where the
+    folder cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made: {error.strerror}; give another") from error
+    rng = np.random.default_rng(seed)
+    machine, hidden = hidden_machine(model, catalogue, rng)
+    say("1. a machine with an effect that the model lacks runs three experiments, logged as MCAP")
+    logs = {
+        f"machine_{i}.mcap": _record(
+            machine, folder / f"machine_{i}.mcap", seed + 1000 * i, progress
+        )
+        for i in (1, 2, 3)
+    }
+    held = {"machine_3.mcap": logs.pop("machine_3.mcap")}
+    say("2. the model (lugre, cable_slab, roller_spikes) is fitted, and every absent effect tried")
+    diagnosis = workflow.diagnose(model, logs, held, catalogue=catalogue, progress=progress)
+    addition = None
+    final = diagnosis.model
+    if diagnosis.effect is not None:
+        say(f"3. the diagnosis names {diagnosis.effect.name} on {diagnosis.leading.study.axis}")
+        addition = workflow.add(
+            diagnosis.effect, diagnosis.model, logs, held, axis=diagnosis.leading.study.axis,
+            progress=progress,
+        )  # fmt: skip
+        final = addition.model
+        say(_fallen(addition))
+    save_model(final, folder / "better.toml")
+    report = folder / "report.html"
+    write_report(
+        report,
+        title=f"{model.name}: what the model lacks",
+        diagnosis=diagnosis,
+        comparison=workflow.compare(final, {**logs, **held}),
+        history=final.history,
+        additions=[addition] if addition else [],
+    )
+    return Demo(hidden, diagnosis, addition, report)
+
+
+def _record(machine: StageModel, path: Path, seed: int, progress: workflow.Progress) -> Log:
+    log = simulate(
+        machine, "tracking", seed=seed, duration=DURATION,
+        progress=lambda done, total: progress(f"simulating {path.name}", done, total),
+    )  # fmt: skip
+    write_log(log, path)
+    return log
+
+
+def _fallen(addition: Addition) -> str:
+    step = addition.step
+    floor = addition.candidate.fit.floor
+    before, after = step.holdout_error_before, step.holdout_error_after
+    assert before is not None
+    assert after is not None
+    return (
+        f"4. added: the held-out force error falls from {1e3 * before:.2f} mN to "
+        f"{1e3 * after:.2f} mN, {before / after:.0f} times; the noise floor is {1e3 * floor:.2f} mN"
+    )
+
+
+def hidden_machine(
+    model: StageModel, catalogue: Catalogue, rng: np.random.Generator
+) -> tuple[StageModel, Fitted]:
+    """A machine of other values with one catalogue effect more on x, drawn from those that show."""
+    machine = model
+    for name, axis in model.axes.items():
+        machine = machine.with_axis(name, other_machine(axis, rng))
+    trial = simulate(machine, "tracking", seed=int(rng.integers(1 << 30)), duration=DURATION)
+    study = studies(machine, {"trial": trial}, {})[AXIS]
+    base = fit_axis(machine.axes[AXIS], study.fit)
+    absent = [e for e in catalogue.values() if _can_hide(e, machine)]
+    for index in rng.permutation(len(absent)):
+        hidden = draw_effect(
+            absent[index], machine.axes[AXIS], study.fit, study.excitation, FORCE, rng
+        )
+        if shows(hidden, base, study):
+            return machine.with_axis(AXIS, machine.axes[AXIS].with_effect(hidden)), hidden
+    raise InputError("no effect of the catalogue shows in this stage's motion; try another seed")
+
+
+def _can_hide(effect: Effect, machine: StageModel) -> bool:
+    return (
+        effect.name not in machine.axes[AXIS].names
+        and effect.kind in (Kind.FORCE, Kind.MODIFIER, Kind.ACTUATION)
+    )  # fmt: skip
+
+
+def shows(hidden: Fitted, base: Fit, study: Study) -> bool:
+    """Whether the parameters of the base can not take over the hidden effect's force."""
+    force = residual(base.axis.with_effect(hidden), study.fit)[base.kept] - base.residual
+    basis = orthonormal(base.jacobian)
+    return rms(force - basis @ (basis.T @ force)) > VISIBLE * rms(force)

@@ -1,0 +1,87 @@
+"""Draw a machine: a stage with other values than the model's, and an effect the model lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.fit import rms
+from identify.residual import Windowed, residual
+from twin.effect import Effect, Excitation
+from twin.model import AxisModel, Fitted, coordinates, read, write
+
+Array = NDArray[np.float64]
+
+SPREAD = 0.2  # relative spread of a machine's values about the model's
+
+
+def other_machine(axis: AxisModel, rng: np.random.Generator) -> AxisModel:
+    """The axis with every free value of its effects moved by up to 20 %."""
+    where = [c for c in coordinates(axis) if c.effect]
+    values = read(axis, where) * (1.0 + SPREAD * rng.uniform(-1.0, 1.0, len(where)))
+    for i, c in enumerate(where):
+        if c.parameter.at_least:
+            floor = next(
+                (
+                    values[j]
+                    for j, d in enumerate(where)
+                    if d.effect == c.effect and d.parameter.name == c.parameter.at_least
+                ),
+                c.parameter.lower,
+            )
+            values[i] = max(values[i], floor)
+        values[i] = min(max(values[i], c.parameter.lower), c.parameter.upper)
+    return write(axis, where, values)
+
+
+def draw_effect(
+    effect: Effect,
+    axis: AxisModel,
+    logs: Sequence[Windowed],
+    excitation: Excitation,
+    force: float,
+    rng: np.random.Generator,
+) -> Fitted:
+    """Random values of an effect such that it changes the axis' force by ``force`` (N RMS).
+
+    Shape parameters are drawn between the ends of what a diagnosis would scan; strengths in a
+    random direction, scaled along the motion of the logs.
+    """
+    values = effect.starts(excitation)
+    for p in effect.parameters:
+        if p.scan and not p.strength:
+            low, high = min(p.scan(excitation)), max(p.scan(excitation))
+            if low > 0:
+                values[p.name] = float(np.exp(rng.uniform(np.log(low), np.log(high))))
+            else:
+                values[p.name] = float(rng.uniform(low, high))
+    direction = {p.name: _direction(p.lower, rng) for p in effect.strengths}
+    base = residual(axis, logs)
+
+    def at(scale: float) -> Fitted:
+        moved = {
+            p.name: float(np.clip(scale * direction[p.name], p.lower, p.upper))
+            for p in effect.strengths
+        }
+        return Fitted.at_start(effect, {**values, **moved})
+
+    def error(scale: float) -> float:
+        return rms(residual(axis.with_effect(at(scale)), logs) - base) - force
+
+    return at(_root(error))
+
+
+def _direction(lower: float, rng: np.random.Generator) -> float:
+    size = rng.uniform(0.5, 1.5)
+    return float(size if lower >= 0 else size * rng.choice((-1.0, 1.0)))
+
+
+def _root(error: Callable[[float], float]) -> float:
+    """Scale at which a growing error crosses zero, by bisection on the logarithm."""
+    low, high = 1e-9, 1e9
+    for _ in range(60):
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if error(middle) < 0 else (low, middle)
+    return float(low)
