@@ -31,8 +31,7 @@ class Motion:
     name: of the log. signals (3, n): position m, velocity m/s, command N. others (3, n): position,
     velocity, acceleration of the other axis (zero where there is none). period: s, of a block.
     start: s, middle of the first block. sample_period: s, of the log. position_noise: m rms.
-    raw (2, m): at the log's own rate, mean command N over two samples and second difference of the
-    position m/s^2, which belong to the same instants; only the noise floor is taken from them.
+    raw (2, n * samples a block): velocity m/s and command N at the log's own rate.
     """
 
     name: str
@@ -105,7 +104,7 @@ def motion_of(log: Log, axis: str, name: str) -> Motion:
         start=0.5 * block * log.period,
         sample_period=log.period,
         position_noise=noise,
-        raw=np.stack([0.5 * (force[1:-1] + force[:-2]), np.diff(position, 2) / log.period**2]),
+        raw=np.stack([np.diff(position) / log.period, force[:-1]])[:, : block * signals.shape[1]],
     )
 
 

@@ -31,8 +31,8 @@ def noise_floor(mass: float, logs: Sequence[tuple[Motion, Window]]) -> float:
 
 def _variance(mass: float, motion: Motion, window: Window) -> float:
     dt = motion.sample_period
-    force, acceleration = motion.raw
-    raw = force - mass * acceleration
+    velocity, command = motion.raw
+    raw = 0.5 * (command[1:] + command[:-1]) - mass * np.diff(velocity) / dt
     # The median over segments passes by those with spikes and reversals.
     segment = min(4096, len(raw))
     frequency, power = welch(raw, 1.0 / dt, nperseg=segment, average="median")

@@ -33,9 +33,9 @@ class Windowed:
     def of(cls, motion: Motion, length: float) -> Windowed:
         """Weak form with windows of that length (s)."""
         window = Window.of_length(length, motion.period)
-        return cls(
-            motion, window, window.mean(motion.command), window.acceleration(motion.velocity)
-        )
+        fine = window.refined(round(motion.period / motion.sample_period))
+        velocity, command = motion.raw
+        return cls(motion, window, fine.mean(command), fine.acceleration(velocity))
 
     @property
     def time(self) -> Array:

@@ -43,15 +43,18 @@ class Window:
                 f"window = {length:g} s: shorter than 8 blocks of {period:g} s; give at least "
                 f"{8 * period:g} s"
             )
-        r = (np.arange(n) + 0.5) / n * 2.0 - 1.0
-        phi = (1.0 - r**2) ** 2
+        return cls._of_blocks(n, period, max(n // OVERLAP, 1))
+
+    @classmethod
+    def _of_blocks(cls, n: int, period: float, stride: int) -> Window:
         edges = (1.0 - (np.arange(n + 1) / n * 2.0 - 1.0) ** 2) ** 2
-        return cls(
-            period=period,
-            weights=phi / phi.sum(),
-            slope=np.diff(edges) / phi.sum() / period,
-            stride=max(n // OVERLAP, 1),
-        )
+        phi = 0.5 * (edges[1:] + edges[:-1])
+        return cls(period, phi / phi.sum(), np.diff(edges) / phi.sum() / period, stride)
+
+    def refined(self, parts: int) -> Window:
+        """The same windows over blocks ``parts`` times shorter."""
+        n = len(self.weights) * parts
+        return self._of_blocks(n, self.period / parts, self.stride * parts)
 
     def mean(self, signals: Array) -> Array:
         """Windowed means of signals (..., n) -> (..., n_windows)."""

@@ -139,7 +139,7 @@ def axis_force(entries, first, last, parameters, states, at, io, rows):
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def walk(entries, first, last, parameters, states, at, motion, others, dt, begin, rows):
-    """Forces along a measured motion: the laws stepped over every sample, the first being ``begin``.
+    """Forces along a measured motion: the laws stepped over every sample from ``begin`` on.
 
     motion (3, n): position m, velocity m/s, command N; others (3, n): position, velocity,
     acceleration of the other axis. Friction slides wherever v != 0, by an infinite mass: what holds

@@ -72,7 +72,7 @@ class MujocoStage:
         self._step = step_address()
 
     def place(self, position: Array, velocity: Array, states: Array, first: int) -> None:
-        """Put the axes at positions (n_axes,) m and velocities m/s, with effect states, at sample."""
+        """See Stepper."""
         self.data.time = first * self.model.opt.timestep
         self.data.qpos[self._where[:, 0]] = position
         self.data.qvel[self._where[:, 1]] = velocity
@@ -99,7 +99,7 @@ class ReducedStage:
         self._masses = table.masses
 
     def place(self, position: Array, velocity: Array, states: Array, first: int) -> None:
-        """Put the axes at positions (n_axes,) m and velocities m/s, with effect states, at sample."""
+        """See Stepper."""
         self._motion[:, 0] = position
         self._motion[:, 1] = velocity
         self._states[:] = states
