@@ -44,6 +44,8 @@ IO_SIZE = 18
 
 Law = Callable[[Any, Any, Any], None]
 
+ELEMENTS = "elements"  # the parameter that counts the elements of an effect with ``of_size``
+
 
 class Kind(Enum):
     """What a law acts on; the values give the order of computation within a sample."""
@@ -112,7 +114,8 @@ class Effect:
 
     equation and source: as printed in `twin effects NAME`. states: names of internal states.
     fingerprint: what is left in the residual when the effect is missing. excited_by: the motion
-    that shows it. replaces: this friction is a richer form of those kinds of friction.
+    that shows it. of_size: for a law of any number of elements, the effect with that many; its
+    parameter ``elements``, whose bounds are both that number, tells the law.
     """
 
     kind: Kind
@@ -124,6 +127,7 @@ class Effect:
     fingerprint: str
     excited_by: str
     states: tuple[str, ...] = ()
+    of_size: Callable[[int], Effect] | None = None
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]

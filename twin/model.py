@@ -9,11 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.effect import Effect, Kind, Parameter
+from twin.effect import ELEMENTS, Effect, Kind, Parameter
 from twin.errors import InputError
 from twin.native import Table, build_table
 
 MASS = Parameter("mass", "kg", 1.0, 1e-6, 1e6, "moved mass")
+MOST_ELEMENTS = 1000
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class Fitted:
     @classmethod
     def at_start(cls, effect: Effect, values: Mapping[str, float] | None = None) -> Fitted:
         """The effect at its start values, or those given; checks names and bounds (InputError)."""
+        effect = _sized(effect, values or {})
         merged = {**effect.starts(), **(values or {})}
         for name, value in merged.items():
             _check_value(effect, name, value)
@@ -57,6 +59,20 @@ class Fitted:
     def vector(self) -> list[float]:
         """Values in the order of the effect's parameters."""
         return [self.values[p.name] for p in self.effect.parameters]
+
+
+def _sized(effect: Effect, values: Mapping[str, float]) -> Effect:
+    """The effect with as many elements as its values ask for."""
+    count = values.get(ELEMENTS)
+    if effect.of_size is None or count is None:
+        return effect
+    whole = isinstance(count, int | float) and float(count).is_integer()
+    if not (whole and 1 <= count <= MOST_ELEMENTS):
+        raise InputError(
+            f"{effect.name}.{ELEMENTS} = {count}: give a whole number of elements from 1 to "
+            f"{MOST_ELEMENTS}"
+        )
+    return effect.of_size(int(count))
 
 
 def _check_value(effect: Effect, name: str, value: float) -> None:
@@ -207,7 +223,7 @@ def coordinates(axis: AxisModel) -> tuple[Coordinate, ...]:
         Coordinate(f.effect.name, p)
         for f in axis.effects
         for p in f.effect.parameters
-        if p.name not in f.fixed
+        if p.name not in f.fixed and p.lower < p.upper
     )
 
 

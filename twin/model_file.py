@@ -7,7 +7,7 @@ import math
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -126,10 +126,10 @@ def _fitted(effect: Any, entry: Mapping[str, Any]) -> Fitted:
     fitted = Fitted.at_start(effect, {k: v for k, v in entry.items() if k != "fixed"})
     if "fixed" not in entry:
         return fitted
-    unknown = set(entry["fixed"]) - {p.name for p in effect.parameters}
+    unknown = set(entry["fixed"]) - set(fitted.values)
     if unknown:
         raise InputError(f"effect '{effect.name}': fixed names unknown {', '.join(unknown)}")
-    return Fitted(effect, fitted.values, frozenset(entry["fixed"]))
+    return replace(fitted, fixed=frozenset(entry["fixed"]))
 
 
 def _history_step(entry: Mapping[str, Any]) -> HistoryStep:

@@ -1,0 +1,157 @@
+"""Leuven friction: hysteresis that remembers where it turned, joined to the Stribeck curve.
+
+dz/dt = v (1 - sgn(r) |r|^m) with r = F_d/(s(v) - F_b);  F_h = F_b + F_d;
+friction = F_h + sigma1 dz/dt + sigma2 v;  s(v) = g(v) sgn(v),
+g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n). F_b is the hysteresis force F_h where the present branch
+began and F_d(z), odd and growing, the transition curve along it; both at work since the last
+reversal. A reversal begins a branch and is put on a stack; when a branch comes back to where the
+branch before it began, the inner loop is closed and forgotten, and the branch before that goes on.
+J. Swevers, F. Al-Bender, C. G. Ganseman, T. Prajogo, "An integrated friction model structure with
+improved presliding behavior for accurate friction compensation", IEEE TAC 45 (2000); thesis
+eq. 2.10-2.12. As in the paper dz/dt jumps where a loop closes, because F_b does.
+
+The paper leaves F_d open. Here the stiffness falls along it as dF_d/dz = sigma0 exp(-b |F_d|/2 Fs),
+and on the first branch, from rest or from sliding (F_b = 0), twice as fast (Masing's rule), so that
+loops are symmetric; the stiffness falls by e^b up to Fs. Once F_h reaches s(v) the axis slides and
+the stack is emptied. It holds TURNS reversals; when one more comes, the last two, which bound the
+smallest loop, are dropped: the force does not jump, only that loop is not closed any more. As F_h
+fixes z on a branch, F_h is the state. Within a sample F_d approaches its end s(v) - F_b
+exponentially, at the mean of the rates at both ends of the step: any stiffness is stable.
+"""
+
+from math import copysign, exp, expm1, log, log1p
+
+from numba.extending import register_jitable
+
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
+
+TURNS = 16  # reversals remembered
+FULL = 1.0 - 1e-12  # part of a gap that counts as all of it
+MOST = 100.0  # exponent beyond which the stiffness is as good as gone
+FORCE, DIRECTION, DEPTH, STACK = range(4)  # states; the stack comes last
+
+
+@register_jitable
+def turn(s, direction):
+    """Begin a branch where the direction of motion has changed."""
+    depth = int(s[DEPTH])
+    if s[DIRECTION] == -direction:
+        if depth == TURNS:
+            depth -= 2
+        s[STACK + depth] = s[FORCE]
+        s[DEPTH] = depth + 1.0
+    s[DIRECTION] = direction
+
+
+@register_jitable
+def mean_rate(gap, length, m, softening):
+    """Mean rate at which F_d nears its end, of those at the start and at the end of a step.
+
+    The rate is stiffness (1 - sgn(r)|r|^m)/(1 - r) over the stiffness at r = 0. gap: 1 - r at the
+    start; length: of the path, over the reach by that stiffness; softening: exponent by which the
+    stiffness falls up to r = 1.
+    """
+    rate = 0.0
+    ahead = gap
+    for stage in range(2):
+        r = min(max(1.0 - ahead, 0.0), 1e3)
+        slope = m
+        if ahead != 0.0:
+            slope = (-expm1(m * log(r)) if r > 0.0 else 1.0) / ahead
+        slope *= exp(-min(softening * r, MOST))
+        rate = slope if stage == 0 else 0.5 * (rate + slope)
+        ahead = gap * exp(-rate * length)
+    return rate
+
+
+@register_jitable
+def advance(p, s, io, level):
+    """Step the hysteresis along the path of a sample; its deflection, m."""
+    direction = copysign(1.0, io[V])
+    path = abs(io[V]) * io[DT]
+    soft = p[6] / (io[DRY] * max(p[1] * io[STATIC], p[0]))  # b/Fs
+    deflected = 0.0
+    for _ in range(TURNS):
+        if direction * s[FORCE] >= level:  # the axis slides
+            s[DEPTH] = 0.0
+        depth = int(s[DEPTH])
+        base = s[STACK + depth - 1] if depth > 0 else 0.0
+        reach = level - direction * base
+        along = direction * (s[FORCE] - base)
+        gap = 1.0 - along / reach
+        if path <= 0.0 or gap == 0.0:
+            break
+        own = soft if depth == 0 else 0.5 * soft
+        rate = p[4] / reach * mean_rate(gap, p[4] * path / reach, p[7], own * reach)
+        change = -reach * gap * expm1(-rate * path)
+        # a loop closes where the branch before began; the first, at the mirror image of its start
+        closing = s[STACK + depth - 2] if depth > 1 else -base
+        left = direction * (closing - s[FORCE])
+        if depth > 0 and change >= left:
+            change = left
+            path += log1p(-min(left / (reach * gap), FULL)) / rate
+            s[FORCE] = closing
+            s[DEPTH] = max(depth - 2.0, 0.0)
+        else:
+            path = 0.0
+            s[FORCE] += direction * change
+        bend = own * change
+        longer = expm1(bend) / bend if bend != 0.0 else 1.0
+        deflected += direction * change / p[4] * exp(min(own * along, MOST)) * longer
+    return deflected
+
+
+def law(p, s, io):
+    v = io[V]
+    q = abs(v) / p[2]
+    fall = exp(-q * q) if p[8] == 2.0 else exp(-(q ** p[8]))
+    level = io[DRY] * (p[0] + (p[1] * io[STATIC] - p[0]) * fall)
+    io[OUT] = p[3] * io[VISCOUS] * v
+    if level > 0.0:
+        if v != 0.0:
+            turn(s, copysign(1.0, v))
+        before = s[FORCE]
+        deflected = advance(p, s, io, level)
+        io[OUT] += before + io[WHEN] * (s[FORCE] - before) + p[5] * deflected / io[DT]
+    else:
+        for i in range(STACK + TURNS):
+            s[i] = 0.0
+
+
+EFFECT = Effect(
+    kind=Kind.FRICTION,
+    summary="hysteresis with memory of its reversals, joined to the Stribeck curve",
+    equation="dz/dt = v (1 - sgn(r) |r|^m), r = F_d/(g(v) sgn v - F_b);  F_h = F_b + F_d(z), "
+    "dF_d/dz = sigma0 exp(-b |F_d|/2 Fs);  F = F_h + sigma1 dz/dt + sigma2 v;  "
+    "g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n)",
+    source="Swevers et al. 2000; L. Jia 2023, eq. 2.10-2.12",
+    parameters=(
+        Parameter(
+            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True,
+            start_rule=lambda e: e.dry_level,
+        ),
+        Parameter(
+            "Fs", "N", 0.35, 0.0, 1e4, "static friction", strength=True, at_least="Fc",
+            start_rule=lambda e: 1.15 * e.dry_level,
+        ),
+        Parameter(
+            "v0", "m/s", 0.01, 1e-5, 1.0, "Stribeck velocity",
+            start_rule=lambda e: 0.05 * e.speed_max,
+            scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
+        ),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
+        Parameter(
+            "sigma0", "N/m", 300.0, 1.0, 1e9, "stiffness after a reversal",
+            start_rule=lambda e: 1e3 * e.dry_level,
+            scan=lambda e: tuple(e.dry_level / z for z in (1e-3, 1e-4, 1e-5)),
+        ),
+        Parameter("sigma1", "N s/m", 0.5, 1e-6, 1e5, "bristle damping"),
+        Parameter("b", "1", 1.5, 0.0, 10.0, "log of the factor the stiffness falls by up to Fs"),
+        Parameter("m", "1", 16.0, 1.0, 50.0, "sharpness of the onset of sliding", fixed=True),
+        Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
+    ),
+    states=("F_h", "direction", "depth", *(f"turn_{i + 1}" for i in range(TURNS))),
+    law=law,
+    fingerprint="residual after a reversal that depends on where the axis turned before",
+    excited_by="slow reversals with inner loops within the pre-sliding, and a velocity staircase",
+)  # fmt: skip
