@@ -36,7 +36,7 @@ def law(p, s, io):
 
 EFFECT = Effect(
     kind=Kind.FRICTION,
-    summary="rate-independent pre-sliding: friction builds up along the path like a yielding spring",
+    summary="pre-sliding like that of a yielding spring, the same at every speed",
     equation="dF/dx = sigma0 sgn(r) |r|^n,  r = 1 - F sgn(v)/Fc;  friction = F + sigma2 v",
     source="Dahl 1968; Dahl 1976; with the viscous part added",
     parameters=(

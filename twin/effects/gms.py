@@ -6,7 +6,10 @@ sigma2 v, with sum a_i = 1 and g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n).
 F. Al-Bender, V. Lampaert, J. Swevers, "The generalized Maxwell-slip model: a novel model for
 friction simulation and compensation", IEEE TAC 50 (2005); thesis eq. 2.16-2.18. The slip equation
 is usually printed as sgn(v) C (a_i - F_i/s(v)). That needs s(v) = g(v) sgn(v), which is followed
-here: with an unsigned g an element would never settle while moving backwards.
+here: with an unsigned g an element would never settle while moving backwards. One limit is added:
+a slipping element's force rises by no more than k_i |v| dt, what its spring is stretched by;
+without it a level that rises near standstill (C does not see v) would load the springs from
+nothing, and a reversal would give that energy out.
 
 Unless given one by one, elements share the force equally and yield after deflections in geometric
 progression, the last after ``spread`` times the deflection of the first: a_i ~ share_i and k_i ~
@@ -51,8 +54,8 @@ def advance(p, s, io, level):
         change = p[SHARES + count + i] * stretch
         stretch *= ratio
         slips = moves and (s[count + i] == direction or direction * s[i] >= limit)
-        if slips:
-            change = (direction * limit - s[i]) * settled
+        if slips:  # towards the curve, but rising no faster than the spring is stretched
+            change = direction * min((limit - direction * s[i]) * settled, direction * change)
         elif moves and direction * (s[i] + change) >= limit:
             slips = True
             change = direction * limit - s[i]
@@ -85,18 +88,24 @@ def of_size(elements: int) -> Effect:
         "slip: dF_i/dt = C (a_i sgn v - F_i/g(v));  F = sum F_i + sigma2 v;  "
         "g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n)",
         source="Al-Bender, Lampaert, Swevers 2005; L. Jia 2023, eq. 2.16-2.18",
-        parameters=(*_shared(elements), *_own("share", numbers), *_own("stiff", numbers)),
+        parameters=(
+            *_shared(elements),
+            *_own("share", "force", numbers),
+            *_own("stiff", "stiffness", numbers),
+        ),
         states=(*(f"F_{i}" for i in numbers), *(f"slip_{i}" for i in numbers)),
         law=law,
         fingerprint="residual after a reversal that depends on where the axis turned before",
-        excited_by="slow reversals with inner loops within the pre-sliding, and a velocity staircase",
+        excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
         of_size=of_size,
     )
 
 
 def _shared(elements: int) -> tuple[Parameter, ...]:
     return (
-        Parameter("elements", "1", elements, elements, elements, "number N of elements"),
+        Parameter(
+            "elements", "1", elements, elements, elements, "number N, from the model file"
+        ),
         Parameter(
             "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True,
             start_rule=lambda e: e.dry_level,
@@ -125,11 +134,14 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
     )  # fmt: skip
 
 
-def _own(part: str, numbers: range) -> tuple[Parameter, ...]:
+def _own(part: str, what: str, numbers: range) -> tuple[Parameter, ...]:
     return tuple(
-        Parameter(f"{part}_{i}", "1", 1.0, 1e-6, 1e6, f"{part} of element {i}", fixed=True)
+        Parameter(
+            f"{part}_{i}", "1", 1.0, 1e-6, 1e6, f"element {i}: relative part of the {what}",
+            fixed=True,
+        )
         for i in numbers
-    )
+    )  # fmt: skip
 
 
 EFFECT = of_size(4)

@@ -6,20 +6,23 @@ g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n). F_b is the hysteresis force F_h where the 
 began and F_d(z), odd and growing, the transition curve along it; both at work since the last
 reversal. A reversal begins a branch and is put on a stack; when a branch comes back to where the
 branch before it began, the inner loop is closed and forgotten, and the branch before that goes on.
+s(v) carries the sign of v: with an unsigned g, z would run away while moving backwards.
 J. Swevers, F. Al-Bender, C. G. Ganseman, T. Prajogo, "An integrated friction model structure with
 improved presliding behavior for accurate friction compensation", IEEE TAC 45 (2000); thesis
-eq. 2.10-2.12. As in the paper dz/dt jumps where a loop closes, because F_b does.
+eq. 2.10-2.12. dz/dt jumps where a loop closes, because F_b does: a property of the model, which
+its modification of 2002 removes. While the level falls, r > 1 and z goes back at v (r^m - 1), so a
+large m with a large sigma1 makes the friction dip.
 
-The paper leaves F_d open. Here the stiffness falls along it as dF_d/dz = sigma0 exp(-b |F_d|/2 Fs),
-and on the first branch, from rest or from sliding (F_b = 0), twice as fast (Masing's rule), so that
-loops are symmetric; the stiffness falls by e^b up to Fs. Once F_h reaches s(v) the axis slides and
-the stack is emptied. It holds TURNS reversals; when one more comes, the last two, which bound the
+The model leaves F_d and m open. Here m = 16 at the start; the stiffness along F_d falls as
+sigma0 exp(-b |F_d|/2 Fs), and on the first branch, from rest or from sliding (F_b = 0), twice as
+fast (Masing's rule), so that loops are symmetric. Once F_h reaches s(v) the axis slides and the
+stack is emptied. It holds TURNS reversals; when one more comes, the last two, which bound the
 smallest loop, are dropped: the force does not jump, only that loop is not closed any more. As F_h
-fixes z on a branch, F_h is the state. Within a sample F_d approaches its end s(v) - F_b
-exponentially, at the mean of the rates at both ends of the step: any stiffness is stable.
+fixes z on a branch, F_h is the state. Within a sample F_d nears its end s(v) - F_b exponentially,
+at the mean of the rates at both ends of the step: any stiffness is stable.
 """
 
-from math import copysign, exp, expm1, log, log1p
+from math import copysign, exp, expm1, log1p
 
 from numba.extending import register_jitable
 
@@ -27,6 +30,7 @@ from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Param
 
 TURNS = 16  # reversals remembered
 FULL = 1.0 - 1e-12  # part of a gap that counts as all of it
+NEAR = 1e-7  # gap below which its slope is that at its end
 MOST = 100.0  # exponent beyond which the stiffness is as good as gone
 FORCE, DIRECTION, DEPTH, STACK = range(4)  # states; the stack comes last
 
@@ -44,24 +48,14 @@ def turn(s, direction):
 
 
 @register_jitable
-def mean_rate(gap, length, m, softening):
-    """Mean rate at which F_d nears its end, of those at the start and at the end of a step.
+def slope(gap, m, softening):
+    """Stiffness (1 - sgn(r)|r|^m)/(1 - r), with 1 - r = gap, over the stiffness at r = 0.
 
-    The rate is stiffness (1 - sgn(r)|r|^m)/(1 - r) over the stiffness at r = 0. gap: 1 - r at the
-    start; length: of the path, over the reach by that stiffness; softening: exponent by which the
-    stiffness falls up to r = 1.
+    softening: exponent by which the stiffness falls up to r = 1.
     """
-    rate = 0.0
-    ahead = gap
-    for stage in range(2):
-        r = min(max(1.0 - ahead, 0.0), 1e3)
-        slope = m
-        if ahead != 0.0:
-            slope = (-expm1(m * log(r)) if r > 0.0 else 1.0) / ahead
-        slope *= exp(-min(softening * r, MOST))
-        rate = slope if stage == 0 else 0.5 * (rate + slope)
-        ahead = gap * exp(-rate * length)
-    return rate
+    r = min(max(1.0 - gap, 0.0), 1e3)
+    ratio = m if abs(gap) < NEAR else (1.0 - r**m) / gap
+    return ratio * exp(-min(softening * r, MOST))
 
 
 @register_jitable
@@ -82,7 +76,9 @@ def advance(p, s, io, level):
         if path <= 0.0 or gap == 0.0:
             break
         own = soft if depth == 0 else 0.5 * soft
-        rate = p[4] / reach * mean_rate(gap, p[4] * path / reach, p[7], own * reach)
+        rate = p[4] / reach * slope(gap, p[7], own * reach)
+        ahead = slope(gap * exp(-rate * path), p[7], own * reach)
+        rate = 0.5 * (rate + p[4] / reach * ahead)
         change = -reach * gap * expm1(-rate * path)
         # a loop closes where the branch before began; the first, at the mirror image of its start
         closing = s[STACK + depth - 2] if depth > 1 else -base
@@ -95,9 +91,8 @@ def advance(p, s, io, level):
         else:
             path = 0.0
             s[FORCE] += direction * change
-        bend = own * change
-        longer = expm1(bend) / bend if bend != 0.0 else 1.0
-        deflected += direction * change / p[4] * exp(min(own * along, MOST)) * longer
+        softened = exp(min(own * (along + 0.5 * change), MOST))
+        deflected += direction * change / p[4] * softened
     return deflected
 
 
@@ -153,5 +148,5 @@ EFFECT = Effect(
     states=("F_h", "direction", "depth", *(f"turn_{i + 1}" for i in range(TURNS))),
     law=law,
     fingerprint="residual after a reversal that depends on where the axis turned before",
-    excited_by="slow reversals with inner loops within the pre-sliding, and a velocity staircase",
+    excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
 )  # fmt: skip

@@ -8,7 +8,8 @@ structure", IEEE TAC 47 (2002); thesis eq. 2.13-2.14. Against the Leuven model i
 of the force where an inner loop closes, and the stacks. s(v) carries the sign of v; with an
 unsigned g, z would run away while moving backwards. Two things are this project's choice: m = 16
 at the start (the larger, the less a biased vibration creeps: by about 2 r^m of its amplitude a
-cycle), and sum W_i = reserve max(Fs, Fc), for below Fs the friction could not follow s(v).
+cycle; but while the level falls, z goes back at v (r^m - 1), and with a large sigma1 the friction
+dips), and sum W_i = reserve max(Fs, Fc), for below Fs the friction could not follow s(v).
 
 Unless given one by one, elements share sum W_i equally and yield after deflections in geometric
 progression, the last after ``spread`` times the deflection of the first: W_i ~ share_i and k_i ~
@@ -26,6 +27,7 @@ from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Param
 
 SHARES = 11  # where the elements' own parameters begin
 FULL = 1.0 - 1e-12  # part of a limit, or of a gap, that counts as all of it
+NEAR = 1e-7  # gap below which its slope is that at its end
 
 
 @register_jitable
@@ -66,24 +68,12 @@ def sticking(p, s, count, share, spring, ratio, way):
 
 
 @register_jitable
-def mean_rate(gap, length, m):
-    """Mean of (1 - sgn(r)|r|^m)/(1 - r) at the start of a step, where 1 - r = gap, and at its end.
-
-    length: of the path, over level/stiffness.
-    """
-    rate = 0.0
-    ahead = gap
-    for stage in range(2):
-        r = min(max(1.0 - ahead, -1e3), 1e3)
-        if ahead == 0.0:
-            slope = m
-        elif r > 0.0:
-            slope = -expm1(m * log(r)) / ahead
-        else:
-            slope = (1.0 + (-r) ** m) / ahead
-        rate = slope if stage == 0 else 0.5 * (rate + slope)
-        ahead = gap * exp(-rate * length)
-    return rate
+def slope(gap, m):
+    """(1 - sgn(r)|r|^m)/(1 - r) with 1 - r = gap."""
+    r = min(max(1.0 - gap, -1e3), 1e3)
+    if abs(gap) < NEAR:
+        return m
+    return (1.0 - r**m if r > 0.0 else 1.0 + (-r) ** m) / gap
 
 
 @register_jitable
@@ -104,17 +94,18 @@ def advance(p, s, io, level):
             break
         way = direction if gap > 0.0 else -direction
         stiffness, room = sticking(p, s, count, share, spring, ratio, way)
-        rate = mean_rate(gap, stiffness * path / level, p[8])
+        rate = slope(gap, p[8])
+        rate = 0.5 * (rate + slope(gap * exp(-rate * stiffness / level * path), p[8]))
+        decay = rate * stiffness / level
         if stiffness == 0.0:
             step = abs(gap) * rate * path
         else:
-            step = -abs(gap) * expm1(-rate * stiffness * path / level) * level / stiffness
+            step = -abs(gap) * expm1(-decay * path) * level / stiffness
         if step < room:
             path = 0.0
         else:
             step = room
-            gone = min(step * stiffness / (level * abs(gap)), FULL)
-            path += log1p(-gone) * level / (rate * stiffness)
+            path += log1p(-min(step * stiffness / (level * abs(gap)), FULL)) / decay
         deflected += way * step
         force = deflect(p, s, count, share, spring, ratio, way * step)
     return before + io[WHEN] * (force - before), deflected / io[DT]
@@ -144,18 +135,24 @@ def of_size(elements: int) -> Effect:
         "dF_i/dz = k_i until |F_i| = W_i;  F = F_h + sigma1 dz/dt + sigma2 v;  "
         "g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n)",
         source="Lampaert, Swevers, Al-Bender 2002; L. Jia 2023, eq. 2.13-2.14",
-        parameters=(*_shared(elements), *_own("share", numbers), *_own("stiff", numbers)),
+        parameters=(
+            *_shared(elements),
+            *_own("share", "force", numbers),
+            *_own("stiff", "stiffness", numbers),
+        ),
         states=tuple(f"F_{i}" for i in numbers),
         law=law,
         fingerprint="residual after a reversal that depends on where the axis turned before",
-        excited_by="slow reversals with inner loops within the pre-sliding, and a velocity staircase",
+        excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
         of_size=of_size,
     )
 
 
 def _shared(elements: int) -> tuple[Parameter, ...]:
     return (
-        Parameter("elements", "1", elements, elements, elements, "number N of elements"),
+        Parameter(
+            "elements", "1", elements, elements, elements, "number N, from the model file"
+        ),
         Parameter(
             "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True,
             start_rule=lambda e: e.dry_level,
@@ -183,11 +180,14 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
     )  # fmt: skip
 
 
-def _own(part: str, numbers: range) -> tuple[Parameter, ...]:
+def _own(part: str, what: str, numbers: range) -> tuple[Parameter, ...]:
     return tuple(
-        Parameter(f"{part}_{i}", "1", 1.0, 1e-6, 1e6, f"{part} of element {i}", fixed=True)
+        Parameter(
+            f"{part}_{i}", "1", 1.0, 1e-6, 1e6, f"element {i}: relative part of the {what}",
+            fixed=True,
+        )
         for i in numbers
-    )
+    )  # fmt: skip
 
 
 EFFECT = of_size(4)
