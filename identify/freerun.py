@@ -105,6 +105,7 @@ def _states_at(
             walk(
                 table.entries, first, last, table.parameters, states, at, motion,
                 np.ascontiguousarray(others), period, begin, np.ascontiguousarray(rows[:, span]),
+                table.masses[a],
             )  # fmt: skip
         out[i] = states
         begin = int(start)

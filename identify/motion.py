@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.lines import lines
 from twin.effect import Excitation
 from twin.errors import InputError
 from twin.log import Log
@@ -148,4 +149,6 @@ def excitation(motions: list[Motion]) -> Excitation:
         dry_level=float(max(abs(gap) / 2.0, 1e-9)),
         duration=float(sum(len(m.time) * m.period for m in motions)),
         period=motions[0].period,
+        force_max=float(np.abs(command).max()),
+        lines=lines(motions),
     )

@@ -56,7 +56,7 @@ def forces(axis: AxisModel, motion: Motion) -> dict[str, Array]:
     first, last, state, _, _ = table.axes[0]
     walk(
         table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
-        motion.signals, motion.others, motion.period, 0, rows,
+        motion.signals, motion.others, motion.period, 0, rows, table.masses[0],
     )  # fmt: skip
     return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
 
@@ -98,7 +98,7 @@ def jacobian(axis: AxisModel, logs: Sequence[Windowed], where: Sequence[Coordina
     bases: dict[str, tuple[AxisModel, list[Array]]] = {}
     for j, c in enumerate(where):
         if not c.effect:
-            columns[:, j] = -np.concatenate([log.acceleration for log in logs])
+            columns[:, j] = _by_mass(axis, logs)
             continue
         if c.effect not in bases:
             group = group_of(axis, c.effect)
@@ -114,6 +114,19 @@ def jacobian(axis: AxisModel, logs: Sequence[Windowed], where: Sequence[Coordina
             ]
         )
     return columns
+
+
+def _by_mass(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
+    """Derivative by the moved mass, to which the forces of structure are in proportion."""
+    attached = replace(
+        axis, effects=tuple(f for f in axis.effects if f.effect.kind is Kind.STRUCTURE)
+    )
+    return np.concatenate(
+        [
+            log.window.mean(total_force(attached, log.motion)) / axis.mass - log.acceleration
+            for log in logs
+        ]
+    )
 
 
 def difference_step(c: Coordinate, value: float) -> float:

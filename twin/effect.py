@@ -9,13 +9,16 @@ A law is one function ``law(p, s, io)`` of three arrays of doubles:
 The law reads what it needs from ``io`` and writes one result: a force effect writes OUT (the force
 on the axis, N); a friction writes OUT (the force opposing motion, N); an actuation changes U; a
 modifier multiplies DRY, STATIC or VISCOUS; a sensing effect changes READING.
+A structure effect writes OUT, the force (N) that bodies attached to the axis add to its motion. It
+answers linearly to ACC when it rides on the axis, to NET when the axis stands on it; where WHEN is
+0 it is only asked, and leaves its states alone.
 It is plain Python and also compiles, once, to native code (see twin.native).
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -28,7 +31,7 @@ DT = 2  # s, sample period
 X = 3  # m, true position
 V = 4  # m/s, true velocity
 U = 5  # N, actuator force; commanded on entry, actual after the actuation effects
-MASS = 6  # kg, moved mass of the axis
+MASS = 6  # kg, mass that a force moves: the moved mass; infinite along a measured motion
 X_OTHER = 7  # m, position of the other axis
 V_OTHER = 8  # m/s
 A_OTHER = 9  # m/s^2
@@ -40,7 +43,10 @@ HOLD = 14  # N, friction that would bring the axis to rest within this sample
 READING = 15  # m, encoder reading
 OUT = 16  # N, result of a force or friction law
 WHEN = 17  # 1, where in the sample states are wanted: 1 its end (stepping), 1/2 its middle (walk)
-IO_SIZE = 18
+MOVED = 18  # kg, moved mass of the axis
+NET = 19  # m/s^2, all forces on the axis but those of structure, over its moved mass
+ACC = 20  # m/s^2, acceleration in space of what rides on the axis
+IO_SIZE = 21
 
 Law = Callable[[Any, Any, Any], None]
 
@@ -63,7 +69,8 @@ class Excitation:
     """What a log's motion covers; start rules and scans are computed from it.
 
     position_low, position_high (m), speed_max (m/s), dry_level (N, half the gap between the force
-    in the two directions), duration (s), period (s, sample period).
+    in the two directions), duration (s), period (s, sample period), force_max (N, largest command),
+    lines (Hz, frequencies at which the force repeats in time; strongest first).
     """
 
     position_low: float
@@ -72,6 +79,8 @@ class Excitation:
     dry_level: float
     duration: float
     period: float
+    force_max: float = 1.0
+    lines: tuple[float, ...] = ()
 
     @property
     def travel(self) -> float:
@@ -115,7 +124,10 @@ class Effect:
     equation and source: as printed in `twin effects NAME`. states: names of internal states.
     fingerprint: what is left in the residual when the effect is missing. excited_by: the motion
     that shows it. of_size: for a law of any number of elements, the effect with that many; its
-    parameter ``elements``, whose bounds are both that number, tells the law.
+    parameter ``elements``, whose bounds are both that number, tells the law. attach: of a structure
+    effect, builds its bodies in MuJoCo, given a twin.mount.Mount and the values by name; its first
+    two states are then the position (m) and speed (m/s) of the joint built. added_mass: values by
+    name -> what the effect adds to the moved mass, as a part of it.
     """
 
     kind: Kind
@@ -128,6 +140,8 @@ class Effect:
     excited_by: str
     states: tuple[str, ...] = ()
     of_size: Callable[[int], Effect] | None = None
+    attach: Callable[[Any, Mapping[str, float]], None] | None = None
+    added_mass: Callable[[Mapping[str, float]], float] | None = None
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]
@@ -155,6 +169,10 @@ class Effect:
     def strengths(self) -> tuple[Parameter, ...]:
         """Parameters that are all zero when the effect is absent."""
         return tuple(p for p in self.parameters if p.strength)
+
+    def is_present(self, values: Mapping[str, float]) -> bool:
+        """Whether these values give the effect any strength."""
+        return any(values[p.name] != 0.0 for p in self.strengths)
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name; KeyError where there is none."""

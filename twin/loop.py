@@ -18,6 +18,7 @@ from twin.effect import (
     INDEX,
     IO_SIZE,
     MASS,
+    MOVED,
     TIME,
     V_OTHER,
     WHEN,
@@ -122,15 +123,16 @@ def run_reduced(
             io[V] = coupled[a, 1]
             io[U] = force[a]
             io[MASS] = masses[a]
+            io[MOVED] = masses[a]
             if n_axes == 2:
                 io[X_OTHER] = coupled[1 - a, 0]
                 io[V_OTHER] = coupled[1 - a, 1]
                 io[A_OTHER] = coupled[1 - a, 2]
-            passive = axis_force(
+            passive, structure = axis_force(
                 entries, axes[a, 0], axes[a, 1], parameters, effect_states, axes[a, 2], io,
                 forces[k],
             )  # fmt: skip
-            motion[a, 1] += dt * ((passive + force[a]) / masses[a])
+            motion[a, 1] += dt * ((passive + structure + force[a]) / masses[a])
             motion[a, 0] += dt * motion[a, 1]
         for i in range(watched.shape[0]):
             states[k, i] = effect_states[watched[i]]

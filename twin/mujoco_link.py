@@ -23,12 +23,14 @@ from numba import carray, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from twin.calling import DOUBLES
 from twin.effect import (
     A_OTHER,
     DT,
     INDEX,
     IO_SIZE,
     MASS,
+    MOVED,
     TIME,
     V_OTHER,
     WHEN,
@@ -37,7 +39,7 @@ from twin.effect import (
     V,
     X,
 )
-from twin.native import DOUBLES, LAST_ACCELERATION, Table, axis_force
+from twin.native import LAST_ACCELERATION, Table, axis_force
 
 UNKNOWN_LAYOUT = "this MuJoCo lays out its structs in an unknown way; report its version"
 NUMERIC = "proton_twin_table"
@@ -204,14 +206,17 @@ def passive_forces(block, data, off):
         io[V] = qvel[int(axes[a, 5])]
         io[U] = ctrl[int(axes[a, 6])]
         io[MASS] = axes[a, 3]
+        io[MOVED] = axes[a, 3]
         if n_axes == 2:
             b = 1 - a
             io[X_OTHER] = qpos[int(axes[b, 4])]
             io[V_OTHER] = qvel[int(axes[b, 5])]
             io[A_OTHER] = start[int(axes[b, 2]) + LAST_ACCELERATION]
-        passive[int(axes[a, 5])] += axis_force(
+        # What the structure adds is known for the log; MuJoCo's own bodies put it on the axis.
+        force, _ = axis_force(
             entries, int(axes[a, 0]), int(axes[a, 1]), parameters, after, int(axes[a, 2]), io, rows
         )
+        passive[int(axes[a, 5])] += force
 
 
 @cache

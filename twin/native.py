@@ -9,18 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import numba
 import numpy as np
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from twin.calling import ADDRESS, KIND, P_AT, S_AT, call_law, law_address
 from twin.effect import (
     A_OTHER,
+    ACC,
     DRY,
     DT,
     FRICTION,
@@ -28,6 +25,7 @@ from twin.effect import (
     INDEX,
     IO_SIZE,
     MASS,
+    MOVED,
     OUT,
     READING,
     STATIC,
@@ -38,127 +36,89 @@ from twin.effect import (
     X_OTHER,
     Effect,
     Kind,
-    Law,
     U,
     V,
     X,
 )
-from twin.errors import InputError
+from twin.structure import answers, settle, slope
 
-DOUBLES = types.CPointer(types.float64)
-LAW_SIGNATURE = types.void(DOUBLES, DOUBLES, DOUBLES)
-
-# Columns of the entry table, one row an effect.
-ADDRESS, KIND, P_AT, S_AT = range(4)
 # States every axis has before those of its effects.
 LAST_FRICTION, LAST_VELOCITY, LAST_ACCELERATION = range(3)
 AXIS_STATES = 3
 
 _FORCE = Kind.FORCE.value
 _FRICTION = Kind.FRICTION.value
-_ACTUATION = Kind.ACTUATION.value
-
-
-@cache
-def law_address(effect: Effect) -> int:
-    """Address of the effect's compiled law; compiles at the first use on this machine.
-
-    Raises InputError where the law cannot be compiled.
-    """
-    try:
-        return _compile(effect.law).address
-    except numba.core.errors.NumbaError as error:
-        reason = next((line for line in str(error).splitlines()[1:] if line.strip()), "")
-        raise InputError(
-            f"effect '{effect.name}': its law cannot be compiled: {reason.strip()}; use only "
-            "numbers, math functions and the arrays p, s, io"
-        ) from error
-
-
-@cache  # the native code must live as long as its address
-def _compile(law: Law) -> Any:
-    return numba.cfunc(LAW_SIGNATURE, cache=True, error_model="numpy")(law)
-
-
-@intrinsic
-def call_law(typingctx, address, p, s, io):
-    """Call the law at ``address`` with three addresses of doubles."""
-
-    def codegen(context, builder, signature, args):
-        double_p = context.get_value_type(types.float64).as_pointer()
-        void = context.get_value_type(types.void)
-        fnty = cgutils.ir.FunctionType(void, [double_p] * 3)
-        fn = builder.inttoptr(args[0], fnty.as_pointer())
-        builder.call(fn, [builder.inttoptr(a, double_p) for a in args[1:]])
-        return context.get_dummy_value()
-
-    return types.void(types.int64, types.int64, types.int64, types.int64), codegen
+_STRUCTURE = Kind.STRUCTURE.value
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
 def axis_force(entries, first, last, parameters, states, at, io, rows):
-    """Force of one axis' effects, in N, beyond the command; states advance one sample.
+    """Forces on one axis beyond the command, N: (of its effects, of its structure).
 
     entries (n, 4); parameters, states, io, rows: flat doubles; at: where this axis' states begin.
-    io holds INDEX, TIME, DT, X, V, U, MASS and the other axis on entry. rows[i] receives the
-    force entry i puts on the axis.
+    io holds INDEX, TIME, DT, X, V, U, MASS, MOVED, WHEN and the other axis on entry, and the axis'
+    ACC where its motion is measured. rows[i] receives the force entry i puts on the axis. States
+    advance one sample.
     """
-    command = io[U]
-    io[DRY] = 1.0
-    io[STATIC] = 1.0
-    io[VISCOUS] = 1.0
+    command, measured = io[U], io[ACC]
+    io[DRY], io[STATIC], io[VISCOUS] = 1.0, 1.0, 1.0
     io[FRICTION] = states[at + LAST_FRICTION]
-    p = parameters.ctypes.data
-    s = states.ctypes.data
-    w = io.ctypes.data
+    p, s = parameters.ctypes.data, states.ctypes.data
+    structure = last
+    while structure > first and int(entries[structure - 1, KIND]) == _STRUCTURE:
+        structure -= 1
+    answered = answers(entries, structure, last, p, s, io)
+    share = io[MASS] / (io[MASS] - answered[1])  # of a force, that accelerates the nominal mass
+    stop = io[MASS] * io[V] / io[DT] + share * answered[0] + answered[2]
+    stop /= share + answered[3] / io[MOVED]
     total = 0.0
     friction = 0.0
-    for i in range(first, last):
+    for i in range(first, structure):
         kind = int(entries[i, KIND])
-        law = int(entries[i, ADDRESS])
-        own_p = p + 8 * int(entries[i, P_AT])
-        own_s = s + 8 * int(entries[i, S_AT])
         before = io[U]
         io[OUT] = 0.0
+        io[HOLD] = stop + io[U] + total
+        own_p, own_s = p + 8 * int(entries[i, P_AT]), s + 8 * int(entries[i, S_AT])
+        call_law(int(entries[i, ADDRESS]), own_p, own_s, io.ctypes.data)
+        rows[i] = io[OUT] if kind == _FORCE else io[U] - before
+        total += io[OUT] if kind == _FORCE else 0.0
         if kind == _FRICTION:
-            io[HOLD] = io[MASS] * io[V] / io[DT] + io[U] + total
-            call_law(law, own_p, own_s, w)
             friction = io[OUT]
             rows[i] = -friction
-        else:
-            if kind != _FORCE:
-                io[HOLD] = io[MASS] * io[V] / io[DT] + io[U] + total
-            call_law(law, own_p, own_s, w)
-            rows[i] = io[OUT] if kind == _FORCE else io[U] - before
-            total += io[OUT] if kind == _FORCE else 0.0
+    net = total - friction + io[U]
+    added = settle(entries, structure, last, p, s, io, net, measured, answered, rows)
     states[at + LAST_FRICTION] = friction
     states[at + LAST_ACCELERATION] = (io[V] - states[at + LAST_VELOCITY]) / io[DT]
     states[at + LAST_VELOCITY] = io[V]
-    return total - friction + io[U] - command
+    return net - command, added
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def walk(entries, first, last, parameters, states, at, motion, others, dt, begin, rows):
+def walk(entries, first, last, parameters, states, at, motion, others, dt, begin, rows, mass=1.0):
     """Forces along a measured motion: the laws stepped over every sample from ``begin`` on.
 
     motion (3, n): position m, velocity m/s, command N; others (3, n): position, velocity,
-    acceleration of the other axis. Friction slides wherever v != 0, by an infinite mass: what holds
-    a measured axis at rest cannot be told. rows (n_entries, n): N.
+    acceleration of the other axis; mass: moved mass, kg. Friction slides wherever v != 0, by an
+    infinite mass: what holds a measured axis at rest cannot be told. rows (n_entries, n): N.
     """
     io = np.zeros(IO_SIZE)
     row = np.zeros(entries.shape[0])
     io[DT] = dt
     io[WHEN] = 0.5
+    io[MASS] = 1e300
+    io[MOVED] = mass
+    structured = last > first and int(entries[last - 1, KIND]) == _STRUCTURE
     for k in range(motion.shape[1]):
         io[INDEX] = begin + k
         io[TIME] = (begin + k) * dt
         io[X] = motion[0, k]
         io[V] = motion[1, k]
         io[U] = motion[2, k]
-        io[MASS] = 1e300
         io[X_OTHER] = others[0, k]
         io[V_OTHER] = others[1, k]
         io[A_OTHER] = others[2, k]
+        if structured:
+            io[ACC] = slope(motion[1], k, dt)
         axis_force(entries, first, last, parameters, states, at, io, row)
         for i in range(first, last):
             rows[i, k] = row[i]

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from twin.control import Controller, gain_table
 from twin.errors import InputError
 from twin.loop import N_SIGNALS, run_mujoco, run_reduced
-from twin.model import StageModel
+from twin.model import AxisModel, StageModel
+from twin.mount import Mount
 from twin.mujoco_link import attach, offsets, passive_callback, step_address
 from twin.native import Table
 from twin.trajectory.setpoint import Setpoint
@@ -69,13 +70,26 @@ class MujocoStage:
                 for a in axes
             ]
         )
+        self._attached = self._attached_joints(table)
         self._step = step_address()
+
+    def _attached_joints(self, table: Table) -> NDArray[np.int64]:
+        """For each joint that a structure effect built: qpos, dof, the effect's first state."""
+        rows = []
+        for (axis, effect), entry in zip(table.labels, table.entries, strict=True):
+            name = attached_joint(axis, effect)
+            if mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_JOINT, name) >= 0:
+                joint = self.model.joint(name)
+                rows.append((joint.qposadr[0], joint.dofadr[0], int(entry[3])))
+        return np.array(rows, dtype=np.int64).reshape(-1, 3)
 
     def place(self, position: Array, velocity: Array, states: Array, first: int) -> None:
         """See Stepper."""
         self.data.time = first * self.model.opt.timestep
         self.data.qpos[self._where[:, 0]] = position
         self.data.qvel[self._where[:, 1]] = velocity
+        self.data.qpos[self._attached[:, 0]] = states[self._attached[:, 2]]
+        self.data.qvel[self._attached[:, 1]] = states[self._attached[:, 2] + 1]
         user = self.data.userdata[self.user_at :]
         n = len(states)
         user[0] = self.data.time
@@ -113,10 +127,11 @@ class ReducedStage:
 
 
 def stage_spec(model: StageModel) -> mujoco.MjSpec:
-    """The MuJoCo spec of a stage with its moved masses set.
+    """The MuJoCo spec of a stage with its moved masses set and its structure effects attached.
 
     A stage without MJCF becomes plain slides. On a stacked stage the axis that carries the other
-    moves both masses. Raises InputError where the file lacks a joint or motor of an axis.
+    moves both masses. Raises InputError where the file lacks a joint or motor of an axis, and where
+    a mass leaves nothing for a body.
     """
     spec = mujoco.MjSpec.from_string(model.mjcf) if model.mjcf else _plain_slides(model)
     spec.option.timestep = model.period
@@ -129,15 +144,30 @@ def stage_spec(model: StageModel) -> mujoco.MjSpec:
                 "an axis needs both"
             )
         inside = sum(m for other, m in carried.items() if _carries(joint.parent, other))
-        mass = model.axes[name].mass - inside
-        if mass <= 0:
+        moved = model.axes[name].mass + _added_mass(model.axes[name])
+        if moved - inside <= 0:
             raise InputError(
-                f"axis {name}: mass {model.axes[name].mass:g} kg is not above the {inside:g} kg of "
+                f"axis {name}: mass {moved:g} kg is not above the {inside:g} kg of "
                 "the axis that it carries; give the whole moved mass"
             )
-        joint.parent.mass = mass
-        carried[name] = mass
+        joint.parent.mass = carried[name] = moved - inside
+    for name, axis in model.axes.items():
+        for f in axis.effects:
+            if f.effect.attach is not None and f.effect.is_present(f.values):
+                joint_name = attached_joint(name, f.effect.name)
+                f.effect.attach(Mount(spec, name, joint_name, axis.mass), f.values)
     return spec
+
+
+def attached_joint(axis: str, effect: str) -> str:
+    """Name of the joint that a structure effect builds for an axis."""
+    return f"{effect}_{axis}"
+
+
+def _added_mass(axis: AxisModel) -> float:
+    """What the effects add to the moved mass, kg."""
+    parts = [f.effect.added_mass(f.values) for f in axis.effects if f.effect.added_mass]
+    return axis.mass * sum(parts)
 
 
 def _carries(body: mujoco.MjsBody, joint: str) -> bool:
@@ -150,7 +180,9 @@ def _plain_slides(model: StageModel) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     directions = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     for name, direction in zip(model.axes, directions, strict=False):
-        body = spec.worldbody.add_body(name=name)
+        frame = spec.worldbody.add_body(name=f"frame_{name}")
+        frame.inertia, frame.explicitinertial = [1.0, 1.0, 1.0], True
+        body = frame.add_body(name=name)
         body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=direction)
         body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
         motor = spec.add_actuator(

@@ -1,0 +1,68 @@
+"""Frequencies at which the force of a log repeats in time, whatever the axis does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.signal.windows import hann
+
+if TYPE_CHECKING:
+    from identify.motion import Motion
+
+Array = NDArray[np.float64]
+
+MOST_LINES = 60
+PROMINENT = 4.0  # amplitude of a line over that of the spectrum around it
+AROUND = 61  # bins of the spectrum that are taken for what surrounds a line
+HIGHEST = 0.4  # of the block rate
+
+
+def lines(motions: Sequence[Motion]) -> tuple[float, ...]:
+    """Frequencies (Hz) of narrow peaks in the spectrum of the force, the most prominent first.
+
+    The force is the command less what acceleration, direction, speed and position explain.
+    """
+    found = [peak for m in motions for peak in _peaks(_rest(m), m.period)]
+    found.sort(reverse=True)
+    kept: list[float] = []
+    for _, frequency, width in found:
+        if all(abs(frequency - other) > width for other in kept):
+            kept.append(frequency)
+    return tuple(kept[:MOST_LINES])
+
+
+def _rest(motion: Motion) -> Array:
+    """Command that a rough model leaves, (n,) N."""
+    x, v = motion.position, motion.velocity
+    rows = np.stack(
+        [np.gradient(v, motion.period), np.sign(v), v, np.ones_like(x), x, x**2, x**3], axis=1
+    )
+    rows /= np.maximum(np.abs(rows).max(axis=0), 1e-300)
+    solution = np.linalg.lstsq(rows, motion.command, rcond=None)[0]
+    return np.asarray(motion.command - rows @ solution)
+
+
+def _peaks(force: Array, period: float) -> list[tuple[float, float, float]]:
+    """(prominence, frequency Hz, resolution Hz) of the narrow peaks of a force (n,) N."""
+    n = len(force)
+    spectrum = np.abs(np.fft.rfft(force * hann(n, sym=False)))
+    spectrum = spectrum[: max(int(HIGHEST * n), 3)]
+    around = median_filter(spectrum, AROUND, mode="nearest")
+    prominence = spectrum / np.maximum(around, 1e-12 * spectrum.max(initial=1e-300))
+    middle = np.arange(2, len(spectrum) - 1)
+    high = middle[
+        (prominence[middle] > PROMINENT)
+        & (spectrum[middle] >= spectrum[middle - 1])
+        & (spectrum[middle] > spectrum[middle + 1])
+    ]
+    out = []
+    for k in high:
+        # Vertex of the parabola through three logarithms: near exact for a Hann window.
+        a, b, c = np.log(spectrum[k - 1 : k + 2])
+        shift = 0.5 * (a - c) / (a - 2.0 * b + c)
+        out.append((float(prominence[k]), float((k + shift) / n / period), 1.0 / (n * period)))
+    return out

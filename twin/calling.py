@@ -1,0 +1,56 @@
+"""Laws as native functions, and how compiled code calls one by its address."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numba
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from twin.effect import Effect, Law
+from twin.errors import InputError
+
+DOUBLES = types.CPointer(types.float64)
+LAW_SIGNATURE = types.void(DOUBLES, DOUBLES, DOUBLES)
+
+# Columns of the entry table, one row an effect.
+ADDRESS, KIND, P_AT, S_AT = range(4)
+
+
+@cache
+def law_address(effect: Effect) -> int:
+    """Address of the effect's compiled law; compiles at the first use on this machine.
+
+    Raises InputError where the law cannot be compiled.
+    """
+    try:
+        return _compile(effect.law).address
+    except numba.core.errors.NumbaError as error:
+        reason = next((line for line in str(error).splitlines()[1:] if line.strip()), "")
+        raise InputError(
+            f"effect '{effect.name}': its law cannot be compiled: {reason.strip()}; use only "
+            "numbers, math functions and the arrays p, s, io"
+        ) from error
+
+
+@cache  # the native code must live as long as its address
+def _compile(law: Law) -> Any:
+    return numba.cfunc(LAW_SIGNATURE, cache=True, error_model="numpy")(law)
+
+
+@intrinsic
+def call_law(typingctx, address, p, s, io):
+    """Call the law at ``address`` with three addresses of doubles."""
+
+    def codegen(context, builder, signature, args):
+        double_p = context.get_value_type(types.float64).as_pointer()
+        void = context.get_value_type(types.void)
+        fnty = cgutils.ir.FunctionType(void, [double_p] * 3)
+        fn = builder.inttoptr(args[0], fnty.as_pointer())
+        builder.call(fn, [builder.inttoptr(a, double_p) for a in args[1:]])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64, types.int64), codegen

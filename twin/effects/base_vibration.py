@@ -1,0 +1,68 @@
+"""The stage stands on a vibration isolator: the frame, a mass on a spring and damper, recoils.
+
+(M + m)(b'' + 2 damping w b' + w^2 b) = -m q'';  F_added = -m b'', q the axis as its encoder on the
+frame reads it, b the frame, M + m all mass on the isolator, recoil = m/(M + m), w = 2 pi frequency.
+From m (q'' + b'') = F and M b'' + C b' + K b = -F: limited mass of the stationary machine part in
+A. M. Rankers, Machine Dynamics in Mechatronic Systems, PhD thesis, University of Twente (1997).
+``frequency`` and ``damping`` are those of the isolator with everything aboard at rest.
+Seen by the encoder this is a load on a spring with load = recoil (same poles and zeros); what tells
+the two apart is the frequency.
+
+The step is MuJoCo's: spring from the position, damper implicit. Its spring and damper are those for
+which the whole, axis held, oscillates and decays over a sample exactly as the equation
+(J. L. Cieslinski, B. Ratkiewicz, Adv. Difference Eq. 2006).
+"""
+
+from math import expm1, log, pi, sin, sqrt
+
+from twin.effect import DT, MOVED, NET, OUT, WHEN, Effect, Excitation, Kind, Parameter
+
+
+def law(p, s, io):
+    angle = min(2.0 * pi * p[1] * io[DT], 3.0)
+    grown = expm1(p[2] * angle)
+    half = sin(0.5 * sqrt(1.0 - p[2] * p[2]) * angle)
+    spring = min(grown * grown + 4.0 * (1.0 + grown) * half * half, 2.0 * (1.0 - p[0]))
+    damper = expm1(2.0 * p[2] * angle)
+    pull = (spring * s[0] / io[DT] + damper * s[1]) / io[DT]
+    acceleration = -(pull + p[0] * io[NET]) / (1.0 - p[0] + damper)
+    if io[WHEN] > 0.0:
+        s[1] += io[DT] * acceleration
+        s[0] += io[DT] * s[1]
+    io[OUT] = -io[MOVED] * acceleration
+
+
+def attach(mount, values):
+    mount.stand(values["recoil"], values["frequency"], values["damping"])
+
+
+def frequencies(e: Excitation) -> tuple[float, ...]:
+    """Frequencies to try: steps of an eighth, from what the log's length resolves."""
+    lowest = max(0.3, 2.0 / e.duration)
+    return tuple(lowest * 1.125**k for k in range(max(int(log(20.0 / lowest) / log(1.125)), 1)))
+
+
+EFFECT = Effect(
+    kind=Kind.STRUCTURE,
+    summary="the frame on its vibration isolator recoils from the stage's forces",
+    equation="b'' + 2 damping w b' + w^2 b = -recoil q'';  F = -m b'';  w = 2 pi frequency",
+    source="Rankers 1997, limited mass of the stationary part; step: Cieslinski, Ratkiewicz 2006",
+    parameters=(
+        Parameter(
+            "recoil", "1", 0.0, 0.0, 0.9, "moved mass over all mass on the isolator", strength=True
+        ),
+        Parameter(
+            "frequency", "Hz", 3.0, 0.05, 100.0, "of the isolator with everything aboard",
+            scan=frequencies,
+        ),
+        Parameter(
+            "damping", "1", 0.1, 1e-4, 0.5, "damping ratio of the isolator",
+            scan=lambda e: (0.03, 0.2),
+        ),
+    ),
+    states=("displacement", "speed"),
+    law=law,
+    attach=attach,
+    fingerprint="residual swings at a few hertz after every acceleration, also at rest",
+    excited_by="fast moves with pauses of a second between them",
+)  # fmt: skip

@@ -1,0 +1,48 @@
+"""Hysteresis of the cable slab: layers that stick to each other and slip one after another.
+
+F = -sum_{i=1..4} f_i e_i/d_i,  e_i = stop_{d_i}(x): e_i follows x and stays within +-d_i,
+d_i = reach (1/8, 1/4, 1/2, 1). f_i (N) is the force at which layer i slips, reach (m) the travel
+after a reversal until all slip. Maxwell-slip elements: W. D. Iwan, "A distributed-element model for
+hysteresis and its steady-state dynamic response", J. Appl. Mech. 33 (1966); F. Al-Bender et al.,
+IEEE TAC 50 (2005), eq. 7 without its velocity dependence. Rate-independent, keeps the memory of
+inner loops, linear in the forces, and exact for motion in one direction within a sample.
+"""
+
+from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V
+
+
+def law(p, s, io):
+    step = io[V] * io[DT]
+    limit = p[0]
+    force = 0.0
+    for i in range(4):  # from the layer that slips last to the one that slips first
+        now = min(max(s[i] + io[WHEN] * step, -limit), limit)
+        s[i] = min(max(s[i] + step, -limit), limit)
+        force -= p[1 + i] * now / limit
+        limit *= 0.5
+    io[OUT] = force
+
+
+EFFECT = Effect(
+    kind=Kind.FORCE,
+    summary="rate-independent hysteresis of the cable slab over millimetres of travel",
+    equation="F = -sum_i f_i e_i/d_i;  e_i follows x within +-d_i;  d_i = reach (1, 1/2, 1/4, 1/8)",
+    source="Iwan 1966, distributed elements; Al-Bender, Lampaert, Swevers 2005, Maxwell-slip",
+    parameters=(
+        Parameter(
+            "reach", "m", 5e-3, 1e-6, 1.0, "travel after which every layer slips",
+            scan=lambda e: tuple(min(r, e.travel) for r in (1e-3, 3e-3, 1e-2, 3e-2)),
+        ),
+        *(
+            Parameter(
+                f"f{i}", "N", 0.0, 0.0, 1e3, f"force of the layer that slips at reach/{2 ** i}",
+                strength=True,
+            )
+            for i in range(4)
+        ),
+    ),
+    states=("e0", "e1", "e2", "e3"),
+    law=law,
+    fingerprint="residual bends over millimetres after each reversal, at every speed alike",
+    excited_by="slow passes with reversals at many places, and inner loops of millimetres",
+)  # fmt: skip

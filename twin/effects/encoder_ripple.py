@@ -1,0 +1,39 @@
+"""Interpolation error of the encoder, periodic in position within its signal period.
+
+reading = x + sum_{k=1,2} a_k sin(2 pi k x/period) + b_k cos(2 pi k x/period). Offsets of the two
+quadrature signals give the first harmonic, unequal amplitudes and a phase error the second:
+P. L. M. Heydemann, "Determination and correction of quadrature fringe measurement errors in
+interferometers", Applied Optics 20 (1981), to first order in the errors.
+"""
+
+from math import cos, pi, sin
+
+from twin.effect import READING, Effect, Kind, Parameter
+
+
+def law(p, s, io):
+    phase = 2.0 * pi * io[READING] / p[0]
+    sine = sin(phase)
+    cosine = cos(phase)
+    twice = 2.0 * sine * cosine
+    error = p[1] * sine + p[2] * cosine + p[3] * twice + p[4] * (cosine * cosine - sine * sine)
+    io[READING] += error
+
+
+EFFECT = Effect(
+    kind=Kind.SENSING,
+    summary="interpolation error of the encoder, periodic in position",
+    equation="reading = x + sum_{k=1,2} a_k sin(2 pi k x/period) + b_k cos(2 pi k x/period)",
+    source="Heydemann 1981, quadrature errors to first order",
+    parameters=(
+        Parameter("period", "m", 2e-5, 1e-8, 0.1, "signal period of the scale", fixed=True),
+        *(
+            Parameter(f"{c}{k}", "m", 0.0, -1e-4, 1e-4, f"{f} term of harmonic {k}", strength=True)
+            for k in (1, 2)
+            for c, f in (("a", "sine"), ("b", "cosine"))
+        ),
+    ),
+    law=law,
+    fingerprint="command and speed ripple at a frequency of speed over the signal period",
+    excited_by="slow constant speeds over many signal periods",
+)

@@ -1,0 +1,48 @@
+"""End stops: a spring and damper beyond each travel limit that can push, not pull.
+
+F = -stiffness (d + relaxation v) where that pushes back, d = x - high or x - low, the depth.
+Kelvin-Voigt contact without adhesion; K. L. Johnson, Contact Mechanics, section 6.5. Within the
+step the depth is the one that this force leads to (implicit Euler with the axis' mass), so that any
+stiffness is stable; along a measured motion, which no force changes, the law is as printed.
+"""
+
+from twin.effect import DT, MASS, OUT, Effect, Kind, Parameter, V, X
+
+
+def law(p, s, io):
+    depth = 0.0
+    if io[X] > p[1]:
+        depth = io[X] - p[1]
+    elif io[X] < p[0]:
+        depth = io[X] - p[0]
+    io[OUT] = 0.0
+    push = depth + p[3] * io[V]
+    if depth * push > 0.0:
+        io[OUT] = -p[2] * push / (1.0 + p[2] * io[DT] * (io[DT] + p[3]) / io[MASS])
+
+
+EFFECT = Effect(
+    kind=Kind.FORCE,
+    summary="spring and damper at the travel limits",
+    equation="F = -stiffness (d + relaxation v) where it pushes back;  d = x - high, x - low",
+    source="Kelvin-Voigt contact; Johnson, Contact Mechanics, section 6.5",
+    parameters=(
+        Parameter(
+            "low", "m", 0.0, -1e3, 1e3, "lower stop", fixed=True,
+            start_rule=lambda e: e.position_low,
+            scan=lambda e: tuple(e.position_low + k * e.travel for k in (0.005, 0.02, 0.06)),
+        ),
+        Parameter(
+            "high", "m", 0.0, -1e3, 1e3, "upper stop", fixed=True,
+            start_rule=lambda e: e.position_high,
+            scan=lambda e: tuple(e.position_high - k * e.travel for k in (0.005, 0.02, 0.06)),
+        ),
+        Parameter("stiffness", "N/m", 0.0, 0.0, 1e9, "stiffness of a stop", strength=True),
+        Parameter(
+            "relaxation", "s", 2e-3, 0.0, 0.1, "damping of a stop over its stiffness", fixed=True
+        ),
+    ),
+    law=law,
+    fingerprint="residual pushes inwards at the ends of the travel and is zero between",
+    excited_by="slow moves to both ends of the travel",
+)  # fmt: skip

@@ -1,0 +1,67 @@
+"""Part of the moved mass hangs on a spring and damper; motor and encoder are on the other part.
+
+s'' + 2 damping w s' + w^2 s = -a;  F_added = -load m s'', s the load's displacement from the
+motor side, a the acceleration of the motor side, w = 2 pi frequency. With the motor side held the
+load swings at ``frequency`` (the antiresonance seen by the motor); free, both swing at frequency/
+sqrt(1 - load) (the resonance). Two-mass model of actuator flexibility: A. M. Rankers, Machine
+Dynamics in Mechatronic Systems, PhD thesis, University of Twente (1997), chapter on basic dynamic
+phenomena.
+
+The step is MuJoCo's: spring from the position, damper implicit. Its spring and damper are those for
+which the held load oscillates and decays over a sample exactly as the equation (J. L. Cieslinski,
+B. Ratkiewicz, "On simulations of the classical harmonic oscillator equation by difference
+equations", Adv. Difference Eq. 2006); above a third of the sampling rate they are held where the
+step is stable.
+"""
+
+from math import expm1, log, pi, sin, sqrt
+
+from twin.effect import ACC, DT, MOVED, OUT, WHEN, Effect, Excitation, Kind, Parameter
+
+
+def law(p, s, io):
+    angle = min(2.0 * pi * p[1] * io[DT], 3.0)
+    grown = expm1(p[2] * angle)
+    half = sin(0.5 * sqrt(1.0 - p[2] * p[2]) * angle)
+    spring = min(grown * grown + 4.0 * (1.0 + grown) * half * half, 2.0 * (1.0 - p[0]))
+    damper = expm1(2.0 * p[2] * angle)
+    pull = (spring * s[0] / io[DT] + damper * s[1]) / io[DT]
+    acceleration = -(pull + io[ACC]) / (1.0 + damper)
+    if io[WHEN] > 0.0:
+        s[1] += io[DT] * acceleration
+        s[0] += io[DT] * s[1]
+    io[OUT] = -p[0] * io[MOVED] * acceleration
+
+
+def attach(mount, values):
+    mount.hang(values["load"], values["frequency"], values["damping"])
+
+
+def frequencies(e: Excitation) -> tuple[float, ...]:
+    """Frequencies to try: steps of an eighth, up to what the log's blocks resolve."""
+    highest = max(min(400.0, 0.25 / e.period), 20.0)
+    return tuple(10.0 * 1.125**k for k in range(int(log(highest / 10.0) / log(1.125)) + 1))
+
+
+EFFECT = Effect(
+    kind=Kind.STRUCTURE,
+    summary="part of the moved mass hangs on a spring and damper",
+    equation="s'' + 2 damping w s' + w^2 s = -a;  F = -load m s'';  w = 2 pi frequency",
+    source="Rankers 1997, actuator flexibility; step: Cieslinski, Ratkiewicz 2006",
+    parameters=(
+        Parameter("load", "1", 0.0, 0.0, 0.9, "part of the mass behind the spring", strength=True),
+        Parameter(
+            "frequency", "Hz", 60.0, 1.0, 2000.0, "of the load with the motor side held",
+            scan=frequencies,
+        ),
+        Parameter(
+            "damping", "1", 0.03, 1e-4, 0.5, "damping ratio with the motor side held",
+            scan=lambda e: (0.01, 0.1),
+        ),
+    ),
+    states=("displacement", "speed"),
+    law=law,
+    attach=attach,
+    fingerprint="residual rings at one frequency after every change of acceleration",
+    excited_by="moves with high jerk, and a force sweep through the resonance",
+)  # fmt: skip

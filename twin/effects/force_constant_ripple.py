@@ -1,0 +1,45 @@
+"""Force constant of the motor that varies with position at the magnet pitch.
+
+u_actual = u (1 + sum_{k=1,2} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)), p the magnet pitch.
+Ripple of the thrust constant in proportion to current, beside the cogging that does not depend on
+it: C. Rohrig, A. Jochheim, "Identification and compensation of force ripple in linear permanent
+magnet motors", Proc. American Control Conference 2001.
+"""
+
+from math import cos, pi, sin
+
+from twin.effect import Effect, Excitation, Kind, Parameter, U, X
+
+
+def law(p, s, io):
+    phase = 2.0 * pi * io[X] / p[0]
+    sine = sin(phase)
+    cosine = cos(phase)
+    twice = 2.0 * sine * cosine
+    ripple = p[1] * sine + p[2] * cosine + p[3] * twice + p[4] * (cosine * cosine - sine * sine)
+    io[U] += io[U] * ripple
+
+
+def pitches(e: Excitation) -> tuple[float, ...]:
+    """Pitches to try: equally spaced in cycles over the travel, half a cycle apart."""
+    cycles = int(min(e.travel / 2e-3, 70.0))
+    return tuple(2.0 * e.travel / k for k in range(4, 2 * cycles + 1))
+
+
+EFFECT = Effect(
+    kind=Kind.ACTUATION,
+    summary="force constant varies with position at the magnet pitch",
+    equation="u_actual = u (1 + sum_{k=1,2} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p))",
+    source="Rohrig, Jochheim 2001, force ripple in proportion to current",
+    parameters=(
+        Parameter("p", "m", 0.024, 1e-4, 1.0, "magnet pitch", scan=pitches),
+        *(
+            Parameter(f"{c}{k}", "1", 0.0, -0.5, 0.5, f"{f} term of harmonic {k}", strength=True)
+            for k in (1, 2)
+            for c, f in (("a", "sine"), ("b", "cosine"))
+        ),
+    ),
+    law=law,
+    fingerprint="residual repeats along the track in proportion to the motor force there",
+    excited_by="strong accelerations both ways at many places, over many magnet pitches",
+)

@@ -1,0 +1,39 @@
+"""Force that is a sinusoid in time: floor vibration, a pump, the mains.
+
+F = a sin(2 pi f t) + b cos(2 pi f t), t from the start of the log. What acts is its mean over the
+sample: the value in the middle times sinc(f dt), so that steps of any length carry the same
+impulse. Fourier series of a periodic force, e.g. C. W. de Silva, Vibration: Fundamentals and
+Practice, section 3.4.
+"""
+
+from math import cos, pi, sin
+
+from twin.effect import DT, OUT, TIME, Effect, Excitation, Kind, Parameter
+
+
+def law(p, s, io):
+    half = pi * p[0] * io[DT]
+    phase = 2.0 * pi * p[0] * io[TIME] + half
+    mean = sin(half) / half
+    io[OUT] = mean * (p[1] * sin(phase) + p[2] * cos(phase))
+
+
+def frequencies(e: Excitation) -> tuple[float, ...]:
+    """Lines seen in the force of the log; a coarse ladder where there are none."""
+    return e.lines or tuple(0.5 * 1.1**k for k in range(50))
+
+
+EFFECT = Effect(
+    kind=Kind.FORCE,
+    summary="sinusoidal force in time: floor vibration, pump, mains",
+    equation="F = a sin(2 pi f t) + b cos(2 pi f t)",
+    source="Fourier series of a periodic force; de Silva, Vibration, section 3.4",
+    parameters=(
+        Parameter("f", "Hz", 10.0, 1e-2, 5e3, "frequency", scan=frequencies),
+        Parameter("a", "N", 0.0, -1e4, 1e4, "sine term", strength=True),
+        Parameter("b", "N", 0.0, -1e4, 1e4, "cosine term", strength=True),
+    ),
+    law=law,
+    fingerprint="residual repeats in time at one frequency, whatever the axis does",
+    excited_by="any motion; a log of many periods, also at rest",
+)
