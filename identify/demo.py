@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from identify import workflow
-from identify.candidates import orthonormal
 from identify.fit import Fit, fit_axis, rms
 from identify.planting import draw_effect, other_machine
 from identify.report import write_report
 from identify.residual import residual
+from identify.search import orthonormal
 from identify.study import Study, studies
 from identify.workflow import Addition, Diagnosis
 from twin.effect import Effect, Kind
@@ -129,11 +129,11 @@ def hidden_machine(
     trial = simulate(machine, "tracking", seed=int(rng.integers(1 << 30)), duration=DURATION)
     study = studies(machine, {"trial": trial}, {})[AXIS]
     base = fit_axis(machine.axes[AXIS], study.fit)
+    low, high = machine.axes[AXIS].hardware.travel
+    covered = replace(study.excitation, position_low=low, position_high=high)
     absent = [e for e in catalogue.values() if _can_hide(e, machine)]
     for index in rng.permutation(len(absent)):
-        hidden = draw_effect(
-            absent[index], machine.axes[AXIS], study.fit, study.excitation, FORCE, rng
-        )
+        hidden = draw_effect(absent[index], machine.axes[AXIS], study.fit, covered, FORCE, rng)
         if shows(hidden, base, study):
             return machine.with_axis(AXIS, machine.axes[AXIS].with_effect(hidden)), hidden
     raise InputError("no effect of the catalogue shows in this stage's motion; try another seed")

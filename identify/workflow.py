@@ -11,8 +11,9 @@ import numpy as np
 from identify.candidates import Candidate, score, try_effect
 from identify.compare import AxisComparison, compare_axis, position_errors
 from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
-from identify.fit import Fit, error_on, fit_axis, rms
+from identify.fit import Fit, error_on, rms
 from identify.freerun import free_run, rms_error
+from identify.search import fit_thoroughly
 from identify.study import Study, studies
 from identify.uncertainty import Estimate, estimates, half_widths
 from twin.effect import Effect
@@ -110,7 +111,7 @@ def fit(
     found = studies(model, logs, holdout or {}, window)
     fits: dict[str, Fit] = {}
     for i, (axis, study) in enumerate(found.items()):
-        fits[axis] = fit_axis(model.axes[axis], study.fit)
+        fits[axis] = fit_thoroughly(model.axes[axis], study)
         progress("fitting", i + 1, len(found))
     for axis, result in fits.items():
         model = model.with_axis(axis, result.axis)
@@ -230,11 +231,12 @@ def moved_parameters(before: Fit, after: Fit) -> tuple[str, ...]:
     earlier = half_widths(before)[[before.scaling.where.index(c) for c in shared]]
     allowed = np.hypot(width, earlier)
     out = []
-    for c, a, b, limit in zip(shared, old, new, allowed, strict=True):
-        if not abs(b - a) > limit:
-            continue
+    for c, a, b, limit, first in zip(shared, old, new, allowed, earlier, strict=True):
         p = c.parameter
-        collapsed = p.strength and abs(b) < COLLAPSE * abs(a)
+        # Its own new interval does not matter here: what stood in for the effect may be collinear.
+        collapsed = p.strength and abs(b) < COLLAPSE * abs(a) and abs(a) > first
+        if not collapsed and not abs(b - a) > limit:
+            continue
         verb = "collapsed" if collapsed else "moved"
         tail = (
             "it stood in for the effect that was missing" if collapsed else "more than its interval"

@@ -18,6 +18,7 @@ import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,7 @@ class Parameter:
     better one from the data. lower, upper: bounds, same unit. strength: the effect is absent when
     every strength is zero. fixed: known by design, held by a fit. at_least: name of a parameter of
     the same effect below which this one may not fall. scan: values that the diagnosis tries, from
-    the data.
+    the data. screened: whether a strength takes part while those are tried; a detail need not.
     """
 
     name: str
@@ -99,6 +100,7 @@ class Parameter:
     at_least: str | None = None
     start_rule: Callable[[Excitation], float] | None = None
     scan: Callable[[Excitation], Sequence[float]] | None = None
+    screened: bool = True
 
     def start_from(self, excitation: Excitation) -> float:
         """Start value for this motion, inside the bounds."""
@@ -112,7 +114,7 @@ class Effect:
 
     equation and source: as printed in `twin effects NAME`. states: names of internal states.
     fingerprint: what is left in the residual when the effect is missing. excited_by: the motion
-    that shows it. replaces: this friction is a richer form of those kinds of friction.
+    that shows it. sticks: a friction that holds the axis at rest by whatever force that takes.
     """
 
     kind: Kind
@@ -124,6 +126,7 @@ class Effect:
     fingerprint: str
     excited_by: str
     states: tuple[str, ...] = ()
+    sticks: bool = False
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]
@@ -139,10 +142,15 @@ class Effect:
                     f"effect {self.name}: start {p.start} {p.unit} of {p.name} is outside its "
                     f"bounds [{p.lower}, {p.upper}]"
                 )
+            if p.strength and not p.lower <= 0.0 <= p.upper:
+                raise ValueError(
+                    f"effect {self.name}: strength {p.name} cannot be zero within its bounds "
+                    f"[{p.lower}, {p.upper}] {p.unit}"
+                )
             if p.at_least is not None and p.at_least not in names:
                 raise ValueError(f"effect {self.name}: {p.name} refers to unknown {p.at_least}")
 
-    @property
+    @cached_property
     def name(self) -> str:
         """The name of the file that holds the law."""
         return Path(inspect.getfile(self.law)).stem

@@ -225,9 +225,15 @@ def write(axis: AxisModel, where: Iterable[Coordinate], values: Iterable[float])
         by_effect.setdefault(c.effect, {})[c.parameter.name] = float(value)
     mass = by_effect.pop("", {}).get("mass", axis.mass)
     effects = tuple(
-        replace(f, values={**f.values, **by_effect[f.effect.name]})
+        replace(f, values=_ordered(f.effect, {**f.values, **by_effect[f.effect.name]}))
         if f.effect.name in by_effect
         else f
         for f in axis.effects
     )
     return replace(axis, mass=mass, effects=effects)
+
+
+def _ordered(effect: Effect, values: dict[str, float]) -> dict[str, float]:
+    """The values with each held one raised to the one it may not fall below (Fs >= Fc)."""
+    floors = {p.name: values[p.at_least] for p in effect.parameters if p.at_least}
+    return {name: max(value, floors.get(name, value)) for name, value in values.items()}

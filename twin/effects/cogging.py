@@ -35,7 +35,10 @@ EFFECT = Effect(
     parameters=(
         Parameter("p", "m", 0.024, 1e-4, 1.0, "magnet pitch", scan=pitches),
         *(
-            Parameter(f"{c}{k}", "N", 0.0, -1e4, 1e4, f"{f} term of harmonic {k}", strength=True)
+            Parameter(
+                f"{c}{k}", "N", 0.0, -1e4, 1e4, f"{f} term of harmonic {k}", strength=True,
+                screened=k == 1,
+            )
             for k in (1, 2, 3)
             for c, f in (("a", "sine"), ("b", "cosine"))
         ),
@@ -43,4 +46,4 @@ EFFECT = Effect(
     law=law,
     fingerprint="residual repeats along the track, the same in both directions and at every force",
     excited_by="constant-speed passes over many magnet pitches",
-)
+)  # fmt: skip
