@@ -337,7 +337,7 @@ def effects(
 @app.command()
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path("demo"),
-    seed: Annotated[int, typer.Option(help="Draws the machine and its hidden effect.")] = 1,
+    seed: Annotated[int, typer.Option(help="Draws the machine and its hidden effect.")] = 2,
     model: Annotated[str, typer.Option("--model", help="Stage model (.toml).")] = "proton_xy",
     effects: Effects = None,
     as_json: Json = False,

@@ -21,14 +21,16 @@ from twin.model import AxisModel, StageModel
 Array = NDArray[np.float64]
 
 REGIONS = 24  # bins along a coordinate
+ABOVE_FLOOR = 1.5  # error over noise floor from which a region counts as bad
+LEAST_SHARE = 0.02  # part of the squared error, beyond that of the time, from which it is told
 PITCH = 0.034  # m, of the rollers, where the model has no other
 
 
 @dataclass(frozen=True, eq=False)
 class MisfitMap:
-    """Misfit along one coordinate: bin centres (n,), mean and RMS force error (n,) N, share (n,).
+    """Misfit along one coordinate: bin centres (n,), mean and RMS force error (n,) N.
 
-    share: part of the whole squared force error in each bin.
+    share (n,): part of the whole squared force error in each bin; visited (n,): part of the time.
     """
 
     coordinate: str
@@ -39,6 +41,7 @@ class MisfitMap:
     mean: Array
     rms: Array
     share: Array
+    visited: Array
 
 
 @dataclass(frozen=True)
@@ -163,15 +166,21 @@ def misfit_map(name: str, residual: Array, coordinate: Array) -> MisfitMap:
         mean=np.bincount(index, residual, bins) / count,
         rms=np.sqrt(square / count),
         share=square / max(square.sum(), np.finfo(float).tiny),
+        visited=np.bincount(index, minlength=bins) / len(index),
     )
 
 
 def worst_regions(maps: Sequence[MisfitMap], floor: float, count: int = 3) -> list[Region]:
-    """The regions that concentrate most error against their width, one a coordinate."""
+    """The regions with most error against the time spent there, one a coordinate.
+
+    None where the error is at the noise floor.
+    """
     found = []
     for m in maps:
-        excess = m.share - 1.0 / len(m.share)
+        excess = np.where(m.rms > ABOVE_FLOOR * floor, m.share - m.visited, 0.0)
         i = int(np.argmax(excess))
+        if excess[i] < LEAST_SHARE:
+            continue
         found.append(
             (
                 float(excess[i]),

@@ -202,6 +202,8 @@ def compare_text(result: Comparison) -> str:
                 f"floor), free-running position error {c.position_error[name]:.3g} m"
             )
         lines += [f"  worst: {region.in_words()}" for region in c.worst]
+        if not c.worst:
+            lines.append("  nowhere does the error stand above the noise")
     return "\n".join(lines)
 
 

@@ -77,6 +77,7 @@ def new_figure(height: float) -> Figure:
 
 def data_uri(figure: Figure) -> str:
     """The figure as an SVG picture inside a link, without date and without outside references."""
+    settle(figure)
     buffer = io.BytesIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     figure.savefig(buffer, format="svg", dpi=RESOLUTION, metadata=nothing)
@@ -84,6 +85,14 @@ def data_uri(figure: Figure) -> str:
     # What comes before refers to the document type on the web.
     content = content[content.index(b"<svg") :]
     return "data:image/svg+xml;base64," + base64.b64encode(content).decode("ascii")
+
+
+def settle(figure: Figure) -> None:
+    """Lay the figure out, once, on a grid: the solver's last digits differ from run to run."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes in figure.axes:
+        axes.set_position(tuple(np.round(axes.get_position().bounds, 4)))
 
 
 def noise_band(axes: Axes, floor: float) -> None:

@@ -29,6 +29,8 @@ def check(axis: Axis) -> Iterator[Finding]:
             f"position bends by up to {axis.jumps.max():.3g} {unit} within a sample, its usual "
             f"motion and noise allow {axis.possible_jump:.2g} {unit}",
         )
+    if not axis.moves:
+        return
     rough = _rough_command(axis)
     if len(rough):
         yield _outliers(axis, rough, "the force jumps to and fro from sample to sample")
@@ -51,7 +53,7 @@ def _rough_command(axis: Axis) -> Array:
 
 def _contradictions(axis: Axis) -> Iterator[Finding]:
     """Where command and motion do not go together, jumps of the position aside."""
-    if not axis.moves or not axis.dynamics.explains:
+    if not axis.dynamics.explains:
         return
     fit = axis.dynamics
     error = np.abs(fit.residual) * axis.kept[fit.first : fit.first + len(fit.residual)]
@@ -69,7 +71,7 @@ def _contradictions(axis: Axis) -> Iterator[Finding]:
 
 
 def _usual(axis: Axis, values: Array) -> float:
-    """What 99 % of the values stay below; fewer of a short log, in which a burst is more than 1 %."""
+    """What 99 % of the values stay below; fewer in a short log, where a burst takes more than 1 %."""
     burst = 3.0 * axis.smoother.length / axis.duration
     return float(np.quantile(values, 1.0 - max(0.01, burst)))
 
