@@ -91,7 +91,7 @@ def demo(
         report,
         title=f"{model.name}: what the model lacks",
         diagnosis=diagnosis,
-        comparison=workflow.compare(final, {**logs, **held}),
+        comparison=workflow.compare(diagnosis.model, {**logs, **held}),
         history=final.history,
         additions=[addition] if addition else [],
     )

@@ -321,7 +321,7 @@ def test_the_axis_of_the_answer_comes_first(case: Case) -> None:
 def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
     evil = '<script>alert(\'$1\')</script> & "x" onerror="y"'
     source = Path(load_catalogue()["cogging"].law.__code__.co_filename)
-    own = tmp_path / "a$b^<i>&c.py"
+    own = tmp_path / "a$b^<i>$&c.py"
     own.write_bytes(source.read_bytes())
     catalogue = Catalogue([e for e in load_catalogue([own]).values() if e.name == own.stem])
     model = replace(case.model, name=evil)

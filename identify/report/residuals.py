@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 MOST_DOTS = 10_000  # more would fill the panel and the file; means are of all
 # The dots show a mean whose neighbours on both sides are missing.
-MEAN: dict[str, Any] = {"linewidth": 1.5, "markersize": 2.5}
+MEAN: dict[str, Any] = {"linewidth": 1.5, "markersize": 2.0}
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,10 @@ from scipy.signal import correlate
 from twin.log.check.smooth import Array
 
 LONGEST = 0.25  # s, searched both ways
-_CLEAR = 0.5  # residual at the best lag, as a part of the signal
-_BETTER = 0.6  # residual at the best lag, as a part of that without a lag
+_MOTION = 20  # the log is so many times longer than the longest lag, to hold several moves
+_CLEAR = 0.5  # residual at the best lag at the most, as a part of the signal
+_WRONG = 0.05  # residual without a lag at the least, likewise
+_BETTER = 0.6  # residual at the best lag at the most, as a part of that without a lag
 _AS_GOOD = 1.5  # a residual so many times the least may be the right one too
 
 
@@ -28,7 +30,7 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
 
     kept: (n,) 1.0 where the regressors may be believed, else 0.0; block: s from sample to sample.
     """
-    reach = min(round(LONGEST / block), len(signal) // 4)
+    reach = min(round(LONGEST / block), len(signal) // _MOTION)
     inner = slice(reach, len(signal) - reach)
     weights = kept[inner]
     basis = np.linalg.qr(_unit_columns(explained_by[inner] * weights[:, None]))[0]
@@ -47,7 +49,11 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
     below, at, above = residual[best - 1 : best + 2]
     bend = below - 2.0 * at + above
     fraction = 0.5 * (below - above) / bend if bend > 0.0 else 0.0
-    clear = at < _CLEAR**2 * total[best] and at <= _BETTER**2 * residual[reach]
+    clear = (
+        at < _CLEAR**2 * total[best]
+        and residual[reach] > _WRONG**2 * total[reach]
+        and at < _BETTER**2 * residual[reach]
+    )
     return Lag(float((best - reach + fraction) * block), bool(clear))
 
 

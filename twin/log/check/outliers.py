@@ -11,8 +11,8 @@ from twin.log.check.report import Fault, Finding, Severity
 from twin.log.check.smooth import Array
 
 _APART = 0.05  # s without an outlier ends a burst
-_UNUSUAL = 4.0  # times the level that 99 % of the samples stay below
-_CONTRADICTION = 0.02  # of the command, at the least
+_UNUSUAL = 5.0  # times the level that 99 % of the samples stay below
+_CONTRADICTION = 0.1  # of the command, at the least
 _ROUGH = 0.1  # of the command, at the least
 _ROUGH_SPAN = 10e-3  # s, in which half of the samples are rough; a commanded step is only a few
 _FEWEST_ROUGH = 5
@@ -71,7 +71,7 @@ def _contradictions(axis: Axis) -> Iterator[Finding]:
 
 
 def _usual(axis: Axis, values: Array) -> float:
-    """What 99 % of the values stay below; fewer in a short log, where a burst takes more than 1 %."""
+    """What 99 % of the values stay below; fewer in a log so short that a burst is more than 1 %."""
     burst = 3.0 * axis.smoother.length / axis.duration
     return float(np.quantile(values, 1.0 - max(0.01, burst)))
 

@@ -14,6 +14,7 @@ from twin.log.check.smooth import Array, white_noise
 _STUCK = 5e-3  # s at one value exactly
 _STUCK_SAMPLES = 5
 _LEVEL = 20e-3  # s at one value but for noise, after the low-pass
+_LEVEL_BLOCKS = 10
 _NEAR = 10.0  # times the noise
 _WIDE = 40.0
 _EDGE_BLOCKS = 3  # a limited command leaves its level at once, a smooth one slowly
@@ -55,7 +56,10 @@ def _but_for_noise(axis: Axis, height: Array) -> tuple[float, float] | None:
         return None
     starts, near = _runs(height >= height.max() - _NEAR * noise)
     wide = _runs(height >= height.max() - _WIDE * noise)[1]
-    if near.max() * smoother.block < _LEVEL or wide.max() - near.max() > _EDGE_BLOCKS:
+    longest = int(np.argmax(near))
+    inside = 0 < starts[longest] < len(height) - near[longest]
+    level = max(_LEVEL / smoother.block, _LEVEL_BLOCKS)
+    if not inside or near[longest] < level or wide.max() - near[longest] > _EDGE_BLOCKS:
         return None
     return smoother.time(starts[:1])[0], float(near.sum() * smoother.block)
 
