@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from twin.model import AxisModel
 
 Array = NDArray[np.float64]
 
+SAME_ERROR = 1.01  # error that simpler values may cost
 RIDGE = 1e-4  # keeps the estimate of left-out blocks finite along directions nobody sees
 
 
@@ -53,7 +54,8 @@ def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
 def try_effect(base: Fit, study: Study, effect: Effect) -> Candidate:
     """Refit the model together with the effect and score it against the base."""
     best, *others = starts(base, study, effect)
-    first = score(base, fit_axis(base.axis.with_effect(best), study.fit), study, effect)
+    fit = simplified(fit_axis(base.axis.with_effect(best), study.fit), study, effect)
+    first = score(base, fit, study, effect)
     if first.fit.at_floor or first.delta_bic < LEAST_BIC:
         return first
     # It helps but leaves structure: what is missing distorts the base, so begin where that did too.
@@ -62,7 +64,19 @@ def try_effect(base: Fit, study: Study, effect: Effect) -> Candidate:
     best_fit = min(fits, key=lambda f: f.error)
     if not best_fit.at_floor:
         best_fit = fit_thoroughly(best_fit.axis, study)
-    return score(base, best_fit, study, effect)
+    return score(base, simplified(best_fit, study, effect), study, effect)
+
+
+def simplified(fit: Fit, study: Study, effect: Effect) -> Fit:
+    """The fit with the effect in its simplest values, where that explains as much."""
+    if effect.simplest is None:
+        return fit
+    fitted = fit.axis[effect.name]
+    simple = effect.simplest(fitted.values)
+    if simple == dict(fitted.values):
+        return fit
+    again = fit_axis(fit.axis.with_effect(replace(fitted, values=simple)), study.fit)
+    return again if again.error < SAME_ERROR * fit.error else fit
 
 
 def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:

@@ -151,9 +151,8 @@ def import_(
     as_json: Json = False,
 ) -> None:
     """Turn a machine's recording into an MCAP log."""
-    from twin.log.importers import import_log, load_mapping
-
     from twin.log import write_log
+    from twin.log.importers import import_log, load_mapping
 
     _check_output(out)
     log = import_log(source, load_mapping(mapping))

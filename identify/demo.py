@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,7 @@ from twin.model import Fitted, StageModel
 from twin.model_file import save_model
 
 DURATION = 20.0  # s of each log
+RUNS = ("tracking", "moves", "tracking")  # the last is held out
 FORCE = 0.05  # N RMS of the hidden effect, about 50 times the noise floor
 VISIBLE = 0.5  # part of the hidden force that the baseline must not be able to absorb
 AXIS = "x"
@@ -68,9 +69,9 @@ def demo(
     say("1. a machine with an effect that the model lacks runs three experiments, logged as MCAP")
     logs = {
         f"machine_{i}.mcap": _record(
-            machine, folder / f"machine_{i}.mcap", seed + 1000 * i, progress
+            machine, experiment, folder / f"machine_{i}.mcap", seed + 1000 * i, progress
         )
-        for i in (1, 2, 3)
+        for i, experiment in enumerate(RUNS, start=1)
     }
     held = {"machine_3.mcap": logs.pop("machine_3.mcap")}
     say("2. the model (lugre, cable_slab, roller_spikes) is fitted, and every absent effect tried")
@@ -98,9 +99,11 @@ def demo(
     return Demo(hidden, diagnosis, addition, report)
 
 
-def _record(machine: StageModel, path: Path, seed: int, progress: workflow.Progress) -> Log:
+def _record(
+    machine: StageModel, experiment: str, path: Path, seed: int, progress: workflow.Progress
+) -> Log:
     log = simulate(
-        machine, "tracking", seed=seed, duration=DURATION,
+        machine, experiment, seed=seed, duration=DURATION,
         progress=lambda done, total: progress(f"simulating {path.name}", done, total),
     )  # fmt: skip
     write_log(log, path)
@@ -129,11 +132,11 @@ def hidden_machine(
     trial = simulate(machine, "tracking", seed=int(rng.integers(1 << 30)), duration=DURATION)
     study = studies(machine, {"trial": trial}, {})[AXIS]
     base = fit_axis(machine.axes[AXIS], study.fit)
-    low, high = machine.axes[AXIS].hardware.travel
-    covered = replace(study.excitation, position_low=low, position_high=high)
     absent = [e for e in catalogue.values() if _can_hide(e, machine)]
     for index in rng.permutation(len(absent)):
-        hidden = draw_effect(absent[index], machine.axes[AXIS], study.fit, covered, FORCE, rng)
+        hidden = draw_effect(
+            absent[index], machine.axes[AXIS], study.fit, study.excitation, FORCE, rng
+        )
         if shows(hidden, base, study):
             return machine.with_axis(AXIS, machine.axes[AXIS].with_effect(hidden)), hidden
     raise InputError("no effect of the catalogue shows in this stage's motion; try another seed")

@@ -19,6 +19,7 @@ from identify.weak import Window
 
 Array = NDArray[np.float64]
 
+SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 
 
@@ -34,8 +35,8 @@ def _variance(mass: float, motion: Motion, window: Window) -> float:
     velocity, command = motion.raw
     raw = 0.5 * (command[1:] + command[:-1]) - mass * np.diff(velocity) / dt
     # The median over segments passes by those with spikes and reversals.
-    segment = min(4096, len(raw))
-    frequency, power = welch(raw, 1.0 / dt, nperseg=segment, average="median")
+    segment = min(max(round(SEGMENT / dt), 256), len(raw))
+    frequency, power = welch(raw, 1.0 / dt, nperseg=segment, average="median", detrend="linear")
     half = np.cos(np.pi * frequency * dt) ** 2
     bend = ((2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * dt)) * mass / dt**2) ** 2
     band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < BAND[2] / dt)

@@ -60,7 +60,7 @@ def studies(
             axis=name,
             fit=tuple(Windowed.of(m, length) for m in fit),
             holdout=tuple(Windowed.of(m, length) for m in held),
-            excitation=excitation(fit),
+            excitation=excitation(fit, axis.hardware.travel),
         )
     if not out:
         known = sorted({a for log in logs.values() for a in log.axes})

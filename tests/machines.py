@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -44,9 +44,7 @@ def machine(
         trial = simulate(drawn, "tracking", seed=seed, duration=DURATION, stage=ReducedStage)
         study = studies(drawn, {"trial": trial}, {})["x"]
         base = fit_axis(drawn.axes["x"], study.fit)
-        low, high = base.axis.hardware.travel
-        whole = replace(study.excitation, position_low=low, position_high=high)
-        planted = draw_effect(catalogue[effect], base.axis, study.fit, whole, force, rng)
+        planted = draw_effect(catalogue[effect], base.axis, study.fit, study.excitation, force, rng)
         drawn = drawn.with_axis("x", drawn.axes["x"].with_effect(planted))
     logs = {
         f"log {i}": simulate(drawn, "tracking", seed=100 * seed + i, duration=DURATION)

@@ -15,7 +15,7 @@ It is plain Python and also compiles, once, to native code (see twin.native).
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -61,8 +61,9 @@ class Kind(Enum):
 class Excitation:
     """What a log's motion covers; start rules and scans are computed from it.
 
-    position_low, position_high (m), speed_max (m/s), dry_level (N, half the gap between the force
-    in the two directions), duration (s), period (s, sample period).
+    position_low, position_high (m, of the axis' travel where the model gives it), speed_max (m/s),
+    dry_level (N, half the gap between the force in the two directions), duration (s), period (s,
+    sample period).
     """
 
     position_low: float
@@ -115,6 +116,7 @@ class Effect:
     equation and source: as printed in `twin effects NAME`. states: names of internal states.
     fingerprint: what is left in the residual when the effect is missing. excited_by: the motion
     that shows it. sticks: a friction that holds the axis at rest by whatever force that takes.
+    simplest: the same force in simpler values, such as a pitch of which only harmonics were used.
     """
 
     kind: Kind
@@ -127,6 +129,7 @@ class Effect:
     excited_by: str
     states: tuple[str, ...] = ()
     sticks: bool = False
+    simplest: Callable[[Mapping[str, float]], dict[str, float]] | None = None
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]

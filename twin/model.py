@@ -20,12 +20,12 @@ MASS = Parameter("mass", "kg", 1.0, 1e-6, 1e6, "moved mass")
 class Hardware:
     """What surrounds an axis' mechanics.
 
-    travel (m, low and high), force_constant (N/A), force_limit (N), encoder_resolution (m),
-    encoder_noise (m rms), current_noise (A rms), velocity (m/s), acceleration (m/s^2) and jerk
-    (m/s^3) limits of its moves, bandwidth (Hz) of its position loop.
+    travel (m, low and high; None where it is not known), force_constant (N/A), force_limit (N),
+    encoder_resolution (m), encoder_noise (m rms), current_noise (A rms), velocity (m/s),
+    acceleration (m/s^2) and jerk (m/s^3) limits of its moves, bandwidth (Hz) of its position loop.
     """
 
-    travel: tuple[float, float] = (-1.0, 1.0)
+    travel: tuple[float, float] | None = None
     force_constant: float = 1.0
     force_limit: float = math.inf
     encoder_resolution: float = 0.0

@@ -82,12 +82,16 @@ class Axis:
 
     @cached_property
     def kept(self) -> Array:
-        """(m,) 1.0 where the low-passed motion is free of impossible jumps, else 0.0."""
+        """(m,) 1.0 where the low-passed motion is free of impossible jumps, else 0.0.
+
+        All 1.0 where little would be left.
+        """
         jumps = np.zeros(len(self.log))
         jumps[1:-1] = self.jumps > 0.0
         reach = np.ones(4 * self.smoother.samples + 1)
         hit = np.convolve(jumps, reach, "same") if jumps.any() else jumps
-        return np.asarray(self.smoother.held((hit > 0.5).astype(float)) == 0.0, dtype=float)
+        free = self.smoother.held((hit > 0.5).astype(float)) == 0.0
+        return free.astype(float) if free.mean() > 0.5 else np.ones(len(free))
 
     @cached_property
     def lag(self) -> Lag:

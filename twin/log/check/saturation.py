@@ -25,6 +25,8 @@ def check(axis: Axis) -> Iterator[Finding]:
     """Saturation of the command."""
     force = axis.log.force
     for sign, extreme in ((1.0, force.max()), (-1.0, force.min())):
+        if extreme == 0.0:  # a drive that is off
+            continue
         stuck = _exactly(axis, force, extreme) or _but_for_noise(axis, sign * axis.force)
         if stuck:
             first, seconds = stuck

@@ -80,7 +80,7 @@ def find_unit(text: str, *allowed: str) -> Unit:
         return Unit(1.0, None)
     known = [unit for si in allowed for unit in _QUANTITIES[si]]
     by_lower = {unit.lower(): unit for unit in reversed(known)}
-    near = difflib.get_close_matches(plain.lower(), by_lower, n=1, cutoff=0.4)
+    near = difflib.get_close_matches(plain.lower(), by_lower, n=1, cutoff=0.55)
     hint = f"did you mean '{by_lower[near[0]]}'? " if near else ""
     raise InputError(
         f"unit '{text}' is not known here; {hint}give a unit of {' or '.join(allowed)} "
