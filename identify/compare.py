@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,10 +129,13 @@ def _by_log(axis: AxisModel, study: Study) -> dict[str, float]:
     return {w.motion.name: rms(residual(axis, [w])[moving([w], sticks(axis))]) for w in study.fit}
 
 
-def position_errors(model: StageModel, logs: Mapping[str, Log]) -> dict[str, dict[str, float]]:
+def position_errors(
+    model: StageModel, logs: Mapping[str, Log], progress: Callable[[int, int], None]
+) -> dict[str, dict[str, float]]:
     """Free-running position error, axis -> log name -> m RMS."""
     out: dict[str, dict[str, float]] = {a: {} for a in model.axes}
-    for name, log in logs.items():
+    for i, (name, log) in enumerate(logs.items()):
+        progress(i, len(logs))
         run = free_run(model, log)
         for axis in model.axes:
             out[axis][name] = rms_error(run, axis)

@@ -124,10 +124,12 @@ def holdout_error(fitted: Fit, study: Study) -> float | None:
     return rms(error_on(fitted.axis, study.holdout)) if study.holdout else None
 
 
-def compare(model: StageModel, logs: Logs, *, window: float | None = None) -> Comparison:
+def compare(
+    model: StageModel, logs: Logs, *, window: float | None = None, progress: Progress = silent
+) -> Comparison:
     """Error numbers of a model as it stands, and where it fails. Raises InputError."""
     found = studies(model, logs, {}, window)
-    errors = position_errors(_only(model, found), logs)
+    errors = position_errors(_only(model, found), logs, partial(progress, "comparing"))
     axes = {a: compare_axis(model, study, logs, errors[a]) for a, study in found.items()}
     return Comparison(model, axes)
 
@@ -157,7 +159,9 @@ def diagnose(
         )
         for axis, fitted in result.fits.items()
     }
-    return Diagnosis(result.model, axes, compare(result.model, logs, window=window))
+    return Diagnosis(
+        result.model, axes, compare(result.model, logs, window=window, progress=progress)
+    )
 
 
 def add(

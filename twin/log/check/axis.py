@@ -14,7 +14,9 @@ from twin.log.log import AxisLog
 
 _IMPOSSIBLE = 4.0  # times the acceleration that 99 % of the samples stay below
 _NOISE = 10.0  # times the rms of noise
-_MOVING = 10.0  # speed, in units of its noise
+_SLOW = 0.02  # times the highest speed: below, Coulomb friction is not yet full
+_TINY = float(np.finfo(float).tiny)
+_MOVING = 5.0  # speed, in units of its noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,15 +111,14 @@ class Axis:
     @cached_property
     def _regressors(self) -> Array:
         """(m, 5): what a command is spent on: mass, damping, Coulomb friction, bias, stiffness."""
-        velocity = self.velocity
-        slow = 0.02 * float(np.quantile(np.abs(velocity), 0.99))
+        fast = float(np.quantile(np.abs(self.velocity), 0.99))
         position = self.smoother.position(self.log.position)
         return np.column_stack(
             [
                 self.acceleration,
-                velocity,
-                np.tanh(velocity / max(slow, np.finfo(float).tiny)),
-                np.ones_like(velocity),
+                self.velocity,
+                self.smoother.direction(self.log.position, max(_SLOW * fast, _TINY)),
+                np.ones_like(position),
                 position - position.mean(),
             ]
         )

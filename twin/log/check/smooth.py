@@ -55,12 +55,15 @@ class Smoother:
 
     def velocity(self, x: Array) -> Array:
         """Position (n,) -> low-passed velocity (m,)."""
-        return self._low_pass(np.diff(self._edges(x)) / self.block)
+        return self._low_pass(self._block_velocity(x))
 
     def acceleration(self, x: Array) -> Array:
         """Position (n,) -> low-passed acceleration (m,); the ends repeat their neighbours."""
-        velocity = np.diff(self._edges(x)) / self.block
-        return self._low_pass(np.gradient(velocity, self.block))
+        return self._low_pass(np.gradient(self._block_velocity(x), self.block))
+
+    def direction(self, x: Array, slow: float) -> Array:
+        """Position (n,) -> low-passed sign of the velocity (m,), rounded off below ``slow``."""
+        return self._low_pass(np.tanh(self._block_velocity(x) / slow))
 
     def held(self, u: Array) -> Array:
         """Signal held over each sample (n,) -> low-passed (m,)."""
@@ -88,6 +91,9 @@ class Smoother:
         """Noise of ``acceleration``, likewise."""
         kernel = np.convolve(np.convolve(self.weights, [1.0, -1.0]), [0.5, 0.0, -0.5])
         return float(noise / self.block**2 * np.linalg.norm(kernel))
+
+    def _block_velocity(self, x: Array) -> Array:
+        return np.diff(self._edges(x)) / self.block
 
     def _edges(self, x: Array) -> Array:
         count = (len(x) - 1) // self.samples
