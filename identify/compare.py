@@ -105,7 +105,7 @@ def compare_axis(
     axis = model.axes[study.axis]
     kept = moving(study.fit, sticks(axis))
     force = residual(axis, study.fit)
-    floor = noise_floor(axis.mass, [(w.motion, w.window) for w in study.fit])
+    floor = noise_floor(axis, [(w.motion, w.window) for w in study.fit])
     where = gathered(study.fit)
     where["roller_phase"] = np.mod(where["position"], roller_pitch(axis))
     force, where = force[kept], {k: v[kept] for k, v in where.items()}

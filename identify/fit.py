@@ -156,7 +156,7 @@ def fit_axis(axis: AxisModel, logs: Sequence[Windowed]) -> Fit:
 def _finish(problem: _Problem, internal: Array, outcome: Outcome) -> Fit:
     axis = problem.scaling.outside(problem.axis, internal)
     force = residual(axis, problem.logs)[problem.kept]
-    floor = noise_floor(axis.mass, [(log.motion, log.window) for log in problem.logs])
+    floor = noise_floor(axis, [(log.motion, log.window) for log in problem.logs])
     return Fit(
         axis=axis,
         scaling=problem.scaling,

@@ -18,7 +18,7 @@ from identify.cli.shared import (
     app,
     bars_on_stderr,
     catalogue_with,
-    checked_logs,
+    checked,
     read_logs,
     require_folder,
     say,
@@ -43,13 +43,12 @@ def fit(
     if out:
         require_folder(out)
     stage = stage_model(model, catalogue_with(effects))
+    recorded = read_logs(logs)
     with bars_on_stderr() as bars:
-        result = workflow.fit(
-            stage, checked_logs(logs), read_logs(holdout), window=window, progress=bars
-        )
+        result = workflow.fit(stage, recorded, read_logs(holdout), window=window, progress=bars)
     if out:
         save_model(result.model, out)
-    say(as_text.fit_text(result), as_json.fit_json(result), as_json_)
+    say(as_text.fit_text(result), as_json.fit_json(result), as_json_, checked(recorded))
 
 
 @app.command()
@@ -67,8 +66,9 @@ def compare(
     if out:
         require_folder(out)
     stage = stage_model(model, catalogue_with(effects))
+    recorded = read_logs(logs)
     with bars_on_stderr() as bars:
-        result = workflow.compare(stage, checked_logs(logs), window=window, progress=bars)
+        result = workflow.compare(stage, recorded, window=window, progress=bars)
     if out:
         from identify.report import write_report
 
@@ -76,7 +76,7 @@ def compare(
             out, title=f"{stage.name}: model against measurement", diagnosis=None,
             comparison=result, history=stage.history,
         )  # fmt: skip
-    say(as_text.compare_text(result), as_json.compare_json(result), as_json_)
+    say(as_text.compare_text(result), as_json.compare_json(result), as_json_, checked(recorded))
 
 
 @app.command()
@@ -96,10 +96,11 @@ def diagnose(
         require_folder(out)
     catalogue = catalogue_with(effects)
     stage = stage_model(model, catalogue)
+    recorded = read_logs(logs)
     with bars_on_stderr() as bars:
         result = workflow.diagnose(
             stage,
-            checked_logs(logs),
+            recorded,
             read_logs(holdout),
             catalogue=catalogue,
             window=window,
@@ -112,7 +113,7 @@ def diagnose(
             out, title=f"{stage.name}: what the model lacks", diagnosis=result,
             comparison=result.comparison, history=result.model.history,
         )  # fmt: skip
-    say(as_text.diagnose_text(result), as_json.diagnose_json(result), as_json_)
+    say(as_text.diagnose_text(result), as_json.diagnose_json(result), as_json_, checked(recorded))
 
 
 @app.command()
@@ -137,18 +138,19 @@ def add(
     catalogue = catalogue_with(effects)
     chosen = catalogue[effect]
     stage = stage_model(model, catalogue)
+    recorded = read_logs(logs)
     with bars_on_stderr() as bars:
         result = workflow.add(
             chosen,
             stage,
-            checked_logs(logs),
+            recorded,
             read_logs(holdout),
             axis=axis,
             window=window,
             progress=bars,
         )
     save_model(result.model, out)
-    say(as_text.add_text(result), as_json.add_json(result), as_json_)
+    say(as_text.add_text(result), as_json.add_json(result), as_json_, checked(recorded))
     if not result.kept:
         raise typer.Exit(1)
 

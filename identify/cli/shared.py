@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -63,9 +63,12 @@ def bars_on_stderr() -> Iterator[Progress]:
         yield show
 
 
-def say(text: str, result: dict[str, Any], as_json: bool) -> None:
+def say(text: str, result: dict[str, Any], as_json: bool, warnings: Sequence[str] = ()) -> None:
+    """Print the warnings on standard error, and the result as text or as one JSON object."""
     from identify.as_json import plain
 
+    for warning in warnings:
+        print(f"twin: {warning}", file=sys.stderr)
     print(json.dumps(plain(result)) if as_json else text)
 
 
@@ -87,15 +90,15 @@ def read_logs(paths: list[Path] | None) -> dict[str, Log]:
     return {str(path): read_log(path) for path in paths or ()}
 
 
-def checked_logs(paths: list[Path]) -> dict[str, Log]:
-    """The logs, with what is wrong with them said on standard error before anything is fitted."""
+def checked(logs: Mapping[str, Log]) -> list[str]:
+    """What is wrong with the logs, one sentence a finding."""
     from twin.log.check import check_log
 
-    logs = read_logs(paths)
-    for name, log in logs.items():
-        for finding in check_log(log).findings:
-            print(f"twin: {name}: {finding.severity.value}: {finding}", file=sys.stderr)
-    return logs
+    return [
+        f"{name}: {finding.severity.value}: {finding}"
+        for name, log in logs.items()
+        for finding in check_log(log).findings
+    ]
 
 
 def require_folder(path: Path) -> None:

@@ -12,7 +12,7 @@ from twin.log.check.smooth import Array
 LONGEST = 0.25  # s, searched both ways
 _MOTION = 20  # the log is so many times longer than the longest lag, to hold several moves
 _CLEAR = 0.5  # residual at the best lag at the most, as a part of the signal
-_WRONG = 0.05  # residual without a lag at the least, likewise
+_WRONG = 0.03  # residual without a lag at the least, likewise
 _BETTER = 0.6  # residual at the best lag at the most, as a part of that without a lag
 _AS_GOOD = 1.5  # a residual so many times the least may be the right one too
 
