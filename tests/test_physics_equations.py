@@ -47,7 +47,7 @@ def test_constant_force_is_constant() -> None:
 
 def test_position_dependent_friction_scales_the_level_by_its_cosine_series() -> None:
     p, factor = law("position_dependent_friction", 5, DRY)
-    along = np.pi * (RANDOM.x - p["start"]) / p["length"]
+    along = np.pi * np.clip((RANDOM.x - p["start"]) / p["length"], 0.0, 1.0)
     profile = sum(p[f"c{k}"] * np.cos(k * along) for k in range(1, 6))
     require(factor, np.maximum(1.0 + profile, 0.01))
 

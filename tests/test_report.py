@@ -320,14 +320,13 @@ def test_the_axis_of_the_answer_comes_first(case: Case) -> None:
 
 def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
     evil = '<script>alert(\'$1\')</script> & "x" onerror="y"'
-    source = Path(load_catalogue()["cogging"].law.__code__.co_filename)
-    own = tmp_path / "a$b^<i>$&c.py"
-    own.write_bytes(source.read_bytes())
-    catalogue = Catalogue([e for e in load_catalogue([own]).values() if e.name == own.stem])
+    own = replace(load_catalogue()["cogging"])
+    own.__dict__["name"] = "a$b^<i>$&c"  # what no file may be called
+    catalogue = Catalogue([own])
     model = replace(case.model, name=evil)
     logs = {evil: case.fit["run 1"]}
     diagnosis = workflow.diagnose(model, logs, case.held, catalogue=catalogue)
-    step = replace(case.addition.step, effect=own.stem, notes=(evil,))
+    step = replace(case.addition.step, effect=own.name, notes=(evil,))
     page = case.write(
         tmp_path / "evil.html", title=evil, diagnosis=diagnosis, comparison=diagnosis.comparison,
         history=[step], additions=(),
@@ -336,9 +335,9 @@ def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
     assert not {"script", "i"} & set(outline.tags)
     assert "onerror" not in {name for name, _ in outline.attributes}
     assert outline.text.count(evil) >= 5  # title twice, model, log, note
-    assert f"Axis x: {own.stem} is missing" in outline.text
+    assert f"Axis x: {own.name} is missing" in outline.text
     names = ["".join(ElementTree.fromstring(picture).itertext()) for picture in pictures_in(page)]
-    assert any(own.stem in name for name in names)
+    assert any(own.name in name for name in names)
 
 
 # --- whole or not at all --------------------------------------------------------------------
