@@ -49,7 +49,10 @@ def write_hdf5(path: Path, columns: dict[str, np.ndarray]) -> None:
 def write_hdf5_records(path: Path, columns: dict[str, np.ndarray]) -> None:
     h5py = pytest.importorskip("h5py")
     with h5py.File(path, "w") as file:
-        file["log"] = np.rec.fromarrays(list(columns.values()), names=list(columns))
+        records = np.empty(COUNT, [(name, column.dtype) for name, column in columns.items()])
+        for name, column in columns.items():
+            records[name] = column
+        file["log"] = records
 
 
 def write_parquet(path: Path, columns: dict[str, np.ndarray]) -> None:

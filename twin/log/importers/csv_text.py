@@ -37,10 +37,8 @@ class _Style:
     def cells(self, line: str) -> list[str]:
         text = line.strip(" \r\n").removeprefix("#").strip(" ")
         if self.delimiter is None:
-            cells = text.split()
-        else:
-            cells = next(csv.reader([text], delimiter=self.delimiter), [])
-        return [cell.strip() for cell in (cells[:-1] if cells and not cells[-1] else cells)]
+            return text.split()
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=self.delimiter), [])]
 
     def is_number(self, cell: str) -> bool:
         try:
@@ -72,19 +70,23 @@ def read(path: Path, mapping: ImportMap) -> Table:
     """Columns of a text table; raises InputError."""
     with parsing("a text table"):
         layout = _find_layout(path, mapping.csv)
-    wanted = mapping.column_names()
-    require_columns(wanted, layout.names)
-    where = [layout.names.index(name) for name in wanted]
-    try:
-        with closing(_lines(path, layout)) as lines:
-            values = np.loadtxt(
-                lines, delimiter=layout.style.delimiter, usecols=where, comments=None,
-                quotechar='"', ndmin=2, unpack=True,
-            )  # fmt: skip
-    except ValueError as error:
-        raise _first_fault(path, layout, where) or InputError(str(error)) from error
-    columns: dict[str, Array] = dict(zip(wanted, values, strict=True))
-    return Table(columns)
+        wanted = mapping.column_names()
+        require_columns(wanted, layout.names)
+        where = [layout.names.index(name) for name in wanted]
+        try:
+            values = _numbers(path, layout, where)
+        except ValueError as error:
+            raise _first_fault(path, layout, where) or InputError(str(error)) from error
+    return Table(dict(zip(wanted, values, strict=True)))
+
+
+def _numbers(path: Path, layout: _Layout, where: Sequence[int]) -> Array:
+    """Columns ``where`` as rows (k, n)."""
+    with closing(_lines(path, layout)) as lines:
+        return np.loadtxt(
+            lines, delimiter=layout.style.delimiter, usecols=where, comments=None, quotechar='"',
+            ndmin=2, unpack=True,
+        )  # fmt: skip
 
 
 def _lines(path: Path, layout: _Layout) -> Generator[str]:
@@ -138,29 +140,31 @@ def _first_row(rows: Sequence[Sequence[str]], style: _Style, header_line: int | 
     for index in range(header_line or 0, len(rows)):
         if len(rows[index]) == len(rows[-1]) and any(map(style.is_number, rows[index])):
             return index
-    raise InputError(f"has no rows of numbers below line {header_line}; correct header_line")
+    raise InputError(
+        f"has no rows of numbers below line {header_line or 0} that are as wide as its last line; "
+        "cut off what follows the numbers, or correct header_line"
+    )
 
 
 def _names(rows: Sequence[Sequence[str]], skip: int, header_line: int | None) -> tuple[str, ...]:
     """Names of the columns: the topmost of the rows above the numbers that are as wide."""
     width = len(rows[skip])
+    widths = (width, width - 1) if not rows[skip][-1] else (width,)  # rows may end in a delimiter
     if header_line is not None:
-        names = rows[header_line - 1]
-        if len(names) != width:
-            raise InputError(
-                f"line {header_line} has {len(names)} names, the rows have {width} cells; "
-                "correct header_line, delimiter or decimal in the map"
-            )
-        return tuple(names)
-    top = skip
-    while top > 0 and len(rows[top - 1]) == width:
-        top -= 1
-    if top == skip and skip > 0 and len(rows[skip - 1]) > 1:
+        top = header_line - 1
+    else:
+        top = skip
+        while top > 0 and len(rows[top - 1]) in widths:
+            top -= 1
+        if top == skip and (skip == 0 or len(rows[skip - 1]) < 2):
+            return tuple(str(k + 1) for k in range(width))
+        top = min(top, skip - 1)
+    if len(rows[top]) not in widths:
         raise InputError(
-            f"line {skip} has {len(rows[skip - 1])} names, the rows below have {width} cells; "
+            f"line {top + 1} has {len(rows[top])} names, the rows have {width} cells; "
             "state header_line, delimiter or decimal in the map"
         )
-    return tuple(rows[top]) if top < skip else tuple(str(k + 1) for k in range(width))
+    return tuple(rows[top])
 
 
 def _first_fault(path: Path, layout: _Layout, where: Sequence[int]) -> InputError | None:
