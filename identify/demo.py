@@ -74,7 +74,8 @@ def demo(
         for i, experiment in enumerate(RUNS, start=1)
     }
     held = {"machine_3.mcap": logs.pop("machine_3.mcap")}
-    say("2. the model (lugre, cable_slab, roller_spikes) is fitted, and every absent effect tried")
+    known = ", ".join(model.axes[AXIS].names)
+    say(f"2. the model ({known}) is fitted, and every absent effect tried")
     diagnosis = workflow.diagnose(model, logs, held, catalogue=catalogue, progress=progress)
     addition = None
     final = diagnosis.model

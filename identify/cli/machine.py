@@ -99,6 +99,9 @@ def recover(
 @app.command()
 def effects(
     name: Annotated[str | None, typer.Argument(help="One effect in full.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw what the effect leaves in the force (.png, .svg).")
+    ] = None,
     files: Effects = None,
     as_json_: Json = False,
 ) -> None:
@@ -108,6 +111,11 @@ def effects(
     catalogue = catalogue_with(files)
     if name is not None:
         chosen = catalogue[name]
+        if plot is not None:
+            from identify.signature import draw
+
+            require_folder(plot)
+            draw(chosen, catalogue, plot)
         say(as_text.effect_text(chosen), as_json.effect_json(chosen), as_json_)
         return
     everything = list(catalogue.values())
