@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,14 +21,16 @@ from twin.model import AxisModel, StageModel
 Array = NDArray[np.float64]
 
 REGIONS = 24  # bins along a coordinate
+ABOVE_FLOOR = 1.5  # error over noise floor from which a region counts as bad
+LEAST_SHARE = 0.02  # part of the squared error, beyond that of the time, from which it is told
 PITCH = 0.034  # m, of the rollers, where the model has no other
 
 
 @dataclass(frozen=True, eq=False)
 class MisfitMap:
-    """Misfit along one coordinate: bin centres (n,), mean and RMS force error (n,) N, share (n,).
+    """Misfit along one coordinate: bin centres (n,), mean and RMS force error (n,) N.
 
-    share: part of the whole squared force error in each bin.
+    share (n,): part of the whole squared force error in each bin; visited (n,): part of the time.
     """
 
     coordinate: str
@@ -39,6 +41,7 @@ class MisfitMap:
     mean: Array
     rms: Array
     share: Array
+    visited: Array
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,7 @@ def compare_axis(
     axis = model.axes[study.axis]
     kept = moving(study.fit, sticks(axis))
     force = residual(axis, study.fit)
-    floor = noise_floor(axis.mass, [(w.motion, w.window) for w in study.fit])
+    floor = noise_floor(axis, [(w.motion, w.window) for w in study.fit])
     where = gathered(study.fit)
     where["roller_phase"] = np.mod(where["position"], roller_pitch(axis))
     force, where = force[kept], {k: v[kept] for k, v in where.items()}
@@ -126,10 +129,13 @@ def _by_log(axis: AxisModel, study: Study) -> dict[str, float]:
     return {w.motion.name: rms(residual(axis, [w])[moving([w], sticks(axis))]) for w in study.fit}
 
 
-def position_errors(model: StageModel, logs: Mapping[str, Log]) -> dict[str, dict[str, float]]:
+def position_errors(
+    model: StageModel, logs: Mapping[str, Log], progress: Callable[[int, int], None]
+) -> dict[str, dict[str, float]]:
     """Free-running position error, axis -> log name -> m RMS."""
     out: dict[str, dict[str, float]] = {a: {} for a in model.axes}
-    for name, log in logs.items():
+    for i, (name, log) in enumerate(logs.items()):
+        progress(i, len(logs))
         run = free_run(model, log)
         for axis in model.axes:
             out[axis][name] = rms_error(run, axis)
@@ -163,15 +169,21 @@ def misfit_map(name: str, residual: Array, coordinate: Array) -> MisfitMap:
         mean=np.bincount(index, residual, bins) / count,
         rms=np.sqrt(square / count),
         share=square / max(square.sum(), np.finfo(float).tiny),
+        visited=np.bincount(index, minlength=bins) / len(index),
     )
 
 
 def worst_regions(maps: Sequence[MisfitMap], floor: float, count: int = 3) -> list[Region]:
-    """The regions that concentrate most error against their width, one a coordinate."""
+    """The regions with most error against the time spent there, one a coordinate.
+
+    None where the error is at the noise floor.
+    """
     found = []
     for m in maps:
-        excess = m.share - 1.0 / len(m.share)
+        excess = np.where(m.rms > ABOVE_FLOOR * floor, m.share - m.visited, 0.0)
         i = int(np.argmax(excess))
+        if excess[i] < LEAST_SHARE:
+            continue
         found.append(
             (
                 float(excess[i]),

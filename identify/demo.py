@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from identify import workflow
-from identify.candidates import orthonormal
 from identify.fit import Fit, fit_axis, rms
 from identify.planting import draw_effect, other_machine
 from identify.report import write_report
 from identify.residual import residual
+from identify.search import orthonormal
 from identify.study import Study, studies
 from identify.workflow import Addition, Diagnosis
 from twin.effect import Effect, Kind
@@ -25,6 +25,7 @@ from twin.model import Fitted, StageModel
 from twin.model_file import save_model
 
 DURATION = 20.0  # s of each log
+RUNS = ("tracking", "moves", "tracking")  # the last is held out
 FORCE = 0.05  # N RMS of the hidden effect, about 50 times the noise floor
 VISIBLE = 0.5  # part of the hidden force that the baseline must not be able to absorb
 AXIS = "x"
@@ -68,12 +69,13 @@ def demo(
     say("1. a machine with an effect that the model lacks runs three experiments, logged as MCAP")
     logs = {
         f"machine_{i}.mcap": _record(
-            machine, folder / f"machine_{i}.mcap", seed + 1000 * i, progress
+            machine, experiment, folder / f"machine_{i}.mcap", seed + 1000 * i, progress
         )
-        for i in (1, 2, 3)
+        for i, experiment in enumerate(RUNS, start=1)
     }
     held = {"machine_3.mcap": logs.pop("machine_3.mcap")}
-    say("2. the model (lugre, cable_slab, roller_spikes) is fitted, and every absent effect tried")
+    known = ", ".join(model.axes[AXIS].names)
+    say(f"2. the model ({known}) is fitted, and every absent effect tried")
     diagnosis = workflow.diagnose(model, logs, held, catalogue=catalogue, progress=progress)
     addition = None
     final = diagnosis.model
@@ -91,16 +93,18 @@ def demo(
         report,
         title=f"{model.name}: what the model lacks",
         diagnosis=diagnosis,
-        comparison=workflow.compare(final, {**logs, **held}),
+        comparison=workflow.compare(diagnosis.model, {**logs, **held}),
         history=final.history,
         additions=[addition] if addition else [],
     )
     return Demo(hidden, diagnosis, addition, report)
 
 
-def _record(machine: StageModel, path: Path, seed: int, progress: workflow.Progress) -> Log:
+def _record(
+    machine: StageModel, experiment: str, path: Path, seed: int, progress: workflow.Progress
+) -> Log:
     log = simulate(
-        machine, "tracking", seed=seed, duration=DURATION,
+        machine, experiment, seed=seed, duration=DURATION,
         progress=lambda done, total: progress(f"simulating {path.name}", done, total),
     )  # fmt: skip
     write_log(log, path)

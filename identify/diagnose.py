@@ -20,7 +20,6 @@ from twin.effects import Catalogue
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
-AT_FLOOR = 1.5  # ratio of error to noise floor below which a residual is noise
 TIE = 2.0  # |t| of the held-out difference below which two explanations cannot be told apart
 
 
@@ -79,7 +78,7 @@ def decide(base: Fit, study: Study, ranking: tuple[Candidate, ...]) -> AxisDiagn
     structure = None
     if supported:
         verdict = Verdict.AMBIGUOUS if tied else Verdict.MISSING_EFFECT
-    elif base.ratio < AT_FLOOR:
+    elif base.at_floor:
         verdict = Verdict.NOTHING_MISSING
     else:
         verdict = Verdict.UNEXPLAINED

@@ -12,9 +12,9 @@ from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from identify.evidence import effective_samples
+from identify.levenberg_marquardt import minimise
 from identify.noise import noise_floor
 from identify.residual import Windowed, jacobian, moving, residual
 from identify.scaling import Scaling
@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 
 PRIOR_FORCE = 0.1  # expected force of what is added to the friction, over that to be explained
 PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
-MOST_EVALUATIONS = 60
+MOST_EVALUATIONS = 40
+AT_FLOOR = 1.5  # ratio of error to noise floor below which a residual is taken for noise
 
 
 class Outcome(Enum):
@@ -44,7 +45,8 @@ class Fit:
     """A fitted axis.
 
     error: RMS force residual in N over the logs. floor: RMS noise floor in N. residual (n,) N and
-    jacobian (n, k) N per unit at the end, over the windows that carry information (kept).
+    jacobian (n, k) N per unit at the end, over the windows that carry information (kept). begun:
+    the axis that the fit started from.
     """
 
     axis: AxisModel
@@ -55,6 +57,12 @@ class Fit:
     residual: Array
     jacobian: Array
     kept: NDArray[np.bool_]
+    begun: AxisModel
+
+    @property
+    def at_floor(self) -> bool:
+        """Whether the error is hardly more than noise."""
+        return self.ratio < AT_FLOOR
 
     @property
     def ratio(self) -> float:
@@ -64,9 +72,7 @@ class Fit:
 
 def sticks(axis: AxisModel) -> bool:
     """Whether the axis' friction is a static one, whose force at rest can be anything."""
-    return any(
-        f.effect.kind is Kind.FRICTION and "at_rest" in f.effect.states for f in axis.effects
-    )
+    return any(f.effect.sticks for f in axis.effects)
 
 
 def _is_added(axis: AxisModel, c: Coordinate) -> bool:
@@ -94,9 +100,8 @@ class _Problem:
         self.logs = logs
         self.scaling = Scaling(coordinates(axis))
         self.kept = moving(logs, sticks(axis))
-        low, high = self.bounds = self.scaling.bounds()
-        margin = 1e-9 * np.minimum(high - low, 1.0)
-        self.start = np.clip(self.scaling.inside(axis), low + margin, high - margin)
+        self.bounds = self.scaling.bounds()
+        self.start = np.clip(self.scaling.inside(axis), *self.bounds)
         self.added = np.array([_is_added(axis, c) for c in self.scaling.where], dtype=bool)
         self.centre = np.where(self.added, 0.0, self.start)
         self.pull = np.zeros(len(self.start))
@@ -129,11 +134,11 @@ class _Problem:
 
     def solve(self, internal: Array, tolerance: float) -> tuple[Array, bool]:
         """Least squares from these values; the solution and whether it converged."""
-        solution = least_squares(
-            self.rows, internal, jac=self.slopes, bounds=self.bounds, x_scale="jac",
-            ftol=tolerance, xtol=tolerance, max_nfev=MOST_EVALUATIONS,
+        solution = minimise(
+            self.rows, self.slopes, internal, self.bounds,
+            tolerance=tolerance, most_evaluations=MOST_EVALUATIONS,
         )  # fmt: skip
-        return solution.x, solution.status > 0
+        return solution.x, solution.converged
 
 
 def fit_axis(axis: AxisModel, logs: Sequence[Windowed]) -> Fit:
@@ -144,14 +149,14 @@ def fit_axis(axis: AxisModel, logs: Sequence[Windowed]) -> Fit:
         problem.set_priors(internal)
         internal, _ = problem.solve(internal, 1e-3)
         problem.set_priors(internal)
-        internal, converged = problem.solve(internal, 1e-9)
+        internal, converged = problem.solve(internal, 1e-7)
     return _finish(problem, internal, Outcome.CONVERGED if converged else Outcome.NOT_CONVERGED)
 
 
 def _finish(problem: _Problem, internal: Array, outcome: Outcome) -> Fit:
     axis = problem.scaling.outside(problem.axis, internal)
     force = residual(axis, problem.logs)[problem.kept]
-    floor = noise_floor(axis.mass, [(log.motion, log.window) for log in problem.logs])
+    floor = noise_floor(axis, [(log.motion, log.window) for log in problem.logs])
     return Fit(
         axis=axis,
         scaling=problem.scaling,
@@ -161,6 +166,7 @@ def _finish(problem: _Problem, internal: Array, outcome: Outcome) -> Fit:
         residual=force,
         jacobian=jacobian(axis, problem.logs, problem.scaling.where)[problem.kept],
         kept=problem.kept,
+        begun=problem.axis,
     )
 
 

@@ -113,10 +113,10 @@ def _states_at(
 
 
 def _local_motion(position: Array, period: float) -> tuple[Array, Array]:
-    """Position and velocity (n_axes,) in the middle of some samples, by a parabola."""
+    """Position and velocity (n_axes,) in the middle of some samples, by a cubic."""
     half = len(position) // 2
     t = (np.arange(len(position)) - half) * period
-    fit = np.polynomial.polynomial.polyfit(t / t[-1], position, 2)
+    fit = np.polynomial.polynomial.polyfit(t / t[-1], position, 3)
     return fit[0], fit[1] / t[-1]
 
 

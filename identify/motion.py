@@ -131,9 +131,11 @@ def _blocks(position: Array, velocity: Array, force: Array, samples: int) -> Arr
     return np.ascontiguousarray(stacked.reshape(3, -1, samples).mean(axis=2))
 
 
-def excitation(motions: list[Motion]) -> Excitation:
-    """What the motions of one axis cover together."""
-    position = np.concatenate([m.position for m in motions])
+def excitation(motions: list[Motion], travel: tuple[float, float] | None) -> Excitation:
+    """What the motions of one axis cover together; ``travel`` (m) of the axis where it is known."""
+    position = np.concatenate(
+        [m.position for m in motions] + ([np.array(travel)] if travel else [])
+    )
     velocity = np.concatenate([m.velocity for m in motions])
     command = np.concatenate([m.command for m in motions])
     fast = 0.02 * np.abs(velocity).max()

@@ -8,6 +8,7 @@ are fitted to its spectrum above the band of the effects, and give what passes t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,32 +17,60 @@ from scipy.signal import welch
 
 from identify.motion import Motion
 from identify.weak import Window
+from twin.effect import Kind
+from twin.model import AxisModel, axis_table
+from twin.native import walk
 
 Array = NDArray[np.float64]
 
+SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 
 
-def noise_floor(mass: float, logs: Sequence[tuple[Motion, Window]]) -> float:
+def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, Window]]) -> float:
     """RMS in N of what measurement noise leaves in the windowed residual of these logs."""
-    parts = [_variance(mass, motion, window) for motion, window in logs]
+    parts = [_variance(axis, motion, window) for motion, window in logs]
     weights = [motion.signals.shape[1] for motion, _ in logs]
     return float(np.sqrt(np.average(parts, weights=weights)))
 
 
-def _variance(mass: float, motion: Motion, window: Window) -> float:
+def _variance(axis: AxisModel, motion: Motion, window: Window) -> float:
     dt = motion.sample_period
-    velocity, command = motion.raw
+    mass = axis.mass
+    velocity = motion.raw[0]
+    command = _actual_force(axis, motion)
     raw = 0.5 * (command[1:] + command[:-1]) - mass * np.diff(velocity) / dt
     # The median over segments passes by those with spikes and reversals.
-    segment = min(4096, len(raw))
-    frequency, power = welch(raw, 1.0 / dt, nperseg=segment, average="median")
+    segment = min(max(round(SEGMENT / dt), 256), len(raw))
+    frequency, power = welch(raw, 1.0 / dt, nperseg=segment, average="median", detrend="linear")
     half = np.cos(np.pi * frequency * dt) ** 2
     bend = ((2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * dt)) * mass / dt**2) ** 2
     band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < BAND[2] / dt)
     levels = _fit_levels(np.stack([half, bend], axis=1)[band], power[band])
     passed = levels[0] + levels[1] * bend
     return float(np.trapezoid(passed * window.response(dt, segment), frequency))
+
+
+def _actual_force(axis: AxisModel, motion: Motion) -> Array:
+    """The command (n,) N after the axis' actuation effects, at the log's own rate.
+
+    The loop's own noise is in the command and moves the axis; a delay left out would tear the two
+    apart and pass for measurement noise.
+    """
+    effects = tuple(f for f in axis.effects if f.effect.kind is Kind.ACTUATION)
+    velocity, command = motion.raw
+    if not effects:
+        return command
+    position = motion.signals[0, 0] + np.cumsum(velocity) * motion.sample_period
+    signals = np.ascontiguousarray(np.stack([position, velocity, command]))
+    table = axis_table({motion.axis: replace(axis, effects=effects)})
+    rows = np.zeros((len(table.entries), len(command)))
+    first, last, state, _, _ = table.axes[0]
+    walk(
+        table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
+        signals, np.zeros_like(signals), motion.sample_period, 0, rows,
+    )  # fmt: skip
+    return command + rows.sum(axis=0)
 
 
 def _fit_levels(shapes: Array, power: Array) -> Array:

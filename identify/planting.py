@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +57,27 @@ def draw_effect(
                 values[p.name] = float(np.exp(rng.uniform(np.log(low), np.log(high))))
             else:
                 values[p.name] = float(rng.uniform(low, high))
-    direction = {p.name: _direction(p.lower, rng) for p in effect.strengths}
     base = residual(axis, logs)
+
+    def added(fitted: Fitted) -> Array:
+        return residual(axis.with_effect(fitted), logs) - base
+
+    return strength_for(effect, added, force, values, rng)
+
+
+def strength_for(
+    effect: Effect,
+    added: Callable[[Fitted], Array],
+    force: float,
+    values: Mapping[str, float] | None = None,
+    rng: np.random.Generator | None = None,
+) -> Fitted:
+    """The effect with strengths scaled until ``added`` (the force it adds, N) has that RMS.
+
+    values: the other parameters. rng: draws the strengths' directions; all alike where None.
+    """
+    values = values or effect.starts()
+    direction = {p.name: _direction(p.lower, rng) for p in effect.strengths}
 
     def at(scale: float) -> Fitted:
         moved = {
@@ -67,13 +86,12 @@ def draw_effect(
         }
         return Fitted.at_start(effect, {**values, **moved})
 
-    def error(scale: float) -> float:
-        return rms(residual(axis.with_effect(at(scale)), logs) - base) - force
-
-    return at(_root(error))
+    return at(_root(lambda scale: rms(added(at(scale))) - force))
 
 
-def _direction(lower: float, rng: np.random.Generator) -> float:
+def _direction(lower: float, rng: np.random.Generator | None) -> float:
+    if rng is None:
+        return 1.0
     size = rng.uniform(0.5, 1.5)
     return float(size if lower >= 0 else size * rng.choice((-1.0, 1.0)))
 

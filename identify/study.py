@@ -55,12 +55,12 @@ def studies(
         if not fit:
             continue
         held = _moving(holdout, name)
-        length = window or choose_window(axis, fit)
+        length = window or choose_window(fit)
         out[name] = Study(
             axis=name,
             fit=tuple(Windowed.of(m, length) for m in fit),
             holdout=tuple(Windowed.of(m, length) for m in held),
-            excitation=excitation(fit),
+            excitation=excitation(fit, axis.hardware.travel),
         )
     if not out:
         known = sorted({a for log in logs.values() for a in log.axes})
@@ -91,7 +91,7 @@ def _one_way(position: Array) -> bool:
     return bool(np.abs(steps.sum()) > 0.5 * np.abs(steps).sum() > 0)
 
 
-def choose_window(axis: AxisModel, motions: Iterable[Motion]) -> float:
+def choose_window(motions: Iterable[Motion]) -> float:
     """The shortest window (s) whose noise floor is small against what is to be explained."""
     motions = list(motions)
     mass = inertia(motions)
@@ -103,7 +103,7 @@ def choose_window(axis: AxisModel, motions: Iterable[Motion]) -> float:
                 for m, w in zip(motions, windows, strict=True)
             ]
         )
-        floor = noise_floor(mass, list(zip(motions, windows, strict=True)))
+        floor = noise_floor(AxisModel(mass), list(zip(motions, windows, strict=True)))
         if floor < QUIET * np.sqrt(np.mean(rest**2)):
             return length
     return WINDOWS[-1]

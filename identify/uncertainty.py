@@ -20,6 +20,7 @@ from twin.model import read
 Array = NDArray[np.float64]
 
 BLOCKS = 30
+INSEPARABLE = 0.9999  # correlation of two estimates from which they are one number
 CONFIDENCE = 0.90
 LARGEST_RATIO = 3.0  # of error to noise floor; above it the model is wrong and no interval holds
 
@@ -42,6 +43,7 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
     values = read(fit.axis, fit.scaling.where)
     half = half_widths(fit)
     reason = refusal(fit)
+    twins = inseparable(fit)
     free = []
     for c, value, width in zip(fit.scaling.where, values, half, strict=True):
         p = c.parameter
@@ -49,11 +51,29 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
         high: float | None = None
         why = reason
         if why is None and not np.isfinite(width):
-            why = "this motion does not show the parameter"
+            why = "no interval: this motion does not show the parameter"
+        if why is None and c.label in twins:
+            why = f"no interval: this data cannot tell it from {twins[c.label]}"
         if why is None:
             low, high = max(value - width, p.lower), min(value + width, p.upper)
         free.append(Estimate(c.label, float(value), p.unit, low, high, True, why))
     return (*free, *_held(fit))
+
+
+def inseparable(fit: Fit) -> dict[str, str]:
+    """Pairs of parameters, by label, whose estimates are correlated to all but one."""
+    norms = np.linalg.norm(fit.jacobian, axis=0)
+    seen = np.flatnonzero(norms > 0)
+    columns = fit.jacobian[:, seen] / norms[seen]
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-15, hermitian=True)
+    spread = np.sqrt(np.diag(inverse))
+    correlation = np.abs(inverse / np.outer(spread, spread)) - np.eye(len(seen))
+    labels = [fit.scaling.where[i].label for i in seen]
+    return {
+        label: labels[int(np.argmax(row))]
+        for label, row in zip(labels, correlation, strict=True)
+        if row.max() > INSEPARABLE
+    }
 
 
 def refusal(fit: Fit) -> str | None:

@@ -11,8 +11,9 @@ import numpy as np
 from identify.candidates import Candidate, score, try_effect
 from identify.compare import AxisComparison, compare_axis, position_errors
 from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
-from identify.fit import Fit, error_on, fit_axis, rms
+from identify.fit import Fit, error_on, rms
 from identify.freerun import free_run, rms_error
+from identify.search import fit_thoroughly
 from identify.study import Study, studies
 from identify.uncertainty import Estimate, estimates, half_widths
 from twin.effect import Effect
@@ -110,7 +111,7 @@ def fit(
     found = studies(model, logs, holdout or {}, window)
     fits: dict[str, Fit] = {}
     for i, (axis, study) in enumerate(found.items()):
-        fits[axis] = fit_axis(model.axes[axis], study.fit)
+        fits[axis] = fit_thoroughly(model.axes[axis], study)
         progress("fitting", i + 1, len(found))
     for axis, result in fits.items():
         model = model.with_axis(axis, result.axis)
@@ -123,10 +124,12 @@ def holdout_error(fitted: Fit, study: Study) -> float | None:
     return rms(error_on(fitted.axis, study.holdout)) if study.holdout else None
 
 
-def compare(model: StageModel, logs: Logs, *, window: float | None = None) -> Comparison:
+def compare(
+    model: StageModel, logs: Logs, *, window: float | None = None, progress: Progress = silent
+) -> Comparison:
     """Error numbers of a model as it stands, and where it fails. Raises InputError."""
     found = studies(model, logs, {}, window)
-    errors = position_errors(_only(model, found), logs)
+    errors = position_errors(_only(model, found), logs, partial(progress, "comparing"))
     axes = {a: compare_axis(model, study, logs, errors[a]) for a, study in found.items()}
     return Comparison(model, axes)
 
@@ -156,7 +159,9 @@ def diagnose(
         )
         for axis, fitted in result.fits.items()
     }
-    return Diagnosis(result.model, axes, compare(result.model, logs, window=window))
+    return Diagnosis(
+        result.model, axes, compare(result.model, logs, window=window, progress=progress)
+    )
 
 
 def add(
@@ -230,11 +235,12 @@ def moved_parameters(before: Fit, after: Fit) -> tuple[str, ...]:
     earlier = half_widths(before)[[before.scaling.where.index(c) for c in shared]]
     allowed = np.hypot(width, earlier)
     out = []
-    for c, a, b, limit in zip(shared, old, new, allowed, strict=True):
-        if not abs(b - a) > limit:
-            continue
+    for c, a, b, limit, first in zip(shared, old, new, allowed, earlier, strict=True):
         p = c.parameter
-        collapsed = p.strength and abs(b) < COLLAPSE * abs(a)
+        # Its own new interval does not matter here: what stood in for the effect may be collinear.
+        collapsed = p.strength and abs(b) < COLLAPSE * abs(a) and abs(a) > first
+        if not collapsed and not abs(b - a) > limit:
+            continue
         verb = "collapsed" if collapsed else "moved"
         tail = (
             "it stood in for the effect that was missing" if collapsed else "more than its interval"

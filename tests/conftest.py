@@ -11,5 +11,5 @@ SHARED_DATA = Path(__file__).resolve().parent.parent.parent / "shared" / "data"
 def shared_data() -> Path:
     """Folder of real measurements beside the repository; skips where it is absent."""
     if not SHARED_DATA.is_dir():
-        pytest.skip(f"real measurements are not available: no folder {SHARED_DATA.name} beside the repository")
+        pytest.skip("the real measurements (../shared/data) are not beside the repository")
     return SHARED_DATA

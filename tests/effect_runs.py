@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from twin.effect import (
     TIME,
     V_OTHER,
     VISCOUS,
+    WHEN,
     X_OTHER,
     Effect,
     Kind,
@@ -124,7 +124,7 @@ def moderate(effect: Effect, rng: np.random.Generator, wanted: float = 0.3) -> d
 
 
 def forces(effects: Sequence[Fitted], motion: Motion) -> dict[str, Array]:
-    """Force of each effect on an axis of 1 kg along a given motion, N."""
+    """Force of each effect along a measured motion, N."""
     table = axis_table({"x": AxisModel(1.0, effects=tuple(effects))})
     rows = np.zeros((len(table.entries), len(motion)))
     first, last, state, _, _ = table.axes[0]
@@ -136,22 +136,23 @@ def forces(effects: Sequence[Fitted], motion: Motion) -> dict[str, Array]:
     return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
 
 
-def sampled(io: Any, k: int, motion: Motion) -> None:
-    """Fill io as the native core does before a law."""
-    for slot in range(IO_SIZE):
-        io[slot] = 0.0
-    io[INDEX], io[TIME], io[DT], io[MASS] = float(k), k * motion.dt, motion.dt, 1.0
-    io[X], io[V], io[U] = float(motion.x[k]), float(motion.v[k]), float(motion.u[k])
+def sampled(io: Array, k: int, motion: Motion) -> None:
+    """Fill io as a simulation does before a law."""
+    io[:] = 0.0
+    io[INDEX], io[TIME], io[DT], io[MASS] = k, k * motion.dt, motion.dt, 1.0
+    io[X], io[V], io[U] = motion.x[k], motion.v[k], motion.u[k]
     io[X_OTHER], io[V_OTHER] = 0.5 * io[X], -0.5 * io[V]
     io[DRY] = io[STATIC] = io[VISCOUS] = 1.0
     io[HOLD] = io[V] / motion.dt + io[U]
     io[READING] = io[X]
+    io[WHEN] = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One law stepped by itself: io (n, IO_SIZE) before and after, states (n, n_states) after.
+    """One law stepped by itself as in a simulation.
 
+    before, after: io (n, IO_SIZE) around each sample; states (n, n_states) after each sample;
     spilled: it wrote behind its own states; p_changed: it wrote its parameters.
     """
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from effect_runs import (
@@ -126,11 +127,13 @@ def check_writes_only_its_result(effect: Effect) -> None:
 def check_dissipative(friction: Effect, modifier: Effect | None = None) -> None:
     """Friction takes work out of every closed cycle, large or within its pre-sliding."""
     rng = np.random.default_rng(15)
+    around: list[list[Fitted]] = [[]]
+    if modifier:  # with a moderate action, and at its most
+        around = [[Fitted.at_start(modifier, moderate(modifier, rng, w))] for w in (0.3, 1e9, 1e9)]
     for values in (friction.starts(), moderate(friction, rng), moderate(friction, rng)):
-        for amplitude in (1e-6, 1e-4, 1e-2, 0.15):
+        for amplitude, changed in product((1e-6, 1e-4, 1e-2, 0.15), around):
             motion = Motion.cycles(amplitude)
-            around = [Fitted.at_start(modifier, moderate(modifier, rng))] if modifier else []
-            force = forces([Fitted.at_start(friction, values), *around], motion)[friction.name]
+            force = forces([Fitted.at_start(friction, values), *changed], motion)[friction.name]
             given = np.sum(force * motion.v) * motion.dt
             size = np.sum(np.abs(force * motion.v)) * motion.dt
             assert given <= 1e-9 * size, f"friction gives {given} J, amplitude {amplitude} m"

@@ -46,8 +46,10 @@ def require_parity(model: StageModel, experiment: str = "tracking") -> Log:
     log = simulated(model, MujocoStage, experiment)
     reduced = columns(simulated(model, ReducedStage, experiment))
     for name, column in columns(log).items():
-        size = np.abs(column).max()
-        np.testing.assert_allclose(reduced[name], column, rtol=0, atol=1e-10 * size, err_msg=name)
+        # The position loop turns the last bit of a position into some 1e-10 N.
+        share = 1e-11 if name.endswith(("position", "velocity")) else 1e-8
+        tolerance = share * np.abs(column).max()
+        np.testing.assert_allclose(reduced[name], column, rtol=0, atol=tolerance, err_msg=name)
     return log
 
 

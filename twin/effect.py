@@ -21,6 +21,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -68,9 +69,10 @@ class Kind(Enum):
 class Excitation:
     """What a log's motion covers; start rules and scans are computed from it.
 
-    position_low, position_high (m), speed_max (m/s), dry_level (N, half the gap between the force
-    in the two directions), duration (s), period (s, sample period), force_max (N, largest command),
-    lines (Hz, frequencies at which the force repeats in time; strongest first).
+    position_low, position_high (m, of the axis' travel where the model gives it), speed_max (m/s),
+    dry_level (N, half the gap between the force in the two directions), duration (s), period (s,
+    sample period), force_max (N, largest command), lines (Hz, frequencies at which the force
+    repeats in time; strongest first).
     """
 
     position_low: float
@@ -96,7 +98,7 @@ class Parameter:
     better one from the data. lower, upper: bounds, same unit. strength: the effect is absent when
     every strength is zero. fixed: known by design, held by a fit. at_least: name of a parameter of
     the same effect below which this one may not fall. scan: values that the diagnosis tries, from
-    the data.
+    the data. screened: whether a strength takes part while those are tried; a detail need not.
     """
 
     name: str
@@ -110,6 +112,7 @@ class Parameter:
     at_least: str | None = None
     start_rule: Callable[[Excitation], float] | None = None
     scan: Callable[[Excitation], Sequence[float]] | None = None
+    screened: bool = True
 
     def start_from(self, excitation: Excitation) -> float:
         """Start value for this motion, inside the bounds."""
@@ -127,7 +130,9 @@ class Effect:
     parameter ``elements``, whose bounds are both that number, tells the law. attach: of a structure
     effect, builds its bodies in MuJoCo, given a twin.mount.Mount and the values by name; its first
     two states are then the position (m) and speed (m/s) of the joint built. added_mass: values by
-    name -> what the effect adds to the moved mass, as a part of it.
+    name -> what the effect adds to the moved mass, as a part of it. sticks: a friction that holds
+    the axis at rest by whatever force that takes. simplest: the same force in simpler values, such
+    as a pitch of which only harmonics were used.
     """
 
     kind: Kind
@@ -142,6 +147,8 @@ class Effect:
     of_size: Callable[[int], Effect] | None = None
     attach: Callable[[Any, Mapping[str, float]], None] | None = None
     added_mass: Callable[[Mapping[str, float]], float] | None = None
+    sticks: bool = False
+    simplest: Callable[[Mapping[str, float]], dict[str, float]] | None = None
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]
@@ -157,10 +164,15 @@ class Effect:
                     f"effect {self.name}: start {p.start} {p.unit} of {p.name} is outside its "
                     f"bounds [{p.lower}, {p.upper}]"
                 )
+            if p.strength and not p.lower <= 0.0 <= p.upper:
+                raise ValueError(
+                    f"effect {self.name}: strength {p.name} cannot be zero within its bounds "
+                    f"[{p.lower}, {p.upper}] {p.unit}"
+                )
             if p.at_least is not None and p.at_least not in names:
                 raise ValueError(f"effect {self.name}: {p.name} refers to unknown {p.at_least}")
 
-    @property
+    @cached_property
     def name(self) -> str:
         """The name of the file that holds the law."""
         return Path(inspect.getfile(self.law)).stem

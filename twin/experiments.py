@@ -41,15 +41,18 @@ class Experiment:
 
 
 def stage_limits(model: StageModel) -> list[Limits]:
-    """Motion limits of every axis of the model."""
-    return [
-        Limits(h.travel, h.velocity, h.acceleration, h.jerk)
-        for h in (axis.hardware for axis in model.axes.values())
-    ]
+    """Motion limits of every axis of the model; InputError where its travel is not known."""
+    limits = []
+    for name, axis in model.axes.items():
+        h = axis.hardware
+        if h.travel is None:
+            raise InputError(f"axis {name} has no travel; give travel = [low, high] in m")
+        limits.append(Limits(h.travel, h.velocity, h.acceleration, h.jerk))
+    return limits
 
 
 def _middle(model: StageModel) -> np.ndarray:
-    return np.array([sum(a.hardware.travel) / 2.0 for a in model.axes.values()])
+    return np.array([sum(limit.travel) / 2.0 for limit in stage_limits(model)])
 
 
 def _tracking(model: StageModel, axis: int, duration: float, rng: np.random.Generator) -> Setpoint:

@@ -21,12 +21,12 @@ MOST_ELEMENTS = 1000
 class Hardware:
     """What surrounds an axis' mechanics.
 
-    travel (m, low and high), force_constant (N/A), force_limit (N), encoder_resolution (m),
-    encoder_noise (m rms), current_noise (A rms), velocity (m/s), acceleration (m/s^2) and jerk
-    (m/s^3) limits of its moves, bandwidth (Hz) of its position loop.
+    travel (m, low and high; None where it is not known), force_constant (N/A), force_limit (N),
+    encoder_resolution (m), encoder_noise (m rms), current_noise (A rms), velocity (m/s),
+    acceleration (m/s^2) and jerk (m/s^3) limits of its moves, bandwidth (Hz) of its position loop.
     """
 
-    travel: tuple[float, float] = (-1.0, 1.0)
+    travel: tuple[float, float] | None = None
     force_constant: float = 1.0
     force_limit: float = math.inf
     encoder_resolution: float = 0.0
@@ -241,9 +241,15 @@ def write(axis: AxisModel, where: Iterable[Coordinate], values: Iterable[float])
         by_effect.setdefault(c.effect, {})[c.parameter.name] = float(value)
     mass = by_effect.pop("", {}).get("mass", axis.mass)
     effects = tuple(
-        replace(f, values={**f.values, **by_effect[f.effect.name]})
+        replace(f, values=_ordered(f.effect, {**f.values, **by_effect[f.effect.name]}))
         if f.effect.name in by_effect
         else f
         for f in axis.effects
     )
     return replace(axis, mass=mass, effects=effects)
+
+
+def _ordered(effect: Effect, values: dict[str, float]) -> dict[str, float]:
+    """The values with each held one raised to the one it may not fall below (Fs >= Fc)."""
+    floors = {p.name: values[p.at_least] for p in effect.parameters if p.at_least}
+    return {name: max(value, floors.get(name, value)) for name, value in values.items()}

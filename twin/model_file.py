@@ -169,7 +169,8 @@ def _axis_table(axis: AxisModel) -> tomlkit.items.Table:
         table["fixed"] = ["mass"]
     for key, unit in HARDWARE_UNITS.items():
         value = getattr(axis.hardware, key)
-        table[key] = tomlkit.item(list(value) if key == "travel" else value).comment(unit)
+        if value is not None:
+            table[key] = tomlkit.item(list(value) if key == "travel" else value).comment(unit)
     effects = tomlkit.table(is_super_table=True)
     for fitted in axis.effects:
         entry = tomlkit.table()

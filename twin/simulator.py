@@ -133,8 +133,10 @@ def stage_spec(model: StageModel) -> mujoco.MjSpec:
     moves both masses. Raises InputError where the file lacks a joint or motor of an axis, and where
     a mass leaves nothing for a body.
     """
-    spec = mujoco.MjSpec.from_string(model.mjcf) if model.mjcf else _plain_slides(model)
+    spec = _read_mjcf(model) if model.mjcf else _plain_slides(model)
     spec.option.timestep = model.period
+    # Higher-order integrators evaluate the forces within a sample, where states do not advance.
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     carried: dict[str, float] = {}
     for name in reversed(list(model.axes)):
         joint = spec.joint(name)
@@ -143,6 +145,7 @@ def stage_spec(model: StageModel) -> mujoco.MjSpec:
                 f"{model.mjcf_name}: has no joint '{name}' with a motor 'motor_{name}'; "
                 "an axis needs both"
             )
+        _require_bare(model, name, joint, spec.actuator(f"motor_{name}"))
         inside = sum(m for other, m in carried.items() if _carries(joint.parent, other))
         moved = model.axes[name].mass + _added_mass(model.axes[name])
         if moved - inside <= 0:
@@ -168,6 +171,39 @@ def _added_mass(axis: AxisModel) -> float:
     """What the effects add to the moved mass, kg."""
     parts = [f.effect.added_mass(f.values) for f in axis.effects if f.effect.added_mass]
     return axis.mass * sum(parts)
+
+
+def _read_mjcf(model: StageModel) -> mujoco.MjSpec:
+    try:
+        return mujoco.MjSpec.from_string(model.mjcf)
+    except ValueError as error:
+        raise InputError(
+            f"{model.mjcf_name}: is not an MJCF file that MuJoCo reads: {error}"
+        ) from error
+
+
+def _require_bare(
+    model: StageModel, axis: str, joint: mujoco.MjsJoint, motor: mujoco.MjsActuator
+) -> None:
+    """Friction, damping and springs belong in the stage model, where both simulations see them."""
+    own = {
+        "damping": np.any(joint.damping),
+        "stiffness": np.any(joint.stiffness),
+        "frictionloss": np.any(joint.frictionloss),
+        "armature": np.any(joint.armature),
+    }
+    for name, present in own.items():
+        if present:
+            raise InputError(
+                f"{model.mjcf_name}: joint '{axis}' has {name} of its own; remove it and give the "
+                "axis an effect instead"
+            )
+    if motor.gear[0] != 1.0:
+        raise InputError(
+            f"{model.mjcf_name}: motor_{axis} has gear {motor.gear[0]:g}; the command is a force "
+            "in N, give gear 1"
+        )
+    motor.ctrllimited = mujoco.mjtLimited.mjLIMITED_FALSE  # the control loop limits the force
 
 
 def _carries(body: mujoco.MjsBody, joint: str) -> bool:

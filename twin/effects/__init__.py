@@ -58,6 +58,10 @@ def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:
 def _user_effect(path: Path) -> Effect:
     if not path.is_file():
         raise InputError(f"{path}: no such effect file; give a Python file that defines EFFECT")
+    if not path.stem.isidentifier():
+        raise InputError(
+            f"{path}: '{path.stem}' cannot be the name of an effect; use letters, digits and _"
+        )
     module = _import_file(path)
     effect = getattr(module, "EFFECT", None)
     if not isinstance(effect, Effect):

@@ -5,7 +5,8 @@ J. F. Gieras, Z. J. Piech, B. Tomczuk, "Linear Synchronous Motors", 2nd ed. (201
 force is a Fourier series in position with period set by pole pitch and slot pitch.
 """
 
-from math import cos, pi, sin
+from collections.abc import Mapping
+from math import cos, hypot, pi, sin
 
 from twin.effect import OUT, Effect, Excitation, Kind, Parameter, X
 
@@ -27,6 +28,17 @@ def pitches(e: Excitation) -> tuple[float, ...]:
     return tuple(2.0 * e.travel / k for k in range(4, 2 * cycles + 1))
 
 
+def simplest(values: Mapping[str, float]) -> dict[str, float]:
+    """A pitch whose fundamental is silent is a multiple of the true one."""
+    size = {k: hypot(values[f"a{k}"], values[f"b{k}"]) for k in (1, 2, 3)}
+    for k in (2, 3):
+        others = sum(size[j] for j in (1, 2, 3) if j != k)
+        if others < 0.1 * size[k]:
+            zero = {f"{c}{j}": 0.0 for c in "ab" for j in (2, 3)}
+            return {"p": values["p"] / k, "a1": values[f"a{k}"], "b1": values[f"b{k}"], **zero}
+    return dict(values)
+
+
 EFFECT = Effect(
     kind=Kind.FORCE,
     summary="force periodic in position at the magnet pitch, harmonics 1 to 3",
@@ -35,12 +47,16 @@ EFFECT = Effect(
     parameters=(
         Parameter("p", "m", 0.024, 1e-4, 1.0, "magnet pitch", scan=pitches),
         *(
-            Parameter(f"{c}{k}", "N", 0.0, -1e4, 1e4, f"{f} term of harmonic {k}", strength=True)
+            Parameter(
+                f"{c}{k}", "N", 0.0, -1e4, 1e4, f"{f} term of harmonic {k}", strength=True,
+                screened=k == 1,
+            )
             for k in (1, 2, 3)
             for c, f in (("a", "sine"), ("b", "cosine"))
         ),
     ),
     law=law,
+    simplest=simplest,
     fingerprint="residual repeats along the track, the same in both directions and at every force",
     excited_by="constant-speed passes over many magnet pitches",
-)
+)  # fmt: skip

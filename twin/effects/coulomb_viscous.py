@@ -43,6 +43,7 @@ EFFECT = Effect(
         Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
     ),
     states=("at_rest",),
+    sticks=True,
     law=law,
     fingerprint="force steps at every reversal, and grows in proportion to speed",
     excited_by="constant-speed passes in both directions at several speeds",

@@ -11,7 +11,7 @@ from twin.effect import DRY, Effect, Kind, Parameter, X
 
 
 def law(p, s, io):
-    phase = pi * (io[X] - p[0]) / p[1]
+    phase = pi * min(max((io[X] - p[0]) / p[1], 0.0), 1.0)  # beyond the track it stays as it is
     profile = (
         p[2] * cos(phase)
         + p[3] * cos(2.0 * phase)

@@ -51,6 +51,7 @@ EFFECT = Effect(
         Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
     ),
     states=("at_rest",),
+    sticks=True,
     law=law,
     fingerprint="residual rises below the Stribeck velocity, with the sign of the direction",
     excited_by="constant-speed passes in both directions, most of them slow",

@@ -1,4 +1,4 @@
-"""Results as JSON objects (the documented ones) and as text for a terminal."""
+"""Results as JSON objects: the documented ones, numbers in SI units."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from identify.compare import AxisComparison
 from identify.uncertainty import Estimate
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
+from twin.log.check import CheckReport
 
 
 def plain(value: Any) -> Any:
@@ -167,117 +168,18 @@ def effect_json(effect: Effect) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def fit_text(result: FitResult) -> str:
-    """Parameters of each axis, one a line."""
-    lines = []
-    for axis, fit in result.fits.items():
-        held = result.holdout_error[axis]
-        tail = "" if held is None else f", held out {held:.4g} N"
-        lines.append(
-            f"axis {axis}: force error {fit.error:.4g} N{tail}, noise floor {fit.floor:.4g} N "
-            f"(ratio {fit.ratio:.2f})"
-        )
-        lines.append(f"  {fit.outcome.value}")
-        for e in result.estimates[axis]:
-            lines.append(f"  {e.label:34s} {_with_interval(e)}")
-    return "\n".join(lines)
-
-
-def _with_interval(e: Estimate) -> str:
-    text = f"{e.value:12.6g} {e.unit:10s}"
-    if not e.free:
-        return text + " fixed"
-    if e.low is None:
-        return text + f" {e.reason}"
-    return text + f" 90 % in [{e.low:.6g}, {e.high:.6g}]"
-
-
-def compare_text(result: Comparison) -> str:
-    """Errors by log, and the three worst regions of each axis."""
-    lines = []
-    for axis, c in result.axes.items():
-        for name, error in c.force_error.items():
-            lines.append(
-                f"axis {axis}, {name}: force error {error:.4g} N ({error / c.floor:.1f} x noise "
-                f"floor), free-running position error {c.position_error[name]:.3g} m"
-            )
-        lines += [f"  worst: {region.in_words()}" for region in c.worst]
-    return "\n".join(lines)
-
-
-def diagnose_text(result: Diagnosis) -> str:
-    """The answer for each axis with the ranking's head."""
-    lines = []
-    for axis, d in result.axes.items():
-        named = f" {d.best.effect.name}." if d.best else ""
-        lines.append(f"axis {axis}: {d.verdict.value}{named}")
-        lines.append(
-            f"  force error {d.base.error:.4g} N, noise floor {d.base.floor:.4g} N "
-            f"(ratio {d.base.ratio:.2f})"
-        )
-        if d.ambiguous_with:
-            lines.append(f"  cannot be told apart from: {', '.join(d.ambiguous_with)}")
-        if d.unexplained:
-            s = d.unexplained
-            again = f", period {s.period:.4g} {s.unit}" if s.period else ""
-            lines.append(
-                f"  {100 * s.share_of_error:.0f} % of the squared error depends on "
-                f"{s.depends_on.replace('_', ' ')}{again}"
-            )
-        lines += [_ranking_line(c) for c in d.ranking[:4]]
-    return "\n".join(lines)
-
-
-def _ranking_line(c: Candidate) -> str:
-    return (
-        f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   held-out error "
-        f"{c.gain.before:.4g} -> {c.gain.after:.4g} N{'' if c.supported else '   not supported'}"
-    )
-
-
-def add_text(result: Addition) -> str:
-    """What adding the effect did."""
-    s = result.step
-    lines = [
-        f"added {s.effect} to axis {s.axis}",
-        f"  force error on the fit logs   {s.fit_error_before:.4g} -> {s.fit_error_after:.4g} N",
-    ]
-    if s.holdout_error_before is not None and s.holdout_error_after is not None:
-        lines.append(
-            "  force error held out          "
-            f"{s.holdout_error_before:.4g} -> {s.holdout_error_after:.4g} N"
-        )
-    before, after = result.position_error
-    lines.append(
-        f"  free-running position error   {before:.3g} -> {after:.3g} m "
-        f"(MuJoCo: {result.replayed:.3g} m)"
-    )
-    lines += [f"  {note}" for note in result.notes]
-    if not result.kept:
-        lines.append("  the data do not support this effect: it does not help held out")
-    return "\n".join(lines)
-
-
-def effects_text(effects: list[Effect]) -> str:
-    """One line an effect."""
-    width = max(len(e.name) for e in effects)
-    return "\n".join(f"{e.name:{width}s}  {e.kind.name.lower():9s}  {e.summary}" for e in effects)
-
-
-def effect_text(effect: Effect) -> str:
-    """One effect in full."""
-    rows = [
-        f"  {p.name:14s} {p.start:>10.4g} {p.unit:10s} [{p.lower:g}, {p.upper:g}]  {p.meaning}"
-        for p in effect.parameters
-    ]
-    return "\n".join(
-        [
-            f"{effect.name} ({effect.kind.name.lower()}): {effect.summary}",
-            f"equation     {effect.equation}",
-            f"source       {effect.source}",
-            f"fingerprint  {effect.fingerprint}",
-            f"excited by   {effect.excited_by}",
-            "parameters   start value, unit, bounds, meaning",
-            *rows,
-        ]
-    )
+def check_json(reports: Mapping[str, CheckReport]) -> dict[str, Any]:
+    """Whether all logs may be fitted, and the findings of each."""
+    return {
+        "ok": all(report.ok for report in reports.values()),
+        "logs": {
+            name: [
+                {
+                    "severity": f.severity.value, "fault": f.fault.name.lower(), "axis": f.axis,
+                    "what": f.what, "where": f.where, "remedy": f.remedy,
+                }
+                for f in report.findings
+            ]
+            for name, report in reports.items()
+        },
+    }  # fmt: skip

@@ -1,0 +1,40 @@
+# Two commands do all the set-up: `make demo` and `make test`. Nothing is installed outside .venv.
+PYTHON ?= python3
+VENV := .venv
+ifeq ($(OS),Windows_NT)
+BIN := $(VENV)/Scripts
+else
+BIN := $(VENV)/bin
+endif
+
+.PHONY: demo test bench clean
+
+demo: $(VENV)/runtime
+	$(BIN)/twin demo --out demo
+
+test: $(VENV)/tests
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -n 2 -m "not slow"
+
+bench: $(VENV)/benchmarks
+	$(BIN)/python -m benchmarks
+	$(BIN)/python -m pytest -n 2 -m slow
+
+$(VENV)/runtime: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/tests: $(VENV)/runtime
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[test,import]"
+	@touch $@
+
+$(VENV)/benchmarks: $(VENV)/tests
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[test,import,bench]"
+	@touch $@
+
+clean:
+	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

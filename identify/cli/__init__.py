@@ -1,0 +1,41 @@
+"""The command line: `twin COMMAND`."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from identify.cli import loop, machine
+from identify.cli.shared import app
+from twin.errors import InputError
+
+__all__ = ["loop", "machine", "main"]
+
+
+def main() -> None:
+    """Entry point of `twin`: errors are one line, exit code 2."""
+    try:
+        code = app(standalone_mode=False)
+    except InputError as error:
+        code = fail(str(error))
+    except KeyboardInterrupt:
+        code = fail("interrupted")
+    except OSError as error:
+        code = fail(f"{error.filename}: {error.strerror}; check the name and the permissions")
+    except Exception as error:
+        if hasattr(error, "format_message"):  # a usage error; its class moves between versions
+            code = fail(f"{error.format_message()} See `twin --help`.")
+        elif "TWIN_TRACEBACK" in os.environ:
+            raise
+        else:
+            code = fail(
+                f"this is a fault of the program: {type(error).__name__}: {error}; please report "
+                "it with the command and what TWIN_TRACEBACK=1 adds"
+            )
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def fail(message: str) -> int:
+    """Print one line on standard error; the exit code of bad input."""
+    print(f"twin: {' '.join(message.split())}", file=sys.stderr)
+    return 2

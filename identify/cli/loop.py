@@ -1,0 +1,189 @@
+"""Commands of the loop: fit, compare, diagnose, add, demo."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from identify.cli.shared import (
+    Effects,
+    Holdout,
+    Json,
+    Logs,
+    Model,
+    Window,
+    app,
+    bars_on_stderr,
+    catalogue_with,
+    checked,
+    read_logs,
+    require_folder,
+    say,
+    stage_model,
+)
+
+
+@app.command()
+def fit(
+    model: Model,
+    logs: Logs,
+    holdout: Holdout = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Fitted model to write.")] = None,
+    window: Window = None,
+    effects: Effects = None,
+    as_json_: Json = False,
+) -> None:
+    """Identify the parameters of the model's effects."""
+    from identify import as_json, as_text, workflow
+    from twin.model_file import save_model
+
+    if out:
+        require_folder(out)
+    stage = stage_model(model, catalogue_with(effects))
+    recorded = read_logs(logs)
+    with bars_on_stderr() as bars:
+        result = workflow.fit(stage, recorded, read_logs(holdout), window=window, progress=bars)
+    if out:
+        save_model(result.model, out)
+    say(as_text.fit_text(result), as_json.fit_json(result), as_json_, checked(recorded))
+
+
+@app.command()
+def compare(
+    model: Model,
+    logs: Logs,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")] = None,
+    window: Window = None,
+    effects: Effects = None,
+    as_json_: Json = False,
+) -> None:
+    """Say how far model and machine are apart, and where the model fails."""
+    from identify import as_json, as_text, workflow
+
+    if out:
+        require_folder(out)
+    stage = stage_model(model, catalogue_with(effects))
+    recorded = read_logs(logs)
+    with bars_on_stderr() as bars:
+        result = workflow.compare(stage, recorded, window=window, progress=bars)
+    if out:
+        from identify.report import write_report
+
+        write_report(
+            out, title=f"{stage.name}: model against measurement", diagnosis=None,
+            comparison=result, history=stage.history,
+        )  # fmt: skip
+    say(as_text.compare_text(result), as_json.compare_json(result), as_json_, checked(recorded))
+
+
+@app.command()
+def diagnose(
+    model: Model,
+    logs: Logs,
+    holdout: Holdout = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")] = None,
+    window: Window = None,
+    effects: Effects = None,
+    as_json_: Json = False,
+) -> None:
+    """Say which physical effect is missing, with the evidence for it."""
+    from identify import as_json, as_text, workflow
+
+    if out:
+        require_folder(out)
+    catalogue = catalogue_with(effects)
+    stage = stage_model(model, catalogue)
+    recorded = read_logs(logs)
+    with bars_on_stderr() as bars:
+        result = workflow.diagnose(
+            stage,
+            recorded,
+            read_logs(holdout),
+            catalogue=catalogue,
+            window=window,
+            progress=bars,
+        )
+    if out:
+        from identify.report import write_report
+
+        write_report(
+            out, title=f"{stage.name}: what the model lacks", diagnosis=result,
+            comparison=result.comparison, history=result.model.history,
+        )  # fmt: skip
+    say(as_text.diagnose_text(result), as_json.diagnose_json(result), as_json_, checked(recorded))
+
+
+@app.command()
+def add(
+    effect: Annotated[str, typer.Argument(metavar="EFFECT", help="Name from `twin effects`.")],
+    model: Model,
+    logs: Logs,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Model with the effect.")],
+    holdout: Holdout = None,
+    axis: Annotated[
+        str | None, typer.Option(help="Axis; the one it helps most if left out.")
+    ] = None,
+    window: Window = None,
+    effects: Effects = None,
+    as_json_: Json = False,
+) -> None:
+    """Add an effect, refit, and record the error before and after."""
+    from identify import as_json, as_text, workflow
+    from twin.model_file import save_model
+
+    require_folder(out)
+    catalogue = catalogue_with(effects)
+    chosen = catalogue[effect]
+    stage = stage_model(model, catalogue)
+    recorded = read_logs(logs)
+    with bars_on_stderr() as bars:
+        result = workflow.add(
+            chosen,
+            stage,
+            recorded,
+            read_logs(holdout),
+            axis=axis,
+            window=window,
+            progress=bars,
+        )
+    save_model(result.model, out)
+    say(as_text.add_text(result), as_json.add_json(result), as_json_, checked(recorded))
+    if not result.kept:
+        raise typer.Exit(1)
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path("demo"),
+    seed: Annotated[int, typer.Option(help="Draws the machine and its hidden effect.")] = 2,
+    model: Annotated[str, typer.Option("--model", help="Stage model (.toml).")] = "proton_xy",
+    effects: Effects = None,
+    as_json_: Json = False,
+) -> None:
+    """Run the whole loop on a machine with an effect that the analysis is not told of."""
+    from identify import as_json
+    from identify.demo import demo as run
+
+    catalogue = catalogue_with(effects)
+    stage = stage_model(model, catalogue)
+
+    def tell(text: str) -> None:
+        print(text, file=sys.stderr if as_json_ else sys.stdout, flush=True)
+
+    with bars_on_stderr() as bars:
+        result = run(stage, catalogue, out, seed, tell, bars)
+    hidden = result.hidden.effect.name
+    summary = {
+        "hidden": hidden,
+        "named": result.named,
+        "report": str(result.report),
+        "diagnosis": as_json.diagnose_json(result.diagnosis),
+        "addition": result.addition and as_json.add_json(result.addition),
+    }
+    verdict = "the diagnosis is right" if result.named else "the diagnosis did not name it"
+    say(f"5. hidden was {hidden}: {verdict}\nreport: {result.report}", summary, as_json_)
+    if not result.named:
+        raise typer.Exit(1)

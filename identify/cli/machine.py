@@ -1,0 +1,126 @@
+"""Commands on the machine's side: simulate, import, check, recover, effects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from identify.cli.shared import (
+    Effects,
+    Json,
+    Logs,
+    app,
+    bars_on_stderr,
+    catalogue_with,
+    read_logs,
+    require_folder,
+    say,
+    stage_model,
+)
+
+
+@app.command()
+def simulate(
+    experiment: Annotated[str, typer.Argument(help="tracking, moves, cable_pass, ...")],
+    model: Annotated[str, typer.Option("--model", help="Stage model (.toml).")] = "proton_xy",
+    out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")] = Path("log.mcap"),
+    seed: Annotated[int, typer.Option(help="Same seed, same log.")] = 0,
+    duration: Annotated[float, typer.Option(help="s")] = 20.0,
+    axis: Annotated[str | None, typer.Option(help="Axis that moves, where one does.")] = None,
+    effects: Effects = None,
+    as_json_: Json = False,
+) -> None:
+    """Run an experiment on the twin in MuJoCo and log it as MCAP."""
+    from functools import partial
+
+    from twin.experiments import simulate as run
+    from twin.log import write_log
+
+    require_folder(out)
+    stage = stage_model(model, catalogue_with(effects))
+    with bars_on_stderr() as bars:
+        log = run(
+            stage, experiment, seed=seed, duration=duration, axis=axis,
+            progress=partial(bars, "simulating"),
+        )  # fmt: skip
+        write_log(log, out, progress=partial(bars, "writing"))
+    result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
+    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_)
+
+
+@app.command("import")
+def import_(
+    source: Annotated[Path, typer.Argument(help="CSV, MAT, Parquet, HDF5 or TDMS file.")],
+    mapping: Annotated[Path, typer.Option("--map", help="Columns, units, scale, sign, rate.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")],
+    as_json_: Json = False,
+) -> None:
+    """Turn a machine's recording into an MCAP log."""
+    from twin.log import write_log
+    from twin.log.importers import import_log, load_mapping
+
+    require_folder(out)
+    log = import_log(source, load_mapping(mapping))
+    write_log(log, out)
+    result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
+    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_)
+
+
+@app.command()
+def check(logs: Logs, as_json_: Json = False) -> None:
+    """Say whether logs are fit for identification, and what is wrong with them."""
+    from identify import as_json, as_text
+    from twin.log.check import check_log
+
+    reports = {name: check_log(log) for name, log in read_logs(logs).items()}
+    say(as_text.check_text(reports), as_json.check_json(reports), as_json_)
+    if not all(report.ok for report in reports.values()):
+        raise typer.Exit(1)
+
+
+@app.command()
+def recover(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="Damaged MCAP log.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log of what is intact.")],
+    as_json_: Json = False,
+) -> None:
+    """Keep the intact part of a damaged log."""
+    from twin.log import recover_log, write_log
+
+    require_folder(out)
+    good, recovery = recover_log(log)
+    write_log(good, out)
+    result = {"log": str(out), "kept": recovery.kept, "lost": list(recovery.lost)}
+    say(str(recovery), result, as_json_)
+
+
+@app.command()
+def effects(
+    name: Annotated[str | None, typer.Argument(help="One effect in full.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw what the effect leaves in the force (.png, .svg).")
+    ] = None,
+    files: Effects = None,
+    as_json_: Json = False,
+) -> None:
+    """Print the catalogue, or one effect with its equation, units and source."""
+    from identify import as_json, as_text
+
+    catalogue = catalogue_with(files)
+    if name is not None:
+        chosen = catalogue[name]
+        if plot is not None:
+            from identify.signature import draw
+
+            require_folder(plot)
+            draw(chosen, catalogue, plot)
+        say(as_text.effect_text(chosen), as_json.effect_json(chosen), as_json_)
+        return
+    everything = list(catalogue.values())
+    say(
+        as_text.effects_text(everything),
+        {"effects": [as_json.effect_json(e) for e in everything]},
+        as_json_,
+    )

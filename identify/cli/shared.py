@@ -1,0 +1,107 @@
+"""What the commands share: their options, how they read input and how they speak."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from twin.errors import InputError
+
+if TYPE_CHECKING:
+    from identify.workflow import Progress
+    from twin.effects import Catalogue
+    from twin.log import Log
+    from twin.model import StageModel
+
+app = typer.Typer(
+    help="Find out why the model and the machine disagree.",
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs to fit on.")]
+Model = Annotated[str, typer.Argument(metavar="MODEL", help="Stage model (.toml).")]
+Holdout = Annotated[
+    list[Path] | None, typer.Option("--holdout", help="MCAP log held out; may be repeated.")
+]
+Window = Annotated[
+    float | None,
+    typer.Option("--window", help="Weak-form window in s; from the noise if left out."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Effects = Annotated[
+    list[Path] | None, typer.Option("--effects", help="Your own effect file; may be repeated.")
+]
+
+
+@contextmanager
+def bars_on_stderr() -> Iterator[Progress]:
+    """Progress bars on standard error, one for each kind of work."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    tasks: dict[str, Any] = {}
+    console = Console(stderr=True)
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bars:
+
+        def show(what: str, done: int, total: int) -> None:
+            if what not in tasks:
+                tasks[what] = bars.add_task(what, total=total)
+            bars.update(tasks[what], completed=done)
+
+        yield show
+
+
+def say(text: str, result: dict[str, Any], as_json: bool, warnings: Sequence[str] = ()) -> None:
+    """Print the warnings on standard error, and the result as text or as one JSON object."""
+    from identify.as_json import plain
+
+    for warning in warnings:
+        print(f"twin: {warning}", file=sys.stderr)
+    print(json.dumps(plain(result)) if as_json else text)
+
+
+def catalogue_with(files: list[Path] | None) -> Catalogue:
+    from twin.effects import load_catalogue
+
+    return load_catalogue(files or ())
+
+
+def stage_model(name: str, catalogue: Catalogue) -> StageModel:
+    from twin.model_file import load_model
+
+    return load_model(name, catalogue)
+
+
+def read_logs(paths: list[Path] | None) -> dict[str, Log]:
+    from twin.log import read_log
+
+    return {str(path): read_log(path) for path in paths or ()}
+
+
+def checked(logs: Mapping[str, Log]) -> list[str]:
+    """What is wrong with the logs, one sentence a finding."""
+    from twin.log.check import check_log
+
+    return [
+        f"{name}: {finding.severity.value}: {finding}"
+        for name, log in logs.items()
+        for finding in check_log(log).findings
+    ]
+
+
+def require_folder(path: Path) -> None:
+    """Fail before the work, not after it."""
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")

@@ -1,0 +1,165 @@
+"""Search an effect's shape: at each, its best strengths by one linear step from a base fit."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from identify.fit import Fit, fit_axis
+from identify.residual import jacobian, residual
+from identify.study import Study
+from twin.effect import Effect, Kind, Parameter
+from twin.model import AxisModel, Coordinate, Fitted
+
+Array = NDArray[np.float64]
+
+RIDGE = 1e-4  # keeps the linear step finite along directions that the base explains already
+RESCORED_SHAPES = 24  # best shapes of a coarse scan that are tried with every strength
+REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
+BETTER = 0.99  # part of the error that a new start must reach to be taken
+
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    squared_error: float
+    shape: dict[str, float]
+    fitted: Fitted
+
+
+def starts(base: Fit, study: Study, effect: Effect) -> list[Fitted]:
+    """The effect at its best shapes beside the base, best first; at least one.
+
+    All shapes are tried with the screened strengths, then the best of them with every strength.
+    """
+    ground = _Ground.of(base, study, effect)
+    coarse = [p for p in effect.strengths if p.screened]
+    found = sorted(
+        (_try(ground, shape, coarse) for shape in shapes(effect, study)),
+        key=lambda s: s.squared_error,
+    )
+    if len(coarse) < len(effect.strengths):
+        again = (_try(ground, s.shape, effect.strengths) for s in found[:RESCORED_SHAPES])
+        found = sorted(again, key=lambda s: s.squared_error)
+    return [s.fitted for s in found[:REFINED_STARTS]]
+
+
+def fit_thoroughly(axis: AxisModel, study: Study) -> Fit:
+    """Fit an axis; search its effects' shapes anew where the first fit leaves more than noise."""
+    best = fit_axis(axis, study.fit)
+    for name in axis.names:
+        effect = axis[name].effect
+        if best.at_floor or not any(p.scan for p in effect.parameters):
+            continue
+        rest = _fit_without(best, study, name)
+        first = starts(rest, study, effect)[0]
+        held = {n: best.axis[name].values[n] for n in best.axis[name].fixed}
+        again = replace(first, values={**first.values, **held}, fixed=best.axis[name].fixed)
+        other = fit_axis(best.axis.with_effect(again), study.fit)
+        if other.error < BETTER * best.error:
+            best = replace(other, begun=best.begun)
+    return best
+
+
+def _fit_without(fit: Fit, study: Study, name: str) -> Fit:
+    """The fit with one effect taken out, its other parameters left where they are."""
+    kept = [i for i, c in enumerate(fit.scaling.where) if c.effect != name]
+    axis = fit.axis.without(name)
+    return replace(
+        fit,
+        axis=axis,
+        scaling=replace(fit.scaling, where=tuple(fit.scaling.where[i] for i in kept)),
+        residual=residual(axis, study.fit)[fit.kept],
+        jacobian=fit.jacobian[:, kept],
+    )
+
+
+def shapes(effect: Effect, study: Study) -> Iterator[dict[str, float]]:
+    """Values to try for the parameters that the effect says must be searched."""
+    scanned = [p for p in effect.parameters if p.scan]
+    grids = [p.scan(study.excitation) if p.scan else () for p in scanned]
+    for values in itertools.product(*grids):
+        yield {p.name: v for p, v in zip(scanned, values, strict=True)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """What is the same at every shape: the base without what the effect replaces."""
+
+    study: Study
+    effect: Effect
+    rest: AxisModel
+    basis: Array
+    unchanged: Array
+    kept: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, base: Fit, study: Study, effect: Effect) -> _Ground:
+        rest = _without_friction(base.axis) if effect.kind is Kind.FRICTION else base.axis
+        columns = [i for i, c in enumerate(base.scaling.where) if _belongs(c, rest)]
+        unchanged = residual(base.axis, study.fit)[base.kept]
+        return cls(
+            study, effect, rest, orthonormal(base.jacobian[:, columns]), unchanged, base.kept
+        )
+
+
+def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter]) -> _Start:
+    """Best strengths at one shape, by a linear step with the base parameters free."""
+    effect, study = ground.effect, ground.study
+    first = Fitted.at_start(effect, _clipped(effect, study, shape))
+    axis = ground.rest.with_effect(first)
+    where = [Coordinate(effect.name, p) for p in strengths if p.name not in first.fixed]
+    silent = all(first.values[p.name] == 0.0 for p in effect.strengths)
+    force = ground.unchanged if silent else residual(axis, study.fit)[ground.kept]
+    columns = jacobian(axis, study.fit, where)[ground.kept]
+    step, squared = _bounded_step(ground.basis, force, columns, where, first)
+    moved = {c.parameter.name: s for c, s in zip(where, step, strict=True)}
+    return _Start(squared, shape, replace(first, values={**first.values, **moved}))
+
+
+def _clipped(effect: Effect, study: Study, shape: dict[str, float]) -> dict[str, float]:
+    values = {**effect.starts(study.excitation), **shape}
+    return {p.name: float(min(max(values[p.name], p.lower), p.upper)) for p in effect.parameters}
+
+
+def _belongs(c: Coordinate, axis: AxisModel) -> bool:
+    return not c.effect or c.effect in axis.names
+
+
+def _without_friction(axis: AxisModel) -> AxisModel:
+    return replace(
+        axis, effects=tuple(f for f in axis.effects if f.effect.kind is not Kind.FRICTION)
+    )
+
+
+def orthonormal(columns: Array) -> Array:
+    """Orthonormal basis (n, r) of the columns' span."""
+    norms = np.linalg.norm(columns, axis=0)
+    scaled = columns[:, norms > 0] / norms[norms > 0]
+    power, directions = np.linalg.eigh(scaled.T @ scaled)
+    seen = power > 1e-12 * power.max(initial=1.0)
+    return scaled @ (directions[:, seen] / np.sqrt(power[seen]))
+
+
+def _bounded_step(
+    basis: Array, force: Array, columns: Array, where: list[Coordinate], first: Fitted
+) -> tuple[Array, float]:
+    """Strengths within their bounds that minimise the force left beside the base's columns."""
+    left = force - basis @ (basis.T @ force)
+    own = columns - basis @ (basis.T @ columns)
+    norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    start = np.array([first.values[c.parameter.name] for c in where])
+    low = np.array([c.parameter.lower for c in where]) - start
+    high = np.array([c.parameter.upper for c in where]) - start
+    ridge = RIDGE * np.eye(len(where))
+    scaled = np.vstack([own / norms, ridge])
+    target = np.concatenate([-left, np.zeros(len(where))])
+    step = np.linalg.lstsq(scaled, target, rcond=None)[0] / norms
+    if ((step < low) | (step > high)).any():
+        low, high = low * norms, np.maximum(high * norms, low * norms + 1e-12)
+        step = lsq_linear(scaled, target, bounds=(low, high)).x / norms
+    return start + step, float(np.sum((left + own @ step) ** 2))

@@ -1,0 +1,83 @@
+"""The product's own path on the EMPS measurements: import, fit, diagnose, add, stop.
+
+A. Janot, M. Gautier, M. Brunot, "Data Set and Reference Models of EMPS", Workshop on Nonlinear
+System Identification Benchmarks, 2019.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from identify.diagnose import Verdict
+from identify.workflow import add, diagnose
+from twin.effects import load_catalogue
+from twin.log import read_log, write_log
+from twin.log.importers import import_log, load_mapping
+from twin.model_file import load_model
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+CATALOGUE = load_catalogue()
+WINDOW = 0.2  # s
+
+
+@pytest.fixture(scope="module")
+def emps(shared_data, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("emps")
+    mapping = load_mapping(EXAMPLES / "import_emps.toml")
+    logs = {}
+    for name in ("DATA_EMPS", "DATA_EMPS_PULSES"):
+        imported = import_log(shared_data / "emps" / f"{name}.mat", mapping)
+        write_log(imported, folder / f"{name}.mcap")
+        logs[name] = read_log(folder / f"{name}.mcap")
+    return {"run": logs["DATA_EMPS"]}, {"pulses": logs["DATA_EMPS_PULSES"]}
+
+
+@pytest.fixture(scope="module")
+def model():
+    return load_model(EXAMPLES / "emps.toml", CATALOGUE)
+
+
+@pytest.fixture(scope="module")
+def found(model, emps):
+    return diagnose(model, *emps, catalogue=CATALOGUE, window=WINDOW)
+
+
+@pytest.fixture(scope="module")
+def added(found, emps):
+    return add(CATALOGUE["asymmetric_friction"], found.model, *emps, window=WINDOW)
+
+
+def test_the_four_parameter_fit_is_near_the_published_one(found):
+    axis = found.model.axes["x"]
+    assert axis.mass == pytest.approx(95.1089, rel=0.015)
+    assert axis["coulomb_viscous"].values["sigma2"] == pytest.approx(203.5034, rel=0.015)
+    assert axis["coulomb_viscous"].values["Fc"] == pytest.approx(20.3935, rel=0.015)
+    assert axis["constant_force"].values["F0"] == pytest.approx(3.1648, rel=0.05)
+
+
+def test_direction_dependent_friction_is_named_first(found):
+    assert found.leading.verdict is Verdict.MISSING_EFFECT
+    assert found.effect is not None
+    assert found.effect.name == "asymmetric_friction"
+
+
+def test_the_held_out_error_falls_by_about_a_third(added):
+    assert added.kept
+    assert added.step.holdout_error_before == pytest.approx(1.94, abs=0.06)
+    assert added.step.holdout_error_after == pytest.approx(1.30, abs=0.06)
+
+
+def test_the_constant_force_is_said_to_have_collapsed(added):
+    notes = [n for n in added.notes if n.startswith("constant_force.F0 collapsed")]
+    assert len(notes) == 1
+    assert abs(added.model.axes["x"]["constant_force"].values["F0"]) < 0.4
+
+
+def test_then_it_stops_adding(added, emps):
+    again = diagnose(added.model, *emps, catalogue=CATALOGUE, window=WINDOW)
+    assert again.effect is None
+    assert again.leading.verdict is Verdict.UNEXPLAINED
+
+
+def test_without_a_window_the_answer_is_the_same(model, emps):
+    assert diagnose(model, *emps, catalogue=CATALOGUE).effect is CATALOGUE["asymmetric_friction"]

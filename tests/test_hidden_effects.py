@@ -1,0 +1,45 @@
+"""An effect that the analysis is not told of is named; nothing is named where nothing is hidden."""
+
+import pytest
+from machines import machine, one_axis
+
+from identify.diagnose import Verdict
+from identify.workflow import add, diagnose
+from twin.effects import load_catalogue
+from twin.model_file import load_model
+
+CATALOGUE = load_catalogue()
+STAGE = one_axis(load_model("proton_xy", CATALOGUE))
+FLOOR = 1e-3  # N, about the noise floor of these logs
+
+HIDDEN = (
+    "cogging",
+    "asymmetric_friction",
+    "position_dependent_friction",
+    "quadratic_drag",
+    "actuator_delay",
+)
+
+
+@pytest.mark.parametrize("effect", HIDDEN)
+@pytest.mark.parametrize("force", [5.0 * FLOOR, 40.0 * FLOOR], ids=["weak", "strong"])
+def test_a_hidden_effect_is_named_first_and_adding_it_reaches_the_noise_floor(effect, force):
+    seed = 1 + HIDDEN.index(effect)
+    hidden = machine(STAGE, CATALOGUE, effect, force, seed)
+    found = diagnose(STAGE, hidden.logs, hidden.holdout, catalogue=CATALOGUE)
+    assert found.leading.verdict is Verdict.MISSING_EFFECT
+    assert found.effect is not None
+    assert found.effect.name == effect
+    added = add(found.effect, found.model, hidden.logs, hidden.holdout)
+    assert added.kept
+    assert added.step.holdout_error_after < 1.5 * added.candidate.fit.floor
+    if force > 10.0 * FLOOR:  # below, the drift of half a second hardly shows the force
+        assert added.position_error[1] < 0.5 * added.position_error[0]
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_nothing_is_named_where_nothing_is_hidden(seed):
+    honest = machine(STAGE, CATALOGUE, None, 0.0, seed)
+    found = diagnose(STAGE, honest.logs, honest.holdout, catalogue=CATALOGUE)
+    assert found.leading.verdict is Verdict.NOTHING_MISSING
+    assert found.effect is None

@@ -1,0 +1,140 @@
+"""Fits on the twin's own logs: parameters, delay, noise floor, intervals, and a user's effect."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from machines import machine, one_axis
+
+from identify.candidates import try_effect
+from identify.fit import fit_axis
+from identify.levenberg_marquardt import minimise
+from identify.study import studies
+from identify.uncertainty import estimates, refusal
+from identify.workflow import diagnose
+from twin.effects import load_catalogue
+from twin.experiments import simulate
+from twin.model import Fitted, coordinates, read, write
+from twin.model_file import load_model
+
+CATALOGUE = load_catalogue()
+STAGE = one_axis(load_model("proton_xy", CATALOGUE))
+AXIS = STAGE.axes["x"]
+
+
+@pytest.fixture(scope="module")
+def study():
+    logs = {f"log {s}": simulate(STAGE, "tracking", seed=s, duration=15.0) for s in (1, 2)}
+    return studies(STAGE, logs, {})["x"]
+
+
+@pytest.fixture(scope="module")
+def fitted(study):
+    return fit_axis(AXIS, study.fit)
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.5])
+def test_every_parameter_is_found_from_a_start_half_off(study, factor):
+    where = coordinates(AXIS)
+    truth = read(AXIS, where)
+    off = [c.parameter.name != "phase" for c in where]
+    found = fit_axis(write(AXIS, where, np.where(off, factor * truth, truth)), study.fit)
+    assert found.ratio < 1.2
+    for c, value, true in zip(where, read(found.axis, where), truth, strict=True):
+        loose = 0.15 if c.label in ("lugre.sigma1", "lugre.sigma2") else 0.05
+        assert value == pytest.approx(true, rel=loose), c.label
+
+
+def test_most_intervals_cover_the_truth_and_are_narrow(fitted):
+    truth = dict(
+        zip((c.label for c in coordinates(AXIS)), read(AXIS, coordinates(AXIS)), strict=True)
+    )
+    free = [e for e in estimates(fitted) if e.free]
+    covered = [e.low <= truth[e.label] <= e.high for e in free if e.low is not None]
+    assert len(covered) == len(free)
+    assert np.mean(covered) > 0.6
+    mass = next(e for e in free if e.label == "mass")
+    assert (mass.high - mass.low) < 1e-3 * mass.value
+
+
+def test_intervals_are_refused_on_a_wrong_model(study):
+    wrong = fit_axis(AXIS.without("cable_slab"), study.fit)
+    assert refusal(wrong) is not None
+    assert all(e.low is None for e in estimates(wrong))
+
+
+def test_the_twin_has_no_delay(fitted, study):
+    delayed = try_effect(fitted, study, CATALOGUE["actuator_delay"])
+    assert not delayed.supported
+    assert delayed.fit.axis["actuator_delay"].values["tau"] < 0.05 * STAGE.period
+
+
+def test_the_noise_floor_is_that_of_the_noise_put_in(fitted):
+    hardware = AXIS.hardware
+    current = hardware.force_constant * hardware.current_noise
+    window = fitted_window()
+    expected = current * np.sqrt(np.sum(window.weights**2))
+    assert fitted.floor == pytest.approx(expected, rel=0.25)
+    assert fitted.error == pytest.approx(expected, rel=0.25)
+
+
+def fitted_window():
+    from identify.weak import Window
+
+    return Window.of_length(0.02, STAGE.period)
+
+
+def test_twice_the_noise_is_twice_the_floor():
+    loud = replace(
+        AXIS.hardware, current_noise=4.0 * AXIS.hardware.current_noise, encoder_noise=4e-9
+    )
+    stage = STAGE.with_axis("x", replace(AXIS, hardware=loud))
+    logs = [simulate(s, "tracking", seed=5, duration=8.0) for s in (STAGE, stage)]
+    floors = [
+        fit_axis(AXIS, studies(STAGE, {"log": log}, {}, window=0.05)["x"].fit).floor for log in logs
+    ]
+    assert floors[1] == pytest.approx(4.0 * floors[0], rel=0.3)
+
+
+def test_a_users_effect_is_fitted_and_named():
+    own = load_catalogue([Path(__file__).parent.parent / "examples" / "my_effect.py"])
+    true = {"k": 9.0, "place": 0.043, "w": 0.018}
+    stage = STAGE.with_axis("x", AXIS.with_effect(Fitted.at_start(own["my_effect"], true)))
+    logs = {f"log {s}": simulate(stage, "moves", seed=s, duration=12.0) for s in (1, 2, 3)}
+    held = {"log 3": logs.pop("log 3")}
+    found = diagnose(STAGE, logs, held, catalogue=own)
+    assert found.effect is own["my_effect"]
+    best = found.leading.best
+    assert best is not None
+    for name, value in true.items():
+        assert best.fit.axis["my_effect"].values[name] == pytest.approx(value, rel=0.03)
+
+
+def test_a_hidden_effect_of_a_planted_fault_is_not_explained_by_others():
+    """Negative control: with the planted effect out of the catalogue nothing takes its name."""
+    from twin.effects import Catalogue
+
+    hidden = machine(STAGE, CATALOGUE, "cogging", 0.04, 21)
+    without = Catalogue([e for e in CATALOGUE.values() if e.name != "cogging"])
+    found = diagnose(STAGE, hidden.logs, hidden.holdout, catalogue=without)
+    assert found.effect is None
+    assert found.leading.unexplained is not None
+
+
+def test_levenberg_marquardt_solves_rosenbrock_within_bounds():
+    def residual(x):
+        return np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
+
+    def jacobian(x):
+        return np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]])
+
+    wide = np.array([-5.0, -5.0]), np.array([5.0, 5.0])
+    start = np.array([-1.2, 1.0])
+    free = minimise(residual, jacobian, start, wide, tolerance=1e-12, most_evaluations=200)
+    np.testing.assert_allclose(free.x, [1.0, 1.0], rtol=1e-6)
+    tight = np.array([-5.0, -5.0]), np.array([0.5, 5.0])
+    held = minimise(residual, jacobian, start, tight, tolerance=1e-12, most_evaluations=200)
+    np.testing.assert_allclose(held.x, [0.5, 0.25], rtol=1e-5)
+    assert free.converged
+    assert held.converged

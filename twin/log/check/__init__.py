@@ -1,0 +1,26 @@
+"""Is a log fit for identification? What is wrong with it, before anything is fitted."""
+
+from __future__ import annotations
+
+from twin.log.check import content, excitation, outliers, saturation, timing, units
+from twin.log.check.axis import Axis
+from twin.log.check.report import CheckReport, Fault, Finding, Severity
+from twin.log.log import Log
+
+__all__ = ["CheckReport", "Fault", "Finding", "Severity", "check_log"]
+
+
+def check_log(log: Log) -> CheckReport:
+    """Look for what spoils an identification; the log is not changed.
+
+    Where an axis lacks something that every other check needs, only that is reported.
+    """
+    findings: list[Finding] = []
+    for name, columns in log.axes.items():
+        axis = Axis(name, log.sample_rate, columns)
+        basic = list(content.check(axis))
+        findings += basic
+        if not basic:
+            for part in (units, timing, outliers, saturation, excitation):
+                findings += part.check(axis)
+    return CheckReport(tuple(findings))

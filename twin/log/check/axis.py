@@ -1,0 +1,124 @@
+"""One axis of a log as the checks see it; everything is computed when first asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from twin.log.check.dynamics import Dynamics, fit_dynamics
+from twin.log.check.lag import Lag, find_lag
+from twin.log.check.smooth import Array, Smoother, white_noise
+from twin.log.log import AxisLog
+
+_IMPOSSIBLE = 4.0  # times the acceleration that 99 % of the samples stay below
+_NOISE = 10.0  # times the rms of noise
+_SLOW = 0.02  # times the highest speed: below, Coulomb friction is not yet full
+_TINY = float(np.finfo(float).tiny)
+_MOVING = 5.0  # speed, in units of its noise
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """name: of the axis; sample_rate in Hz; log: its columns."""
+
+    name: str
+    sample_rate: float
+    log: AxisLog
+
+    @property
+    def duration(self) -> float:
+        """Length of the log in s."""
+        return len(self.log) / self.sample_rate
+
+    @cached_property
+    def smoother(self) -> Smoother:
+        """The low-pass at which signals are compared."""
+        return Smoother(1.0 / self.sample_rate)
+
+    @cached_property
+    def position_step(self) -> float:
+        """Smallest change of the position in m: the encoder's step, where it is seen."""
+        steps = np.abs(np.diff(self.log.position))
+        return float(steps[steps > 0.0].min())
+
+    @cached_property
+    def position_noise(self) -> float:
+        """Noise of the position in m rms: the white part of it, or what its step makes."""
+        return max(white_noise(self.log.position), self.position_step / 12**0.5)
+
+    @cached_property
+    def velocity(self) -> Array:
+        """(m,) low-passed velocity of the position, m/s."""
+        return self.smoother.velocity(self.log.position)
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """(m,) low-passed acceleration of the position, m/s^2."""
+        return self.smoother.acceleration(self.log.position)
+
+    @cached_property
+    def force(self) -> Array:
+        """(m,) low-passed command, N."""
+        return self.smoother.held(self.log.force)
+
+    @cached_property
+    def moves(self) -> bool:
+        """Whether a tenth of the log or more has motion beyond the noise of the encoder."""
+        speed = float(np.quantile(np.abs(self.velocity), 0.9))
+        return speed > _MOVING * self.smoother.velocity_noise(self.position_noise)
+
+    @cached_property
+    def possible_jump(self) -> float:
+        """Largest second difference of the position, in m, that motion and noise explain."""
+        usual = float(np.quantile(np.abs(self.acceleration), 0.99))
+        noise = _NOISE * 6**0.5 * self.position_noise
+        return _IMPOSSIBLE * usual / self.sample_rate**2 + noise
+
+    @cached_property
+    def jumps(self) -> Array:
+        """(n - 2,) second difference of the position in m where it is impossible, else 0."""
+        second = np.abs(np.diff(self.log.position, 2))
+        return np.where(second > self.possible_jump, second, 0.0)
+
+    @cached_property
+    def kept(self) -> Array:
+        """(m,) 1.0 where the low-passed motion is free of impossible jumps, else 0.0.
+
+        All 1.0 where little would be left.
+        """
+        jumps = np.zeros(len(self.log))
+        jumps[1:-1] = self.jumps > 0.0
+        reach = np.ones(4 * self.smoother.samples + 1)
+        hit = np.convolve(jumps, reach, "same") if jumps.any() else jumps
+        free = self.smoother.held((hit > 0.5).astype(float)) == 0.0
+        return free.astype(float) if free.mean() > 0.5 else np.ones(len(free))
+
+    @cached_property
+    def lag(self) -> Lag:
+        """By how much the command is late against the motion that it causes."""
+        return find_lag(self.force, self._regressors, self.kept, self.smoother.block)
+
+    @cached_property
+    def dynamics(self) -> Dynamics:
+        """The command explained by the motion, the lag between them undone."""
+        shift = round(self.lag.seconds / self.smoother.block) if self.lag.clear else 0
+        span = slice(max(-shift, 0), len(self.force) - max(shift, 0))
+        force = self.force[span.start + shift : span.stop + shift]
+        return fit_dynamics(force, self._regressors[span], self.kept[span], span.start)
+
+    @cached_property
+    def _regressors(self) -> Array:
+        """(m, 5): what a command is spent on: mass, damping, Coulomb friction, bias, stiffness."""
+        fast = float(np.quantile(np.abs(self.velocity), 0.99))
+        position = self.smoother.position(self.log.position)
+        return np.column_stack(
+            [
+                self.acceleration,
+                self.velocity,
+                self.smoother.direction(self.log.position, max(_SLOW * fast, _TINY)),
+                np.ones_like(position),
+                position - position.mean(),
+            ]
+        )

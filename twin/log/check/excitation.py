@@ -1,0 +1,77 @@
+"""Does the motion tell enough: both directions, several speeds, more than the encoder's noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from twin.log.check.axis import Axis
+from twin.log.check.report import Fault, Finding, Severity
+
+_COARSE = 0.3  # acceleration noise as a part of the acceleration
+_CREEP = 0.02  # of the highest speed: slower counts as standing
+_ONE_WAY = 0.02  # share of the moving time
+_SAME_SPEED = 0.05  # spread of the speeds as a part of their median
+
+
+def check(axis: Axis) -> Iterator[Finding]:
+    """Weak excitation and coarse position."""
+    unit = axis.log.units["position"]
+    if not axis.moves:
+        yield _warning(
+            axis,
+            Fault.WEAK_EXCITATION,
+            f"the axis hardly moves: {np.ptp(axis.log.position):.2g} {unit} in all, most of the "
+            f"time too slowly for the noise of its position ({axis.position_noise:.2g} {unit})",
+            "move it, or leave it out of the fit",
+        )
+        return
+    yield from _directions(axis)
+    yield from _coarse(axis)
+
+
+def _directions(axis: Axis) -> Iterator[Finding]:
+    unit = axis.log.units["velocity"]
+    fastest = float(np.quantile(np.abs(axis.velocity), 0.999))
+    moving = axis.velocity[np.abs(axis.velocity) > _CREEP * fastest]
+    forward = float(np.mean(moving > 0.0))
+    one_way = max(forward, 1.0 - forward)
+    if one_way > 1.0 - _ONE_WAY:
+        yield _warning(
+            axis,
+            Fault.WEAK_EXCITATION,
+            f"the axis moves only {'forwards' if forward > 0.5 else 'backwards'} "
+            f"({100.0 * one_way:.3g} % of its moving time), so that friction and a constant "
+            "force look alike",
+            "move both ways",
+        )
+    low, middle, high = np.quantile(np.abs(moving), (0.1, 0.5, 0.9))
+    if high - low < _SAME_SPEED * middle:
+        yield _warning(
+            axis,
+            Fault.WEAK_EXCITATION,
+            f"there is one speed only, {middle:.3g} {unit}, so that Coulomb and viscous friction "
+            "look alike",
+            "add other speeds",
+        )
+
+
+def _coarse(axis: Axis) -> Iterator[Finding]:
+    noise = axis.smoother.acceleration_noise(axis.position_noise)
+    rms = float(np.sqrt(np.mean(axis.acceleration**2)))
+    if noise < _COARSE * rms:
+        return
+    unit = axis.log.units["position"]
+    yield _warning(
+        axis,
+        Fault.COARSE_POSITION,
+        f"the position is good to {axis.position_noise:.2g} {unit} rms (its smallest change is "
+        f"{axis.position_step:.2g} {unit}), which over {axis.smoother.length * 1e3:.2g} ms makes "
+        f"{noise:.2g} of the {rms:.2g} {axis.log.units['setpoint_acceleration']} seen",
+        "use a finer encoder or a livelier motion",
+    )
+
+
+def _warning(axis: Axis, fault: Fault, what: str, remedy: str) -> Finding:
+    return Finding(Severity.WARNING, fault, axis.name, what, "whole log", remedy)

@@ -1,0 +1,62 @@
+"""By how much one signal is late against others that explain it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import correlate
+
+from twin.log.check.smooth import Array
+
+LONGEST = 0.25  # s, searched both ways
+_MOTION = 20  # the log is so many times longer than the longest lag, to hold several moves
+_CLEAR = 0.5  # residual at the best lag at the most, as a part of the signal
+_WRONG = 0.03  # residual without a lag at the least, likewise
+_BETTER = 0.6  # residual at the best lag at the most, as a part of that without a lag
+_AS_GOOD = 1.5  # a residual so many times the least may be the right one too
+
+
+@dataclass(frozen=True)
+class Lag:
+    """seconds: positive where the signal is late. clear: whether another lag fits much worse."""
+
+    seconds: float
+    clear: bool
+
+
+def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> Lag:
+    """Lag of ``signal`` (n,) for which regressors (n, k) explain most of it by least squares.
+
+    kept: (n,) 1.0 where the regressors may be believed, else 0.0; block: s from sample to sample.
+    """
+    reach = min(round(LONGEST / block), len(signal) // _MOTION)
+    inner = slice(reach, len(signal) - reach)
+    weights = kept[inner]
+    basis = np.linalg.qr(_unit_columns(explained_by[inner] * weights[:, None]))[0]
+    centred = signal - signal.mean()
+    total = correlate(centred**2, weights, "valid", "fft")
+    found = sum(correlate(centred, column, "valid", "fft") ** 2 for column in basis.T)
+    residual = np.maximum(total - found, 0.0)
+    dips = 1 + np.flatnonzero(
+        (residual[1:-1] <= residual[:-2])
+        & (residual[1:-1] < residual[2:])
+        & (residual[1:-1] <= _AS_GOOD**2 * residual.min())
+    )
+    if not len(dips):
+        return Lag(0.0, False)
+    best = int(dips[np.argmin(np.abs(dips - reach))])  # a periodic motion has several
+    below, at, above = residual[best - 1 : best + 2]
+    bend = below - 2.0 * at + above
+    fraction = 0.5 * (below - above) / bend if bend > 0.0 else 0.0
+    clear = (
+        at < _CLEAR**2 * total[best]
+        and residual[reach] > _WRONG**2 * total[reach]
+        and at < _BETTER**2 * residual[reach]
+    )
+    return Lag(float((best - reach + fraction) * block), bool(clear))
+
+
+def _unit_columns(matrix: Array) -> Array:
+    length = np.linalg.norm(matrix, axis=0)
+    return matrix / np.where(length > 0.0, length, 1.0)

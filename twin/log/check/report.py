@@ -1,0 +1,56 @@
+"""What a check finds, as sentences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Severity(Enum):
+    """ERROR: do not fit this log. WARNING: it limits what a fit can tell."""
+
+    ERROR = "error"
+    WARNING = "warning"
+
+
+class Fault(Enum):
+    """The kinds of fault that are looked for."""
+
+    INCOMPLETE = "a signal is missing"
+    NOT_FINITE = "a sample is no number"
+    TOO_SHORT = "the log is too short"
+    FLAT = "a signal never changes"
+    UNIT = "a signal is in another unit"
+    SIGN = "a signal is reversed"
+    LAG = "one channel is late"
+    OUTLIERS = "samples that cannot be"
+    SATURATION = "the command is limited"
+    COARSE_POSITION = "the position is too coarse"
+    WEAK_EXCITATION = "the motion tells too little"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One fault of one axis: what and where with numbers and units, and the remedy."""
+
+    severity: Severity
+    fault: Fault
+    axis: str
+    what: str
+    where: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"axis {self.axis}, {self.where}: {self.what}; {self.remedy}"
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """All findings of a log, axis by axis."""
+
+    findings: tuple[Finding, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether the log may be fitted: there is no error, warnings aside."""
+        return all(f.severity is not Severity.ERROR for f in self.findings)

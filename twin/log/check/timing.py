@@ -1,0 +1,76 @@
+"""Channels that are late against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from twin.log.check.axis import Axis
+from twin.log.check.lag import find_lag
+from twin.log.check.report import Fault, Finding, Severity
+from twin.log.check.smooth import Array
+
+ALLOWED = 3e-3  # s
+ALLOWED_SAMPLES = 2.0
+PHYSICAL = 10e-3  # s, what a slow drive may account for
+FOLLOWING = 30e-3  # s, what a slow position loop may account for
+
+
+def check(axis: Axis) -> Iterator[Finding]:
+    """Command, measured velocity and setpoint against the position."""
+    if not axis.moves:
+        return
+    allowed = max(ALLOWED, ALLOWED_SAMPLES / axis.sample_rate)
+    columns = axis.log.columns
+    lag = axis.lag.seconds if axis.lag.clear else 0.0
+    if abs(lag) > allowed:
+        dead_time = -PHYSICAL <= lag < 0.0
+        late = "force" if lag > 0.0 else "position"
+        yield Finding(
+            Severity.WARNING if dead_time else Severity.ERROR,
+            Fault.LAG,
+            axis.name,
+            f"the force is {_text(axis, lag)} the motion that it causes",
+            "whole log",
+            f"{_remedy(axis, late, lag)}{', unless the drive has that dead time' * dead_time}",
+        )
+    if "velocity" in columns:
+        lag = _lag(axis, axis.smoother.rate(columns["velocity"]), axis.velocity)
+        if abs(lag) > allowed:
+            late = "velocity" if lag > 0.0 else "position"
+            yield _disagree(axis, "velocity", "the rate of position", late, lag)
+    if "setpoint_position" in columns:
+        setpoint = axis.smoother.velocity(columns["setpoint_position"])
+        lag = _lag(axis, axis.velocity, setpoint)
+        if lag < -allowed or lag > max(allowed, FOLLOWING):
+            late = "position" if lag > 0.0 else "setpoint_position"
+            yield _disagree(axis, "position", "its setpoint", late, lag)
+
+
+def _lag(axis: Axis, signal: Array, other: Array) -> float:
+    """Seconds by which a signal trails the one it should equal; 0 where that is not clear."""
+    regressors = np.column_stack([other, np.ones_like(other)])
+    lag = find_lag(signal, regressors, axis.kept, axis.smoother.block)
+    return lag.seconds if lag.clear else 0.0
+
+
+def _disagree(axis: Axis, name: str, other: str, late: str, lag: float) -> Finding:
+    return Finding(
+        Severity.WARNING,
+        Fault.LAG,
+        axis.name,
+        f"{name} is {_text(axis, lag)} {other}",
+        "whole log",
+        _remedy(axis, late, lag),
+    )
+
+
+def _text(axis: Axis, lag: float) -> str:
+    side = "behind" if lag > 0.0 else "ahead of"
+    return f"{abs(lag) * 1e3:.3g} ms ({abs(lag) * axis.sample_rate:.3g} samples) {side}"
+
+
+def _remedy(axis: Axis, late: str, lag: float) -> str:
+    samples = round(abs(lag) * axis.sample_rate)
+    return f"give {late} delay_samples = {samples} in the import map"

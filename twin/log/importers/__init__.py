@@ -1,0 +1,6 @@
+"""Logs of other programs -> Log: one file a format, and a map that says which column is what."""
+
+from twin.log.importers.importer import import_log
+from twin.log.importers.mapping import AxisMap, ColumnMap, CsvLayout, ImportMap, load_mapping
+
+__all__ = ["AxisMap", "ColumnMap", "CsvLayout", "ImportMap", "import_log", "load_mapping"]

@@ -1,0 +1,186 @@
+"""Text tables: delimiter, decimal sign, header and first row of numbers are found in the file.
+
+Lines above the header and a line of units below it are passed over. Where there is no header the
+columns are called "1", "2", ...
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import itertools
+from collections.abc import Generator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from twin.errors import InputError
+from twin.log.importers.mapping import CsvLayout, ImportMap
+from twin.log.importers.table import Table, parsing, require_columns
+from twin.log.log import Array
+
+_HEAD_BYTES = 1 << 16
+_SAMPLE_LINES = 20
+_DELIMITERS = (",", ";", "\t", "|", None)  # None: any white space
+_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"))
+
+
+@dataclass(frozen=True)
+class _Style:
+    """How a line is cut into cells, and how a cell is a number."""
+
+    delimiter: str | None
+    decimal: str
+
+    def cells(self, line: str) -> list[str]:
+        text = line.strip(" \r\n").removeprefix("#").strip(" ")
+        if self.delimiter is None:
+            return text.split()
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=self.delimiter), [])]
+
+    def is_number(self, cell: str) -> bool:
+        try:
+            float(cell.replace(self.decimal, "."))
+        except ValueError:
+            return False
+        return True
+
+    def share_of_numbers(self, lines: Sequence[str]) -> float:
+        """Of the cells of ``lines``; 0 where there are not two columns."""
+        rows = [self.cells(line) for line in lines]
+        if len(rows[-1]) < 2:
+            return 0.0
+        cells = list(itertools.chain.from_iterable(rows))
+        return sum(map(self.is_number, cells)) / len(cells)
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """encoding, style, names of the columns, and the lines before the first row of numbers."""
+
+    encoding: str
+    style: _Style
+    names: tuple[str, ...]
+    skip: int
+
+
+def read(path: Path, mapping: ImportMap) -> Table:
+    """Columns of a text table; raises InputError."""
+    with parsing("a text table"):
+        layout = _find_layout(path, mapping.csv)
+        wanted = mapping.column_names()
+        require_columns(wanted, layout.names)
+        where = [layout.names.index(name) for name in wanted]
+        try:
+            values = _numbers(path, layout, where)
+        except ValueError as error:
+            raise _first_fault(path, layout, where) or InputError(str(error)) from error
+    return Table(dict(zip(wanted, values, strict=True)))
+
+
+def _numbers(path: Path, layout: _Layout, where: Sequence[int]) -> Array:
+    """Columns ``where`` as rows (k, n)."""
+    with closing(_lines(path, layout)) as lines:
+        return np.loadtxt(
+            lines, delimiter=layout.style.delimiter, usecols=where, comments=None, quotechar='"',
+            ndmin=2, unpack=True,
+        )  # fmt: skip
+
+
+def _lines(path: Path, layout: _Layout) -> Generator[str]:
+    """Lines of numbers, with a point as decimal sign."""
+    with open(path, encoding=layout.encoding, errors="replace") as stream:
+        rows = itertools.islice(stream, layout.skip, None)
+        comma = layout.style.decimal == ","
+        yield from (line.replace(",", ".") for line in rows) if comma else rows
+
+
+def _find_layout(path: Path, stated: CsvLayout) -> _Layout:
+    with open(path, "rb") as stream:
+        head = stream.read(_HEAD_BYTES)
+        whole = not stream.read(1)
+    encoding = _encoding(head)
+    text = head.decode(encoding, errors="replace")
+    lines = text.split("\n") if whole else text.split("\n")[:-1]
+    while lines and not lines[-1].strip():
+        lines.pop()
+    if not lines:
+        raise InputError("has no line of text; give a table of numbers")
+    style = _find_style(lines[-_SAMPLE_LINES:], stated)
+    rows = [style.cells(line) for line in lines]
+    skip = _first_row(rows, style, stated.header_line)
+    return _Layout(encoding, style, _names(rows, skip, stated.header_line), skip)
+
+
+def _encoding(head: bytes) -> str:
+    for mark, encoding in _MARKS:
+        if head.startswith(mark):
+            return encoding
+    try:
+        head[: head.rfind(b"\n") + 1].decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252"  # what programs on Windows write where it is not UTF-8
+    return "utf-8"
+
+
+def _find_style(lines: Sequence[str], stated: CsvLayout) -> _Style:
+    delimiters = (stated.delimiter,) if stated.delimiter else _DELIMITERS
+    decimals = (stated.decimal,) if stated.decimal else (".", ",")
+    styles = [_Style(d, p) for d in delimiters for p in decimals if d != p]
+    best = max(styles, key=lambda style: style.share_of_numbers(lines))
+    if best.share_of_numbers(lines) == 0.0:
+        raise InputError("has no rows of numbers; state delimiter and decimal in the map")
+    return best
+
+
+def _first_row(rows: Sequence[Sequence[str]], style: _Style, header_line: int | None) -> int:
+    """Index of the first row with a number, as wide as the last row."""
+    for index in range(header_line or 0, len(rows)):
+        if len(rows[index]) == len(rows[-1]) and any(map(style.is_number, rows[index])):
+            return index
+    raise InputError(
+        f"has no rows of numbers below line {header_line or 0} that are as wide as its last line; "
+        "cut off what follows the numbers, or correct header_line"
+    )
+
+
+def _names(rows: Sequence[Sequence[str]], skip: int, header_line: int | None) -> tuple[str, ...]:
+    """Names of the columns: the topmost of the rows above the numbers that are as wide."""
+    width = len(rows[skip])
+    widths = (width, width - 1) if not rows[skip][-1] else (width,)  # rows may end in a delimiter
+    if header_line is not None:
+        top = header_line - 1
+    else:
+        top = skip
+        while top > 0 and len(rows[top - 1]) in widths:
+            top -= 1
+        if top == skip and (skip == 0 or len(rows[skip - 1]) < 2):
+            return tuple(str(k + 1) for k in range(width))
+        top = min(top, skip - 1)
+    if len(rows[top]) not in widths:
+        raise InputError(
+            f"line {top + 1} has {len(rows[top])} names, the rows have {width} cells; "
+            "state header_line, delimiter or decimal in the map"
+        )
+    return tuple(rows[top])
+
+
+def _first_fault(path: Path, layout: _Layout, where: Sequence[int]) -> InputError | None:
+    """The first cell that is not a number."""
+    with open(path, encoding=layout.encoding, errors="replace") as stream:
+        for number, line in enumerate(stream, 1):
+            if number <= layout.skip or not line.strip():
+                continue
+            cells = layout.style.cells(line)
+            for index in where:
+                place = f"line {number}, column '{layout.names[index]}'"
+                if index >= len(cells) or not cells[index]:
+                    return InputError(f"{place}: is empty; complete or cut out the row")
+                if not layout.style.is_number(cells[index]):
+                    return InputError(
+                        f"{place}: {cells[index]!r} is not a number; correct it, or state "
+                        "header_line, delimiter or decimal in the map"
+                    )
+    return None

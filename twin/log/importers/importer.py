@@ -1,0 +1,150 @@
+"""Foreign file + map -> Log: SI units, one clock, delays undone, nothing left unsaid."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from twin.errors import InputError
+from twin.log.container import at, reading
+from twin.log.importers import csv_text, hdf5, mat, parquet, tdms
+from twin.log.importers.clock import rate_of
+from twin.log.importers.mapping import ImportMap
+from twin.log.importers.table import Table, numbers
+from twin.log.log import Array, AxisLog, Log
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format: how its files end, and what reads them."""
+
+    endings: tuple[str, ...]
+    read: Callable[[Path, ImportMap], Table]
+
+
+FORMATS: Mapping[str, Format] = {
+    "csv": Format((".csv", ".txt", ".tsv", ".dat", ".asc"), csv_text.read),
+    "mat": Format((".mat",), mat.read),
+    "hdf5": Format((".h5", ".hdf5", ".hdf", ".he5"), hdf5.read),
+    "parquet": Format((".parquet", ".pq"), parquet.read),
+    "tdms": Format((".tdms",), tdms.read),
+}
+
+
+def import_log(path: str | Path, mapping: ImportMap) -> Log:
+    """Read a log of another program as ``mapping`` says; see ``load_mapping``.
+
+    Samples are in SI, those that delays leave without a partner are cut off at the ends. Raises
+    InputError for a missing file, column or package, a cell that is not a finite number, columns
+    of different length, and times that are not even.
+    """
+    path = Path(path)
+    with reading(path):
+        name = _format_name(path, mapping)
+        with open(path, "rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        table = FORMATS[name].read(path, mapping)
+        columns = {n: numbers(n, raw) for n, raw in table.columns.items()}
+        count = _common_length(columns)
+        rate = _sample_rate(table, mapping, columns)
+        for column, values in columns.items():
+            _require_finite(column, values, rate)
+        span = _undelayed(mapping, count)
+    metadata = {
+        "source": "import",
+        "original_format": name,
+        "original_sha256": digest,
+        "import_map": mapping.text,
+    }
+    return Log(rate, _axes(mapping, columns, span), metadata)
+
+
+def _format_name(path: Path, mapping: ImportMap) -> str:
+    if mapping.format is not None:
+        if mapping.format not in FORMATS:
+            raise InputError(
+                f"the map gives format = '{mapping.format}'; allowed: {', '.join(FORMATS)}"
+            )
+        return mapping.format
+    for name, known in FORMATS.items():
+        if path.suffix.lower() in known.endings:
+            return name
+    endings = ", ".join(e for f in FORMATS.values() for e in f.endings)
+    raise InputError(
+        f"ends in '{path.suffix}', known are {endings}; state format in the map: "
+        f"{', '.join(FORMATS)}"
+    )
+
+
+def _common_length(columns: Mapping[str, Array]) -> int:
+    first, values = next(iter(columns.items()))
+    for name, other in columns.items():
+        if len(other) != len(values):
+            raise InputError(
+                f"column '{first}' has {len(values)} rows, '{name}' has {len(other)}; "
+                "export them with one clock"
+            )
+    if len(values) < 2:
+        raise InputError(f"has {len(values)} rows; a log has at least 2")
+    return len(values)
+
+
+def _sample_rate(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> float:
+    if mapping.time is not None:
+        dated = table.columns[mapping.time.column].dtype.kind == "M"
+        if dated and mapping.time.unit.size != 1.0:
+            raise InputError(f"column '{mapping.time.column}' holds dates; state its unit as s")
+        with at(f"column '{mapping.time.column}'"):
+            return rate_of(mapping.time.to_si(columns[mapping.time.column]))
+    rate = mapping.sample_rate or table.sample_rate
+    if rate is None:
+        raise InputError(
+            "does not tell its sample rate; state sample_rate (Hz) or time "
+            '({column = "t", unit = "s"}) in the map'
+        )
+    if table.sample_rate is not None and abs(table.sample_rate - rate) > 1e-6 * rate:
+        raise InputError(
+            f"is sampled at {table.sample_rate:.9g} Hz, the map says {rate:.9g} Hz; "
+            "correct sample_rate in the map or leave it out"
+        )
+    return rate
+
+
+def _require_finite(name: str, values: Array, rate: float) -> None:
+    finite = np.isfinite(values)
+    if not finite.all():
+        k = int(np.argmin(finite))
+        raise InputError(
+            f"column '{name}' is {values[k]} in row {k + 1} of {len(values)} ({k / rate:.6g} s), "
+            f"{len(values) - np.count_nonzero(finite)} such rows in all; cut them out or leave "
+            "the signal out of the map"
+        )
+
+
+def _undelayed(mapping: ImportMap, count: int) -> range:
+    """Samples for which every column, moved back by its delay, has a value."""
+    delays = [c.delay_samples for axis in mapping.axes.values() for c in axis.columns.values()]
+    span = range(max(0, -min(delays)), count - max(0, *delays))
+    if len(span) < 2:
+        raise InputError(
+            f"delay_samples of {min(delays)} to {max(delays)} leave nothing of {count} rows; "
+            "correct them in the map"
+        )
+    return span
+
+
+def _axes(mapping: ImportMap, columns: Mapping[str, Array], span: range) -> dict[str, AxisLog]:
+    axes = {}
+    for name, axis in mapping.axes.items():
+        signals = {
+            field: c.to_si(
+                columns[c.column][span.start + c.delay_samples : span.stop + c.delay_samples]
+            )
+            for field, c in axis.columns.items()
+        }
+        axes[name] = AxisLog(signals, axis.units, axis.force_constant)
+    return axes

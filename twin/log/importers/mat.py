@@ -1,0 +1,40 @@
+"""MATLAB: versions 4 to 7.2 through SciPy, 7.3 as the HDF5 file it is.
+
+A field of a struct is named ``struct.field``, whatever the version.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.io
+from numpy.typing import NDArray
+
+from twin.log.importers import hdf5
+from twin.log.importers.mapping import ImportMap
+from twin.log.importers.table import Table, parsing, require_columns, split_columns
+
+
+def read(path: Path, mapping: ImportMap) -> Table:
+    """Columns of a MAT file; raises InputError."""
+    if hdf5.is_hdf5(path):
+        return hdf5.read_named(path, mapping, separator=".")
+    with parsing("MAT"):
+        content = scipy.io.loadmat(path, simplify_cells=True)
+    columns = _columns("", {k: v for k, v in content.items() if not k.startswith("__")})
+    require_columns(mapping.column_names(), columns)
+    return Table({name: columns[name] for name in mapping.column_names()})
+
+
+def _columns(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:
+    columns: dict[str, NDArray] = {}
+    for key, value in content.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            columns |= _columns(f"{name}.", value)
+        elif isinstance(value, np.ndarray):
+            columns |= split_columns(name, value)
+    return columns

@@ -1,0 +1,34 @@
+"""TDMS of LabVIEW: a channel is named ``group/channel``; its waveform may state the rate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from twin.errors import InputError
+from twin.log.importers.mapping import ImportMap
+from twin.log.importers.table import Table, extra, parsing, require_columns
+
+_PERIOD = "wf_increment"  # s a sample
+
+
+def read(path: Path, mapping: ImportMap) -> Table:
+    """Columns of a TDMS file; raises InputError."""
+    nptdms = extra("nptdms")
+    wanted = mapping.column_names()
+    with parsing("TDMS"), nptdms.TdmsFile.open(path) as file:
+        channels = {f"{g.name}/{c.name}": c for g in file.groups() for c in g.channels()}
+        require_columns(wanted, channels)
+        chosen = {name: channels[name] for name in wanted}
+        periods = {n: c.properties[_PERIOD] for n, c in chosen.items() if _PERIOD in c.properties}
+        return Table({name: c[:] for name, c in chosen.items()}, _rate(periods))
+
+
+def _rate(periods: dict[str, float]) -> float | None:
+    for name, period in periods.items():
+        first, expected = next(iter(periods.items()))
+        if period != expected or not period > 0.0:
+            raise InputError(
+                f"channel '{first}' has a sample every {expected:.9g} s, '{name}' every "
+                f"{period:.9g} s; export them at one rate"
+            )
+    return 1.0 / next(iter(periods.values())) if periods else None
