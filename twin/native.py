@@ -95,15 +95,49 @@ def call_law(typingctx, address, p, s, io):
     return types.void(types.int64, types.int64, types.int64, types.int64), codegen
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
-def axis_force(entries, first, last, parameters, states, at, io, rows):
-    """Force of one axis' effects, in N, beyond the command; states advance one sample.
+@intrinsic
+def doubles_at(typingctx, address):
+    """Pointer to doubles at an address."""
 
-    entries (n, 4); parameters, states, io, rows: flat doubles; at: where this axis' states begin.
-    io holds INDEX, TIME, DT, X, V, U, MASS and the other axis on entry. rows[i] receives the
-    force entry i puts on the axis.
+    def codegen(context, builder, signature, args):
+        return builder.inttoptr(args[0], context.get_value_type(DOUBLES))
+
+    return DOUBLES(types.int64), codegen
+
+
+@intrinsic
+def borrow(typingctx, arrays):
+    """Arrays, alone or in a tuple, without their reference counts; their owner must keep them.
+
+    In a loop over samples, counting the references to every row costs as much as the laws.
     """
-    command = io[U]
+
+    def codegen(context, builder, signature, args):
+        return _lend(context, builder, signature.return_type, args[0])
+
+    return arrays(arrays), codegen
+
+
+def _lend(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    if isinstance(kind, types.BaseTuple):
+        items = zip(kind, cgutils.unpack_tuple(builder, value), strict=True)
+        return context.make_tuple(builder, kind, [_lend(context, builder, *i) for i in items])
+    lent = context.make_array(kind)(context, builder, value=value)
+    lent.meminfo = cgutils.get_null_value(lent.meminfo.type)
+    lent.parent = cgutils.get_null_value(lent.parent.type)
+    return lent._getvalue()
+
+
+@numba.njit(cache=True, inline="always", error_model="numpy")
+def axis_force(entries, first, last, parameters, states, at, io, rows, k):
+    """Force on one axis in N, actuator included; states advance one sample.
+
+    entries (n, 4); parameters, states, io: flat doubles; at: where this axis' states begin.
+    io holds INDEX, TIME, DT, X, V, U, MASS and the other axis on entry. rows[k, i] receives the
+    force that entry i puts on the axis.
+    """
+    rate = 1.0 / io[DT]
+    stopping = io[MASS] * io[V] * rate
     io[DRY] = 1.0
     io[STATIC] = 1.0
     io[VISCOUS] = 1.0
@@ -114,27 +148,28 @@ def axis_force(entries, first, last, parameters, states, at, io, rows):
     total = 0.0
     friction = 0.0
     for i in range(first, last):
-        kind = int(entries[i, KIND])
-        law = int(entries[i, ADDRESS])
-        own_p = p + 8 * int(entries[i, P_AT])
-        own_s = s + 8 * int(entries[i, S_AT])
+        kind = entries[i, KIND]
         before = io[U]
+        io[HOLD] = stopping + before + total
         io[OUT] = 0.0
-        if kind == _FRICTION:
-            io[HOLD] = io[MASS] * io[V] / io[DT] + io[U] + total
-            call_law(law, own_p, own_s, w)
+        call_law(
+            int(entries[i, ADDRESS]),
+            p + 8 * int(entries[i, P_AT]),
+            s + 8 * int(entries[i, S_AT]),
+            w,
+        )
+        if kind == _FORCE:
+            rows[k, i] = io[OUT]
+            total += io[OUT]
+        elif kind == _FRICTION:
             friction = io[OUT]
-            rows[i] = -friction
+            rows[k, i] = -friction
         else:
-            if kind != _FORCE:
-                io[HOLD] = io[MASS] * io[V] / io[DT] + io[U] + total
-            call_law(law, own_p, own_s, w)
-            rows[i] = io[OUT] if kind == _FORCE else io[U] - before
-            total += io[OUT] if kind == _FORCE else 0.0
+            rows[k, i] = io[U] - before
     states[at + LAST_FRICTION] = friction
-    states[at + LAST_ACCELERATION] = (io[V] - states[at + LAST_VELOCITY]) / io[DT]
+    states[at + LAST_ACCELERATION] = (io[V] - states[at + LAST_VELOCITY]) * rate
     states[at + LAST_VELOCITY] = io[V]
-    return total - friction + io[U] - command
+    return total - friction + io[U]
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -145,23 +180,24 @@ def walk(entries, first, last, parameters, states, at, motion, others, dt, begin
     acceleration of the other axis. Friction slides wherever v != 0, by an infinite mass: what holds
     a measured axis at rest cannot be told. rows (n_entries, n): N.
     """
+    entries, parameters, states = borrow((entries, parameters, states))
     io = np.zeros(IO_SIZE)
-    row = np.zeros(entries.shape[0])
+    row = np.zeros((1, entries.shape[0]))
     io[DT] = dt
     io[WHEN] = 0.5
+    io[MASS] = 1e300
     for k in range(motion.shape[1]):
         io[INDEX] = begin + k
         io[TIME] = (begin + k) * dt
         io[X] = motion[0, k]
         io[V] = motion[1, k]
         io[U] = motion[2, k]
-        io[MASS] = 1e300
         io[X_OTHER] = others[0, k]
         io[V_OTHER] = others[1, k]
         io[A_OTHER] = others[2, k]
-        axis_force(entries, first, last, parameters, states, at, io, row)
+        axis_force(entries, first, last, parameters, states, at, borrow(io), borrow(row), 0)
         for i in range(first, last):
-            rows[i, k] = row[i]
+            rows[i, k] = row[0, i]
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
