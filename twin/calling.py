@@ -54,3 +54,36 @@ def call_law(typingctx, address, p, s, io):
         return context.get_dummy_value()
 
     return types.void(types.int64, types.int64, types.int64, types.int64), codegen
+
+
+@intrinsic
+def doubles_at(typingctx, address):
+    """Pointer to doubles at an address."""
+
+    def codegen(context, builder, signature, args):
+        return builder.inttoptr(args[0], context.get_value_type(DOUBLES))
+
+    return DOUBLES(types.int64), codegen
+
+
+@intrinsic
+def borrow(typingctx, arrays):
+    """Arrays, alone or in a tuple, without their reference counts; their owner must keep them.
+
+    In a loop over samples, counting the references to every row costs as much as the laws.
+    """
+
+    def codegen(context, builder, signature, args):
+        return _lend(context, builder, signature.return_type, args[0])
+
+    return arrays(arrays), codegen
+
+
+def _lend(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    if isinstance(kind, types.BaseTuple):
+        items = zip(kind, cgutils.unpack_tuple(builder, value), strict=True)
+        return context.make_tuple(builder, kind, [_lend(context, builder, *i) for i in items])
+    lent = context.make_array(kind)(context, builder, value=value)
+    lent.meminfo = cgutils.get_null_value(lent.meminfo.type)
+    lent.parent = cgutils.get_null_value(lent.parent.type)
+    return lent._getvalue()

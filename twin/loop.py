@@ -11,6 +11,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from twin.calling import borrow, doubles_at
 from twin.control import RESOLUTION, command, measure
 from twin.effect import (
     A_OTHER,
@@ -27,7 +28,7 @@ from twin.effect import (
     V,
     X,
 )
-from twin.mujoco_link import call_step, doubles_at, word_at
+from twin.mujoco_link import call_step, word_at
 from twin.native import LAST_ACCELERATION, axis_force, sense
 
 # Columns of the logged signals of one axis.
@@ -36,12 +37,10 @@ N_SIGNALS = 4
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
-def control_axis(a, k, dt, x, v, table, sensing_states, gains, states, setpoint, noise, io, out):
+def control_axis(a, x, v, table, sensing_states, gains, states, setpoint, noise, io, out):
     """Read the encoder, compute the command, log both with the true motion; returns the command."""
     entries, axes, parameters = table
-    io[INDEX] = k
-    io[TIME] = k * dt
-    io[DT] = dt
+    dt = io[DT]
     io[X] = x
     io[V] = v
     position = x - 0.5 * dt * v
@@ -49,7 +48,7 @@ def control_axis(a, k, dt, x, v, table, sensing_states, gains, states, setpoint,
     if axes[a, 4] > axes[a, 3]:
         reading = sense(entries, axes[a, 3], axes[a, 4], parameters, sensing_states, io, position)
     reading = measure(reading, noise, gains[a, RESOLUTION])
-    force = command(gains[a], states[a], setpoint, reading, dt, k == 0)
+    force = command(gains[a], states[a], setpoint, reading, dt, io[INDEX] == 0.0)
     out[READING_COLUMN] = reading
     out[COMMAND_COLUMN] = force
     out[POSITION_COLUMN] = position
@@ -72,18 +71,23 @@ def run_mujoco(
     n_entries = forces.shape[1]
     n_states = sensing_states.shape[0]
     io = np.zeros(IO_SIZE)
+    (table, sensing_states, gains, controller_states, setpoints, signals) = borrow(
+        (table, sensing_states, gains, controller_states, setpoints, signals)
+    )
     userdata, qpos_at, qvel_at, ctrl_at = off
     qpos = doubles_at(word_at(data + qpos_at))
     qvel = doubles_at(word_at(data + qvel_at))
     ctrl = doubles_at(word_at(data + ctrl_at))
     user = doubles_at(word_at(data + userdata))
     after = user_at + 1 + n_states
+    io[DT] = dt
     for k in range(n):
+        io[INDEX] = first_sample + k
+        io[TIME] = (first_sample + k) * dt
         for a in range(n_axes):
             ctrl[where[a, 2]] = control_axis(
-                a, first_sample + k, dt, qpos[where[a, 0]], qvel[where[a, 1]], table,
-                sensing_states, gains, controller_states, setpoints[k, a], noise[k, a], io,
-                signals[k, a],
+                a, qpos[where[a, 0]], qvel[where[a, 1]], table, sensing_states, gains,
+                controller_states, setpoints[k, a], noise[k, a], borrow(io), signals[k, a],
             )  # fmt: skip
         call_step(step, model, data)
         for i in range(n_entries):
@@ -102,37 +106,41 @@ def run_reduced(
     The other arrays are those of run_mujoco.
     """
     n, n_axes = noise.shape
+    (effect_states, table, sensing_states, gains, controller_states, setpoints, signals, forces) = (
+        borrow(
+            (effect_states, table, sensing_states, gains, controller_states, setpoints, signals,
+             forces)
+        )
+    )  # fmt: skip
     entries, axes, parameters = table
     io = np.zeros(IO_SIZE)
+    before = np.zeros((n_axes, 3))  # x m, v m/s, last a m/s^2 of every axis as a sample begins
+    drive = dt / masses
+    io[DT] = dt
     io[WHEN] = 1.0
-    force = np.zeros(n_axes)
-    coupled = np.zeros((n_axes, 3))
     for k in range(n):
+        io[INDEX] = first_sample + k
+        io[TIME] = (first_sample + k) * dt
         for a in range(n_axes):
-            force[a] = control_axis(
-                a, first_sample + k, dt, motion[a, 0], motion[a, 1], table, sensing_states, gains,
-                controller_states, setpoints[k, a], noise[k, a], io, signals[k, a],
+            before[a, 0] = motion[a, 0]
+            before[a, 1] = motion[a, 1]
+            before[a, 2] = effect_states[axes[a, 2] + LAST_ACCELERATION]
+        for a in range(n_axes):
+            io[U] = control_axis(
+                a, motion[a, 0], motion[a, 1], table, sensing_states, gains, controller_states,
+                setpoints[k, a], noise[k, a], borrow(io), signals[k, a],
             )  # fmt: skip
-            coupled[a, 0] = motion[a, 0]
-            coupled[a, 1] = motion[a, 1]
-            coupled[a, 2] = effect_states[axes[a, 2] + LAST_ACCELERATION]
-        for a in range(n_axes):
-            io[INDEX] = first_sample + k
-            io[TIME] = (first_sample + k) * dt
-            io[X] = coupled[a, 0]
-            io[V] = coupled[a, 1]
-            io[U] = force[a]
             io[MASS] = masses[a]
             io[MOVED] = masses[a]
             if n_axes == 2:
-                io[X_OTHER] = coupled[1 - a, 0]
-                io[V_OTHER] = coupled[1 - a, 1]
-                io[A_OTHER] = coupled[1 - a, 2]
-            passive, structure = axis_force(
-                entries, axes[a, 0], axes[a, 1], parameters, effect_states, axes[a, 2], io,
-                forces[k],
+                io[X_OTHER] = before[1 - a, 0]
+                io[V_OTHER] = before[1 - a, 1]
+                io[A_OTHER] = before[1 - a, 2]
+            force, structure = axis_force(
+                entries, axes[a, 0], axes[a, 1], parameters, effect_states, axes[a, 2],
+                borrow(io), forces, k,
             )  # fmt: skip
-            motion[a, 1] += dt * ((passive + structure + force[a]) / masses[a])
+            motion[a, 1] += drive[a] * (force + structure)
             motion[a, 0] += dt * motion[a, 1]
         for i in range(watched.shape[0]):
             states[k, i] = effect_states[watched[i]]

@@ -23,7 +23,7 @@ from numba import carray, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from twin.calling import DOUBLES
+from twin.calling import doubles_at
 from twin.effect import (
     A_OTHER,
     DT,
@@ -133,16 +133,6 @@ def offsets() -> Offsets:
 
 
 @intrinsic
-def doubles_at(typingctx, address):
-    """Pointer to doubles at an address."""
-
-    def codegen(context, builder, signature, args):
-        return builder.inttoptr(args[0], context.get_value_type(DOUBLES))
-
-    return DOUBLES(types.int64), codegen
-
-
-@intrinsic
 def word_at(typingctx, address):
     """The 8-byte word at an address."""
 
@@ -167,41 +157,61 @@ def call_step(typingctx, step, model, data):
     return types.void(types.int64, types.int64, types.int64), codegen
 
 
+@numba.njit(cache=True, inline="always")
+def view(address, shape):
+    """Array of the doubles at an address, which MuJoCo owns."""
+    return carray(doubles_at(address), shape)
+
+
+@numba.njit(cache=True, inline="always", error_model="numpy")
+def begin_sample(time, committed, start, after):
+    """Make ``start`` the states at the start of this sample, and ``after`` a copy of them.
+
+    committed[0]: time of the last call. Forwards, what came after that sample is what this one
+    starts from; backwards, the simulation begins anew from zero.
+    """
+    forwards = time > committed[0]
+    backwards = time < committed[0]
+    committed[0] = time
+    for i in range(start.shape[0]):
+        if forwards:
+            start[i] = after[i]
+        elif backwards:
+            start[i] = 0.0
+        after[i] = start[i]
+
+
 @numba.njit(cache=True, inline="always", error_model="numpy")
 def passive_forces(block, data, off):
-    """Add the effects' forces of every axis to qfrc_passive (see the module's docstring)."""
-    dt = block[0]
-    n_axes = int(block[1])
-    n_states = int(block[2])
-    n_entries = int(block[3])
+    """Add the effects' forces of every axis to qfrc_passive (see the module's docstring).
+
+    block: address of the table's numbers, in the order of ``attach``.
+    """
+    header = doubles_at(block)
+    dt = header[0]
+    n_axes = int(header[1])
+    n_states = int(header[2])
+    n_entries = int(header[3])
     table = HEADER + AXIS_COLUMNS * n_axes
-    axes = block[HEADER:table].reshape((n_axes, AXIS_COLUMNS))
-    entries = block[table : table + 4 * n_entries].reshape((n_entries, 4))
-    parameters = block[table + 4 * n_entries :]
-    user = carray(
-        doubles_at(word_at(data + off[1]) + 8 * int(block[5])),
-        1 + 2 * n_states + n_entries + IO_SIZE,
-    )
-    start = user[1 : 1 + n_states]
-    after = user[1 + n_states : 1 + 2 * n_states]
-    rows = user[1 + 2 * n_states : 1 + 2 * n_states + n_entries]
-    io = user[1 + 2 * n_states + n_entries :]
+    axes = view(block + 8 * HEADER, (n_axes, AXIS_COLUMNS))
+    entries = view(block + 8 * table, (n_entries, 4))
+    parameters = view(block + 8 * (table + 4 * n_entries), int(header[4]))
+    user = word_at(data + off[1]) + 8 * int(header[5])
+    start = view(user + 8, n_states)
+    after = view(user + 8 * (1 + n_states), n_states)
+    rows = view(user + 8 * (1 + 2 * n_states), (1, n_entries))
+    io = view(user + 8 * (1 + 2 * n_states + n_entries), IO_SIZE)
     qpos = doubles_at(word_at(data + off[2]))
     qvel = doubles_at(word_at(data + off[3]))
     ctrl = doubles_at(word_at(data + off[4]))
     passive = doubles_at(word_at(data + off[5]))
     time = doubles_at(data + off[0])[0]
-    if time > user[0]:
-        start[:] = after
-    elif time < user[0]:
-        start[:] = 0.0
-    user[0] = time
-    after[:] = start
+    begin_sample(time, doubles_at(user), start, after)
+    io[INDEX] = np.rint(time / dt)
+    io[TIME] = time
+    io[DT] = dt
+    io[WHEN] = 1.0
     for a in range(n_axes):
-        io[INDEX] = np.rint(time / dt)
-        io[TIME] = time
-        io[DT] = dt
-        io[WHEN] = 1.0
         io[X] = qpos[int(axes[a, 4])]
         io[V] = qvel[int(axes[a, 5])]
         io[U] = ctrl[int(axes[a, 6])]
@@ -214,9 +224,10 @@ def passive_forces(block, data, off):
             io[A_OTHER] = start[int(axes[b, 2]) + LAST_ACCELERATION]
         # What the structure adds is known for the log; MuJoCo's own bodies put it on the axis.
         force, _ = axis_force(
-            entries, int(axes[a, 0]), int(axes[a, 1]), parameters, after, int(axes[a, 2]), io, rows
-        )
-        passive[int(axes[a, 5])] += force
+            entries, int(axes[a, 0]), int(axes[a, 1]), parameters, after, int(axes[a, 2]), io,
+            rows, 0,
+        )  # fmt: skip
+        passive[int(axes[a, 5])] += force - ctrl[int(axes[a, 6])]  # MuJoCo adds the command
 
 
 @cache
@@ -234,7 +245,7 @@ def _callback(off: Offsets) -> Any:
         if numbers[size - 1] != MAGIC:
             return
         length = int(numbers[size - 2])
-        block = carray(doubles_at(word_at(model + model_offsets[1]) + 8 * (size - length)), length)
+        block = word_at(model + model_offsets[1]) + 8 * (size - length)
         passive_forces(block, data, data_offsets)
 
     return passive

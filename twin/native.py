@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.calling import ADDRESS, KIND, P_AT, S_AT, call_law, law_address
+from twin.calling import ADDRESS, KIND, P_AT, S_AT, borrow, call_law, law_address
 from twin.effect import (
     A_OTHER,
     ACC,
@@ -52,45 +52,61 @@ _STRUCTURE = Kind.STRUCTURE.value
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
-def axis_force(entries, first, last, parameters, states, at, io, rows):
-    """Forces on one axis beyond the command, N: (of its effects, of its structure).
+def axis_force(entries, first, last, parameters, states, at, io, rows, k):
+    """Forces on one axis, N: (of actuator and effects, of its structure); states advance a sample.
 
-    entries (n, 4); parameters, states, io, rows: flat doubles; at: where this axis' states begin.
+    entries (n, 4); parameters, states, io: flat doubles; at: where this axis' states begin.
     io holds INDEX, TIME, DT, X, V, U, MASS, MOVED, WHEN and the other axis on entry, and the axis'
-    ACC where its motion is measured. rows[i] receives the force entry i puts on the axis. States
-    advance one sample.
+    ACC where its motion is measured. rows[k, i] receives the force that entry i puts on the axis.
     """
-    command, measured = io[U], io[ACC]
-    io[DRY], io[STATIC], io[VISCOUS] = 1.0, 1.0, 1.0
+    measured = io[ACC]
+    rate = 1.0 / io[DT]
+    stop = io[MASS] * io[V] * rate
+    io[DRY] = 1.0
+    io[STATIC] = 1.0
+    io[VISCOUS] = 1.0
     io[FRICTION] = states[at + LAST_FRICTION]
-    p, s = parameters.ctypes.data, states.ctypes.data
+    p = parameters.ctypes.data
+    s = states.ctypes.data
+    w = io.ctypes.data
     structure = last
-    while structure > first and int(entries[structure - 1, KIND]) == _STRUCTURE:
+    while structure > first and entries[structure - 1, KIND] == _STRUCTURE:
         structure -= 1
-    answered = answers(entries, structure, last, p, s, io)
-    share = io[MASS] / (io[MASS] - answered[1])  # of a force, that accelerates the nominal mass
-    stop = io[MASS] * io[V] / io[DT] + share * answered[0] + answered[2]
-    stop /= share + answered[3] / io[MOVED]
+    answered = (0.0, 0.0, 0.0, 0.0)
+    if structure < last:
+        answered = answers(entries, structure, last, p, s, io)
+        share = io[MASS] / (io[MASS] - answered[1])  # of a force, that moves the nominal mass
+        stop += share * answered[0] + answered[2]
+        stop /= share + answered[3] / io[MOVED]
     total = 0.0
     friction = 0.0
     for i in range(first, structure):
-        kind = int(entries[i, KIND])
+        kind = entries[i, KIND]
         before = io[U]
+        io[HOLD] = stop + before + total
         io[OUT] = 0.0
-        io[HOLD] = stop + io[U] + total
-        own_p, own_s = p + 8 * int(entries[i, P_AT]), s + 8 * int(entries[i, S_AT])
-        call_law(int(entries[i, ADDRESS]), own_p, own_s, io.ctypes.data)
-        rows[i] = io[OUT] if kind == _FORCE else io[U] - before
-        total += io[OUT] if kind == _FORCE else 0.0
-        if kind == _FRICTION:
+        call_law(
+            int(entries[i, ADDRESS]),
+            p + 8 * int(entries[i, P_AT]),
+            s + 8 * int(entries[i, S_AT]),
+            w,
+        )
+        if kind == _FORCE:
+            rows[k, i] = io[OUT]
+            total += io[OUT]
+        elif kind == _FRICTION:
             friction = io[OUT]
-            rows[i] = -friction
+            rows[k, i] = -friction
+        else:
+            rows[k, i] = io[U] - before
     net = total - friction + io[U]
-    added = settle(entries, structure, last, p, s, io, net, measured, answered, rows)
+    added = 0.0
+    if structure < last:
+        added = settle(entries, structure, last, p, s, io, net, measured, answered, rows, k)
     states[at + LAST_FRICTION] = friction
-    states[at + LAST_ACCELERATION] = (io[V] - states[at + LAST_VELOCITY]) / io[DT]
+    states[at + LAST_ACCELERATION] = (io[V] - states[at + LAST_VELOCITY]) * rate
     states[at + LAST_VELOCITY] = io[V]
-    return net - command, added
+    return net, added
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -101,8 +117,9 @@ def walk(entries, first, last, parameters, states, at, motion, others, dt, begin
     acceleration of the other axis; mass: moved mass, kg. Friction slides wherever v != 0, by an
     infinite mass: what holds a measured axis at rest cannot be told. rows (n_entries, n): N.
     """
+    entries, parameters, states = borrow((entries, parameters, states))
     io = np.zeros(IO_SIZE)
-    row = np.zeros(entries.shape[0])
+    row = np.zeros((1, entries.shape[0]))
     io[DT] = dt
     io[WHEN] = 0.5
     io[MASS] = 1e300
@@ -119,9 +136,9 @@ def walk(entries, first, last, parameters, states, at, motion, others, dt, begin
         io[A_OTHER] = others[2, k]
         if structured:
             io[ACC] = slope(motion[1], k, dt)
-        axis_force(entries, first, last, parameters, states, at, io, row)
+        axis_force(entries, first, last, parameters, states, at, borrow(io), borrow(row), 0)
         for i in range(first, last):
-            rows[i, k] = row[i]
+            rows[i, k] = row[0, i]
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")

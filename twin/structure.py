@@ -47,7 +47,7 @@ def answers(entries, first, last, p, s, io):
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
-def settle(entries, first, last, p, s, io, net, measured, answered, rows):
+def settle(entries, first, last, p, s, io, net, measured, answered, rows, k):
     """Force (N) that the structure effects add under a net force; their states advance.
 
     With a the acceleration of what rides on the axis, q'' that of the axis over what it stands on:
@@ -60,8 +60,8 @@ def settle(entries, first, last, p, s, io, net, measured, answered, rows):
         net = (free * (measured - moved / mass) - pushed) / (1.0 + free * yielding / mass**2)
     total = 0.0
     for i in range(first, last):
-        rows[i] = answer(entries[i], p, s, io, net / mass, (net + pushed) / free)
-        total += rows[i]
+        rows[k, i] = answer(entries[i], p, s, io, net / mass, (net + pushed) / free)
+        total += rows[k, i]
     return total
 
 

@@ -11,22 +11,33 @@ from math import copysign, exp, expm1
 
 from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
+GONE = 40.0  # exp(-40) is below the rounding of what it is added to
+SHORT = 0.05  # below it the series of 1 - exp(-a) to a^8 is exact to rounding
+
 
 def law(p, s, io):
     coulomb, static, stribeck, viscous, sigma0, sigma1 = p[0], p[1], p[2], p[3], p[4], p[5]
     v = io[V]
-    q = abs(v) / stribeck
-    fall = exp(-q * q) if p[6] == 2.0 else exp(-(q ** p[6]))
+    speed = abs(v)
+    q = speed / stribeck
+    depth = q * q if p[6] == 2.0 else q ** p[6]
+    fall = exp(-depth) if depth < GONE else 0.0
     level = io[DRY] * (coulomb + (static * io[STATIC] - coulomb) * fall)
     if level <= 0.0:
         s[0] = 0.0
         io[OUT] = viscous * io[VISCOUS] * v
+        return
+    a = speed * (sigma0 * io[DT] / level)
+    if a < SHORT:
+        b = a * a
+        sinh = a * (1.0 + b * (1 / 6 + b * (1 / 120 + b * (1 / 5040))))
+        grown = sinh - b * (1 / 2 + b * (1 / 24 + b * (1 / 720 + b * (1 / 40320))))
     else:
-        grown = -expm1(-sigma0 * abs(v) / level * io[DT])
-        change = (copysign(level / sigma0, v) - s[0]) * grown
-        z = s[0] + io[WHEN] * change
-        s[0] += change
-        io[OUT] = sigma0 * z + sigma1 * change / io[DT] + viscous * io[VISCOUS] * v
+        grown = -expm1(-a)
+    change = (copysign(level / sigma0, v) - s[0]) * grown
+    z = s[0] + io[WHEN] * change
+    s[0] += change
+    io[OUT] = sigma0 * z + sigma1 / io[DT] * change + viscous * io[VISCOUS] * v
 
 
 EFFECT = Effect(

@@ -13,13 +13,16 @@ from math import copysign, expm1, floor
 from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V, X
 
 TURN = 2e-5  # m of travel over which a reversal turns the braking part round
+TURNED = 1e-12  # less of a turn than this is left when it is over
 
 
 def law(p, s, io):
     pitch = p[0]
     direction = s[0]
     if io[V] != 0.0:
-        change = -(copysign(1.0, io[V]) - s[0]) * expm1(-abs(io[V]) * io[DT] / TURN)
+        change = copysign(1.0, io[V]) - s[0]
+        if abs(change) > TURNED:
+            change *= -expm1(-abs(io[V]) * io[DT] / TURN)
         direction += io[WHEN] * change
         s[0] += change
     turns = (io[X] - p[2]) / pitch
