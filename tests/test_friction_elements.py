@@ -18,7 +18,7 @@ EVERY = pytest.mark.parametrize("effect", SIZED, ids=lambda e: e.name)
 FILE = """
 name = "one axis"
 [axes.x]
-mass = 2.0
+mass = 2.0\ntravel = [-0.1, 0.1]
 [axes.x.effects.{name}]
 {lines}
 """
