@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.evidence import LEAST_BIC, LEAST_T, Gain, delta_bic, held_out_gain, left_out
+from identify.evidence import LEAST_BIC, LEAST_T, Evidence, Gain, evidence, held_out_gain, left_out
 from identify.fit import Fit, fit_axis, sticks
 from identify.residual import jacobian, moving, residual
 from identify.search import fit_thoroughly, starts
@@ -29,8 +30,13 @@ class Candidate:
     effect: Effect
     axis: str
     fit: Fit
-    delta_bic: float
+    evidence: Evidence
     gain: Gain
+
+    @property
+    def delta_bic(self) -> float:
+        """BIC without minus BIC with the effect; positive supports it."""
+        return self.evidence.delta_bic
 
     @property
     def supported(self) -> bool:
@@ -94,7 +100,7 @@ def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
         effect=effect,
         axis=study.axis,
         fit=fit,
-        delta_bic=delta_bic(before, after, added),
+        evidence=evidence(before, after, added),
         gain=held_out_gain(pair[0], pair[1], fit.floor),
     )
 
@@ -103,3 +109,18 @@ def _cross_validated(fit: Fit, study: Study, kept: NDArray[np.bool_]) -> Array:
     columns = jacobian(fit.axis, study.fit, fit.scaling.where)[kept]
     force = residual(fit.axis, study.fit)[kept]
     return left_out(force, columns, RIDGE * np.linalg.norm(columns, axis=0))
+
+
+def levelled(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates with no more effective samples than the one that explains most.
+
+    Each one's residual has a colour of its own; evidence on different numbers of samples would not
+    compare.
+    """
+    if not candidates:
+        return []
+    most = max(candidates, key=lambda c: c.evidence.log_gain).evidence.samples
+    return [
+        replace(c, evidence=replace(c.evidence, samples=min(c.evidence.samples, most)))
+        for c in candidates
+    ]

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.candidates import Candidate, absent_effects, try_effect
+from identify.candidates import Candidate, absent_effects, levelled, try_effect
 from identify.evidence import held_out_gain
 from identify.fit import Fit, sticks
 from identify.residual import moving, residual
@@ -58,11 +61,13 @@ def diagnose_axis(
     """Try every absent effect on one fitted axis and decide."""
     effects = absent_effects(base.axis, catalogue)
     candidates = []
-    for i, effect in enumerate(effects):
-        candidates.append(try_effect(base, study, effect))
-        if progress:
-            progress(i + 1, len(effects))
-    ranking = tuple(sorted(candidates, key=_merit))
+    # The laws run outside Python's lock, so candidates go side by side.
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for candidate in pool.map(partial(try_effect, base, study), effects):
+            candidates.append(candidate)
+            if progress:
+                progress(len(candidates), len(effects))
+    ranking = tuple(sorted(levelled(candidates), key=_merit))
     return decide(base, study, ranking)
 
 

@@ -35,15 +35,29 @@ def effective_samples(residual: Array) -> float:
     return float(max(n / tau, 2.0))
 
 
-def delta_bic(before: Array, after: Array, parameters: int) -> float:
-    """BIC before minus BIC after adding that many parameters; positive supports the addition.
+@dataclass(frozen=True)
+class Evidence:
+    """Evidence for a larger model.
 
-    before, after (n,): residuals on the same samples, N.
+    log_gain: logarithm of the squared error before over after. parameters: how many were added.
+    samples: effective number of residual samples.
     """
-    n = effective_samples(after)
+
+    log_gain: float
+    parameters: int
+    samples: float
+
+    @property
+    def delta_bic(self) -> float:
+        """BIC before minus BIC after the addition; positive supports it."""
+        return float(self.samples * self.log_gain - self.parameters * np.log(self.samples))
+
+
+def evidence(before: Array, after: Array, parameters: int) -> Evidence:
+    """Evidence from residuals before and after (n,) N on the same samples."""
     tiny = np.finfo(float).tiny
     gain = np.log(max(np.sum(before**2), tiny) / max(np.sum(after**2), tiny))
-    return float(n * gain - parameters * np.log(n))
+    return Evidence(float(gain), parameters, effective_samples(after))
 
 
 @dataclass(frozen=True)

@@ -8,18 +8,16 @@ are fitted to its spectrum above the band of the effects, and give what passes t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.signal import welch
 
+from identify.actuation import actual_force
 from identify.motion import Motion
 from identify.weak import Window
-from twin.effect import Kind
-from twin.model import AxisModel, axis_table
-from twin.native import walk
+from twin.model import AxisModel
 
 Array = NDArray[np.float64]
 
@@ -38,7 +36,9 @@ def _variance(axis: AxisModel, motion: Motion, window: Window) -> float:
     dt = motion.sample_period
     mass = axis.mass
     velocity = motion.raw[0]
-    command = _actual_force(axis, motion)
+    # The loop's own noise is in the command and moves the axis; a delay left out would tear the two
+    # apart and pass for measurement noise.
+    command = actual_force(axis, motion)
     raw = 0.5 * (command[1:] + command[:-1]) - mass * np.diff(velocity) / dt
     # The median over segments passes by those with spikes and reversals.
     segment = min(max(round(SEGMENT / dt), 256), len(raw))
@@ -49,28 +49,6 @@ def _variance(axis: AxisModel, motion: Motion, window: Window) -> float:
     levels = _fit_levels(np.stack([half, bend], axis=1)[band], power[band])
     passed = levels[0] + levels[1] * bend
     return float(np.trapezoid(passed * window.response(dt, segment), frequency))
-
-
-def _actual_force(axis: AxisModel, motion: Motion) -> Array:
-    """The command (n,) N after the axis' actuation effects, at the log's own rate.
-
-    The loop's own noise is in the command and moves the axis; a delay left out would tear the two
-    apart and pass for measurement noise.
-    """
-    effects = tuple(f for f in axis.effects if f.effect.kind is Kind.ACTUATION)
-    velocity, command = motion.raw
-    if not effects:
-        return command
-    position = motion.signals[0, 0] + np.cumsum(velocity) * motion.sample_period
-    signals = np.ascontiguousarray(np.stack([position, velocity, command]))
-    table = axis_table({motion.axis: replace(axis, effects=effects)})
-    rows = np.zeros((len(table.entries), len(command)))
-    first, last, state, _, _ = table.axes[0]
-    walk(
-        table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
-        signals, np.zeros_like(signals), motion.sample_period, 0, rows,
-    )  # fmt: skip
-    return command + rows.sum(axis=0)
 
 
 def _fit_levels(shapes: Array, power: Array) -> Array:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.actuation import actual_force, parts_of, reading_error
 from identify.motion import Motion
 from identify.weak import Window
 from twin.effect import Kind
@@ -21,11 +22,15 @@ REST_SPEED = 1e-3  # of the highest speed; below it a friction that sticks can b
 
 @dataclass(frozen=True, eq=False)
 class Windowed:
-    """One log's motion of an axis with its weak form; measured (n,) N and acceleration (n,) m/s^2
-    are windowed means, kept (n,) says which windows carry information."""
+    """One log's motion of an axis with its weak form.
+
+    window, fine: over the motion's blocks, and the same over the log's samples. command (n,) N and
+    acceleration (n,) m/s^2 are windowed means.
+    """
 
     motion: Motion
     window: Window
+    fine: Window
     command: Array
     acceleration: Array
 
@@ -35,7 +40,7 @@ class Windowed:
         window = Window.of_length(length, motion.period)
         fine = window.refined(round(motion.period / motion.sample_period))
         velocity, command = motion.raw
-        return cls(motion, window, fine.mean(command), fine.acceleration(velocity))
+        return cls(motion, window, fine, fine.mean(command), fine.acceleration(velocity))
 
     @property
     def time(self) -> Array:
@@ -68,12 +73,33 @@ def total_force(axis: AxisModel, motion: Motion) -> Array:
     return np.sum(list(forces(axis, motion).values()), axis=0)
 
 
+def windowed_force(axis: AxisModel, log: Windowed) -> Array:
+    """What the axis' effects add to the command, windowed means (n,) N.
+
+    A sensing effect adds the force that the reading's error pretends: mass x its acceleration.
+    """
+    actuation = parts_of(axis, Kind.ACTUATION)
+    delayed = any(f.effect.states for f in actuation.effects)  # memory needs the log's own rate
+    on_blocks = parts_of(axis, Kind.FORCE, Kind.MODIFIER, Kind.FRICTION, Kind.STRUCTURE)
+    if not delayed:
+        on_blocks = replace(on_blocks, effects=(*on_blocks.effects, *actuation.effects))
+    out = np.zeros(len(log))
+    if on_blocks.effects:
+        out += log.window.mean(total_force(on_blocks, log.motion))
+    if delayed:
+        out += log.fine.mean(actual_force(axis, log.motion)) - log.command
+    if parts_of(axis, Kind.SENSING).effects:
+        error = reading_error(axis, log.motion)
+        rate = np.diff(error, append=error[-1]) / log.motion.sample_period
+        out += axis.mass * log.fine.acceleration(rate)
+    return out
+
+
 def residual(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
     """Unexplained force (n,) N: windowed command + effects - mass x acceleration, log after log."""
     return np.concatenate(
         [
-            log.command + log.window.mean(total_force(axis, log.motion))
-            - axis.mass * log.acceleration
+            log.command + windowed_force(axis, log) - axis.mass * log.acceleration
             for log in logs
         ]
     )  # fmt: skip
@@ -82,14 +108,13 @@ def residual(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
 def group_of(axis: AxisModel, effect: str) -> AxisModel:
     """The part of the axis whose force can change when a parameter of that effect does.
 
-    Friction and its modifiers act together; any other effect acts by itself.
+    Friction and its modifiers act together, and so does what is in a chain; any other effect acts
+    by itself.
     """
-    joint = (Kind.FRICTION, Kind.MODIFIER)
-    if axis[effect].effect.kind in joint:
-        kept = tuple(f for f in axis.effects if f.effect.kind in joint)
-    else:
-        kept = (axis[effect],)
-    return replace(axis, effects=kept)
+    for joint in ((Kind.FRICTION, Kind.MODIFIER), (Kind.ACTUATION,), (Kind.SENSING,)):
+        if axis[effect].effect.kind in joint:
+            return parts_of(axis, *joint)
+    return replace(axis, effects=(axis[effect],))
 
 
 def jacobian(axis: AxisModel, logs: Sequence[Windowed], where: Sequence[Coordinate]) -> Array:
@@ -102,14 +127,14 @@ def jacobian(axis: AxisModel, logs: Sequence[Windowed], where: Sequence[Coordina
             continue
         if c.effect not in bases:
             group = group_of(axis, c.effect)
-            bases[c.effect] = group, [total_force(group, log.motion) for log in logs]
+            bases[c.effect] = group, [windowed_force(group, log) for log in logs]
         group, base = bases[c.effect]
         value = read(group, [c])[0]
         step = difference_step(c, value)
         moved = write(group, [c], [value + step])
         columns[:, j] = np.concatenate(
             [
-                log.window.mean(total_force(moved, log.motion) - force) / step
+                (windowed_force(moved, log) - force) / step
                 for log, force in zip(logs, base, strict=True)
             ]
         )
@@ -117,15 +142,10 @@ def jacobian(axis: AxisModel, logs: Sequence[Windowed], where: Sequence[Coordina
 
 
 def _by_mass(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
-    """Derivative by the moved mass, to which the forces of structure are in proportion."""
-    attached = replace(
-        axis, effects=tuple(f for f in axis.effects if f.effect.kind is Kind.STRUCTURE)
-    )
+    """Derivative by the moved mass, to which structure and sensing errors are in proportion."""
+    attached = parts_of(axis, Kind.STRUCTURE, Kind.SENSING)
     return np.concatenate(
-        [
-            log.window.mean(total_force(attached, log.motion)) / axis.mass - log.acceleration
-            for log in logs
-        ]
+        [windowed_force(attached, log) / axis.mass - log.acceleration for log in logs]
     )
 
 

@@ -155,6 +155,19 @@ def sense(entries, first, last, parameters, states, io, position):
     return io[READING]
 
 
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def walk_sensing(entries, first, last, parameters, states, motion, dt, readings):
+    """Encoder readings (n,) m along a motion (3, n): position m, velocity m/s, command N."""
+    io = np.zeros(IO_SIZE)
+    io[DT] = dt
+    for k in range(motion.shape[1]):
+        io[INDEX] = k
+        io[TIME] = k * dt
+        io[X] = motion[0, k]
+        io[V] = motion[1, k]
+        readings[k] = sense(entries, first, last, parameters, states, io, motion[0, k])
+
+
 @dataclass(frozen=True)
 class Table:
     """A model as plain arrays.
