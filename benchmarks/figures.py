@@ -1,0 +1,106 @@
+"""What a benchmark finds: figures, some with a target, and the two files that keep them."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from math import inf
+from pathlib import Path
+
+PACKAGES = ("mujoco", "numba", "numpy", "scipy", "mcap")
+PREAMBLE = """\
+# Benchmarks
+
+Written by `python -m benchmarks` (`make bench`). Ratios are of runs in turn (A B A B) on one
+machine, median of the rounds; figures in seconds or nanoseconds hold for that machine alone.
+"""
+
+
+@dataclass(frozen=True)
+class Target:
+    """The interval in which a figure must lie."""
+
+    low: float = -inf
+    high: float = inf
+
+    def met(self, value: float) -> bool:
+        """Whether the value lies in the interval."""
+        return self.low <= value <= self.high
+
+    def __str__(self) -> str:
+        lower = f"at least {self.low:g}" if self.low > -inf else ""
+        upper = f"at most {self.high:g}" if self.high < inf else ""
+        return " and ".join(filter(None, (lower, upper)))
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measured number. value: None where it could not be measured, and the note says why."""
+
+    what: str
+    value: float | None
+    unit: str = "1"
+    target: Target | None = None
+    note: str = ""
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the target is met; None without a target or a value."""
+        if self.target is None or self.value is None:
+            return None
+        return self.target.met(self.value)
+
+    @property
+    def verdict(self) -> str:
+        """One word for the table."""
+        if self.value is None:
+            return "skipped"
+        return {None: "", True: "pass", False: "FAIL"}[self.passed]
+
+
+def machine() -> str:
+    """What the figures were measured on."""
+    versions = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
+    return f"{os.cpu_count()} CPUs, Python {platform.python_version()}, {versions}"
+
+
+def write_results(results: Mapping[str, Sequence[Figure]], folder: Path) -> None:
+    """Write RESULTS.md and RESULTS.json into the folder, whole or not at all."""
+    sections = "\n".join(f"## {title}\n\n{_table(f)}" for title, f in results.items())
+    _replace(folder / "RESULTS.md", f"{PREAMBLE}\n{machine()}\n\n{sections}")
+    content = {
+        "machine": machine(),
+        "benchmarks": {title: [_as_json(f) for f in figures] for title, figures in results.items()},
+    }
+    _replace(folder / "RESULTS.json", json.dumps(content, indent=1) + "\n")
+
+
+def _table(figures: Sequence[Figure]) -> str:
+    rows = ["| figure | value | unit | target | | note |", "|---|---|---|---|---|---|"]
+    for f in figures:
+        value = "" if f.value is None else f"{f.value:.3g}"
+        rows.append(
+            f"| {f.what} | {value} | {f.unit} | {f.target or ''} | {f.verdict} | {f.note} |"
+        )
+    return "\n".join(rows) + "\n"
+
+
+def _as_json(figure: Figure) -> dict[str, object]:
+    return {
+        "figure": figure.what,
+        "value": figure.value,
+        "unit": figure.unit,
+        "target": str(figure.target) if figure.target else None,
+        "passed": figure.passed,
+        "note": figure.note,
+    }
+
+
+def _replace(path: Path, text: str) -> None:
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(text, encoding="utf-8")
+    os.replace(part, path)

@@ -1,0 +1,100 @@
+"""Steps per second: the stage in MuJoCo, a bare mj_step loop, and the reduced model.
+
+All three run on one thread and are timed by its CPU time.
+"""
+
+from __future__ import annotations
+
+from time import thread_time
+
+import mujoco
+import numba
+import numpy as np
+
+from benchmarks.figures import Figure, Target
+from benchmarks.timing import interleaved, ratio
+from twin.effects import load_catalogue
+from twin.experiments import EXPERIMENTS
+from twin.model import StageModel
+from twin.model_file import load_model
+from twin.mujoco_link import call_step, step_address
+from twin.simulator import MujocoStage, ReducedStage, run
+from twin.trajectory import Setpoint
+
+TITLE = "Simulation: LuGre, cable and roller spikes on both axes, 10 kHz"
+DURATION = 20.0  # s of random tracking
+ROUNDS = 7
+
+Stage = type[MujocoStage] | type[ReducedStage]
+
+
+@numba.njit(cache=True)
+def _bare_steps(step, model, data, n):
+    for _ in range(n):
+        call_step(step, model, data)
+
+
+class _Simulation:
+    """Runs one setpoint in a stage; ``stepping`` collects the seconds within its steps."""
+
+    def __init__(self, model: StageModel, setpoint: Setpoint, stage: Stage) -> None:
+        self.stepping: list[float] = []
+        self._model, self._setpoint = model, setpoint
+        self._stage = self._timed(stage)
+
+    def __call__(self) -> None:
+        self.stepping.append(0.0)
+        run(self._model, self._setpoint, np.random.default_rng(2), stage=self._stage)
+
+    def _timed(self, stage: Stage) -> Stage:
+        stepping = self.stepping
+
+        class Timed(stage):  # type: ignore[misc, valid-type]
+            def run(self, *arguments: object) -> None:
+                begun = thread_time()
+                super().run(*arguments)
+                stepping[-1] += thread_time() - begun
+
+        return Timed
+
+
+def measure() -> list[Figure]:
+    """Ratios of steps per second, of whole runs and of the stepping alone."""
+    model = load_model("proton_xy", load_catalogue())
+    setpoint = EXPERIMENTS["tracking"].setpoint(model, 0, DURATION, np.random.default_rng(1))
+    n = len(setpoint.position)
+    bare_model = MujocoStage(model, model.table()).model
+    bare_data = mujoco.MjData(bare_model)
+    in_mujoco = _Simulation(model, setpoint, MujocoStage)
+    in_reduced = _Simulation(model, setpoint, ReducedStage)
+    bare, whole, reduced = interleaved(
+        [
+            lambda: _bare_steps(step_address(), bare_model._address, bare_data._address, n),
+            in_mujoco,
+            in_reduced,
+        ],
+        ROUNDS,
+        thread_time,
+    ).T
+    steps, reduced_steps = (np.array(s.stepping[1:]) for s in (in_mujoco, in_reduced))
+    rates = ", ".join(
+        f"{name} {n / np.median(t) / 1e6:.2f}"
+        for name, t in (("bare", bare), ("MuJoCo", steps), ("reduced", reduced_steps))
+    )
+    return [
+        Figure(
+            "twin.simulator.run in MuJoCo over a bare compiled mj_step loop of the same mjModel",
+            ratio(bare, whole), "steps/s ratio", Target(low=0.8),
+            "whole run: set-up, noise, control, effects, logging",
+        ),
+        Figure("the same, its stepping alone", ratio(bare, steps), "steps/s ratio"),
+        Figure(
+            "reduced model over MuJoCo, stepping the same setpoint",
+            ratio(steps, reduced_steps), "steps/s ratio", Target(low=15.0),
+            f"control, effects, logging; million steps/s: {rates}",
+        ),
+        Figure(
+            "the same, whole runs", ratio(whole, reduced), "steps/s ratio",
+            note="both draw the encoder noise and make the arrays, which the ratio dilutes",
+        ),
+    ]  # fmt: skip
