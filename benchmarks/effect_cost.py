@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from time import thread_time
 
 import numba
@@ -54,7 +55,7 @@ def _motion() -> Array:
     return np.stack([x, v, np.gradient(v, PERIOD)])
 
 
-def _job(effect: Effect, motion: Array):
+def _job(effect: Effect, motion: Array) -> Callable[[], None]:
     """The law at its start values, every strength a tenth of a unit where bounds allow it."""
     law = law_address(effect)
     values = {

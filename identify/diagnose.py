@@ -67,8 +67,18 @@ def diagnose_axis(
             candidates.append(candidate)
             if progress:
                 progress(len(candidates), len(effects))
-    ranking = tuple(sorted(levelled(candidates), key=_merit))
+    ranking = _ranked(levelled(candidates))
     return decide(base, study, ranking)
+
+
+def _ranked(candidates: list[Candidate]) -> tuple[Candidate, ...]:
+    """By falling merit; those within no evidence of the best come in the catalogue's order."""
+    ranking = sorted(candidates, key=_merit)
+    if not ranking or not ranking[0].supported:
+        return tuple(ranking)
+    least = ranking[0].delta_bic - NO_EVIDENCE
+    level = [c for c in ranking if c.supported and c.delta_bic > least]
+    return (*sorted(level, key=lambda c: c.effect.name), *ranking[len(level) :])
 
 
 def _merit(c: Candidate) -> tuple[bool, float]:
@@ -102,4 +112,5 @@ def _tie(study: Study, best: Candidate, other: Candidate) -> bool:
     return abs(held_out_gain(pair[0], pair[1], best.fit.floor).t) < TIE
 
 
+NO_EVIDENCE = 2.0  # difference of BIC "not worth more than a bare mention" (Kass, Raftery 1995)
 LEAST_SEPARATION = 10.0  # difference of BIC that separates two explanations
