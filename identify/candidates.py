@@ -4,22 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.evidence import LEAST_BIC, LEAST_T, Evidence, Gain, evidence, held_out_gain, left_out
-from identify.fit import Fit, fit_axis, sticks
-from identify.residual import jacobian, moving, residual
-from identify.search import fit_thoroughly, starts
+from identify.evidence import (
+    LEAST_BIC,
+    LEAST_T,
+    Evidence,
+    Gain,
+    effective_samples,
+    evidence,
+    held_out_gain,
+    left_out,
+)
+from identify.fit import Fit, Outcome, finished, fit_axis, rms, sticks
+from identify.residual import moving, residual
+from identify.search import Start, fit_thoroughly, starts, stepped
 from identify.study import Study
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
-from twin.model import AxisModel
+from twin.model import AxisModel, Fitted
 
 Array = NDArray[np.float64]
 
 SAME_ERROR = 1.01  # error that simpler values may cost
+PROMISE = 0.3  # part of the evidence asked for that a first look must show
 RIDGE = 1e-4  # keeps the estimate of left-out blocks finite along directions nobody sees
 
 
@@ -58,19 +69,65 @@ def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
 
 
 def try_effect(base: Fit, study: Study, effect: Effect) -> Candidate:
-    """Refit the model together with the effect and score it against the base."""
+    """Refit the model together with the effect and score it against the base.
+
+    Where a first look (one linear step beside the base; a fit of the logs' heads for a friction)
+    is far from any evidence, that is scored and no refit made.
+    """
     best, *others = starts(base, study, effect)
-    fit = simplified(fit_axis(base.axis.with_effect(best), study.fit), study, effect)
+    if effect.kind is Kind.FRICTION:
+        looked = _audition(base, study, best.fitted)
+        if looked is not None:
+            return score(base, looked, study, effect)
+    elif not _promising(base, best):
+        return score(base, _glance(base, study, best.fitted), study, effect)
+    fit = simplified(fit_axis(base.axis.with_effect(best.fitted), study.fit), study, effect)
     first = score(base, fit, study, effect)
     if first.fit.at_floor or first.delta_bic < LEAST_BIC:
         return first
     # It helps but leaves structure: what is missing distorts the base, so begin where that did too.
-    fits = [first.fit, fit_axis(base.begun.with_effect(best), study.fit)]
-    fits += [fit_axis(base.axis.with_effect(other), study.fit) for other in others]
+    fits = [first.fit, fit_axis(base.begun.with_effect(best.fitted), study.fit)]
+    fits += [fit_axis(base.axis.with_effect(other.fitted), study.fit) for other in others]
     best_fit = min(fits, key=lambda f: f.error)
     if not best_fit.at_floor:
         best_fit = fit_thoroughly(best_fit.axis, study)
     return score(base, simplified(best_fit, study, effect), study, effect)
+
+
+def _promising(base: Fit, start: Start) -> bool:
+    """Whether a refit could make evidence of what the linear step gains."""
+    samples = effective_samples(base.residual)
+    before = float(np.sum(base.residual**2))
+    gain = samples * np.log(before / max(start.squared_error, 1e-12 * before))
+    free = len(start.fitted.effect.parameters) - len(start.fitted.fixed)
+    return bool(gain > PROMISE * (LEAST_BIC + free * np.log(samples)))
+
+
+def _glance(base: Fit, study: Study, fitted: Fitted) -> Fit:
+    """The linear step as a fit, or the effect without strength where the step does harm."""
+    axis = stepped(base, fitted, study.fit)
+    if rms(residual(axis, study.fit)[base.kept]) > base.error:
+        absent = {p.name: 0.0 for p in fitted.effect.strengths}
+        axis = base.axis.with_effect(replace(fitted, values={**fitted.values, **absent}))
+    return finished(axis, base.begun, study.fit, Outcome.NOT_CONVERGED)
+
+
+def _audition(base: Fit, study: Study, fitted: Fitted) -> Fit | None:
+    """Another friction fitted to the heads, where that shows it to be no better; else None."""
+    if sum(map(len, study.heads)) > 0.5 * sum(map(len, study.fit)):
+        return None
+    old, new = _on_heads(base, study), fit_axis(base.axis.with_effect(fitted), study.heads)
+    either = moving(study.heads, sticks(old.axis) or sticks(new.axis))
+    before, after = (residual(f.axis, study.heads)[either] for f in (old, new))
+    gain = effective_samples(before) * evidence(before, after, 1).log_gain
+    if gain > PROMISE * LEAST_BIC:
+        return None
+    return finished(new.axis, base.begun, study.fit, new.outcome)
+
+
+@lru_cache(maxsize=1)  # every friction is compared with the same base
+def _on_heads(base: Fit, study: Study) -> Fit:
+    return fit_axis(base.axis, study.heads)
 
 
 def simplified(fit: Fit, study: Study, effect: Effect) -> Fit:
@@ -87,15 +144,14 @@ def simplified(fit: Fit, study: Study, effect: Effect) -> Fit:
 
 def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
     """Evidence for a fitted larger model over the base, on the windows that both can use."""
-    either = sticks(base.axis) or sticks(fit.axis)
-    kept = moving(study.fit, either)
-    before, after = (residual(f.axis, study.fit)[kept] for f in (base, fit))
+    shared = base.kept & fit.kept
+    before, after = (f.residual[shared[f.kept]] for f in (base, fit))
     added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
     if study.holdout:
-        held = moving(study.holdout, either)
+        held = moving(study.holdout, sticks(base.axis) or sticks(fit.axis))
         pair = [residual(f.axis, study.holdout)[held] for f in (base, fit)]
     else:
-        pair = [_cross_validated(f, study, kept) for f in (base, fit)]
+        pair = [_cross_validated(f, shared[f.kept]) for f in (base, fit)]
     return Candidate(
         effect=effect,
         axis=study.axis,
@@ -105,10 +161,9 @@ def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
     )
 
 
-def _cross_validated(fit: Fit, study: Study, kept: NDArray[np.bool_]) -> Array:
-    columns = jacobian(fit.axis, study.fit, fit.scaling.where)[kept]
-    force = residual(fit.axis, study.fit)[kept]
-    return left_out(force, columns, RIDGE * np.linalg.norm(columns, axis=0))
+def _cross_validated(fit: Fit, rows: NDArray[np.bool_]) -> Array:
+    columns = fit.jacobian[rows]
+    return left_out(fit.residual[rows], columns, RIDGE * np.linalg.norm(columns, axis=0))
 
 
 def levelled(candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -150,23 +150,25 @@ def fit_axis(axis: AxisModel, logs: Sequence[Windowed]) -> Fit:
         internal, _ = problem.solve(internal, 1e-3)
         problem.set_priors(internal)
         internal, converged = problem.solve(internal, 1e-7)
-    return _finish(problem, internal, Outcome.CONVERGED if converged else Outcome.NOT_CONVERGED)
+    outcome = Outcome.CONVERGED if converged else Outcome.NOT_CONVERGED
+    return finished(problem.scaling.outside(axis, internal), axis, logs, outcome)
 
 
-def _finish(problem: _Problem, internal: Array, outcome: Outcome) -> Fit:
-    axis = problem.scaling.outside(problem.axis, internal)
-    force = residual(axis, problem.logs)[problem.kept]
-    floor = noise_floor(axis, [(log.motion, log.window) for log in problem.logs])
+def finished(axis: AxisModel, begun: AxisModel, logs: Sequence[Windowed], outcome: Outcome) -> Fit:
+    """The fit that an axis is at its present values."""
+    scaling = Scaling(coordinates(axis))
+    kept = moving(logs, sticks(axis))
+    force = residual(axis, logs)[kept]
     return Fit(
         axis=axis,
-        scaling=problem.scaling,
+        scaling=scaling,
         outcome=outcome,
         error=rms(force),
-        floor=floor,
+        floor=noise_floor(axis, [(log.motion, log.window) for log in logs]),
         residual=force,
-        jacobian=jacobian(axis, problem.logs, problem.scaling.where)[problem.kept],
-        kept=problem.kept,
-        begun=problem.axis,
+        jacobian=jacobian(axis, logs, scaling.where)[kept],
+        kept=kept,
+        begun=begun,
     )
 
 

@@ -7,7 +7,7 @@ samples keep these relations exact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,17 @@ class Motion:
     sample_period: float
     position_noise: float
     raw: Array
+
+    def head(self, duration: float) -> Motion:
+        """Its first ``duration`` seconds."""
+        n = min(max(round(duration / self.period), 1), self.signals.shape[1])
+        samples = self.raw.shape[1] // self.signals.shape[1]
+        return replace(
+            self,
+            signals=np.ascontiguousarray(self.signals[:, :n]),
+            others=np.ascontiguousarray(self.others[:, :n]),
+            raw=self.raw[:, : n * samples],
+        )
 
     @property
     def time(self) -> Array:

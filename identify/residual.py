@@ -13,7 +13,7 @@ from identify.motion import Motion
 from identify.weak import Window
 from twin.effect import Kind
 from twin.model import AxisModel, Coordinate, axis_table, read, write
-from twin.native import walk
+from twin.native import Table, walk
 
 Array = NDArray[np.float64]
 
@@ -51,58 +51,46 @@ class Windowed:
         return len(self.command)
 
 
-def forces(axis: AxisModel, motion: Motion) -> dict[str, Array]:
-    """Force of each effect on the axis along the measured motion: name -> (n,) N.
-
-    A modifier acts through the friction and has none of its own.
-    """
-    table = axis_table({motion.axis: axis})
+def total_force(table: Table, motion: Motion) -> Array:
+    """Sum of the forces of a table's first axis along a measured motion, (n,) N, less command."""
     rows = np.zeros((len(table.entries), motion.signals.shape[1]))
+    if not len(rows):
+        return np.zeros(motion.signals.shape[1])
     first, last, state, _, _ = table.axes[0]
     walk(
         table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
         motion.signals, motion.others, motion.period, 0, rows, table.masses[0],
     )  # fmt: skip
-    return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
+    return np.asarray(rows.sum(axis=0))
 
 
-def total_force(axis: AxisModel, motion: Motion) -> Array:
-    """Sum of the effects' forces along the measured motion, (n,) N, without the command."""
-    if not axis.effects:
-        return np.zeros(motion.signals.shape[1])
-    return np.sum(list(forces(axis, motion).values()), axis=0)
-
-
-def windowed_force(axis: AxisModel, log: Windowed) -> Array:
-    """What the axis' effects add to the command, windowed means (n,) N.
+def windowed_force(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
+    """What the axis' effects add to the command, windowed means (n,) N, log after log.
 
     A sensing effect adds the force that the reading's error pretends: mass x its acceleration.
     """
-    actuation = parts_of(axis, Kind.ACTUATION)
-    delayed = any(f.effect.states for f in actuation.effects)  # memory needs the log's own rate
-    on_blocks = parts_of(axis, Kind.FORCE, Kind.MODIFIER, Kind.FRICTION, Kind.STRUCTURE)
-    if not delayed:
-        on_blocks = replace(on_blocks, effects=(*on_blocks.effects, *actuation.effects))
-    out = np.zeros(len(log))
-    if on_blocks.effects:
-        out += log.window.mean(total_force(on_blocks, log.motion))
-    if delayed:
-        out += log.fine.mean(actual_force(axis, log.motion)) - log.command
-    if parts_of(axis, Kind.SENSING).effects:
-        error = reading_error(axis, log.motion)
-        rate = np.diff(error, append=error[-1]) / log.motion.sample_period
-        out += axis.mass * log.fine.acceleration(rate)
-    return out
+    kinds = {f.effect.kind for f in axis.effects}
+    # An actuation with memory needs the log's own rate.
+    fine = any(f.effect.kind is Kind.ACTUATION and f.effect.states for f in axis.effects)
+    apart = {Kind.SENSING, *((Kind.ACTUATION,) if fine else ())}
+    table = axis_table({"": parts_of(axis, *(set(Kind) - apart))})
+    parts = []
+    for log in logs:
+        out = log.window.mean(total_force(table, log.motion))
+        if fine:
+            out += log.fine.mean(actual_force(axis, log.motion)) - log.command
+        if Kind.SENSING in kinds:
+            error = reading_error(axis, log.motion)
+            rate = np.diff(error, append=error[-1]) / log.motion.sample_period
+            out += axis.mass * log.fine.acceleration(rate)
+        parts.append(out)
+    return np.concatenate(parts)
 
 
 def residual(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
     """Unexplained force (n,) N: windowed command + effects - mass x acceleration, log after log."""
-    return np.concatenate(
-        [
-            log.command + windowed_force(axis, log) - axis.mass * log.acceleration
-            for log in logs
-        ]
-    )  # fmt: skip
+    inertia = np.concatenate([log.command - axis.mass * log.acceleration for log in logs])
+    return np.asarray(inertia + windowed_force(axis, logs))
 
 
 def group_of(axis: AxisModel, effect: str) -> AxisModel:
@@ -120,33 +108,27 @@ def group_of(axis: AxisModel, effect: str) -> AxisModel:
 def jacobian(axis: AxisModel, logs: Sequence[Windowed], where: Sequence[Coordinate]) -> Array:
     """Derivative of the residual by those coordinates, (n, n_coordinates), N per unit."""
     columns = np.empty((sum(map(len, logs)), len(where)))
-    bases: dict[str, tuple[AxisModel, list[Array]]] = {}
+    bases: dict[str, tuple[AxisModel, Array]] = {}
     for j, c in enumerate(where):
         if not c.effect:
             columns[:, j] = _by_mass(axis, logs)
             continue
         if c.effect not in bases:
             group = group_of(axis, c.effect)
-            bases[c.effect] = group, [windowed_force(group, log) for log in logs]
+            bases[c.effect] = group, windowed_force(group, logs)
         group, base = bases[c.effect]
         value = read(group, [c])[0]
         step = difference_step(c, value)
         moved = write(group, [c], [value + step])
-        columns[:, j] = np.concatenate(
-            [
-                (windowed_force(moved, log) - force) / step
-                for log, force in zip(logs, base, strict=True)
-            ]
-        )
+        columns[:, j] = (windowed_force(moved, logs) - base) / step
     return columns
 
 
 def _by_mass(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
     """Derivative by the moved mass, to which structure and sensing errors are in proportion."""
     attached = parts_of(axis, Kind.STRUCTURE, Kind.SENSING)
-    return np.concatenate(
-        [windowed_force(attached, log) / axis.mass - log.acceleration for log in logs]
-    )
+    inertia = np.concatenate([log.acceleration for log in logs])
+    return np.asarray(windowed_force(attached, logs) / axis.mass - inertia)
 
 
 def difference_step(c: Coordinate, value: float) -> float:

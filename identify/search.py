@@ -11,41 +11,67 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from identify.fit import Fit, fit_axis
-from identify.residual import jacobian, residual
+from identify.residual import Windowed, jacobian, residual
 from identify.study import Study
 from twin.effect import Effect, Kind, Parameter
-from twin.model import AxisModel, Coordinate, Fitted
+from twin.model import AxisModel, Coordinate, Fitted, read, write
 
 Array = NDArray[np.float64]
 
 RIDGE = 1e-4  # keeps the linear step finite along directions that the base explains already
 RESCORED_SHAPES = 24  # best shapes of a coarse scan that are tried with every strength
+FULL_SHAPES = 6  # best shapes on the logs' heads that are tried on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
 BETTER = 0.99  # part of the error that a new start must reach to be taken
 
 
 @dataclass(frozen=True, eq=False)
-class _Start:
+class Start:
+    """An effect at one shape with the strengths that one linear step finds best beside a base.
+
+    squared_error: N^2, sum over the windows that is left when the base moves along.
+    """
+
     squared_error: float
     shape: dict[str, float]
     fitted: Fitted
 
 
-def starts(base: Fit, study: Study, effect: Effect) -> list[Fitted]:
+def starts(base: Fit, study: Study, effect: Effect) -> list[Start]:
     """The effect at its best shapes beside the base, best first; at least one.
 
-    All shapes are tried with the screened strengths, then the best of them with every strength.
+    All shapes are tried on the logs' heads with the screened strengths, the best of them with every
+    strength, and the best of those on all of the logs.
     """
-    ground = _Ground.of(base, study, effect)
+    found = [Start(0.0, shape, Fitted.at_start(effect)) for shape in shapes(effect, study)]
     coarse = [p for p in effect.strengths if p.screened]
-    found = sorted(
-        (_try(ground, shape, coarse) for shape in shapes(effect, study)),
-        key=lambda s: s.squared_error,
-    )
-    if len(coarse) < len(effect.strengths):
-        again = (_try(ground, s.shape, effect.strengths) for s in found[:RESCORED_SHAPES])
-        found = sorted(again, key=lambda s: s.squared_error)
-    return [s.fitted for s in found[:REFINED_STARTS]]
+    head = _Ground.of(base, study, effect, on_heads=True)
+    if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
+        found = _best(head, found, coarse, RESCORED_SHAPES)
+    if len(found) > FULL_SHAPES:
+        found = _best(head, found, effect.strengths, FULL_SHAPES)
+    whole = _Ground.of(base, study, effect, on_heads=False)
+    return _best(whole, found, effect.strengths, REFINED_STARTS)
+
+
+def _best(
+    ground: _Ground, tried: Sequence[Start], strengths: Sequence[Parameter], count: int
+) -> list[Start]:
+    scored = [_try(ground, s.shape, strengths) for s in tried]
+    return sorted(scored, key=lambda s: s.squared_error)[:count]
+
+
+def stepped(base: Fit, fitted: Fitted, logs: Sequence[Windowed]) -> AxisModel:
+    """The base with the effect, its own parameters moved along by one linear step."""
+    together = base.axis.with_effect(fitted)
+    where = [c for c in base.scaling.where if _belongs(c, together)]
+    columns = base.jacobian[:, [base.scaling.where.index(c) for c in where]]
+    force = residual(together, logs)[base.kept]
+    norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    step = np.linalg.lstsq(columns / norms, -force, rcond=1e-6)[0] / norms
+    lower = [c.parameter.lower for c in where]
+    upper = [c.parameter.upper for c in where]
+    return write(together, where, np.clip(read(together, where) + step, lower, upper))
 
 
 def fit_thoroughly(axis: AxisModel, study: Study) -> Fit:
@@ -56,7 +82,7 @@ def fit_thoroughly(axis: AxisModel, study: Study) -> Fit:
         if best.at_floor or not any(p.scan for p in effect.parameters):
             continue
         rest = _fit_without(best, study, name)
-        first = starts(rest, study, effect)[0]
+        first = starts(rest, study, effect)[0].fitted
         held = {n: best.axis[name].values[n] for n in best.axis[name].fixed}
         again = replace(first, values={**first.values, **held}, fixed=best.axis[name].fixed)
         other = fit_axis(best.axis.with_effect(again), study.fit)
@@ -91,6 +117,7 @@ class _Ground:
     """What is the same at every shape: the base without what the effect replaces."""
 
     study: Study
+    logs: Sequence[Windowed]
     effect: Effect
     rest: AxisModel
     basis: Array
@@ -98,27 +125,34 @@ class _Ground:
     kept: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, base: Fit, study: Study, effect: Effect) -> _Ground:
+    def of(cls, base: Fit, study: Study, effect: Effect, *, on_heads: bool) -> _Ground:
         rest = _without_friction(base.axis) if effect.kind is Kind.FRICTION else base.axis
         columns = [i for i, c in enumerate(base.scaling.where) if _belongs(c, rest)]
-        unchanged = residual(base.axis, study.fit)[base.kept]
+        among = study.in_heads if on_heads else np.ones(len(base.kept), dtype=bool)
+        rows = among[base.kept]
         return cls(
-            study, effect, rest, orthonormal(base.jacobian[:, columns]), unchanged, base.kept
+            study=study,
+            logs=study.heads if on_heads else study.fit,
+            effect=effect,
+            rest=rest,
+            basis=orthonormal(base.jacobian[rows][:, columns]),
+            unchanged=base.residual[rows],
+            kept=base.kept[among],
         )
 
 
-def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter]) -> _Start:
+def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter]) -> Start:
     """Best strengths at one shape, by a linear step with the base parameters free."""
     effect, study = ground.effect, ground.study
     first = Fitted.at_start(effect, _clipped(effect, study, shape))
     axis = ground.rest.with_effect(first)
     where = [Coordinate(effect.name, p) for p in strengths if p.name not in first.fixed]
     silent = all(first.values[p.name] == 0.0 for p in effect.strengths)
-    force = ground.unchanged if silent else residual(axis, study.fit)[ground.kept]
-    columns = jacobian(axis, study.fit, where)[ground.kept]
+    force = ground.unchanged if silent else residual(axis, ground.logs)[ground.kept]
+    columns = jacobian(axis, ground.logs, where)[ground.kept]
     step, squared = _bounded_step(ground.basis, force, columns, where, first)
     moved = {c.parameter.name: s for c, s in zip(where, step, strict=True)}
-    return _Start(squared, shape, replace(first, values={**first.values, **moved}))
+    return Start(squared, shape, replace(first, values={**first.values, **moved}))
 
 
 def _clipped(effect: Effect, study: Study, shape: dict[str, float]) -> dict[str, float]:

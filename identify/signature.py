@@ -14,7 +14,7 @@ from identify.residual import total_force
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
-from twin.model import AxisModel, Fitted
+from twin.model import AxisModel, Fitted, axis_table
 from twin.model_file import write_atomically
 
 Array = NDArray[np.float64]
@@ -54,10 +54,10 @@ def signature(effect: Effect, catalogue: Catalogue) -> tuple[Motion, Array]:
     if effect.kind is not Kind.FRICTION:
         friction = next(e for e in catalogue.values() if e.kind is Kind.FRICTION)
         axis = axis.with_effect(Fitted.at_start(friction, {VISCOUS: 0.5}))
-    base = total_force(axis, motion)
+    base = total_force(axis_table({motion.axis: axis}), motion)
 
     def added(fitted: Fitted) -> Array:
-        return total_force(axis.with_effect(fitted), motion) - base
+        return total_force(axis_table({motion.axis: axis.with_effect(fitted)}), motion) - base
 
     if effect.kind is Kind.FRICTION:
         return motion, added(Fitted.at_start(effect))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ from twin.model import AxisModel, StageModel
 Array = NDArray[np.float64]
 
 WINDOWS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
+TRIED = 16.0  # s of motion on which the shapes of an effect are tried before all of it is used
+SHORTEST_HEAD = 4.0  # s of each log
 QUIET = 0.01  # noise floor wanted, as a part of the force that the inertia does not explain
 
 
@@ -31,6 +34,18 @@ class Study:
     fit: tuple[Windowed, ...]
     holdout: tuple[Windowed, ...]
     excitation: Excitation
+
+    @cached_property
+    def heads(self) -> tuple[Windowed, ...]:
+        """The beginnings of the fit logs, together long enough to try shapes on."""
+        each = max(TRIED / len(self.fit), SHORTEST_HEAD)
+        return tuple(Windowed.of(w.motion.head(each), w.window.length) for w in self.fit)
+
+    @cached_property
+    def in_heads(self) -> NDArray[np.bool_]:
+        """Which windows of the fit logs are in their heads."""
+        pairs = zip(self.heads, self.fit, strict=True)
+        return np.concatenate([np.arange(len(w)) < len(h) for h, w in pairs])
 
     @property
     def window(self) -> float:
