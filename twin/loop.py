@@ -37,13 +37,16 @@ N_SIGNALS = 4
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
-def control_axis(a, x, v, table, sensing_states, gains, states, setpoint, noise, io, out):
-    """Read the encoder, compute the command, log both with the true motion; returns the command."""
+def control_axis(a, x, v, lead, table, sensing_states, gains, states, setpoint, noise, io, out):
+    """Read the encoder, compute the command, log both with the true motion; returns the command.
+
+    lead: s, by which the integrated x is ahead of the exact motion.
+    """
     entries, axes, parameters = table
     dt = io[DT]
     io[X] = x
     io[V] = v
-    position = x - 0.5 * dt * v
+    position = x - lead * v
     reading = position
     if axes[a, 4] > axes[a, 3]:
         reading = sense(entries, axes[a, 3], axes[a, 4], parameters, sensing_states, io, position)
@@ -86,7 +89,7 @@ def run_mujoco(
         io[TIME] = (first_sample + k) * dt
         for a in range(n_axes):
             ctrl[where[a, 2]] = control_axis(
-                a, qpos[where[a, 0]], qvel[where[a, 1]], table, sensing_states, gains,
+                a, qpos[where[a, 0]], qvel[where[a, 1]], 0.5 * dt, table, sensing_states, gains,
                 controller_states, setpoints[k, a], noise[k, a], borrow(io), signals[k, a],
             )  # fmt: skip
         call_step(step, model, data)
@@ -98,12 +101,13 @@ def run_mujoco(
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def run_reduced(
-    motion, effect_states, masses, first_sample, dt, table, sensing_states, gains,
+    motion, effect_states, masses, substeps, first_sample, dt, table, sensing_states, gains,
     controller_states, setpoints, noise, watched, signals, forces, states,
 ):  # fmt: skip
     """Run some samples of the reduced model; motion (n_axes, 2) holds x m and v m/s.
 
-    The other arrays are those of run_mujoco.
+    substeps: integration steps a sample, over which the command is held; forces are those of the
+    last. The other arrays are those of run_mujoco.
     """
     n, n_axes = noise.shape
     (effect_states, table, sensing_states, gains, controller_states, setpoints, signals, forces) = (
@@ -114,33 +118,43 @@ def run_reduced(
     )  # fmt: skip
     entries, axes, parameters = table
     io = np.zeros(IO_SIZE)
-    before = np.zeros((n_axes, 3))  # x m, v m/s, last a m/s^2 of every axis as a sample begins
-    drive = dt / masses
-    io[DT] = dt
+    before = np.zeros((n_axes, 3))  # x m, v m/s, last a m/s^2 of every axis as a step begins
+    commands = np.zeros(n_axes)
+    step = dt / substeps
+    drive = step / masses
     io[WHEN] = 1.0
     for k in range(n):
+        io[DT] = dt
         io[INDEX] = first_sample + k
         io[TIME] = (first_sample + k) * dt
         for a in range(n_axes):
-            before[a, 0] = motion[a, 0]
-            before[a, 1] = motion[a, 1]
-            before[a, 2] = effect_states[axes[a, 2] + LAST_ACCELERATION]
-        for a in range(n_axes):
-            io[U] = control_axis(
-                a, motion[a, 0], motion[a, 1], table, sensing_states, gains, controller_states,
-                setpoints[k, a], noise[k, a], borrow(io), signals[k, a],
+            commands[a] = control_axis(
+                a, motion[a, 0], motion[a, 1], 0.5 * step, table, sensing_states, gains,
+                controller_states, setpoints[k, a], noise[k, a], borrow(io), signals[k, a],
             )  # fmt: skip
-            io[MASS] = masses[a]
-            io[MOVED] = masses[a]
-            if n_axes == 2:
-                io[X_OTHER] = before[1 - a, 0]
-                io[V_OTHER] = before[1 - a, 1]
-                io[A_OTHER] = before[1 - a, 2]
-            force, structure = axis_force(
-                entries, axes[a, 0], axes[a, 1], parameters, effect_states, axes[a, 2],
-                borrow(io), forces, k,
-            )  # fmt: skip
-            motion[a, 1] += drive[a] * (force + structure)
-            motion[a, 0] += dt * motion[a, 1]
+        io[DT] = step
+        for j in range(substeps):
+            io[INDEX] = (first_sample + k) * substeps + j
+            io[TIME] = ((first_sample + k) * substeps + j) * step
+            for a in range(n_axes):
+                before[a, 0] = motion[a, 0]
+                before[a, 1] = motion[a, 1]
+                before[a, 2] = effect_states[axes[a, 2] + LAST_ACCELERATION]
+            for a in range(n_axes):
+                io[X] = motion[a, 0]
+                io[V] = motion[a, 1]
+                io[U] = commands[a]
+                io[MASS] = masses[a]
+                io[MOVED] = masses[a]
+                if n_axes == 2:
+                    io[X_OTHER] = before[1 - a, 0]
+                    io[V_OTHER] = before[1 - a, 1]
+                    io[A_OTHER] = before[1 - a, 2]
+                force, structure = axis_force(
+                    entries, axes[a, 0], axes[a, 1], parameters, effect_states, axes[a, 2],
+                    borrow(io), forces, k,
+                )  # fmt: skip
+                motion[a, 1] += drive[a] * (force + structure)
+                motion[a, 0] += step * motion[a, 1]
         for i in range(watched.shape[0]):
             states[k, i] = effect_states[watched[i]]
