@@ -8,6 +8,7 @@ from typing import Any
 
 from identify.candidates import Candidate
 from identify.compare import AxisComparison
+from identify.diagnose import Step
 from identify.uncertainty import Estimate
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
@@ -99,6 +100,8 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "effect": d.best.effect.name if d.best else None,
         "ranking": [_candidate(c) for c in d.ranking],
         "ambiguous_with": list(d.ambiguous_with),
+        "missing": list(d.named),
+        "steps": [_step(s) for s in d.steps],
         "unexplained": structure
         and {
             "share_of_error": structure.share_of_error,
@@ -111,6 +114,10 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "unit": "N",
         "next_experiment": None,
     }
+
+
+def _step(s: Step) -> dict[str, Any]:
+    return {**_candidate(s.candidate), "ambiguous_with": list(s.tied), "dropped": list(s.dropped)}
 
 
 def _candidate(c: Candidate) -> dict[str, Any]:

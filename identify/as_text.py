@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from identify.candidates import Candidate
+from identify.diagnose import Step
 from identify.uncertainty import Estimate
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
@@ -71,7 +72,17 @@ def diagnose_text(result: Diagnosis) -> str:
                 f"{s.depends_on.replace('_', ' ')}{again}"
             )
         lines += [_ranking_line(c) for c in d.ranking[:4]]
+        lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
     return "\n".join(lines)
+
+
+def _step_line(number: int, step: Step) -> str:
+    gain = step.candidate.gain
+    dropped = f"; needless then: {', '.join(step.dropped)}" if step.dropped else ""
+    return (
+        f"  step {number}: with {step.candidate.effect.name} the held-out error falls from "
+        f"{gain.before:.4g} to {gain.after:.4g} N{dropped}"
+    )
 
 
 def _ranking_line(c: Candidate) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import Enum
@@ -12,17 +12,19 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.candidates import Candidate, absent_effects, levelled, try_effect
+from identify.candidates import Candidate, absent_effects, levelled, score, try_effect
 from identify.evidence import held_out_gain
-from identify.fit import Fit, sticks
+from identify.fit import Fit, fit_axis, sticks
 from identify.residual import moving, residual
-from identify.structure import Structure, find_structure
+from identify.structure import Structure, explains, find_structure
 from identify.study import Study
+from twin.effect import Kind
 from twin.effects import Catalogue
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
+MOST_STEPS = 5  # effects added to one axis at most
 TIE = 2.0  # |t| of the held-out difference below which two explanations cannot be told apart
 
 
@@ -38,37 +40,114 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, eq=False)
+class Step:
+    """One effect that was added in turn, and the earlier ones it made needless."""
+
+    candidate: Candidate
+    tied: tuple[str, ...]
+    dropped: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class AxisDiagnosis:
-    """Diagnosis of one axis: the fitted base, candidates by falling evidence, and the answer."""
+    """Diagnosis of one axis.
+
+    base: the fitted model. ranking: candidates beside it, by falling evidence. steps: the effects
+    added in turn until evidence stopped. final: the fit with all that were kept. unexplained: what
+    the residual depends on where structure is left.
+    """
 
     study: Study
     base: Fit
     ranking: tuple[Candidate, ...]
+    steps: tuple[Step, ...]
+    final: Fit
     verdict: Verdict
-    ambiguous_with: tuple[str, ...]
     unexplained: Structure | None
 
     @property
+    def named(self) -> tuple[str, ...]:
+        """Names of the effects that are missing, in the order they were found."""
+        if self.verdict not in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS):
+            return ()
+        return tuple(s.candidate.effect.name for s in _kept(self.steps))
+
+    @property
     def best(self) -> Candidate | None:
-        """The candidate that is named, where one is supported."""
-        named = self.verdict in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS)
-        return self.ranking[0] if named else None
+        """The candidate that is named first, where one is."""
+        return _kept(self.steps)[0].candidate if self.named else None
+
+    @property
+    def ambiguous_with(self) -> tuple[str, ...]:
+        """Effects that explain as well as the one named first."""
+        return _kept(self.steps)[0].tied if self.named else ()
+
+
+def _kept(steps: Sequence[Step]) -> list[Step]:
+    dropped = {name for s in steps for name in s.dropped}
+    return [s for s in steps if s.candidate.effect.name not in dropped]
 
 
 def diagnose_axis(
-    base: Fit, study: Study, catalogue: Catalogue, progress: Progress | None = None
+    base: Fit,
+    study: Study,
+    catalogue: Catalogue,
+    progress: Progress | None = None,
+    workers: int | None = None,
 ) -> AxisDiagnosis:
-    """Try every absent effect on one fitted axis and decide."""
+    """Add effects to one fitted axis for as long as evidence asks for them, and decide.
+
+    workers: threads; one a core where None.
+    """
+    ranking = rank(base, study, catalogue, progress, workers)
+    steps: list[Step] = []
+    final, found = base, ranking
+    while found and found[0].supported and len(steps) < MOST_STEPS:
+        best = found[0]
+        tied = tuple(c.effect.name for c in found[1:] if c.supported and _tie(study, best, c))
+        final, dropped = _looked_back(base, best.fit, study, [s.candidate for s in _kept(steps)])
+        steps.append(Step(best, tied, dropped))
+        if final.at_floor:
+            break
+        found = rank(final, study, catalogue, progress, workers)
+    return _decided(base, study, ranking, tuple(steps), final)
+
+
+def rank(
+    base: Fit,
+    study: Study,
+    catalogue: Catalogue,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> tuple[Candidate, ...]:
+    """Every absent effect tried beside a fitted axis, by falling merit."""
     effects = absent_effects(base.axis, catalogue)
     candidates = []
     # The laws run outside Python's lock, so candidates go side by side.
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         for candidate in pool.map(partial(try_effect, base, study), effects):
             candidates.append(candidate)
             if progress:
                 progress(len(candidates), len(effects))
-    ranking = _ranked(levelled(candidates))
-    return decide(base, study, ranking)
+    return _ranked(levelled(candidates))
+
+
+def _looked_back(
+    base: Fit, fit: Fit, study: Study, earlier: Sequence[Candidate]
+) -> tuple[Fit, tuple[str, ...]]:
+    """The fit less the earlier effects that it does not need any more, and their names."""
+    dropped = []
+    for candidate in earlier:
+        effect = candidate.effect
+        if effect.kind is Kind.FRICTION:  # one that took the place of the model's
+            own = next(f for f in base.axis.effects if f.effect.kind is Kind.FRICTION)
+            without = fit_axis(fit.axis.with_effect(own), study.fit)
+        else:
+            without = fit_axis(fit.axis.without(effect.name), study.fit)
+        if not score(without, fit, study, effect).supported:
+            fit = without
+            dropped.append(effect.name)
+    return fit, tuple(dropped)
 
 
 def _ranked(candidates: list[Candidate]) -> tuple[Candidate, ...]:
@@ -86,19 +165,27 @@ def _merit(c: Candidate) -> tuple[bool, float]:
     return (not c.supported, -c.delta_bic)
 
 
-def decide(base: Fit, study: Study, ranking: tuple[Candidate, ...]) -> AxisDiagnosis:
-    """The verdict from the ranked candidates."""
-    supported = [c for c in ranking if c.supported]
-    tied = tuple(c.effect.name for c in supported[1:] if _tie(study, supported[0], c))
+def _decided(
+    base: Fit, study: Study, ranking: tuple[Candidate, ...], steps: tuple[Step, ...], final: Fit
+) -> AxisDiagnosis:
+    """The verdict on what was added.
+
+    A name is given where the effects bring the error to the floor, or leave nothing of what the
+    residual depended on most. What stands in for another effect leaves that dependence behind.
+    """
     structure = None
-    if supported:
+    if final.at_floor:
+        tied = bool(steps) and _kept(steps)[0].tied
         verdict = Verdict.AMBIGUOUS if tied else Verdict.MISSING_EFFECT
-    elif base.at_floor:
-        verdict = Verdict.NOTHING_MISSING
+        if not steps:
+            verdict = Verdict.NOTHING_MISSING
+    elif steps and explains(base, final, study):
+        verdict = Verdict.AMBIGUOUS if _kept(steps)[0].tied else Verdict.MISSING_EFFECT
+        structure = find_structure(final, study)
     else:
         verdict = Verdict.UNEXPLAINED
         structure = find_structure(base, study)
-    return AxisDiagnosis(study, base, ranking, verdict, tied, structure)
+    return AxisDiagnosis(study, base, ranking, steps, final, verdict, structure)
 
 
 def _tie(study: Study, best: Candidate, other: Candidate) -> bool:

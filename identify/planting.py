@@ -7,14 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.fit import rms
+from identify.fit import Fit, rms
 from identify.residual import Windowed, residual
-from twin.effect import Effect, Excitation
+from identify.search import orthonormal
+from twin.effect import Effect, Excitation, Parameter
 from twin.model import AxisModel, Fitted, coordinates, read, write
 
 Array = NDArray[np.float64]
 
 SPREAD = 0.2  # relative spread of a machine's values about the model's
+SHAPE_SPREAD = 0.3  # of the logarithm of shape parameters that nothing scans
 
 
 def other_machine(axis: AxisModel, rng: np.random.Generator) -> AxisModel:
@@ -43,26 +45,39 @@ def draw_effect(
     excitation: Excitation,
     force: float,
     rng: np.random.Generator,
+    beside: Fit | None = None,
 ) -> Fitted:
     """Random values of an effect such that it changes the axis' force by ``force`` (N RMS).
 
-    Shape parameters are drawn between the ends of what a diagnosis would scan; strengths in a
-    random direction, scaled along the motion of the logs.
+    Shape parameters are drawn between the ends of what a diagnosis would scan, or about their start
+    where nothing scans them; strengths in a random direction, scaled along the motion of the logs.
+    beside: a fit to those logs; only what its parameters cannot take over counts then.
     """
     values = effect.starts(excitation)
     for p in effect.parameters:
-        if p.scan and not p.strength:
-            low, high = min(p.scan(excitation)), max(p.scan(excitation))
-            if low > 0:
-                values[p.name] = float(np.exp(rng.uniform(np.log(low), np.log(high))))
-            else:
-                values[p.name] = float(rng.uniform(low, high))
+        if not (p.strength or p.fixed):
+            values[p.name] = _drawn_shape(p, values[p.name], excitation, rng)
     base = residual(axis, logs)
+    basis = orthonormal(beside.jacobian) if beside else np.zeros((len(base), 0))
+    kept = beside.kept if beside else np.ones(len(base), dtype=bool)
 
     def added(fitted: Fitted) -> Array:
-        return residual(axis.with_effect(fitted), logs) - base
+        force = (residual(axis.with_effect(fitted), logs) - base)[kept]
+        return np.asarray(force - basis @ (basis.T @ force))
 
     return strength_for(effect, added, force, values, rng)
+
+
+def _drawn_shape(
+    p: Parameter, start: float, excitation: Excitation, rng: np.random.Generator
+) -> float:
+    if p.scan:
+        low, high = min(p.scan(excitation)), max(p.scan(excitation))
+        if low > 0:
+            return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+        return float(rng.uniform(low, high))
+    drawn = start * float(np.exp(SHAPE_SPREAD * rng.uniform(-1.0, 1.0)))
+    return min(max(drawn, p.lower), p.upper)
 
 
 def strength_for(

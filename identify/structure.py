@@ -15,7 +15,9 @@ from identify.study import Study
 
 Array = NDArray[np.float64]
 
-BINS = 24
+BINS = (24, 96, 384)  # numbers of bins along a coordinate
+PROMINENT = 0.2  # share of the residual's square from which a line is a period
+LEFT_OVER = 0.3  # part of a dependence that an explanation may leave
 
 
 @dataclass(frozen=True)
@@ -84,11 +86,17 @@ def gathered(logs: Sequence[Windowed]) -> dict[str, Array]:
 
 
 def share(residual: Array, coordinate: Array) -> float:
-    """Part of the residual's square that its mean over bins of the coordinate explains, 0..1.
+    """Part of the residual's square that its means over bins of the coordinate explain, 0..1.
 
-    Adjusted for what as many bins explain of noise with the same effective sample size.
+    The finest of several widths is taken that the data carry, each adjusted for what as many bins
+    explain of noise with the same effective sample size.
     """
-    levels = np.unique(np.quantile(coordinate, np.linspace(0.0, 1.0, BINS + 1)))
+    widths = [bins for bins in BINS if bins == BINS[0] or len(residual) > 5 * bins]
+    return max(_share(residual, coordinate, bins) for bins in widths)
+
+
+def _share(residual: Array, coordinate: Array, bins: int) -> float:
+    levels = np.unique(np.quantile(coordinate, np.linspace(0.0, 1.0, bins + 1)))
     if len(levels) < 2:
         return 0.0
     index = np.clip(np.searchsorted(levels, coordinate, side="right") - 1, 0, len(levels) - 2)
@@ -102,30 +110,62 @@ def share(residual: Array, coordinate: Array) -> float:
 
 def find_structure(base: Fit, study: Study) -> Structure:
     """The coordinate on which the residual of a fit depends most, and its period if it has one."""
-    where = {k: v[base.kept] for k, v in gathered(study.fit).items()}
-    shares = {name: share(base.residual, values) for name, values in where.items()}
-    for name, other in _with_direction(where, base.residual).items():
-        shares[name] = other
+    shares, lines = _shares(base.residual, _where(base, study))
     name = max(shares, key=lambda k: shares[k])
-    found = period(base.residual, where[name]) if name in ("position", "time") else None
-    return Structure(shares[name], name, found, UNITS[name], shares)
+    return Structure(shares[name], name, lines.get(name), UNITS[name], shares)
 
 
-def _with_direction(where: Mapping[str, Array], residual: Array) -> dict[str, float]:
-    """Shares of coordinates whose effect has the other sign backwards (friction-like)."""
-    direction = where["direction"]
-    flipped = residual * direction
-    return {
-        name: max(share(residual, where[name]), share(flipped, where[name]))
-        for name in ("position", "distance_since_reversal")
-    }
+def explains(before: Fit, after: Fit, study: Study) -> bool:
+    """Whether a larger model took away what the residual of the smaller depended on most."""
+    shares, _ = _shares(before.residual, _where(before, study))
+    name = max(shares, key=lambda k: shares[k])
+    left, _ = _shares(after.residual, _where(after, study))
+    was = before.error * np.sqrt(shares[name])
+    return bool(after.error * np.sqrt(left[name]) < LEFT_OVER * was)
 
 
-def period(residual: Array, coordinate: Array) -> float | None:
-    """Period (unit of the coordinate) of the strongest line in the residual, if one stands out."""
+def dependences(force: Array, fit: Fit, study: Study) -> dict[str, float]:
+    """Share of a force's square (n,) N, on the windows of a fit, by each coordinate: 0..1."""
+    return _shares(force, _where(fit, study))[0]
+
+
+def _where(fit: Fit, study: Study) -> dict[str, Array]:
+    return {k: v[fit.kept] for k, v in gathered(study.fit).items()}
+
+
+def _shares(
+    residual: Array, where: Mapping[str, Array]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Share of each coordinate, and the periods of those in which the residual repeats."""
+    shares = {name: share(residual, values) for name, values in where.items()}
+    for name in ("position", "distance_since_reversal"):
+        # Friction has the other sign backwards.
+        backwards = share(residual * where["direction"], where[name])
+        shares[name] = max(shares[name], backwards)
+    periods = {}
+    for name in ("position", "time"):
+        found = line(residual, where[name])
+        if found is not None:
+            periods[name], strength = found
+            shares[name] = max(shares[name], strength)
+    return shares, periods
+
+
+def line(residual: Array, coordinate: Array) -> tuple[float, float] | None:
+    """Period (unit of the coordinate) and share of the strongest line, if one stands out."""
     span = float(np.ptp(coordinate))
-    cycles = np.arange(2.0, min(len(residual) / 4.0, 400.0), 0.25)
-    phase = 2j * np.pi * np.outer(cycles, (coordinate - coordinate.min()) / span)
-    power = np.abs(np.exp(phase) @ residual) ** 2 / (len(residual) * np.sum(residual**2) / 2.0)
-    best = int(np.argmax(power))
-    return float(span / cycles[best]) if power[best] > 0.2 else None
+    if span == 0.0:
+        return None
+    place = (coordinate - coordinate.min()) / span * (GRID - 1)
+    summed = np.bincount(np.rint(place).astype(int), residual, GRID)
+    power = np.abs(np.fft.rfft(summed, 4 * GRID)) ** 2  # in quarters of a cycle over the span
+    power /= len(residual) * np.sum(residual**2) / 2.0
+    last = int(4 * min(len(residual) / 4.0, GRID / 8.0))
+    best = FEWEST + int(np.argmax(power[FEWEST:last]))
+    strength = float(min(power[best], 1.0))
+    period = span * GRID / (GRID - 1) / best * 4.0
+    return (period, strength) if strength > PROMINENT else None
+
+
+GRID = 8192  # cells along a coordinate
+FEWEST = 8  # quarters of a cycle over the span, below which a repetition is not one

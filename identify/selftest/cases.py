@@ -1,0 +1,111 @@
+"""Machines for the self-test: drawn values, planted effects, and logs from a finer simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identify.fit import Fit, fit_axis, rms
+from identify.planting import draw_effect, other_machine
+from identify.residual import residual
+from identify.search import orthonormal
+from identify.study import Study, studies
+from twin.effect import Effect
+from twin.experiments import simulate
+from twin.log import Log
+from twin.model import Fitted, StageModel
+from twin.simulator import FineStage, ReducedStage
+
+AXIS = "x"
+DURATION = 12.0  # s of each log
+RUNS = ("tracking", "moves", "tracking")  # the last is held out
+HIDDEN = 0.9  # part of an effect's force from which it hides in the mass, which is then held
+REACHED = 0.7  # part of the wanted force that an effect must reach within its bounds
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """A machine that the analysis knows by its logs alone.
+
+    model: what the analysis begins with. true: the machine. planted: effects that the model lacks.
+    """
+
+    model: StageModel
+    true: StageModel
+    planted: tuple[Fitted, ...]
+    logs: Mapping[str, Log]
+    holdout: Mapping[str, Log]
+
+
+class NotShown(Exception):
+    """The effect cannot reach the wanted force on this stage's motion within its bounds."""
+
+
+def machine(
+    stage: StageModel, effects: Sequence[Effect], strength: float, rng: np.random.Generator
+) -> Machine:
+    """Draw a machine about a stage, plant effects of ``strength`` times the noise floor, log it.
+
+    The strength counts what the model's own parameters cannot take over. Values and motion are
+    drawn; the simulation steps ten times finer than the logs' samples. Raises NotShown.
+    """
+    true = stage
+    for name, axis in stage.axes.items():
+        true = true.with_axis(name, other_machine(axis, rng))
+    seeds = [int(s) for s in rng.integers(1 << 31, size=len(RUNS) + 1)]
+    planted: list[Fitted] = []
+    for effect in effects:
+        true, fitted = _with_planted(true, effect, strength, seeds[-1], rng)
+        planted.append(fitted)
+    held = replace(stage.axes[AXIS], mass_fixed=true.axes[AXIS].mass_fixed)
+    logs = {
+        f"log {i}": simulate(true, run, seed=seed, duration=DURATION, stage=FineStage)
+        for i, (run, seed) in enumerate(zip(RUNS, seeds, strict=False), start=1)
+    }
+    last = list(logs)[-1]
+    return Machine(
+        model=replace(stage, axes={AXIS: held}),
+        true=true,
+        planted=tuple(planted),
+        logs=logs,
+        holdout={last: logs.pop(last)},
+    )
+
+
+def _with_planted(
+    true: StageModel, effect: Effect, strength: float, seed: int, rng: np.random.Generator
+) -> tuple[StageModel, Fitted]:
+    """The machine with one effect more; its mass is held where the effect would hide in it."""
+    trial = simulate(true, RUNS[0], seed=seed, duration=DURATION, stage=ReducedStage)
+    study = studies(replace(true, axes={AXIS: true.axes[AXIS]}), {"trial": trial}, {})[AXIS]
+    base = fit_axis(true.axes[AXIS], study.fit)
+    at_start = draw_effect(
+        effect, base.axis, study.fit, study.excitation, base.floor, np.random.default_rng(seed)
+    )
+    if hidden_part(at_start, base, study) > HIDDEN:
+        base = fit_axis(replace(true.axes[AXIS], mass_fixed=True), study.fit)
+    wanted = strength * base.floor
+    fitted = draw_effect(effect, base.axis, study.fit, study.excitation, wanted, rng, base)
+    if visible_force(fitted, base, study) < REACHED * wanted:
+        raise NotShown(effect.name)
+    axis = replace(true.axes[AXIS], mass_fixed=base.axis.mass_fixed)
+    return true.with_axis(AXIS, axis.with_effect(fitted)), fitted
+
+
+def visible_force(fitted: Fitted, base: Fit, study: Study) -> float:
+    """RMS force (N) of an effect that the parameters of a fit cannot take over."""
+    force = _force(fitted, base, study)
+    basis = orthonormal(base.jacobian)
+    return rms(force - basis @ (basis.T @ force))
+
+
+def hidden_part(fitted: Fitted, base: Fit, study: Study) -> float:
+    """Part of an effect's RMS force that the parameters of a fit take over."""
+    force = rms(_force(fitted, base, study))
+    return 1.0 - visible_force(fitted, base, study) / force if force > 0.0 else 0.0
+
+
+def _force(fitted: Fitted, base: Fit, study: Study) -> np.ndarray:
+    return residual(base.axis.with_effect(fitted), study.fit)[base.kept] - base.residual

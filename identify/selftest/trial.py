@@ -1,0 +1,142 @@
+"""One trial: a machine with effects that the analysis is not told of, and what it answers."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
+from identify.fit import Fit
+from identify.search import fit_thoroughly
+from identify.selftest.cases import AXIS, Machine, NotShown, machine
+from identify.structure import dependences
+from identify.study import Study, studies
+from identify.uncertainty import estimates
+from twin.effects import Catalogue, load_catalogue
+from twin.model import Fitted, read
+from twin.model_file import load_model
+
+STAGE = "proton_xy"
+NEARLY = 0.8  # part of the strongest dependence from which a coordinate counts as right
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is planted: effect names, their force over the noise floor, and the seed.
+
+    known: whether the planted effects stay in the catalogue of the analysis.
+    """
+
+    effects: tuple[str, ...]
+    strength: float
+    seed: int
+    known: bool = True
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a trial found.
+
+    named: effects, in order; tied: those declared as ambiguous with them. ratio, left: error over
+    noise floor before and after. depends_on: of an unexplained residual. coordinates: those that
+    are right, from the planted force itself. covered: for each parameter of an honest machine with
+    an interval, whether it holds the truth. shown: whether the effect could show at all.
+    """
+
+    case: Case
+    verdict: str = ""
+    named: tuple[str, ...] = ()
+    tied: tuple[str, ...] = ()
+    ranking: tuple[tuple[str, float], ...] = ()
+    ratio: float = np.nan
+    left: float = np.nan
+    depends_on: str | None = None
+    coordinates: tuple[str, ...] = ()
+    covered: tuple[tuple[str, bool], ...] = ()
+    seconds: float = 0.0
+    shown: bool = True
+
+    @property
+    def right(self) -> bool:
+        """Whether all planted effects, and no others, are named or in a declared ambiguity."""
+        told = {*self.named, *self.tied}
+        wrong = set(self.named) - set(self.case.effects)
+        return set(self.case.effects) <= told and len(wrong) <= len(self.tied)
+
+    @property
+    def quiet(self) -> bool:
+        """Whether no name was given."""
+        return not self.named
+
+    @property
+    def honest(self) -> bool:
+        """Of an effect outside the catalogue: floor reached, or unexplained with its coordinate."""
+        if self.verdict == Verdict.UNEXPLAINED.name:
+            return self.depends_on in self.coordinates
+        return self.left < FLOOR
+
+
+FLOOR = 1.5  # error over noise floor that passes for noise
+
+
+def run(case: Case) -> Outcome:
+    """Make the machine, diagnose it with one thread, and compare with what was planted."""
+    catalogue = load_catalogue()
+    stage = load_model(STAGE, catalogue)
+    rng = np.random.default_rng([case.seed, *(zlib.crc32(e.encode()) for e in case.effects)])
+    try:
+        built = machine(stage, [catalogue[e] for e in case.effects], case.strength, rng)
+    except NotShown:
+        return Outcome(case, shown=False)
+    known = [e for e in catalogue.values() if case.known or e.name not in case.effects]
+    begun = perf_counter()
+    study = studies(built.model, built.logs, built.holdout)[AXIS]
+    base = fit_thoroughly(built.model.axes[AXIS], study)
+    found = diagnose_axis(base, study, Catalogue(known), workers=1)
+    return Outcome(
+        case=case,
+        verdict=found.verdict.name,
+        named=found.named,
+        tied=tuple(t for s in found.steps for t in s.tied) if found.named else (),
+        ranking=tuple((c.effect.name, c.delta_bic) for c in found.ranking[:4]),
+        ratio=base.ratio,
+        left=found.final.ratio,
+        depends_on=found.unexplained.depends_on if found.unexplained else None,
+        coordinates=_right_coordinates(built, base, study),
+        covered=_covered(built, found) if not case.effects else (),
+        seconds=perf_counter() - begun,
+    )
+
+
+def _right_coordinates(built: Machine, base: Fit, study: Study) -> tuple[str, ...]:
+    """Coordinates that the planted force depends on about as much as on the best of them."""
+    if not built.planted:
+        return ()
+    shares = dependences(_planted_force(built.planted, base, study), base, study)
+    return tuple(name for name, s in shares.items() if s >= NEARLY * max(shares.values()))
+
+
+def _planted_force(planted: tuple[Fitted, ...], base: Fit, study: Study) -> np.ndarray:
+    from identify.residual import residual
+    from identify.search import orthonormal
+
+    axis = base.axis
+    for fitted in planted:
+        axis = axis.with_effect(fitted)
+    force = base.residual - residual(axis, study.fit)[base.kept]
+    basis = orthonormal(base.jacobian)
+    return np.asarray(force - basis @ (basis.T @ force))
+
+
+def _covered(built: Machine, found: AxisDiagnosis) -> tuple[tuple[str, bool], ...]:
+    """Whether the 90 % intervals of an honest machine's fit hold its true values."""
+    fit = found.base
+    truth = read(built.true.axes[AXIS], fit.scaling.where)
+    out = []
+    for estimate, true in zip(estimates(fit), truth, strict=False):
+        if estimate.low is not None and estimate.high is not None:
+            out.append((estimate.label, bool(estimate.low <= true <= estimate.high)))
+    return tuple(out)
