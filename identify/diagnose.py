@@ -18,13 +18,14 @@ from identify.fit import Fit, fit_axis, sticks
 from identify.residual import moving, residual
 from identify.structure import Structure, explains, find_structure
 from identify.study import Study
-from twin.effect import Kind
+from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 MOST_STEPS = 5  # effects added to one axis at most
+SETTLED = 0.999  # part of the error to which another start of the base must bring it
 TIE = 2.0  # |t| of the held-out difference below which two explanations cannot be told apart
 
 
@@ -99,7 +100,7 @@ def diagnose_axis(
 
     workers: threads; one a core where None.
     """
-    ranking = rank(base, study, catalogue, progress, workers)
+    base, ranking = rank(base, study, catalogue, progress, workers)
     steps: list[Step] = []
     final, found = base, ranking
     while found and found[0].supported and len(steps) < MOST_STEPS:
@@ -109,7 +110,7 @@ def diagnose_axis(
         steps.append(Step(best, tied, dropped))
         if final.at_floor:
             break
-        found = rank(final, study, catalogue, progress, workers)
+        final, found = rank(final, study, catalogue, progress, workers)
     return _decided(base, study, ranking, tuple(steps), final)
 
 
@@ -119,8 +120,12 @@ def rank(
     catalogue: Catalogue,
     progress: Progress | None = None,
     workers: int | None = None,
-) -> tuple[Candidate, ...]:
-    """Every absent effect tried beside a fitted axis, by falling merit."""
+) -> tuple[Fit, tuple[Candidate, ...]]:
+    """Every absent effect tried beside a fitted axis: the base and candidates by falling merit.
+
+    The base comes back refitted where a candidate's values, without its effect, suit it better: a
+    base short of its optimum would make evidence for every candidate.
+    """
     effects = absent_effects(base.axis, catalogue)
     candidates = []
     # The laws run outside Python's lock, so candidates go side by side.
@@ -129,7 +134,24 @@ def rank(
             candidates.append(candidate)
             if progress:
                 progress(len(candidates), len(effects))
-    return _ranked(levelled(candidates))
+    supported = [c for c in candidates if c.supported]
+    if supported:
+        best = max(supported, key=lambda c: c.delta_bic)
+        again = _less(best.effect, best.fit, base, study)
+        if again.error < SETTLED * base.error:
+            base = again
+            candidates = [score(base, c.fit, study, c.effect) for c in candidates]
+    return base, _ranked(levelled(candidates))
+
+
+def _less(effect: Effect, fit: Fit, base: Fit, study: Study) -> Fit:
+    """The fit refitted without an effect, the friction that it replaced put back."""
+    if effect.kind is Kind.FRICTION:
+        own = next((f for f in base.axis.effects if f.effect.kind is Kind.FRICTION), None)
+        axis = fit.axis.with_effect(own) if own else fit.axis.without(effect.name)
+    else:
+        axis = fit.axis.without(effect.name)
+    return fit_axis(axis, study.fit)
 
 
 def _looked_back(
@@ -138,15 +160,10 @@ def _looked_back(
     """The fit less the earlier effects that it does not need any more, and their names."""
     dropped = []
     for candidate in earlier:
-        effect = candidate.effect
-        if effect.kind is Kind.FRICTION:  # one that took the place of the model's
-            own = next(f for f in base.axis.effects if f.effect.kind is Kind.FRICTION)
-            without = fit_axis(fit.axis.with_effect(own), study.fit)
-        else:
-            without = fit_axis(fit.axis.without(effect.name), study.fit)
-        if not score(without, fit, study, effect).supported:
+        without = _less(candidate.effect, fit, base, study)
+        if not score(without, fit, study, candidate.effect).supported:
             fit = without
-            dropped.append(effect.name)
+            dropped.append(candidate.effect.name)
     return fit, tuple(dropped)
 
 

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 PRIOR_FORCE = 0.1  # expected force of what is added to the friction, over that to be explained
 PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
 MOST_EVALUATIONS = 40
-AT_FLOOR = 1.5  # ratio of error to noise floor below which a residual is taken for noise
+AT_FLOOR = 1.3  # ratio of error to noise floor below which a residual is taken for noise
 
 
 class Outcome(Enum):

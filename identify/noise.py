@@ -1,6 +1,6 @@
 """The noise floor of a force residual, from the data alone.
 
-The raw residual u - m a, with a from second differences, is all noise at high frequency: white
+The raw residual, with a from second differences, is all noise at high frequency: white
 noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 cos(w dt))/dt^2)^2. A and B
 are fitted to its spectrum above the band of the effects, and give what passes the windows.
 """
@@ -12,17 +12,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
 from scipy.signal.windows import hann
 
 from identify.actuation import actual_force
 from identify.motion import Motion
+from identify.residual import on_blocks, total_force
 from identify.weak import Window
 from twin.model import AxisModel
 
 Array = NDArray[np.float64]
 
 SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
+ROUNDS = 12
+TOLERATED = 0.5  # logarithm of the power over the fit from which a frequency weighs half
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 
 
@@ -41,6 +45,8 @@ def _variance(axis: AxisModel, motion: Motion, window: Window) -> float:
     # apart and pass for measurement noise.
     command = actual_force(axis, motion)
     raw = 0.5 * (command[1:] + command[:-1]) - mass * np.diff(velocity) / dt
+    # What the model explains, a bump passed at speed say, is not noise either.
+    raw += _between_samples(total_force(on_blocks(axis), motion), motion)
     # The median over segments passes by those with spikes and reversals.
     segment = min(max(round(SEGMENT / dt), 256), len(raw))
     frequency, power = _median_spectrum(raw, segment, dt)
@@ -50,6 +56,12 @@ def _variance(axis: AxisModel, motion: Motion, window: Window) -> float:
     levels = _fit_levels(np.stack([half, bend], axis=1)[band], power[band])
     passed = levels[0] + levels[1] * bend
     return float(np.trapezoid(passed * window.response(dt, segment), frequency))
+
+
+def _between_samples(force: Array, motion: Motion) -> Array:
+    """Means over blocks (n,) N as values at the log's inner samples."""
+    samples = np.arange(1, motion.raw.shape[1]) * motion.sample_period
+    return np.asarray(np.interp(samples, motion.time, force))
 
 
 def _median_spectrum(signal: Array, segment: int, dt: float) -> tuple[Array, Array]:
@@ -74,10 +86,21 @@ def _median_spectrum(signal: Array, segment: int, dt: float) -> tuple[Array, Arr
 
 
 def _fit_levels(shapes: Array, power: Array) -> Array:
-    """Non-negative levels by least squares on the relative error, repeated: a Whittle fit."""
-    model = power.copy()
+    """Non-negative levels by least squares on the relative error, repeated: a Whittle fit.
+
+    What stands above the fit, such as a resonance, weighs the less the higher it stands.
+    """
+    model = _underneath(power)
     levels = np.zeros(shapes.shape[1])
-    for _ in range(6):
-        levels, _ = nnls(shapes / model[:, None], power / model)
+    for _ in range(ROUNDS):
+        above = np.maximum(np.log(power / model), 0.0) / TOLERATED
+        weight = 1.0 / (1.0 + above**2)
+        levels, _ = nnls(shapes * (weight / model)[:, None], power / model * weight)
         model = np.maximum(shapes @ levels, 1e-12 * power.max())
     return levels
+
+
+def _underneath(power: Array) -> Array:
+    """The smallest power at this or any higher frequency: noise of these shapes never falls."""
+    smooth = uniform_filter1d(power, 9, mode="nearest")
+    return np.maximum(np.minimum.accumulate(smooth[::-1])[::-1], 1e-300)

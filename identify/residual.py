@@ -64,6 +64,13 @@ def total_force(table: Table, motion: Motion) -> Array:
     return np.asarray(rows.sum(axis=0))
 
 
+def on_blocks(axis: AxisModel) -> Table:
+    """Table of what acts between actuator and encoder, which blocks of a motion resolve."""
+    return axis_table(
+        {"": parts_of(axis, Kind.FORCE, Kind.MODIFIER, Kind.FRICTION, Kind.STRUCTURE)}
+    )
+
+
 def windowed_force(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
     """What the axis' effects add to the command, windowed means (n,) N, log after log.
 

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.fit import Fit, fit_axis, rms
+from identify.noise import noise_floor
 from identify.planting import draw_effect, other_machine
 from identify.residual import residual
 from identify.search import orthonormal
 from identify.study import Study, studies
-from twin.effect import Effect
+from twin.effect import Effect, Kind
+from twin.effects import load_catalogue
 from twin.experiments import simulate
 from twin.log import Log
 from twin.model import Fitted, StageModel
@@ -22,6 +24,8 @@ AXIS = "x"
 DURATION = 12.0  # s of each log
 RUNS = ("tracking", "moves", "tracking")  # the last is held out
 HIDDEN = 0.9  # part of an effect's force from which it hides in the mass, which is then held
+ROUNDS = 2  # corrections of a friction's level
+SPREAD = 0.3  # of the logarithm of a friction's own parameters
 REACHED = 0.7  # part of the wanted force that an effect must reach within its bounds
 
 
@@ -55,23 +59,74 @@ def machine(
     for name, axis in stage.axes.items():
         true = true.with_axis(name, other_machine(axis, rng))
     seeds = [int(s) for s in rng.integers(1 << 31, size=len(RUNS) + 1)]
+    model = replace(stage, axes={AXIS: stage.axes[AXIS]})
     planted: list[Fitted] = []
     for effect in effects:
-        true, fitted = _with_planted(true, effect, strength, seeds[-1], rng)
+        if effect.kind is Kind.FRICTION:
+            model = model.with_axis(
+                AXIS, model.axes[AXIS].with_effect(plain_friction(stage, effect))
+            )
+            true, fitted = _with_friction(true, model, effect, strength, seeds[-1], rng)
+        else:
+            true, fitted = _with_planted(true, effect, strength, seeds[-1], rng)
         planted.append(fitted)
-    held = replace(stage.axes[AXIS], mass_fixed=true.axes[AXIS].mass_fixed)
+    held = replace(model.axes[AXIS], mass_fixed=true.axes[AXIS].mass_fixed)
     logs = {
         f"log {i}": simulate(true, run, seed=seed, duration=DURATION, stage=FineStage)
         for i, (run, seed) in enumerate(zip(RUNS, seeds, strict=False), start=1)
     }
     last = list(logs)[-1]
     return Machine(
-        model=replace(stage, axes={AXIS: held}),
+        model=model.with_axis(AXIS, held),
         true=true,
         planted=tuple(planted),
         logs=logs,
         holdout={last: logs.pop(last)},
     )
+
+
+def plain_friction(stage: StageModel, other: Effect) -> Fitted:
+    """The simplest friction of the catalogue, at the level of the stage's own.
+
+    Raises NotShown where the other friction is the simplest itself.
+    """
+    frictions = [e for e in load_catalogue().values() if e.kind is Kind.FRICTION]
+    plain = min(frictions, key=lambda e: (len(e.states), len(e.parameters)))
+    if plain.name == other.name:
+        raise NotShown(other.name)
+    own = next(f for f in stage.axes[AXIS].effects if f.effect.kind is Kind.FRICTION)
+    shared = {p.name: own.values[p.name] for p in plain.parameters if p.name in own.values}
+    return Fitted.at_start(plain, shared)
+
+
+def _with_friction(
+    true: StageModel,
+    model: StageModel,
+    effect: Effect,
+    strength: float,
+    seed: int,
+    rng: np.random.Generator,
+) -> tuple[StageModel, Fitted]:
+    """The machine with another friction, so strong that the model's falls short by the strength."""
+    own = next(f for f in true.axes[AXIS].effects if f.effect.kind is Kind.FRICTION)
+    shared = {p.name: own.values[p.name] for p in effect.parameters if p.name in own.values}
+    drawn = {
+        p.name: p.start * float(np.exp(SPREAD * rng.uniform(-1.0, 1.0)))
+        for p in effect.parameters
+        if not (p.fixed or p.name in shared or p.lower == p.upper)
+    }
+    fitted = Fitted.at_start(effect, {**effect.starts(), **drawn, **shared})
+    for _ in range(ROUNDS):
+        machine = true.with_axis(AXIS, true.axes[AXIS].with_effect(fitted))
+        trial = simulate(machine, RUNS[0], seed=seed, duration=DURATION, stage=ReducedStage)
+        study = studies(replace(model, axes={AXIS: model.axes[AXIS]}), {"trial": trial}, {})[AXIS]
+        base = fit_axis(model.axes[AXIS], study.fit)
+        floor = noise_floor(machine.axes[AXIS], [(w.motion, w.window) for w in study.fit])
+        left = np.sqrt(max(base.error**2 - floor**2, 1e-4 * floor**2)) / floor
+        scale = float(np.clip(strength / left, 0.1, 10.0))
+        scaled = {p.name: scale * fitted.values[p.name] for p in effect.strengths}
+        fitted = Fitted.at_start(effect, {**fitted.values, **scaled})
+    return true.with_axis(AXIS, true.axes[AXIS].with_effect(fitted)), fitted
 
 
 def _with_planted(
