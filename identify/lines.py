@@ -26,7 +26,12 @@ def lines(motions: Sequence[Motion]) -> tuple[float, ...]:
 
     The force is the command less what acceleration, direction, speed and position explain.
     """
-    found = [peak for m in motions for peak in _peaks(_rest(m), m.period)]
+    return lines_of([(_rest(m), m.period) for m in motions])
+
+
+def lines_of(forces: Sequence[tuple[Array, float]]) -> tuple[float, ...]:
+    """The same of forces (n,) N with their sample periods (s)."""
+    found = [peak for force, period in forces for peak in _peaks(force, period)]
     found.sort(reverse=True)
     kept: list[float] = []
     for _, frequency, width in found:

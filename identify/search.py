@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from identify.fit import Fit, fit_axis
+from identify.lines import lines_of
 from identify.residual import Windowed, jacobian, residual
 from identify.study import Study
-from twin.effect import Effect, Kind, Parameter
+from twin.effect import Effect, Excitation, Kind, Parameter
 from twin.model import AxisModel, Coordinate, Fitted, read, write
 
 Array = NDArray[np.float64]
@@ -22,6 +23,7 @@ RIDGE = 1e-4  # keeps the linear step finite along directions that the base expl
 RESCORED_SHAPES = 24  # best shapes of a coarse scan that are tried with every strength
 FULL_SHAPES = 6  # best shapes on the logs' heads that are tried on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
+RESIDUAL_LINES = 12  # frequencies of the residual that are tried
 BETTER = 0.99  # part of the error that a new start must reach to be taken
 
 
@@ -43,14 +45,16 @@ def starts(base: Fit, study: Study, effect: Effect) -> list[Start]:
     All shapes are tried on the logs' heads with the screened strengths, the best of them with every
     strength, and the best of those on all of the logs.
     """
-    found = [Start(0.0, shape, Fitted.at_start(effect)) for shape in shapes(effect, study)]
+    excitation = _with_lines_left(base, study)
+    shapes = tried_shapes(effect, excitation)
+    found = [Start(0.0, shape, Fitted.at_start(effect)) for shape in shapes]
     coarse = [p for p in effect.strengths if p.screened]
-    head = _Ground.of(base, study, effect, on_heads=True)
+    head = _Ground.of(base, study, effect, excitation, on_heads=True)
     if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
         found = _best(head, found, coarse, RESCORED_SHAPES)
     if len(found) > FULL_SHAPES:
         found = _best(head, found, effect.strengths, FULL_SHAPES)
-    whole = _Ground.of(base, study, effect, on_heads=False)
+    whole = _Ground.of(base, study, effect, excitation, on_heads=False)
     return _best(whole, found, effect.strengths, REFINED_STARTS)
 
 
@@ -104,10 +108,20 @@ def _fit_without(fit: Fit, study: Study, name: str) -> Fit:
     )
 
 
-def shapes(effect: Effect, study: Study) -> Iterator[dict[str, float]]:
+def _with_lines_left(base: Fit, study: Study) -> Excitation:
+    """What the motion covers, with the frequencies at which the base's residual repeats first."""
+    every = np.zeros(len(base.kept))
+    every[base.kept] = base.residual
+    ends = np.cumsum([len(w) for w in study.fit])[:-1]
+    parts = zip(np.split(every, ends), study.fit, strict=True)
+    left = lines_of([(part, w.window.stride * w.window.period) for part, w in parts])
+    return replace(study.excitation, lines=(*left[:RESIDUAL_LINES], *study.excitation.lines))
+
+
+def tried_shapes(effect: Effect, excitation: Excitation) -> Iterator[dict[str, float]]:
     """Values to try for the parameters that the effect says must be searched."""
     scanned = [p for p in effect.parameters if p.scan]
-    grids = [p.scan(study.excitation) if p.scan else () for p in scanned]
+    grids = [p.scan(excitation) if p.scan else () for p in scanned]
     for values in itertools.product(*grids):
         yield {p.name: v for p, v in zip(scanned, values, strict=True)}
 
@@ -116,8 +130,8 @@ def shapes(effect: Effect, study: Study) -> Iterator[dict[str, float]]:
 class _Ground:
     """What is the same at every shape: the base without what the effect replaces."""
 
-    study: Study
     logs: Sequence[Windowed]
+    excitation: Excitation
     effect: Effect
     rest: AxisModel
     basis: Array
@@ -125,13 +139,15 @@ class _Ground:
     kept: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, base: Fit, study: Study, effect: Effect, *, on_heads: bool) -> _Ground:
+    def of(
+        cls, base: Fit, study: Study, effect: Effect, excitation: Excitation, *, on_heads: bool
+    ) -> _Ground:
         rest = _without_friction(base.axis) if effect.kind is Kind.FRICTION else base.axis
         columns = [i for i, c in enumerate(base.scaling.where) if _belongs(c, rest)]
         among = study.in_heads if on_heads else np.ones(len(base.kept), dtype=bool)
         rows = among[base.kept]
         return cls(
-            study=study,
+            excitation=excitation,
             logs=study.heads if on_heads else study.fit,
             effect=effect,
             rest=rest,
@@ -143,8 +159,8 @@ class _Ground:
 
 def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter]) -> Start:
     """Best strengths at one shape, by a linear step with the base parameters free."""
-    effect, study = ground.effect, ground.study
-    first = Fitted.at_start(effect, _clipped(effect, study, shape))
+    effect = ground.effect
+    first = Fitted.at_start(effect, _clipped(effect, ground.excitation, shape))
     axis = ground.rest.with_effect(first)
     where = [Coordinate(effect.name, p) for p in strengths if p.name not in first.fixed]
     silent = all(first.values[p.name] == 0.0 for p in effect.strengths)
@@ -155,8 +171,8 @@ def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter
     return Start(squared, shape, replace(first, values={**first.values, **moved}))
 
 
-def _clipped(effect: Effect, study: Study, shape: dict[str, float]) -> dict[str, float]:
-    values = {**effect.starts(study.excitation), **shape}
+def _clipped(effect: Effect, excitation: Excitation, shape: dict[str, float]) -> dict[str, float]:
+    values = {**effect.starts(excitation), **shape}
     return {p.name: float(min(max(values[p.name], p.lower), p.upper)) for p in effect.parameters}
 
 

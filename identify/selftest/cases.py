@@ -95,7 +95,8 @@ def plain_friction(stage: StageModel, other: Effect) -> Fitted:
     if plain.name == other.name:
         raise NotShown(other.name)
     own = next(f for f in stage.axes[AXIS].effects if f.effect.kind is Kind.FRICTION)
-    shared = {p.name: own.values[p.name] for p in plain.parameters if p.name in own.values}
+    free = [p.name for p in plain.parameters if not p.fixed]
+    shared = {name: own.values[name] for name in free if name in own.values}
     return Fitted.at_start(plain, shared)
 
 
@@ -109,11 +110,12 @@ def _with_friction(
 ) -> tuple[StageModel, Fitted]:
     """The machine with another friction, so strong that the model's falls short by the strength."""
     own = next(f for f in true.axes[AXIS].effects if f.effect.kind is Kind.FRICTION)
-    shared = {p.name: own.values[p.name] for p in effect.parameters if p.name in own.values}
+    free = [p for p in effect.parameters if not p.fixed]
+    shared = {p.name: own.values[p.name] for p in free if p.name in own.values}
     drawn = {
         p.name: p.start * float(np.exp(SPREAD * rng.uniform(-1.0, 1.0)))
-        for p in effect.parameters
-        if not (p.fixed or p.name in shared or p.lower == p.upper)
+        for p in free
+        if p.name not in shared and p.lower < p.upper
     }
     fitted = Fitted.at_start(effect, {**effect.starts(), **drawn, **shared})
     for _ in range(ROUNDS):
