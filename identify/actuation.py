@@ -1,4 +1,4 @@
-"""What actuator and encoder make of a log: the actual force, and the error of the reading.
+"""What actuator and encoder made of a log: the actual force, and the motion behind the readings.
 
 A delay or a lag is a fraction of a millisecond, and an encoder ripple a few micrometres long,
 so these effects are stepped sample by sample, not over blocks.
@@ -18,6 +18,8 @@ from twin.native import walk, walk_sensing
 
 Array = NDArray[np.float64]
 
+PASSES = 3  # from the reading to the position it was taken at
+
 
 def parts_of(axis: AxisModel, *kinds: Kind) -> AxisModel:
     """The axis with its effects of these kinds alone."""
@@ -30,7 +32,7 @@ def actual_force(axis: AxisModel, motion: Motion) -> Array:
     part = parts_of(axis, Kind.ACTUATION)
     if not part.effects:
         return command
-    signals = _signals(motion)
+    signals = _signals(motion, 0.5)
     table = axis_table({motion.axis: part})
     rows = np.zeros((len(table.entries), len(command)))
     first, last, state, _, _ = table.axes[0]
@@ -41,22 +43,40 @@ def actual_force(axis: AxisModel, motion: Motion) -> Array:
     return command + rows.sum(axis=0)
 
 
-def reading_error(axis: AxisModel, motion: Motion) -> Array:
-    """Encoder reading less position, (n,) m at the log's own rate, taken at the measured motion."""
+def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
+    """The motion that the readings come from, and the rate of their error, (n,) m/s.
+
+    A reading is the true position and an error that depends on it, so the error is taken at the
+    reading, then where that says the axis was, and so on. The rate is at the log's own rate.
+    """
     part = parts_of(axis, Kind.SENSING)
-    signals = _signals(motion)
+    if not part.effects:
+        return motion, np.zeros(motion.raw.shape[1])
     table = axis_table({motion.axis: part})
-    readings = np.zeros(signals.shape[1])
     _, _, _, first, last = table.axes[0]
-    walk_sensing(
-        table.entries, first, last, table.parameters, np.zeros(table.n_states), signals,
-        motion.sample_period, readings,
-    )  # fmt: skip
-    return readings - signals[0]
+    read = _signals(motion, 0.0)
+    true, seen = read.copy(), np.empty_like(read[0])
+    for _ in range(PASSES):
+        walk_sensing(
+            table.entries, first, last, table.parameters, np.zeros(table.n_states), true,
+            motion.sample_period, seen,
+        )  # fmt: skip
+        error = seen - true[0]
+        true[0] = read[0] - error
+    rate = np.diff(error, append=error[-1]) / motion.sample_period
+    blocks = motion.signals.copy()
+    blocks[:2] -= np.stack([error, rate]).reshape(2, blocks.shape[1], -1).mean(axis=2)
+    raw = np.stack([motion.raw[0] - rate, motion.raw[1]])
+    return replace(motion, signals=blocks, raw=raw), rate
 
 
-def _signals(motion: Motion) -> Array:
-    """Position m, velocity m/s and command N at the log's own rate, (3, n)."""
+def _signals(motion: Motion, instant: float) -> Array:
+    """Position m, velocity m/s and command N at the log's own rate, (3, n).
+
+    instant: where in the sample the position is taken, 0 its start, 1/2 its middle.
+    """
     velocity, command = motion.raw
-    position = motion.signals[0, 0] + np.cumsum(velocity) * motion.sample_period
-    return np.ascontiguousarray(np.stack([position, velocity, command]))
+    travelled = velocity * motion.sample_period
+    middle = np.cumsum(travelled) - 0.5 * travelled
+    middle += motion.position[0] - middle[: len(middle) // len(motion.position)].mean()
+    return np.stack([middle + (instant - 0.5) * travelled, velocity, command])

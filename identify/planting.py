@@ -93,13 +93,17 @@ def strength_for(
     """
     values = values or effect.starts()
     direction = {p.name: _direction(p.lower, rng) for p in effect.strengths}
+    limits = {p.name: p.at_least for p in effect.parameters if p.at_least}
 
     def at(scale: float) -> Fitted:
         moved = {
             p.name: float(np.clip(scale * direction[p.name], p.lower, p.upper))
             for p in effect.strengths
         }
-        return Fitted.at_start(effect, {**values, **moved})
+        drawn = {**values, **moved}
+        for name, least in limits.items():
+            drawn[least], drawn[name] = sorted((drawn[least], drawn[name]))
+        return Fitted.at_start(effect, drawn)
 
     return at(_root(lambda scale: rms(added(at(scale))) - force))
 

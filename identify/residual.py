@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.actuation import actual_force, parts_of, reading_error
+from identify.actuation import actual_force, parts_of, true_motion
 from identify.motion import Motion
 from identify.weak import Window
 from twin.effect import Kind
@@ -74,22 +74,21 @@ def on_blocks(axis: AxisModel) -> Table:
 def windowed_force(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
     """What the axis' effects add to the command, windowed means (n,) N, log after log.
 
-    A sensing effect adds the force that the reading's error pretends: mass x its acceleration.
+    A sensing effect adds the force that the reading's error pretends, mass x its acceleration, and
+    the other effects act along the motion behind the readings.
     """
-    kinds = {f.effect.kind for f in axis.effects}
     # An actuation with memory needs the log's own rate.
     fine = any(f.effect.kind is Kind.ACTUATION and f.effect.states for f in axis.effects)
     apart = {Kind.SENSING, *((Kind.ACTUATION,) if fine else ())}
     table = axis_table({"": parts_of(axis, *(set(Kind) - apart))})
     parts = []
     for log in logs:
-        out = log.window.mean(total_force(table, log.motion))
+        motion, error_rate = true_motion(axis, log.motion)
+        out = log.window.mean(total_force(table, motion))
         if fine:
-            out += log.fine.mean(actual_force(axis, log.motion)) - log.command
-        if Kind.SENSING in kinds:
-            error = reading_error(axis, log.motion)
-            rate = np.diff(error, append=error[-1]) / log.motion.sample_period
-            out += axis.mass * log.fine.acceleration(rate)
+            out += log.fine.mean(actual_force(axis, motion)) - log.command
+        if motion is not log.motion:
+            out += axis.mass * log.fine.acceleration(error_rate)
         parts.append(out)
     return np.concatenate(parts)
 
@@ -104,12 +103,15 @@ def group_of(axis: AxisModel, effect: str) -> AxisModel:
     """The part of the axis whose force can change when a parameter of that effect does.
 
     Friction and its modifiers act together, and so does what is in a chain; any other effect acts
-    by itself.
+    by itself. All act along the motion that the sensing effects leave.
     """
-    for joint in ((Kind.FRICTION, Kind.MODIFIER), (Kind.ACTUATION,), (Kind.SENSING,)):
-        if axis[effect].effect.kind in joint:
-            return parts_of(axis, *joint)
-    return replace(axis, effects=(axis[effect],))
+    kind = axis[effect].effect.kind
+    if kind is Kind.SENSING:
+        return axis
+    for joint in ((Kind.FRICTION, Kind.MODIFIER), (Kind.ACTUATION,)):
+        if kind in joint:
+            return parts_of(axis, *joint, Kind.SENSING)
+    return replace(axis, effects=(axis[effect], *parts_of(axis, Kind.SENSING).effects))
 
 
 def jacobian(axis: AxisModel, logs: Sequence[Windowed], where: Sequence[Coordinate]) -> Array:

@@ -78,6 +78,8 @@ def inseparable(fit: Fit) -> dict[str, str]:
 
 def refusal(fit: Fit) -> str | None:
     """Why the fit has no intervals, or None where it has."""
+    if len(fit.residual) == 0:
+        return "no interval: the axis comes to rest within every window of these logs"
     if fit.ratio <= LARGEST_RATIO:
         return None
     return (
@@ -100,8 +102,11 @@ def half_widths(fit: Fit) -> Array:
     # Residuals are smaller than errors, by the degrees of freedom that the fit took.
     spread = len(fit.residual) / max(len(fit.residual) - OVERCOUNT * seen.sum(), 1.0)
     covariance = inverse @ (scores.T @ scores * spread * BLOCKS / (BLOCKS - 1)) @ inverse
+    # What holds a parameter off the least squares, a prior or a bound, shifts it by this much.
+    shift = np.abs(inverse @ (columns.T @ fit.residual))
     quantile = student.ppf(0.5 + CONFIDENCE / 2.0, BLOCKS - 1)
-    out[seen] = quantile * np.sqrt(np.maximum(np.diag(covariance), 0.0)) / norms[seen]
+    spread_of = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    out[seen] = (quantile * spread_of + shift) / norms[seen]
     return out
 
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from twin.calling import ADDRESS, KIND, P_AT, S_AT, borrow, call_law, law_address
 from twin.effect import (
     A_OTHER,
-    ACC,
     DRY,
     DT,
     FRICTION,
@@ -40,7 +39,7 @@ from twin.effect import (
     V,
     X,
 )
-from twin.structure import answers, settle, slope
+from twin.structure import along, answers, settle
 
 # States every axis has before those of its effects.
 LAST_FRICTION, LAST_VELOCITY, LAST_ACCELERATION = range(3)
@@ -56,10 +55,9 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
     """Forces on one axis, N: (of actuator and effects, of its structure); states advance a sample.
 
     entries (n, 4); parameters, states, io: flat doubles; at: where this axis' states begin.
-    io holds INDEX, TIME, DT, X, V, U, MASS, MOVED, WHEN and the other axis on entry, and the axis'
-    ACC where its motion is measured. rows[k, i] receives the force that entry i puts on the axis.
+    io holds INDEX, TIME, DT, X, V, U, MASS, MOVED, WHEN and the other axis on entry.
+    rows[k, i] receives the force that entry i puts on the axis.
     """
-    measured = io[ACC]
     rate = 1.0 / io[DT]
     stop = io[MASS] * io[V] * rate
     io[DRY] = 1.0
@@ -102,7 +100,7 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
     net = total - friction + io[U]
     added = 0.0
     if structure < last:
-        added = settle(entries, structure, last, p, s, io, net, measured, answered, rows, k)
+        added = settle(entries, structure, last, p, s, io, net, answered, rows, k)
     states[at + LAST_FRICTION] = friction
     states[at + LAST_ACCELERATION] = (io[V] - states[at + LAST_VELOCITY]) * rate
     states[at + LAST_VELOCITY] = io[V]
@@ -119,12 +117,15 @@ def walk(entries, first, last, parameters, states, at, motion, others, dt, begin
     """
     entries, parameters, states = borrow((entries, parameters, states))
     io = np.zeros(IO_SIZE)
-    row = np.zeros((1, entries.shape[0]))
+    row = np.zeros((2, entries.shape[0]))
     io[DT] = dt
     io[WHEN] = 0.5
     io[MASS] = 1e300
     io[MOVED] = mass
-    structured = last > first and int(entries[last - 1, KIND]) == _STRUCTURE
+    others_end = last
+    while others_end > first and int(entries[others_end - 1, KIND]) == _STRUCTURE:
+        others_end -= 1
+    p, s = parameters.ctypes.data, states.ctypes.data
     for k in range(motion.shape[1]):
         io[INDEX] = begin + k
         io[TIME] = (begin + k) * dt
@@ -134,9 +135,10 @@ def walk(entries, first, last, parameters, states, at, motion, others, dt, begin
         io[X_OTHER] = others[0, k]
         io[V_OTHER] = others[1, k]
         io[A_OTHER] = others[2, k]
-        if structured:
-            io[ACC] = slope(motion[1], k, dt)
-        axis_force(entries, first, last, parameters, states, at, borrow(io), borrow(row), 0)
+        lent = borrow(row)
+        axis_force(entries, first, others_end, parameters, states, at, borrow(io), lent, 0)
+        if others_end < last:
+            along(entries, others_end, last, p, s, borrow(io), motion[1], k, lent)
         for i in range(first, last):
             rows[i, k] = row[0, i]
 

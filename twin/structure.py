@@ -9,9 +9,12 @@ the same one for the bodies that the effects build there.
 from __future__ import annotations
 
 import numba
+import numpy as np
 
 from twin.calling import ADDRESS, P_AT, S_AT, call_law
-from twin.effect import ACC, MOVED, NET, OUT, WHEN
+from twin.effect import ACC, DT, MOVED, NET, OUT, WHEN
+
+LONGEST_STEP = 2e-4  # s, of attached masses along a measured motion
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
@@ -47,22 +50,59 @@ def answers(entries, first, last, p, s, io):
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")
-def settle(entries, first, last, p, s, io, net, measured, answered, rows, k):
+def settle(entries, first, last, p, s, io, net, answered, rows, k):
     """Force (N) that the structure effects add under a net force; their states advance.
 
     With a the acceleration of what rides on the axis, q'' that of the axis over what it stands on:
     m a = net + pushed + riding a,  m q'' = m a + moved + yielding net/m, m the moved mass.
-    Along a measured motion q'' is known and net is the force that it takes.
     """
-    pushed, riding, moved, yielding = answered
-    mass, free = io[MOVED], io[MOVED] - riding
-    if io[WHEN] < 1.0:
-        net = (free * (measured - moved / mass) - pushed) / (1.0 + free * yielding / mass**2)
+    pushed, riding = answered[0], answered[1]
+    mass = io[MOVED]
+    ridden = (net + pushed) / (mass - riding)
     total = 0.0
     for i in range(first, last):
-        rows[k, i] = answer(entries[i], p, s, io, net / mass, (net + pushed) / free)
+        rows[k, i] = answer(entries[i], p, s, io, net / mass, ridden)
         total += rows[k, i]
     return total
+
+
+@numba.njit(cache=True, error_model="numpy")
+def along(entries, first, last, p, s, io, velocity, k, rows):
+    """Force (N) of structure effects along block k of a measured motion; their states advance.
+
+    velocity (n,) m/s: means of blocks of DT s. A block is walked in steps short enough for a
+    contact, with the acceleration a parabola that has the means of the blocks around it. rows
+    (2, n_entries): the first receives the block's mean, the second is overwritten.
+    """
+    block, ended = io[DT], velocity.shape[0] - 1
+    steps = int(np.ceil(block / LONGEST_STEP - 1e-9))
+    now = slope(velocity, k, block)
+    before, after = slope(velocity, max(k - 1, 0), block), slope(velocity, min(k + 1, ended), block)
+    rise, bend = 0.5 * (after - before), 0.5 * (after - 2.0 * now + before)
+    io[DT] = block / steps
+    rows[0, first:last] = 0.0
+    answered = answers(entries, first, last, p, s, io)
+    stands = answered[3] != 0.0
+    for j in range(steps):
+        at = (j + 0.5) / steps - 0.5
+        measured = now + rise * at + bend * (at * at + (1.0 / steps**2 - 1.0) / 12.0)
+        net, ridden = 0.0, measured
+        if stands:
+            if j > 0:
+                answered = answers(entries, first, last, p, s, io)
+            net, ridden = shared(answered, io[MOVED], measured)
+        for i in range(first, last):
+            rows[0, i] += answer(entries[i], p, s, io, net, ridden) / steps
+    io[DT] = block
+
+
+@numba.njit(cache=True, inline="always", error_model="numpy")
+def shared(answered, mass, measured):
+    """NET and ACC (m/s^2) behind an acceleration of the axis over what it stands on."""
+    pushed, riding, moved, yielding = answered
+    free = mass - riding
+    net = (free * (measured - moved / mass) - pushed) / (1.0 + free * yielding / mass**2)
+    return net / mass, (net + pushed) / free
 
 
 @numba.njit(cache=True, inline="always", error_model="numpy")

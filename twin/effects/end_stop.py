@@ -28,12 +28,12 @@ EFFECT = Effect(
     source="Kelvin-Voigt contact; Johnson, Contact Mechanics, section 6.5",
     parameters=(
         Parameter(
-            "low", "m", 0.0, -1e3, 1e3, "lower stop", fixed=True,
+            "low", "m", 0.0, -1e3, 1e3, "lower stop",
             start_rule=lambda e: e.position_low,
             scan=lambda e: tuple(e.position_low + k * e.travel for k in (0.005, 0.02, 0.06)),
         ),
         Parameter(
-            "high", "m", 0.0, -1e3, 1e3, "upper stop", fixed=True,
+            "high", "m", 0.0, -1e3, 1e3, "upper stop",
             start_rule=lambda e: e.position_high,
             scan=lambda e: tuple(e.position_high - k * e.travel for k in (0.005, 0.02, 0.06)),
         ),

@@ -127,7 +127,7 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
         ),
         Parameter("spread", "1", 10.0, 1.0, 1e6, "last yield deflection over the first"),
         Parameter(
-            "C", "N/s", 30.0, 1e-3, 1e8, "attraction to the Stribeck curve", fixed=True,
+            "C", "N/s", 30.0, 1e-3, 1e8, "attraction to the Stribeck curve",
             start_rule=lambda e: 100.0 * e.dry_level,
         ),
         Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
