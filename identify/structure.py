@@ -17,7 +17,9 @@ Array = NDArray[np.float64]
 
 BINS = (24, 96, 384)  # numbers of bins along a coordinate
 PROMINENT = 0.2  # share of the residual's square from which a line is a period
-LEFT_OVER = 0.3  # part of a dependence that an explanation may leave
+LEAST_SHARE = 0.1  # of the residual's square, below which a dependence says nothing
+NEAR = 0.8  # part of the share of time from which another coordinate is preferred
+LEFT_OVER = 0.5  # part of a dependence that an explanation may leave
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,17 @@ def share(residual: Array, coordinate: Array) -> float:
     return max(_share(residual, coordinate, bins) for bins in widths)
 
 
+def _foremost(shares: Mapping[str, float]) -> str:
+    """The coordinate with the largest share; time only where no other comes near it.
+
+    Within one run of a program of moves, any coordinate is a function of time.
+    """
+    name = max(shares, key=lambda k: shares[k])
+    rest = {k: s for k, s in shares.items() if k != "time"}
+    other = max(rest, key=lambda k: rest[k])
+    return other if name == "time" and rest[other] > NEAR * shares[name] else name
+
+
 def _share(residual: Array, coordinate: Array, bins: int) -> float:
     levels = np.unique(np.quantile(coordinate, np.linspace(0.0, 1.0, bins + 1)))
     if len(levels) < 2:
@@ -111,17 +124,21 @@ def _share(residual: Array, coordinate: Array, bins: int) -> float:
 def find_structure(base: Fit, study: Study) -> Structure:
     """The coordinate on which the residual of a fit depends most, and its period if it has one."""
     shares, lines = _shares(base.residual, _where(base, study))
-    name = max(shares, key=lambda k: shares[k])
+    name = _foremost(shares)
     return Structure(shares[name], name, lines.get(name), UNITS[name], shares)
 
 
 def explains(before: Fit, after: Fit, study: Study) -> bool:
-    """Whether a larger model took away what the residual of the smaller depended on most."""
+    """Whether a larger model took away what the residual of the smaller depended on most.
+
+    What is left must be smaller along that coordinate, and depend on another more.
+    """
     shares, _ = _shares(before.residual, _where(before, study))
-    name = max(shares, key=lambda k: shares[k])
     left, _ = _shares(after.residual, _where(after, study))
+    name = _foremost(shares)
     was = before.error * np.sqrt(shares[name])
-    return bool(after.error * np.sqrt(left[name]) < LEFT_OVER * was)
+    smaller = after.error * np.sqrt(left[name]) < LEFT_OVER * was
+    return bool(shares[name] > LEAST_SHARE and smaller and _foremost(left) != name)
 
 
 def dependences(force: Array, fit: Fit, study: Study) -> dict[str, float]:
@@ -138,7 +155,7 @@ def _shares(
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Share of each coordinate, and the periods of those in which the residual repeats."""
     shares = {name: share(residual, values) for name, values in where.items()}
-    for name in ("position", "distance_since_reversal"):
+    for name in where.keys() - {"direction", "velocity"}:
         # Friction has the other sign backwards.
         backwards = share(residual * where["direction"], where[name])
         shares[name] = max(shares[name], backwards)
