@@ -22,6 +22,7 @@ from twin.model import AxisModel
 Array = NDArray[np.float64]
 
 SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
+LINE = 3.0  # power over the noise's from which it counts no more
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 
 
@@ -52,10 +53,13 @@ def _variance(axis: AxisModel, motion: Motion, window: Window) -> float:
 
 
 def _fit_levels(shapes: Array, power: Array) -> Array:
-    """Non-negative levels by least squares on the relative error, repeated: a Whittle fit."""
+    """Non-negative levels by least squares on the relative error, repeated: a Whittle fit.
+
+    Lines and resonances that stand far out of the noise are no part of it.
+    """
     model = power.copy()
     levels = np.zeros(shapes.shape[1])
     for _ in range(6):
-        levels, _ = nnls(shapes / model[:, None], power / model)
+        levels, _ = nnls(shapes / model[:, None], np.minimum(power / model, LINE))
         model = np.maximum(shapes @ levels, 1e-12 * power.max())
     return levels
