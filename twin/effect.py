@@ -157,6 +157,10 @@ class Effect:
         if len(set(names)) != len(names):
             raise ValueError(f"effect {self.name}: a parameter name is used twice")
         for p in self.parameters:
+            if not isinstance(p.unit, str):
+                raise ValueError(
+                    f"effect {self.name}: the unit of {p.name} is {p.unit}; give a text such as 'N'"
+                )
             if not p.unit:
                 raise ValueError(
                     f"effect {self.name}: parameter {p.name} has no unit; use '1' for a ratio"
