@@ -11,7 +11,7 @@ from benchmarks.timing import interleaved, ratio
 
 TITLE = "Start of a process: catalogue loaded and every law ready, with warm caches"
 ROUNDS = 7
-BARE = "import numba, mujoco, scipy"
+BARE = "import numba, mujoco, scipy.linalg"  # numba loads the last with its first function
 WHOLE = (
     "from twin.effects import load_catalogue\n"
     "from twin.native import law_address\n"
