@@ -9,6 +9,7 @@ from time import perf_counter
 from benchmarks import (
     diagnosis,
     effect_cost,
+    import_time,
     mcap_logs,
     peer_fits,
     second_start,
@@ -16,7 +17,7 @@ from benchmarks import (
 )
 from benchmarks.figures import Figure, write_results
 
-ALL = (simulation, second_start, peer_fits, diagnosis, mcap_logs, effect_cost)
+ALL = (simulation, second_start, peer_fits, diagnosis, mcap_logs, effect_cost, import_time)
 
 
 def main() -> int:

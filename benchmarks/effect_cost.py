@@ -10,7 +10,21 @@ import numpy as np
 
 from benchmarks.figures import Figure
 from benchmarks.timing import Array, interleaved, ratio
-from twin.effect import DRY, DT, INDEX, IO_SIZE, MASS, STATIC, VISCOUS, WHEN, Effect, U, V, X
+from twin.effect import (
+    DRY,
+    DT,
+    INDEX,
+    IO_SIZE,
+    MASS,
+    READING,
+    STATIC,
+    VISCOUS,
+    WHEN,
+    Effect,
+    U,
+    V,
+    X,
+)
 from twin.effects import load_catalogue
 from twin.native import call_law, law_address
 
@@ -29,6 +43,7 @@ def _drive(law, p, s, io, motion):
         io[X] = motion[0, k]
         io[V] = motion[1, k]
         io[U] = motion[2, k]
+        io[READING] = motion[0, k]
         call_law(law, p.ctypes.data, s.ctypes.data, io.ctypes.data)
 
 

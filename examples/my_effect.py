@@ -1,6 +1,20 @@
 """A user's own effect: a magnetic detent that pulls the axis to one place.
 
 F = -k d exp(-(d / w)^2), d = x - place. Try it: twin effects --effects my_effect.py my_effect
+
+A file like this is tried as it is loaded, and what is wrong with it is said in one line:
+
+* Parameter("k", "", 0.0, ...)       effect my_effect: parameter k has no unit; use '1' for a ratio
+* Parameter("k", "N/m", 0.0, -1e5, "stiffness")
+                                     ... a Parameter has a name, unit, start, lower, upper and
+                                     meaning, in this order
+* start 2e5 within [-1e5, 1e5]       start 200000.0 N/m of k is outside its bounds
+* s[1] = ... with states=("own",)    its law uses s[1], but 1 states are declared; add a name to
+                                     states=(...)
+* io[OUT] = p[0] / io[V]             its law gives no finite number at v = 0 m/s
+* io[OUT] never written              its law writes no result; a force effect writes io[OUT]
+* float("%g" % p[0])                 its law cannot be compiled: ...; use only numbers, math
+                                     functions and the arrays p, s, io
 """
 
 from math import exp

@@ -172,9 +172,10 @@ def _ranked(candidates: list[Candidate]) -> tuple[Candidate, ...]:
     ranking = sorted(candidates, key=_merit)
     if not ranking or not ranking[0].supported:
         return tuple(ranking)
-    least = ranking[0].delta_bic - NO_EVIDENCE
-    level = [c for c in ranking if c.supported and c.delta_bic > least]
-    return (*sorted(level, key=lambda c: c.effect.name), *ranking[len(level) :])
+    best = ranking[0].evidence
+    level = [c for c in ranking if c.supported and best.over(c.evidence) < NO_EVIDENCE]
+    rest = [c for c in ranking if c not in level]
+    return (*sorted(level, key=lambda c: c.effect.name), *rest)
 
 
 def _merit(c: Candidate) -> tuple[bool, float]:
@@ -207,7 +208,7 @@ def _decided(
 
 def _tie(study: Study, best: Candidate, other: Candidate) -> bool:
     """Whether the evidence and the held-out error both fail to separate two candidates."""
-    if best.delta_bic - other.delta_bic > LEAST_SEPARATION:
+    if best.evidence.over(other.evidence) > LEAST_SEPARATION:
         return False
     logs = study.holdout or study.fit
     either = sticks(best.fit.axis) or sticks(other.fit.axis)

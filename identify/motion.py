@@ -23,6 +23,7 @@ SHORTEST_BLOCK = 1e-3  # s
 LONGEST_BLOCK = 1e-2  # s
 SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
 SHORTEST_LOG = 1.0  # s
+GAP = 20.0  # ratio of differences between readings that only a resolution leaves empty
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,4 +165,24 @@ def excitation(motions: list[Motion], travel: tuple[float, float] | None) -> Exc
         period=motions[0].period,
         force_max=float(np.abs(command).max()),
         lines=lines(motions),
+        resolution=max(resolution(m) for m in motions),
     )
+
+
+def resolution(motion: Motion) -> float:
+    """Step between the readings, m; 0 where their noise, or the lack of one, hides it.
+
+    Differences of readings are then near 0 or near whole steps, with a wide gap between.
+    """
+    apart = np.sort(np.abs(motion.raw[0])) * motion.sample_period
+    few = len(apart) // 100
+    held = np.maximum(apart[few:], np.finfo(float).tiny)
+    widest = int(np.argmax(held[1:] / held[:-1]))
+    step = held[widest + 1]
+    if step < GAP * held[widest] or len(held) - widest < few:
+        return 0.0
+    for reach in (1.5, 4.5, 16.5):
+        near = held[widest + 1 :][held[widest + 1 :] < reach * step]
+        counts = np.rint(near / step)
+        step = float(near @ counts / (counts @ counts))
+    return step

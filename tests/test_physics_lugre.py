@@ -18,7 +18,8 @@ from twin.trajectory import Setpoint
 LUGRE = CATALOGUE["lugre"]
 Lugre = dict[str, float]
 
-# The stage of the thesis; the example of Canudas de Wit et al. (1995); a soft one with exponent 1.
+# The stage of the thesis; a stiff one, attributed to Canudas de Wit et al. (1995), not checked
+# there; a soft one with exponent 1.
 STAGE = {
     "Fc": 0.285, "Fs": 0.335, "v0": 0.01, "sigma2": 0.018, "sigma0": 260.0, "sigma1": 0.6, "n": 2.0
 }  # fmt: skip

@@ -72,7 +72,8 @@ class Excitation:
     position_low, position_high (m, of the axis' travel where the model gives it), speed_max (m/s),
     dry_level (N, half the gap between the force in the two directions), duration (s), period (s,
     sample period), force_max (N, largest command), lines (Hz, frequencies at which the force
-    repeats in time; strongest first).
+    repeats in time; strongest first), resolution (m, step of the
+    readings; 0 where none shows).
     """
 
     position_low: float
@@ -83,6 +84,7 @@ class Excitation:
     period: float
     force_max: float = 1.0
     lines: tuple[float, ...] = ()
+    resolution: float = 0.0
 
     @property
     def travel(self) -> float:
@@ -155,6 +157,10 @@ class Effect:
         if len(set(names)) != len(names):
             raise ValueError(f"effect {self.name}: a parameter name is used twice")
         for p in self.parameters:
+            if not isinstance(p.unit, str):
+                raise ValueError(
+                    f"effect {self.name}: the unit of {p.name} is {p.unit}; give a text such as 'N'"
+                )
             if not p.unit:
                 raise ValueError(
                     f"effect {self.name}: parameter {p.name} has no unit; use '1' for a ratio"

@@ -69,6 +69,9 @@ def _user_effect(path: Path) -> Effect:
             f"{path}: defines no EFFECT of type twin.effect.Effect; "
             "see the worked example in examples/my_effect.py"
         )
+    from twin.user_effect import require_sound  # only a user's file needs the compiler to be read
+
+    require_sound(effect, path)
     return effect
 
 
@@ -81,5 +84,10 @@ def _import_file(path: Path) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise InputError(f"{path}: cannot be loaded as an effect: {error}") from error
+        reason = " ".join(str(error).split()) or type(error).__name__
+        if isinstance(error, TypeError) and "Parameter" in reason:
+            reason += (
+                "; a Parameter has a name, unit, start, lower, upper and meaning, in this order"
+            )
+        raise InputError(f"{path}: cannot be loaded as an effect: {reason}") from error
     return module

@@ -42,11 +42,11 @@ EFFECT = Effect(
         Parameter("load", "1", 0.0, 0.0, 0.9, "part of the mass behind the play", strength=True),
         Parameter(
             "play", "m", 2e-5, 1e-9, 0.1, "full width of the play",
-            scan=lambda e: tuple(2e-6 * 2.0**k for k in range(10)),
+            scan=lambda e: tuple(2e-6 * 1.5**k for k in range(16)),
         ),
         Parameter(
             "frequency", "Hz", 100.0, 1.0, 2000.0, "of the load on the contact, drive held",
-            scan=lambda e: (30.0, 100.0),
+            scan=lambda e: (25.0, 50.0, 100.0),
         ),
         Parameter("damping", "1", 0.1, 1e-4, 0.5, "damping ratio of film and contact", fixed=True),
     ),

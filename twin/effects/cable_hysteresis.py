@@ -4,7 +4,7 @@ F = -sum_{i=1..4} f_i e_i/d_i,  e_i = stop_{d_i}(x): e_i follows x and stays wit
 d_i = reach (1/8, 1/4, 1/2, 1). f_i (N) is the force at which layer i slips, reach (m) the travel
 after a reversal until all slip. Maxwell-slip elements: W. D. Iwan, "A distributed-element model for
 hysteresis and its steady-state dynamic response", J. Appl. Mech. 33 (1966); F. Al-Bender et al.,
-IEEE TAC 50 (2005), eq. 7 without its velocity dependence. Rate-independent, keeps the memory of
+IEEE TAC 50 (2005), less its velocity dependence. Rate-independent, keeps the memory of
 inner loops, linear in the forces, and exact for motion in one direction within a sample.
 """
 

@@ -2,6 +2,8 @@
 
 reading = step floor(x/step + 1/2).
 B. Widrow, I. Kollar, Quantization Noise (2008), section 1.1: uniform rounding quantizer.
+A reading rounded twice is the reading: no force on the measured motion tells the step, so it is
+read off the readings and not fitted.
 """
 
 from math import floor
@@ -21,8 +23,13 @@ EFFECT = Effect(
     summary="resolution step of the encoder",
     equation="reading = step floor(x/step + 1/2)",
     source="Widrow, Kollar, Quantization Noise, section 1.1",
-    parameters=(Parameter("step", "m", 0.0, 0.0, 1e-2, "resolution", strength=True),),
+    parameters=(
+        Parameter(
+            "step", "m", 0.0, 0.0, 1e-2, "resolution", strength=True, fixed=True,
+            start_rule=lambda e: e.resolution,
+        ),
+    ),
     law=law,
     fingerprint="readings take few values; speed and command are rough, most so at low speed",
     excited_by="slow motion, where a step lasts many samples",
-)
+)  # fmt: skip

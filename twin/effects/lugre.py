@@ -3,8 +3,8 @@
 dz/dt = v - sigma0 |v| z / g(v),  g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n)
 F = sigma0 z + sigma1 dz/dt + sigma2 v
 C. Canudas de Wit et al., "A new model for control of systems with friction", IEEE TAC 40 (1995),
-eq. 2-4; thesis eq. 2.6-2.9. The state is integrated exactly over the sample for constant v, so any
-stiffness is stable.
+written as in the thesis, eq. 2.6-2.9. The state is integrated exactly over the sample for constant
+v, so any stiffness is stable.
 """
 
 from math import copysign, exp, expm1
@@ -45,7 +45,7 @@ EFFECT = Effect(
     summary="bristle friction: Stribeck curve, pre-sliding stiffness and damping",
     equation="dz/dt = v - sigma0 |v| z / g(v);  F = sigma0 z + sigma1 dz/dt + sigma2 v;  "
     "g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n)",
-    source="Canudas de Wit et al. 1995, eq. 2-4; L. Jia 2023, eq. 2.6-2.9",
+    source="Canudas de Wit et al. 1995, as in L. Jia 2023, eq. 2.6-2.9",
     parameters=(
         Parameter(
             "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True,

@@ -11,14 +11,15 @@ from twin.effect import DRY, Effect, Kind, Parameter, X
 
 
 def law(p, s, io):
-    phase = pi * min(max((io[X] - p[0]) / p[1], 0.0), 1.0)  # beyond the track it stays as it is
-    profile = (
-        p[2] * cos(phase)
-        + p[3] * cos(2.0 * phase)
-        + p[4] * cos(3.0 * phase)
-        + p[5] * cos(4.0 * phase)
-        + p[6] * cos(5.0 * phase)
-    )
+    along = min(max((io[X] - p[0]) / p[1], 0.0), 1.0)  # beyond the track it stays as it is
+    double = 2.0 * cos(pi * along)
+    # Clenshaw's recurrence for a cosine series
+    last = p[6]
+    b4 = p[5] + double * last
+    b3 = p[4] + double * b4 - last
+    b2 = p[3] + double * b3 - b4
+    b1 = p[2] + double * b2 - b3
+    profile = 0.5 * double * b1 - b2
     io[DRY] *= max(1.0 + profile, 0.01)  # friction cannot turn negative
 
 

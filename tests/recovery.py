@@ -1,0 +1,152 @@
+"""Plant an effect with drawn values, log it, and let the tool find it again: names no effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from effect_runs import CATALOGUE
+
+from identify.candidates import Candidate, try_effect
+from identify.fit import Fit, fit_axis, rms
+from identify.planting import draw_effect
+from identify.residual import residual
+from identify.study import Study, studies
+from identify.uncertainty import Estimate, estimates
+from twin.effect import Effect, Kind
+from twin.experiments import simulate
+from twin.model import AxisModel, Fitted, Hardware, StageModel
+from twin.simulator import ReducedStage
+
+HARDWARE = Hardware(
+    travel=(-0.17, 0.17), force_constant=53.4, encoder_noise=1e-9, current_noise=2e-4,
+    acceleration=2.0, jerk=100.0,
+)  # fmt: skip
+SEEN = 0.1  # N RMS that is planted
+DRAWS = 3
+# Half width of a 99.9 % interval over that of a 90 % one, for the 29 degrees of freedom of blocks.
+WIDER = 3.66 / 1.70
+# A law is fitted on means over blocks of 1 ms, and the stage itself steps 0.1 ms: what bends within
+# a block, such as a contact of 100 Hz, comes back by this much off.
+DISCRETE = 0.01
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A stage and a motion: friction, experiment, duration s, highest speed m/s, mass known."""
+
+    friction: str
+    values: dict[str, float]
+    experiment: str = "tracking"
+    duration: float = 8.0
+    velocity: float = 0.25
+    mass_known: bool = False
+
+    def stage(self) -> StageModel:
+        """Two axes with that friction."""
+        fitted = Fitted.at_start(CATALOGUE[self.friction], self.values)
+        hardware = replace(HARDWARE, velocity=self.velocity)
+        x, y = (AxisModel(m, hardware, (fitted,), self.mass_known) for m in (15.0, 6.0))
+        return StageModel("stage", {"x": x, "y": y})
+
+    def study(self, model: StageModel, seed: int) -> Study:
+        """Its motion on that stage, as a study of x."""
+        log = simulate(
+            model, self.experiment, seed=seed, duration=self.duration, stage=ReducedStage
+        )
+        return studies(model, {"log": log}, {})["x"]
+
+
+SLIDING = {"Fc": 0.285, "Fs": 0.285, "sigma2": 0.5}
+FALLING = {"Fc": 0.285, "Fs": 0.4, "v0": 0.01, "sigma2": 0.5}
+# Tried in turn until one shows the effect: fast, with a static friction above the sliding one, on a
+# known mass, and slow enough for what repeats within micrometres.
+SETTINGS = (
+    Setting("coulomb_viscous", SLIDING),
+    Setting("stribeck", FALLING),
+    Setting("coulomb_viscous", SLIDING, mass_known=True),
+    Setting("coulomb_viscous", SLIDING, velocity=5e-4),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Recovered:
+    """What the tool made of a log: the machine's axis, the base without the effect, and with it."""
+
+    truth: AxisModel
+    base: Fit
+    found: Candidate
+
+    @property
+    def shown(self) -> bool:
+        """Whether the evidence asks for the effect."""
+        return self.found.supported
+
+    def misses(self) -> list[str]:
+        """Free parameters whose interval, widened to 99.9 %, does not cover the truth."""
+        return [e.label for e in estimates(self.found.fit) if e.free and self._missed(e)]
+
+    def own(self) -> list[Estimate]:
+        """The effect's own free parameters."""
+        own = f"{self.found.effect.name}."
+        return [e for e in estimates(self.found.fit) if e.free and e.label.startswith(own)]
+
+    def _missed(self, e: Estimate) -> bool:
+        if e.low is None or e.high is None:
+            return not e.reason
+        effect, _, name = e.label.rpartition(".")
+        true = self.truth[effect].values[name] if effect else self.truth.mass
+        half = max(e.high - e.value, e.value - e.low)
+        return abs(e.value - true) > WIDER * half + DISCRETE * abs(true)
+
+
+def planted(effect: Effect, axis: AxisModel, study: Study, seed: int) -> Fitted | None:
+    """Drawn values with which it acts along this motion; None where it does not."""
+    rng, size = np.random.default_rng(seed), SEEN
+    if effect.kind is Kind.FRICTION:  # as strong as the one whose place it takes
+        size = rms(residual(bare(axis), study.fit) - residual(axis, study.fit))
+        axis = bare(axis)
+    for _ in range(DRAWS):
+        drawn = draw_effect(effect, axis, study.fit, study.excitation, size, rng)
+        acts = residual(axis.with_effect(drawn), study.fit) - residual(axis, study.fit)
+        if rms(acts) > 0.5 * size:
+            return drawn
+    return None
+
+
+def bare(axis: AxisModel) -> AxisModel:
+    """The axis without its friction."""
+    kept = tuple(f for f in axis.effects if f.effect.kind is not Kind.FRICTION)
+    return replace(axis, effects=kept)
+
+
+Change = Callable[[AxisModel], AxisModel]
+
+
+def attempts(effect: Effect, seed: int, lie: Change = lambda axis: axis) -> Iterator[Recovered]:
+    """The effect planted and searched, setting by setting.
+
+    lie: changes the axis that is logged, against the one that is claimed.
+    """
+    for setting in SETTINGS:
+        model = setting.stage()
+        drawn = planted(effect, model.axes["x"], setting.study(model, seed), seed)
+        if drawn is None:
+            continue
+        truth = model.axes["x"].with_effect(drawn)
+        study = setting.study(model.with_axis("x", lie(truth)), seed)
+        own = effect.name == setting.friction
+        without = bare(model.axes["x"]) if own else model.axes["x"]
+        base = fit_axis(without, study.fit)
+        yield Recovered(truth, base, try_effect(base, study, effect))
+
+
+def recovered(effect: Effect, seed: int, lie: Change = lambda axis: axis) -> Recovered:
+    """The first setting that shows the effect, or the last."""
+    last = None
+    for last in attempts(effect, seed, lie):
+        if last.shown:
+            break
+    assert last is not None, "it acts in no motion"
+    return last
