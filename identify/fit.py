@@ -18,6 +18,7 @@ from identify.levenberg_marquardt import minimise
 from identify.noise import noise_floor
 from identify.residual import Windowed, jacobian, moving, residual
 from identify.scaling import Scaling
+from identify.smoothing import described, smoothing
 from twin.effect import Kind
 from twin.model import AxisModel, Coordinate, coordinates
 
@@ -76,15 +77,21 @@ def sticks(axis: AxisModel) -> bool:
 
 
 def _is_added(axis: AxisModel, c: Coordinate) -> bool:
-    """Whether zero means the absence of an effect beside mass and friction."""
-    return (
-        bool(c.effect) and c.parameter.strength and axis[c.effect].effect.kind is not Kind.FRICTION
-    )
+    """Whether zero means the absence of a physical effect beside mass and friction."""
+    if not (c.effect and c.parameter.strength):
+        return False
+    effect = axis[c.effect].effect
+    return effect.kind is not Kind.FRICTION and not effect.is_description
 
 
 def rms(values: Array) -> float:
     """Root of the mean square."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
+
+
+def coloured_noise(residual: Array) -> float:
+    """RMS (N) of white noise that as many samples would weigh as little as this residual (n,)."""
+    return rms(residual) * float(np.sqrt(len(residual) / effective_samples(residual)))
 
 
 class _Problem:
@@ -93,6 +100,8 @@ class _Problem:
     The prior on what is added to the friction is a force of a tenth of what is to be explained; it
     matters only along directions that the data cannot tell apart, such as a constant force and a
     Coulomb asymmetry, where it shares the force out instead of opposing large ones to each other.
+    Beside a description the physical effects are pulled to where they were: what both could explain
+    stays with the physics. The description itself is smoothed.
     """
 
     def __init__(self, axis: AxisModel, logs: Sequence[Windowed]) -> None:
@@ -103,8 +112,10 @@ class _Problem:
         self.bounds = self.scaling.bounds()
         self.start = np.clip(self.scaling.inside(axis), *self.bounds)
         self.added = np.array([_is_added(axis, c) for c in self.scaling.where], dtype=bool)
-        self.centre = np.where(self.added, 0.0, self.start)
+        self.centre = np.where(self.added & (not described(axis)), 0.0, self.start)
         self.pull = np.zeros(len(self.start))
+        self.smooth = smoothing(axis, self.scaling.where)
+        self.noise = 0.0
 
     def set_priors(self, internal: Array) -> None:
         """Weigh the priors by the residual's size, its colour, and the force to be explained."""
@@ -113,7 +124,7 @@ class _Problem:
         inertia = axis.mass * np.concatenate([log.acceleration for log in self.logs])
         command = np.concatenate([log.command for log in self.logs])
         explained = rms((command - inertia)[self.kept])
-        noise = rms(left) * np.sqrt(len(left) / effective_samples(left))
+        self.noise = noise = coloured_noise(left)
         columns = self.columns(internal)
         size = np.linalg.norm(columns, axis=0) / np.sqrt(len(left))
         expected = max(PRIOR_FORCE * explained, noise)
@@ -127,10 +138,12 @@ class _Problem:
 
     def rows(self, internal: Array) -> Array:
         force = residual(self.scaling.outside(self.axis, internal), self.logs)[self.kept]
-        return np.concatenate([force, self.pull * (internal - self.centre)])
+        pulled = self.pull * (internal - self.centre)
+        return np.concatenate([force, pulled, self.noise * (self.smooth @ internal)])
 
     def slopes(self, internal: Array) -> Array:
-        return np.vstack([self.columns(internal), np.diag(self.pull)])
+        rows = [self.columns(internal), np.diag(self.pull), self.noise * self.smooth]
+        return np.vstack(rows)
 
     def solve(self, internal: Array, tolerance: float) -> tuple[Array, bool]:
         """Least squares from these values; the solution and whether it converged."""

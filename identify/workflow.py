@@ -10,6 +10,7 @@ import numpy as np
 
 from identify.candidates import Candidate, score, try_effect
 from identify.compare import AxisComparison, compare_axis, position_errors
+from identify.describe import describe
 from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
 from identify.fit import Fit, error_on, rms
 from identify.freerun import free_run, rms_error
@@ -189,7 +190,8 @@ def add(
         raise InputError(
             f"axis {', '.join(names)} has the effect '{effect.name}' already; `twin fit` refits it"
         )
-    tried = [try_effect(before.fits[n], before.studies[n], effect) for n in open_axes]
+    attempt = describe if effect.is_description else try_effect
+    tried = [attempt(before.fits[n], before.studies[n], effect) for n in open_axes]
     best = max(tried, key=lambda c: c.delta_bic)
     progress("adding", 1, 1)
     return _addition(best, before, logs)
