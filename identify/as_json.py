@@ -131,6 +131,7 @@ def add_json(result: Addition) -> dict[str, Any]:
     return {
         "effect": step.effect,
         "axis": step.axis,
+        "is_description": result.candidate.effect.is_description,
         "kept": result.kept,
         "fit_error_before": step.fit_error_before,
         "fit_error_after": step.fit_error_after,
@@ -152,6 +153,7 @@ def effect_json(effect: Effect) -> dict[str, Any]:
     return {
         "name": effect.name,
         "kind": effect.kind.name.lower(),
+        "is_description": effect.is_description,
         "summary": effect.summary,
         "equation": effect.equation,
         "source": effect.source,

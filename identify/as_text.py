@@ -8,6 +8,7 @@ from identify.candidates import Candidate
 from identify.uncertainty import Estimate
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
+from twin.effects import load_catalogue
 from twin.log.check import CheckReport
 
 
@@ -70,8 +71,18 @@ def diagnose_text(result: Diagnosis) -> str:
                 f"  {100 * s.share_of_error:.0f} % of the squared error depends on "
                 f"{s.depends_on.replace('_', ' ')}{again}"
             )
+            lines.append(f"  {advice()}")
         lines += [_ranking_line(c) for c in d.ranking[:4]]
     return "\n".join(lines)
+
+
+def advice() -> str:
+    """What lowers the error where no physical effect does."""
+    known = [e.name for e in load_catalogue().values() if e.is_description]
+    return (
+        f"`twin add` with {' or '.join(known)} describes what is left, without explaining it, and "
+        "lowers the error"
+    )
 
 
 def _ranking_line(c: Candidate) -> str:

@@ -24,13 +24,14 @@ from identify.residual import jacobian, moving, residual
 from identify.smoothing import part_rows, smoothing
 from identify.study import Study
 from twin.effect import Effect, Part
-from twin.model import Coordinate, Fitted
+from twin.model import Coordinate, Fitted, StageModel
 
 Array = NDArray[np.float64]
 
 STIFFNESS = 10.0 ** np.arange(1.0, -5.1, -0.5)  # noise over spread, per root of samples; tried
 WORTH = 0.99  # part of the squared left-out error that a further part must leave at most
-SWEEPS = 3  # over the parts
+ROUNDS = 3  # of choosing the smoothing anew, at most
+BETTER = 0.95  # part of the error that another round must leave at most
 ROUNDING = 1e-12  # of a unit diagonal, keeps a system solvable
 RIDGE = 1e-4  # on the physics, in units of their columns
 
@@ -120,21 +121,30 @@ def _solve(matrix: Array, right: Array) -> Array:
 
 
 def choose_stiffness(linear: _Linear) -> dict[str, float]:
-    """Stiffness of each part that lowers the error on left-out blocks; a part may be missing."""
-    tried = STIFFNESS * np.sqrt(len(linear.force))
+    """Stiffness of each part that lowers the error on left-out blocks; a part may be missing.
+
+    The part that helps most comes first; then those before are tuned again.
+    """
     chosen: dict[str, float] = {}
     error = float(np.sum(linear.left_out(chosen) ** 2))
-    for _ in range(SWEEPS):
-        start = dict(chosen)
-        for name in linear.parts:
-            rest = {k: v for k, v in chosen.items() if k != name}
-            found = {v: float(np.sum(linear.left_out({**rest, name: v}) ** 2)) for v in tried}
-            best = min(found, key=lambda v: found[v])
-            if name in chosen or found[best] < WORTH * error:
-                chosen, error = {**rest, name: best}, found[best]
-        if chosen == start:
+    while len(chosen) < len(linear.parts):
+        found = [_best(linear, chosen, name) for name in linear.parts if name not in chosen]
+        further, name, value = min(found)
+        if not further < WORTH * error:
             break
+        earlier, chosen[name] = tuple(chosen), value
+        for other in earlier:
+            further, _, chosen[other] = _best(linear, chosen, other)
+        error = further
     return chosen
+
+
+def _best(linear: _Linear, chosen: Mapping[str, float], name: str) -> tuple[float, str, float]:
+    """Squared left-out error, name and stiffness of a part at its best beside the others."""
+    tried = STIFFNESS * np.sqrt(len(linear.force))
+    errors = [float(np.sum(linear.left_out({**chosen, name: v}) ** 2)) for v in tried]
+    least = int(np.argmin(errors))
+    return errors[least], name, float(tried[least])
 
 
 def describe(base: Fit, study: Study, effect: Effect) -> Candidate:
@@ -145,28 +155,78 @@ def describe(base: Fit, study: Study, effect: Effect) -> Candidate:
     """
     covered = effect.starts(excitation([log.motion for log in study.fit], None))
     empty = Fitted.at_start(effect, covered)
-    linear = _Linear.about(base, study, empty)
+    best = _attempt(base, base, study, empty)
+    for _ in range(ROUNDS):
+        # What is missing bent the physics of the base: choose anew beside what it is now.
+        again = _attempt(base, _beside(best.fit, study, effect.name), study, empty)
+        if not again.fit.error < BETTER * best.fit.error:
+            break
+        best = again
+    return best
+
+
+def _attempt(base: Fit, ground: Fit, study: Study, empty: Fitted) -> Candidate:
+    """Choose the smoothing beside the physics of ``ground``, refit, and judge against the base."""
+    linear = _Linear.about(ground, study, empty)
     stiffness = choose_stiffness(linear)
     change, freedom = linear.solution(stiffness)
     first = _filled(empty, linear, stiffness, change)
-    fit = fit_axis(base.axis.with_effect(first), study.fit)
-    either = sticks(base.axis) or sticks(fit.axis)
-    logs = study.holdout
-    if logs:
-        held = moving(logs, either)
-        pair = [residual(f.axis, logs)[held] for f in (base, fit)]
+    fit = fit_axis(ground.axis.with_effect(first), study.fit)
+    fit = _same_stiffness(fit, linear.force + linear.columns @ change, empty.effect)
+    if study.holdout:
+        held = moving(study.holdout, sticks(base.axis) or sticks(fit.axis))
+        pair = [residual(f.axis, study.holdout)[held] for f in (base, fit)]
     else:
         pair = [linear.left_out(s) for s in ({}, stiffness)]
-    _, least = linear.solution({})
     gain = np.log(np.sum(base.residual**2) / np.sum(fit.residual**2))
+    added = max(round(freedom - linear.solution({})[1]), 1)
     return Candidate(
-        effect=effect,
+        effect=empty.effect,
         axis=study.axis,
         fit=fit,
-        evidence=Evidence(
-            float(gain), max(round(freedom - least), 1), effective_samples(fit.residual)
-        ),
+        evidence=Evidence(float(gain), added, effective_samples(fit.residual)),
         gain=held_out_gain(pair[0], pair[1], fit.floor),
+    )
+
+
+def _same_stiffness(fit: Fit, expected: Array, effect: Effect) -> Fit:
+    """The fit with spreads for the noise that it left, so that a refit smooths as was chosen."""
+    fitted = fit.axis[effect.name]
+    ratio = coloured_noise(fit.residual) / coloured_noise(expected)
+    spreads = {part.spread: fitted.values[part.spread] * ratio for part in effect.parts}
+    return replace(
+        fit, axis=fit.axis.with_effect(replace(fitted, values={**fitted.values, **spreads}))
+    )
+
+
+def in_words(fitted: Fitted) -> str:
+    """What a description follows, and what it is not."""
+    used = [p.name for p in fitted.effect.parts if any(fitted.values[n] for n in p.strengths)]
+    what = f"follows {', '.join(used)}" if used else "found nothing to follow"
+    return (
+        f"{fitted.effect.name} is a description, not physics: it {what}, and holds only where the "
+        "fit logs went"
+    )
+
+
+def physics_alone(model: StageModel) -> StageModel:
+    """The stage without its descriptions: what they describe is to be explained anew."""
+    for name, axis in model.axes.items():
+        kept = tuple(f for f in axis.effects if not f.effect.is_description)
+        model = model.with_axis(name, replace(axis, effects=kept))
+    return model
+
+
+def _beside(fit: Fit, study: Study, effect: str) -> Fit:
+    """The fit with the description taken out and its physics as it is."""
+    kept = [i for i, c in enumerate(fit.scaling.where) if c.effect != effect]
+    axis = fit.axis.without(effect)
+    return replace(
+        fit,
+        axis=axis,
+        scaling=replace(fit.scaling, where=tuple(fit.scaling.where[i] for i in kept)),
+        residual=residual(axis, study.fit)[fit.kept],
+        jacobian=fit.jacobian[:, kept],
     )
 
 
@@ -185,5 +245,5 @@ def _filled(
         values.update({n: float(step[effect.name, n]) for n in part.strengths})
         spread = effect.parameter(part.spread)
         wanted = noise / stiffness[part.name]
-        values[part.spread] = float(min(max(wanted, spread.lower), spread.upper))
+        values[part.spread] = min(max(wanted, spread.lower), spread.upper)
     return replace(empty, values=values, fixed=frozenset(fixed))

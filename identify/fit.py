@@ -84,6 +84,11 @@ def _is_added(axis: AxisModel, c: Coordinate) -> bool:
     return effect.kind is not Kind.FRICTION and not effect.is_description
 
 
+def _describes(axis: AxisModel, c: Coordinate) -> bool:
+    """Whether it is a strength of a description."""
+    return bool(c.effect) and c.parameter.strength and axis[c.effect].effect.is_description
+
+
 def rms(values: Array) -> float:
     """Root of the mean square."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
@@ -116,6 +121,9 @@ class _Problem:
         self.pull = np.zeros(len(self.start))
         self.smooth = smoothing(axis, self.scaling.where)
         self.noise = 0.0
+        # A description is linear in its strengths: their columns are taken once.
+        self.constant = np.array([_describes(axis, c) for c in self.scaling.where], dtype=bool)
+        self.described = jacobian(axis, logs, self._where(self.constant))
 
     def set_priors(self, internal: Array) -> None:
         """Weigh the priors by the residual's size, its colour, and the force to be explained."""
@@ -131,10 +139,19 @@ class _Problem:
         self.pull = np.where(self.added, noise * size / expected, 0.0)
         self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD
 
+    def _where(self, mask: NDArray[np.bool_]) -> list[Coordinate]:
+        return [c for c, wanted in zip(self.scaling.where, mask, strict=True) if wanted]
+
+    def jacobian(self, axis: AxisModel) -> Array:
+        """Derivative of the residual by the free coordinates, (n, k) N per unit."""
+        columns = np.empty((len(self.kept), len(self.constant)))
+        columns[:, self.constant] = self.described
+        columns[:, ~self.constant] = jacobian(axis, self.logs, self._where(~self.constant))
+        return columns
+
     def columns(self, internal: Array) -> Array:
         axis = self.scaling.outside(self.axis, internal)
-        raw = jacobian(axis, self.logs, self.scaling.where)
-        return self.scaling.chain(axis, raw)[self.kept]
+        return self.scaling.chain(axis, self.jacobian(axis))[self.kept]
 
     def rows(self, internal: Array) -> Array:
         force = residual(self.scaling.outside(self.axis, internal), self.logs)[self.kept]
@@ -177,7 +194,7 @@ def _finish(problem: _Problem, internal: Array, outcome: Outcome) -> Fit:
         error=rms(force),
         floor=floor,
         residual=force,
-        jacobian=jacobian(axis, problem.logs, problem.scaling.where)[problem.kept],
+        jacobian=problem.jacobian(axis)[problem.kept],
         kept=problem.kept,
         begun=problem.axis,
     )
