@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from identify.candidates import Candidate
 from identify.evidence import BLOCKS, Evidence, effective_samples, held_out_gain
-from identify.fit import Fit, coloured_noise, fit_axis, sticks
+from identify.fit import Fit, fit_axis, sticks
 from identify.motion import excitation
 from identify.residual import jacobian, moving, residual
 from identify.smoothing import part_rows, smoothing
@@ -28,7 +28,7 @@ from twin.model import Coordinate, Fitted, StageModel
 
 Array = NDArray[np.float64]
 
-STIFFNESS = 10.0 ** np.arange(1.0, -5.1, -0.5)  # noise over spread, per root of samples; tried
+STIFFNESS = 10.0 ** np.arange(1.0, -5.1, -0.5)  # tried for each part
 WORTH = 0.99  # part of the squared left-out error that a further part must leave at most
 ROUNDS = 3  # of choosing the smoothing anew, at most
 BETTER = 0.95  # part of the error that another round must leave at most
@@ -58,21 +58,21 @@ class _Linear:
         alone = replace(base.axis, effects=(fitted,))
         new = jacobian(alone, study.fit, own)[base.kept]
         norms = np.linalg.norm(base.jacobian, axis=0)
-        rows = coloured_noise(base.residual) * smoothing(base.axis, where)
+        rows = smoothing(base.axis, where, len(base.residual))
         physics = rows.T @ rows + np.diag([*(RIDGE * norms) ** 2, *np.zeros(len(own))])
         return cls(
             where, base.residual, np.hstack([base.jacobian, new]), physics,
             {part.name: _penalty(part, effect.name, where) for part in effect.parts},
         )  # fmt: skip
 
-    def chosen(self, stiffness: Mapping[str, float]) -> tuple[NDArray[np.bool_], Array]:
+    def _chosen(self, stiffness: Mapping[str, float]) -> tuple[NDArray[np.bool_], Array]:
         """Which columns take part, and the penalty (k, k), at the stiffness of some parts."""
         used = ~np.any([mask for _, mask in self.parts.values()], axis=0)
         penalty = self.physics.copy()
         for name, value in stiffness.items():
             rows, mask = self.parts[name]
             used = used | mask
-            penalty += value**2 * rows
+            penalty += len(self.force) * value**2 * rows
         return used, penalty
 
     @cached_property
@@ -85,7 +85,7 @@ class _Linear:
 
     def left_out(self, stiffness: Mapping[str, float]) -> Array:
         """Residual (n,) N of every block when the others alone were fitted."""
-        used, penalty = self.chosen(stiffness)
+        used, penalty = self._chosen(stiffness)
         gram = sum(g for _, g, _ in self.blocks) + penalty
         gradient = sum(g for _, _, g in self.blocks)
         out = self.force.copy()
@@ -96,7 +96,7 @@ class _Linear:
 
     def solution(self, stiffness: Mapping[str, float]) -> tuple[Array, float]:
         """Change (k,) of all coordinates that fits best, and the degrees of freedom it takes."""
-        used, penalty = self.chosen(stiffness)
+        used, penalty = self._chosen(stiffness)
         columns = self.columns[:, used]
         gram = columns.T @ columns
         full = gram + penalty[np.ix_(used, used)]
@@ -141,10 +141,9 @@ def choose_stiffness(linear: _Linear) -> dict[str, float]:
 
 def _best(linear: _Linear, chosen: Mapping[str, float], name: str) -> tuple[float, str, float]:
     """Squared left-out error, name and stiffness of a part at its best beside the others."""
-    tried = STIFFNESS * np.sqrt(len(linear.force))
-    errors = [float(np.sum(linear.left_out({**chosen, name: v}) ** 2)) for v in tried]
+    errors = [float(np.sum(linear.left_out({**chosen, name: v}) ** 2)) for v in STIFFNESS]
     least = int(np.argmin(errors))
-    return errors[least], name, float(tried[least])
+    return errors[least], name, float(STIFFNESS[least])
 
 
 def describe(base: Fit, study: Study, effect: Effect) -> Candidate:
@@ -172,7 +171,6 @@ def _attempt(base: Fit, ground: Fit, study: Study, empty: Fitted) -> Candidate:
     change, freedom = linear.solution(stiffness)
     first = _filled(empty, linear, stiffness, change)
     fit = fit_axis(ground.axis.with_effect(first), study.fit)
-    fit = _same_stiffness(fit, linear.force + linear.columns @ change, empty.effect)
     if study.holdout:
         held = moving(study.holdout, sticks(base.axis) or sticks(fit.axis))
         pair = [residual(f.axis, study.holdout)[held] for f in (base, fit)]
@@ -186,16 +184,6 @@ def _attempt(base: Fit, ground: Fit, study: Study, empty: Fitted) -> Candidate:
         fit=fit,
         evidence=Evidence(float(gain), added, effective_samples(fit.residual)),
         gain=held_out_gain(pair[0], pair[1], fit.floor),
-    )
-
-
-def _same_stiffness(fit: Fit, expected: Array, effect: Effect) -> Fit:
-    """The fit with spreads for the noise that it left, so that a refit smooths as was chosen."""
-    fitted = fit.axis[effect.name]
-    ratio = coloured_noise(fit.residual) / coloured_noise(expected)
-    spreads = {part.spread: fitted.values[part.spread] * ratio for part in effect.parts}
-    return replace(
-        fit, axis=fit.axis.with_effect(replace(fitted, values={**fitted.values, **spreads}))
     )
 
 
@@ -233,17 +221,13 @@ def _beside(fit: Fit, study: Study, effect: str) -> Fit:
 def _filled(
     empty: Fitted, linear: _Linear, stiffness: Mapping[str, float], change: Array
 ) -> Fitted:
-    """The description with its strengths and spreads; parts left out are zero and held."""
-    effect = empty.effect
-    step = dict(zip(((c.effect, c.parameter.name) for c in linear.where), change, strict=True))
-    noise = coloured_noise(linear.force + linear.columns @ change)
+    """The description with its strengths and stiffness; parts left out are zero and held."""
+    step = {(c.effect, c.parameter.name): x for c, x in zip(linear.where, change, strict=True)}
     values, fixed = dict(empty.values), set(empty.fixed)
-    for part in effect.parts:
+    for part in empty.effect.parts:
         if part.name not in stiffness:
             fixed.update(part.strengths)
             continue
-        values.update({n: float(step[effect.name, n]) for n in part.strengths})
-        spread = effect.parameter(part.spread)
-        wanted = noise / stiffness[part.name]
-        values[part.spread] = min(max(wanted, spread.lower), spread.upper)
+        values.update({n: float(step[empty.effect.name, n]) for n in part.strengths})
+        values[part.stiffness] = stiffness[part.name]
     return replace(empty, values=values, fixed=frozenset(fixed))

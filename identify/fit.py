@@ -94,11 +94,6 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
 
 
-def coloured_noise(residual: Array) -> float:
-    """RMS (N) of white noise that as many samples would weigh as little as this residual (n,)."""
-    return rms(residual) * float(np.sqrt(len(residual) / effective_samples(residual)))
-
-
 class _Problem:
     """Residual and Jacobian of one fit in internal variables, with priors as extra rows.
 
@@ -119,8 +114,7 @@ class _Problem:
         self.added = np.array([_is_added(axis, c) for c in self.scaling.where], dtype=bool)
         self.centre = np.where(self.added & (not described(axis)), 0.0, self.start)
         self.pull = np.zeros(len(self.start))
-        self.smooth = smoothing(axis, self.scaling.where)
-        self.noise = 0.0
+        self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
         # A description is linear in its strengths: their columns are taken once.
         self.constant = np.array([_describes(axis, c) for c in self.scaling.where], dtype=bool)
         self.described = jacobian(axis, logs, self._where(self.constant))
@@ -132,7 +126,7 @@ class _Problem:
         inertia = axis.mass * np.concatenate([log.acceleration for log in self.logs])
         command = np.concatenate([log.command for log in self.logs])
         explained = rms((command - inertia)[self.kept])
-        self.noise = noise = coloured_noise(left)
+        noise = rms(left) * np.sqrt(len(left) / effective_samples(left))
         columns = self.columns(internal)
         size = np.linalg.norm(columns, axis=0) / np.sqrt(len(left))
         expected = max(PRIOR_FORCE * explained, noise)
@@ -156,11 +150,10 @@ class _Problem:
     def rows(self, internal: Array) -> Array:
         force = residual(self.scaling.outside(self.axis, internal), self.logs)[self.kept]
         pulled = self.pull * (internal - self.centre)
-        return np.concatenate([force, pulled, self.noise * (self.smooth @ internal)])
+        return np.concatenate([force, pulled, self.smooth @ internal])
 
     def slopes(self, internal: Array) -> Array:
-        rows = [self.columns(internal), np.diag(self.pull), self.noise * self.smooth]
-        return np.vstack(rows)
+        return np.vstack([self.columns(internal), np.diag(self.pull), self.smooth])
 
     def solve(self, internal: Array, tolerance: float) -> tuple[Array, bool]:
         """Least squares from these values; the solution and whether it converged."""

@@ -19,7 +19,7 @@ def described(axis: AxisModel) -> bool:
 
 
 def part_rows(part: Part, effect: str, where: Sequence[Coordinate]) -> Array:
-    """Rows (m, len(where)) that, times the values, are expected within the part's spread, N."""
+    """Rows (m, len(where)) of a part at unit stiffness; zero for what is not among ``where``."""
     index = {c.parameter.name: i for i, c in enumerate(where) if c.effect == effect}
     own = [index.get(name) for name in part.strengths]
     rows = part.rows(len(own))
@@ -30,10 +30,10 @@ def part_rows(part: Part, effect: str, where: Sequence[Coordinate]) -> Array:
     return out
 
 
-def smoothing(axis: AxisModel, where: Sequence[Coordinate]) -> Array:
-    """Rows (m, len(where)) 1/N that, times the values of those coordinates, are of order one."""
+def smoothing(axis: AxisModel, where: Sequence[Coordinate], samples: int) -> Array:
+    """Rows (m, len(where)) whose product with the values is N beside that many residuals in N."""
     rows = [
-        part_rows(part, f.effect.name, where) / f.values[part.spread]
+        np.sqrt(samples) * f.values[part.stiffness] * part_rows(part, f.effect.name, where)
         for f in axis.effects
         for part in f.effect.parts
     ]

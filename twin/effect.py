@@ -122,16 +122,16 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Part:
-    """Strengths of a description that belong to one curve, and how far they may spread.
+    """Strengths of a description that belong to one curve, and how little they may bend.
 
-    strengths: names, in order along the curve. spread: name of the parameter (of the strengths'
-    unit) that says how far; chosen from the data. rows: number of strengths n -> (m, n) such that
-    rows @ strengths are expected within that spread of zero.
+    strengths: names, in order along the curve. stiffness: name of the parameter (a ratio) that says
+    how little; chosen from the data. rows: number of strengths n -> (m, n) such that a fit adds the
+    square of stiffness x rows @ strengths to the mean square of the residual.
     """
 
     name: str
     strengths: tuple[str, ...]
-    spread: str
+    stiffness: str
     rows: Callable[[int], Any]
 
 

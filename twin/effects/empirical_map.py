@@ -1,17 +1,18 @@
 """What no physical effect explains, as smooth curves of position, speed, direction and time.
 
 F = A(x) + z D(x) + v/speed E(x) + B(v) + C(t/T). A description, not physics: it lowers the error
-and shows the shape of what is missing, but holds only where the logs went. A, D and E are piecewise linear over
-``elements`` equal intervals along the track; B over 16 intervals of sgn(v) sqrt(|v|/speed), finer
-near standstill; C over 12 intervals of the period T, closed to a ring. z is the direction with a
-memory of the last ``turn`` metres, dz/dt = v/turn - |v| z/turn, so that the force does not jump at
-a reversal. Beyond the covered travel and speed every curve holds its end value.
+and shows the shape of what is missing, but holds only where the logs went. A, D and E are piecewise
+linear over ``elements`` equal intervals along the track; B over 16 intervals of
+sgn(v) sqrt(|v|/speed), finer near standstill; C over 12 intervals of the period T, closed to a
+ring. z is the direction with a memory of the last ``turn`` metres, dz/dt = (v - |v| z)/turn, so
+that the force does not jump at a reversal. Beyond the covered travel and speed every curve holds
+its end value.
 
-Each curve is smoothed by its ``bend``: second differences of its knots are expected within it, and
-the knots themselves within bend times their number (P-splines: P. H. C. Eilers, B. D. Marx,
-"Flexible smoothing with B-splines and penalties", Statist. Sci. 11, 1996). T is the strongest line
-in the spectrum of the force; t counts from the start of each log, so C only helps where what
-repeats keeps its phase from log to log.
+Each curve is smoothed by its ``stiff``: a fit adds stiff^2 times the squared second differences of
+its knots, and their squares over the square of their number, to the mean square of the residual
+(P-splines: P. H. C. Eilers, B. D. Marx, "Flexible smoothing with B-splines and penalties", Statist.
+Sci. 11, 1996). T is the strongest line in the spectrum of the force; t counts from the start of
+each log, so C only helps where what repeats keeps its phase from log to log.
 """
 
 from functools import cache
@@ -100,11 +101,11 @@ def of_size(elements: int) -> Effect:
         excited_by="passes over the whole travel at several speeds in both directions",
         of_size=of_size,
         parts=(
-            Part("position", own["x"], "bend_x", smooth),
-            Part("direction and position", own["d"], "bend_d", smooth),
-            Part("speed and position", own["e"], "bend_e", smooth),
-            Part("speed", own["v"], "bend_v", smooth),
-            Part("time phase", own["t"], "bend_t", smooth_ring),
+            Part("position", own["x"], "stiff_x", smooth),
+            Part("direction and position", own["d"], "stiff_d", smooth),
+            Part("speed and position", own["e"], "stiff_e", smooth),
+            Part("speed", own["v"], "stiff_v", smooth),
+            Part("time phase", own["t"], "stiff_t", smooth_ring),
         ),
     )
 
@@ -133,7 +134,7 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
             start_rule=lambda e: 1.0 / e.lines[0] if e.lines else 1.0,
         ),
         *(
-            Parameter(f"bend_{key}", "N", 1e-3, 1e-12, 1e6, f"bend expected of {what}", fixed=True)
+            Parameter(f"stiff_{key}", "N", 1e-3, 1e-12, 1e6, f"bend expected of {what}", fixed=True)
             for key, what in (("x", "A"), ("d", "D"), ("e", "E"), ("v", "B"), ("t", "C"))
         ),
     )  # fmt: skip

@@ -6,8 +6,8 @@ which is what few data can tell. q is the place along the covered travel, 0..1; 
 polynomial; z1 and z2 the direction with a memory of the distance since the reversal, short and
 long, dz/dt = (v - |v| z)/reach. A description, not physics: it is learned from the logs, holds only
 where they went, and its numbers mean nothing one by one. Beyond the covered travel and speed it
-holds its value at the edge. ``size`` is what the c_ijab, times their product above, are expected
-within (ridge).
+holds its value at the edge. A fit adds ``stiff``^2 times the squares of the c_ijab, each times its
+product above, to the mean square of the residual (ridge).
 D. Dung, V. Temlyakov, T. Ullrich, Hyperbolic Cross Approximation, Birkhaeuser (2018).
 """
 
@@ -99,12 +99,12 @@ EFFECT = Effect(
             "reach2", "m", 0.015, 1e-9, 10.0, "long memory of a reversal", fixed=True,
             start_rule=lambda e: 0.05 * e.travel,
         ),
-        Parameter("size", "N", 1.0, 1e-12, 1e6, "size expected of the coefficients", fixed=True),
+        Parameter("stiff", "1", 0.1, 1e-9, 1e9, "ridge on the coefficients", fixed=True),
         *(Parameter(n, "N", 0.0, -1e4, 1e4, "a coefficient", strength=True) for n in ORDERS),
     ),
     states=("z1", "z2"),
     law=law,
     fingerprint="what is left depends on several coordinates together",
     excited_by="varied motion over the whole range of position, speed and reversals",
-    parts=(Part("all coordinates", tuple(ORDERS), "size", ridge),),
+    parts=(Part("all coordinates", tuple(ORDERS), "stiff", ridge),),
 )  # fmt: skip
