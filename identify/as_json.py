@@ -9,6 +9,7 @@ from typing import Any
 from identify.candidates import Candidate
 from identify.compare import AxisComparison
 from identify.uncertainty import Estimate
+from identify.whiteness import ResidualTests
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
 from twin.log.check import CheckReport
@@ -75,10 +76,34 @@ def _axis_comparison(c: AxisComparison) -> dict[str, Any]:
             m.coordinate: {
                 "unit": m.unit, "centre": m.centre.tolist(), "force_error": m.rms.tolist(),
                 "mean": m.mean.tolist(), "share": m.share.tolist(),
+                "noise_floor": m.floor.tolist(),
             }
             for m in c.maps
         },
         "worst": [r.in_words() for r in c.worst],
+        "residual_tests": _residual_tests(c.tests),
+    }  # fmt: skip
+
+
+def _residual_tests(t: ResidualTests) -> dict[str, Any]:
+    return {
+        "tested": "force residual",
+        "loop": t.loop.name.lower(),
+        "reason": t.reason,
+        "samples": t.samples,
+        "passed": t.passes,
+        "histogram": {
+            "edges": t.edges.tolist(), "unit": "N", "density": t.density.tolist(),
+            "density_unit": "1/N", "normal_rms": t.floor, "share_within_90": t.within,
+        },
+        "correlations": {
+            c.signal: {
+                "lag": c.lag.tolist(), "lag_unit": "s", "value": c.value.tolist(),
+                "tested": c.tested.tolist(), "bound_90": c.bound, "limit_all_99": c.limit,
+                "share_outside": c.outside, "passed": c.passes,
+            }
+            for c in t.correlations
+        },
     }  # fmt: skip
 
 

@@ -49,6 +49,8 @@ def compare_text(result: Comparison) -> str:
         lines += [f"  worst: {region.in_words()}" for region in c.worst]
         if not c.worst:
             lines.append("  nowhere does the error stand above the noise")
+        lines += [f"  {test.in_words()}" for test in c.tests.correlations]
+        lines.append(f"  {c.tests.reason}")
     return "\n".join(lines)
 
 

@@ -78,6 +78,15 @@ class Correlation:
         """Whether no tested value is beyond the limit."""
         return bool(np.all(np.abs(self.value[self.tested]) < self.limit))
 
+    def in_words(self) -> str:
+        """E.g. "force residual against command: 12 % of the lags beyond the 90 % bounds, ..."."""
+        other = "its own past" if self.signal == "residual" else self.signal
+        verdict = "as of a right model" if self.passes else "structure is left"
+        return (
+            f"force residual against {other}: {100 * self.outside:.0f} % of the lags beyond the "
+            f"90 % bounds of ±{self.bound:.2g}, {verdict}"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class ResidualTests:
@@ -177,9 +186,9 @@ def _series(log: Windowed, force: Array, kept: NDArray[np.bool_]) -> dict[str, A
 def correlation(
     signal: str, residual: Sequence[Array], other: Sequence[Array], spacing: float, loop: Loop
 ) -> Correlation:
-    """Correlation of residual and signal, log by log (n_i,) each, ``spacing`` s from one to the next.
+    """Correlation of residual and signal, log by log (n_i,) each; values not numbers are left out.
 
-    Values that are not numbers are left out.
+    spacing: s, from one value to the next.
     """
     most = max(min(MOST_LAGS, min(map(len, residual)) // 4), 1)
     own = signal == "residual"
@@ -195,7 +204,7 @@ def correlation(
     root = np.sqrt(max(n, 1))
     return Correlation(
         signal=signal,
-        lag=lags * spacing,
+        lag=np.asarray(spacing * lags),
         value=products / max(power, 1e-300),
         tested=tested,
         bound=float(norm.ppf(0.5 + WITHIN / 2.0) / root),

@@ -1,0 +1,57 @@
+"""Misfit maps: RMS force error along each coordinate and by frequency, with the noise band."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+from identify.compare import AxisComparison, MisfitMap
+from identify.report.blocks import Picture
+from identify.report.drawing import BLUE, FLOOR, GREY, new_figure
+from identify.report.units import Scale, title_case
+
+COLUMNS = 3
+NAMES = {"velocity": "Speed", "distance_since_reversal": "Since reversal"}
+
+
+def picture(axis: AxisComparison) -> Picture:
+    """RMS force error against every coordinate of an axis."""
+    caption = (
+        "RMS force error by region; the grey band is what noise alone leaves there. By frequency "
+        "it is the error in bands of half an octave, whatever the window."
+    )
+    return Picture(_figure(axis), caption)
+
+
+def _figure(axis: AxisComparison) -> Figure:
+    shown = [m for m in axis.maps if np.ptp(m.low) > 0.0 and m.coordinate != "direction"]
+    rows = -(-len(shown) // COLUMNS)
+    figure = new_figure(0.4 + 1.9 * rows)
+    grid = figure.subplots(rows, COLUMNS, squeeze=False, sharey=True)
+    scale = Scale.of("N", np.concatenate([m.rms for m in shown]))
+    for axes, found in zip(grid.ravel(), shown, strict=False):
+        _draw(axes, found, scale)
+    for axes in grid.ravel()[len(shown) :]:
+        axes.remove()
+    for axes in grid[:, 0]:
+        axes.set_ylabel(scale.label("RMS error"))
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
+    return figure
+
+
+def _draw(axes: Axes, found: MisfitMap, scale: Scale) -> None:
+    along = Scale.of(found.unit, np.concatenate([found.low, found.high]))
+    edges = along(np.append(found.low, found.high[-1]))
+    visited = np.where(found.visited > 0.0, found.rms, np.nan)
+    axes.stairs(scale(found.floor), edges, fill=True, color=FLOOR, alpha=0.7, label="noise floor")
+    axes.stairs(scale(visited), edges, color=BLUE, linewidth=1.4, label="force error, RMS")
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel(along.label(NAMES.get(found.coordinate, title_case(found.coordinate))))
+    if found.coordinate == "frequency":
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0,)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_locator(NullLocator())
+    axes.tick_params(color=GREY)
