@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from identify.candidates import Candidate
+from identify.describe import described_labels, in_words
 from identify.uncertainty import Estimate
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
@@ -23,8 +24,13 @@ def fit_text(result: FitResult) -> str:
             f"(ratio {fit.ratio:.2f})"
         )
         lines.append(f"  {fit.outcome.value}")
-        for e in result.estimates[axis]:
-            lines.append(f"  {e.label:34s} {_with_interval(e)}")
+        hidden = described_labels(fit.axis)
+        lines += [
+            f"  {e.label:34s} {_with_interval(e)}"
+            for e in result.estimates[axis]
+            if e.label not in hidden
+        ]
+        lines += [f"  {in_words(f)}" for f in fit.axis.effects if f.effect.is_description]
     return "\n".join(lines)
 
 
@@ -82,8 +88,8 @@ def advice() -> str:
     """What lowers the error where no physical effect does."""
     known = [e.name for e in load_catalogue().values() if e.is_description]
     return (
-        f"`twin add` with {' or '.join(known)} describes what is left, without explaining it, and "
-        "lowers the error"
+        f"twin add {' or '.join(known)} describes what is left without explaining it, and lowers "
+        "the error"
     )
 
 

@@ -24,7 +24,7 @@ from identify.residual import jacobian, moving, residual
 from identify.smoothing import part_rows, smoothing
 from identify.study import Study
 from twin.effect import Effect, Part
-from twin.model import Coordinate, Fitted, StageModel
+from twin.model import AxisModel, Coordinate, Fitted, StageModel
 
 Array = NDArray[np.float64]
 
@@ -194,6 +194,16 @@ def in_words(fitted: Fitted) -> str:
     return (
         f"{fitted.effect.name} is a description, not physics: it {what}, and holds only where the "
         "fit logs went"
+    )
+
+
+def described_labels(axis: AxisModel) -> frozenset[str]:
+    """Labels of the strengths of descriptions, which mean nothing one by one."""
+    return frozenset(
+        f"{f.effect.name}.{p.name}"
+        for f in axis.effects
+        if f.effect.is_description
+        for p in f.effect.strengths
     )
 
 

@@ -25,7 +25,6 @@ from twin.log import Log
 from twin.model import AxisModel, Fitted, Hardware, StageModel
 from twin.simulator import ReducedStage
 
-
 HARDWARE = Hardware(
     travel=(-0.1, 0.1), encoder_noise=1e-9, current_noise=1e-3, force_constant=10.0, velocity=0.2,
     acceleration=2.0, jerk=100.0,
