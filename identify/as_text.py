@@ -56,7 +56,7 @@ def compare_text(result: Comparison) -> str:
         if not c.worst:
             lines.append("  nowhere does the error stand above the noise")
         lines += [f"  {test.in_words()}" for test in c.tests.correlations]
-        lines.append(f"  {c.tests.reason}")
+    lines += dict.fromkeys(c.tests.reason for c in result.axes.values())
     return "\n".join(lines)
 
 

@@ -33,8 +33,8 @@ class MisfitMap:
     """Misfit along one coordinate: bin centres (n,), mean and RMS force error (n,) N.
 
     share (n,): part of the whole squared force error in each bin; visited (n,): part of the time,
-    or of the bands. floor (n,): RMS of what noise alone leaves in each bin, N. By frequency there
-    is no mean.
+    or by frequency of the squared force that is to be explained. floor (n,): RMS of what noise
+    alone leaves in each bin, N. By frequency there is no mean.
     """
 
     coordinate: str
@@ -195,7 +195,7 @@ def misfit_by_frequency(axis: AxisModel, logs: Sequence[Windowed]) -> MisfitMap:
         mean=np.full(len(square), np.nan),
         rms=found.error,
         share=square / max(square.sum(), np.finfo(float).tiny),
-        visited=np.full(len(square), 1.0 / len(square)),
+        visited=found.to_explain**2 / max(np.sum(found.to_explain**2), np.finfo(float).tiny),
         floor=found.noise,
     )
 

@@ -24,12 +24,16 @@ OCTAVE_PARTS = 2  # bands an octave
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """RMS force by frequency band: low, high (k,) Hz; error and noise (k,) N."""
+    """RMS force by frequency band: low, high (k,) Hz; error, noise and to_explain (k,) N.
+
+    to_explain: command less inertia, what the effects must account for.
+    """
 
     low: Array
     high: Array
     error: Array
     noise: Array
+    to_explain: Array
 
 
 def bands(axis: AxisModel, logs: Sequence[Windowed]) -> Bands:
@@ -42,32 +46,34 @@ def bands(axis: AxisModel, logs: Sequence[Windowed]) -> Bands:
     spectra = [_spectrum(axis, log) for log in logs]
     weights = [log.motion.time[-1] for log in logs]
     frequency = min((s[0] for s in spectra), key=lambda f: f[-1])
-    error, noise = (
+    powers = [
         np.average([np.interp(frequency, s[0], s[i]) for s in spectra], axis=0, weights=weights)
-        for i in (1, 2)
-    )
+        for i in (1, 2, 3)
+    ]
     edges = _edges(frequency)
     width = frequency[1] - frequency[0]
     first = np.searchsorted(frequency, edges[:-1])
     stop = np.searchsorted(frequency, edges[-1])
-    sums = [np.sqrt(np.add.reduceat(p[:stop], first) * width) for p in (error, noise)]
+    sums = [np.sqrt(np.add.reduceat(p[:stop], first) * width) for p in powers]
     return Bands(edges[:-1], edges[1:], *sums)
 
 
-def _spectrum(axis: AxisModel, log: Windowed) -> tuple[Array, Array, Array]:
-    """Frequencies Hz, power of error and of noise, N^2/Hz, of one log."""
+def _spectrum(axis: AxisModel, log: Windowed) -> tuple[Array, Array, Array, Array]:
+    """Of one log: frequencies Hz, power N^2/Hz of error, noise and what is to be explained."""
     motion = log.motion
     short = Windowed.of(motion, SHORTEST * motion.period)
     force = np.where(moving([short], sticks(axis)), residual(axis, [short]), 0.0)
     period = short.window.stride * motion.period
     segment = min(round(SEGMENT / period), len(force))
-    frequency, power = welch(force, 1.0 / period, nperseg=segment, detrend="constant")
+    both = np.stack([force, short.command - axis.mass * short.acceleration])
+    frequency, power = welch(both, 1.0 / period, nperseg=segment, detrend="constant")
     ratio = round(period / motion.sample_period)
     passed = short.window.response(motion.sample_period, segment * ratio)[: len(frequency)]
     seen = (passed > SEEN) & (frequency > 0.0)
     at, noise, _ = noise_spectrum(axis, motion)
     frequency = frequency[seen]
-    return frequency, power[seen] / passed[seen], np.interp(frequency, at, noise)
+    error, explain = power[:, seen] / passed[seen]
+    return frequency, error, np.interp(frequency, at, noise), explain
 
 
 def _edges(frequency: Array) -> Array:

@@ -81,7 +81,7 @@ class Correlation:
     def in_words(self) -> str:
         """E.g. "force residual against command: 12 % of the lags beyond the 90 % bounds, ..."."""
         other = "its own past" if self.signal == "residual" else self.signal
-        verdict = "as of a right model" if self.passes else "structure is left"
+        verdict = "no more than by chance" if self.passes else "structure is left"
         return (
             f"force residual against {other}: {100 * self.outside:.0f} % of the lags beyond the "
             f"90 % bounds of ±{self.bound:.2g}, {verdict}"

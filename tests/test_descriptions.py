@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from effect_runs import Motion, forces
 from machines import one_axis
 from unexplained_effects import foreign
 
@@ -157,3 +158,15 @@ def test_a_physical_effect_takes_the_place_of_a_description(tmp_path: Path) -> N
     assert better.kept
     assert MAP not in better.model.axes["x"].names
     assert any(MAP in note for note in better.notes)
+
+
+@DESCRIPTIONS
+def test_beyond_the_covered_travel_it_says_nothing(name: str) -> None:
+    effect = CATALOGUE[name]
+    part = effect.parts[0].strengths  # those by position
+    fitted = Fitted.at_start(effect, dict.fromkeys(part, 0.1))
+    x = np.array([0.15 - 1e-9, 0.15 + 0.3 * 0.5 / 41, 0.17, -0.17])
+    found = forces([fitted], Motion(1e-3, x, np.full(4, 0.1), np.zeros(4)))[name]
+    assert abs(found[0]) > 0.05
+    assert 0.0 < found[1] / found[0] < 1.0
+    assert not found[2:].any()

@@ -93,7 +93,7 @@ def logs() -> dict[str, Log]:
     return {"run": simulate(STAGE, "tracking", seed=3, duration=20.0)}
 
 
-def tested(stage, logs):
+def fitted_and_tested(stage, logs):
     result = fit(stage, logs)
     found, study = result.fits["x"], result.studies["x"]
     force = residual(found.axis, study.fit)
@@ -101,7 +101,7 @@ def tested(stage, logs):
 
 
 def test_the_twins_own_log_passes_and_fits_the_normal_of_the_floor(logs):
-    found = tested(STAGE, logs)
+    found = fitted_and_tested(STAGE, logs)
     assert found.passes
     assert found.loop is Loop.CLOSED
     assert found.within == pytest.approx(0.9, abs=0.06)
@@ -110,7 +110,7 @@ def test_the_twins_own_log_passes_and_fits_the_normal_of_the_floor(logs):
 
 def test_a_model_that_lacks_an_effect_fails(logs):
     poor = STAGE.with_axis("x", STAGE.axes["x"].without("cable_slab"))
-    found = tested(poor, logs)
+    found = fitted_and_tested(poor, logs)
     assert not any(c.passes for c in found.correlations)
     assert found.within < 0.3
 

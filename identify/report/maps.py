@@ -12,8 +12,14 @@ from identify.report.blocks import Picture
 from identify.report.drawing import BLUE, FLOOR, GREY, new_figure
 from identify.report.units import Scale, title_case
 
-COLUMNS = 3
-NAMES = {"velocity": "Speed", "distance_since_reversal": "Since reversal"}
+COLUMNS = 4
+NAMES = {
+    "velocity": "Speed",
+    "distance_since_reversal": "Since reversal",
+    "other_axis_position": "Other axis",
+    "other_axis_velocity": "Other axis",
+    "other_axis_acceleration": "Other axis",
+}
 
 
 def picture(axis: AxisComparison) -> Picture:
@@ -46,7 +52,9 @@ def _draw(axes: Axes, found: MisfitMap, scale: Scale) -> None:
     edges = along(np.append(found.low, found.high[-1]))
     visited = np.where(found.visited > 0.0, found.rms, np.nan)
     axes.stairs(scale(found.floor), edges, fill=True, color=FLOOR, alpha=0.7, label="noise floor")
-    axes.stairs(scale(visited), edges, color=BLUE, linewidth=1.4, label="force error, RMS")
+    axes.stairs(
+        scale(visited), edges, baseline=None, color=BLUE, linewidth=1.4, label="force error"
+    )
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel(along.label(NAMES.get(found.coordinate, title_case(found.coordinate))))
     if found.coordinate == "frequency":

@@ -5,8 +5,8 @@ and shows the shape of what is missing, but holds only where the logs went. A, D
 linear over ``elements`` equal intervals along the track; B over 16 intervals of
 sgn(v) sqrt(|v|/speed), finer near standstill; C over 12 intervals of the period T, closed to a
 ring. z is the direction with a memory of the last ``turn`` metres, dz/dt = (v - |v| z)/turn, so
-that the force does not jump at a reversal. Beyond the covered travel and speed every curve holds
-its end value.
+that the force does not jump at a reversal. Beyond the covered travel A, D and E fade to zero within
+one interval; beyond the covered speed B and E hold their end value.
 
 Each curve is smoothed by its ``stiff``: a fit adds stiff^2 times the squared second differences of
 its knots, and their squares over the square of their number, to the mean square of the residual
@@ -30,11 +30,17 @@ PHASES = 12
 
 @register_jitable
 def curve(p, first, intervals, place):
-    """Piecewise-linear curve through equally spaced knots, place 0..1; beyond, its end value."""
+    """Piecewise-linear curve through even knots at a place 0..1; beyond, its end value."""
     along = min(max(place, 0.0), 1.0) * intervals
     left = min(int(along), intervals - 1)
     low = p[first + left]
     return low + (along - left) * (p[first + left + 1] - low)
+
+
+@register_jitable
+def inside(place, margin):
+    """1 at a place 0..1, falling to zero within a margin beyond."""
+    return max(1.0 - max(-place, place - 1.0, 0.0) / margin, 0.0)
 
 
 @register_jitable
@@ -56,10 +62,13 @@ def law(p, s, io):
     turning = KNOTS + count + 1
     braking = turning + count + 1
     speeds = braking + count + 1
-    io[OUT] = (
+    along = (
         curve(p, KNOTS, count, place)
         + direction * curve(p, turning, count, place)
         + relative * curve(p, braking, count, place)
+    )
+    io[OUT] = (
+        inside(place, 1.0 / count) * along
         + curve(p, speeds, SPEEDS - 1, 0.5 + copysign(0.5 * sqrt(abs(relative)), relative))
         + ring(p, speeds + SPEEDS, io[TIME] / p[5])
     )

@@ -5,9 +5,9 @@ F = sum c_ijab cos(pi i q) T_j(v/speed) z1^a z2^b over the hyperbolic cross
 which is what few data can tell. q is the place along the covered travel, 0..1; T_j a Chebyshev
 polynomial; z1 and z2 the direction with a memory of the distance since the reversal, short and
 long, dz/dt = (v - |v| z)/reach. A description, not physics: it is learned from the logs, holds only
-where they went, and its numbers mean nothing one by one. Beyond the covered travel and speed it
-holds its value at the edge. A fit adds ``stiff``^2 times the squares of the c_ijab, each times its
-product above, to the mean square of the residual (ridge).
+where they went, and its numbers mean nothing one by one. Beyond the covered travel it fades to zero
+within a 24th of it; beyond the covered speed it holds its value. A fit adds ``stiff``^2 times the
+squares of the c_ijab, each times its product above, to the mean square of the residual (ridge).
 D. Dung, V. Temlyakov, T. Ullrich, Hyperbolic Cross Approximation, Birkhaeuser (2018).
 """
 
@@ -42,7 +42,9 @@ def series(p, first, count, wave):
 
 
 def law(p, s, io):
-    wave = cos(pi * min(max((io[X] - p[0]) / p[1], 0.0), 1.0))
+    place = (io[X] - p[0]) / p[1]
+    inside = max(1.0 - CROSS * max(-place, place - 1.0, 0.0), 0.0)
+    wave = cos(pi * min(max(place, 0.0), 1.0))
     speed = min(max(io[V] / p[2], -1.0), 1.0)
     short = remembered(s, 0, io, p[3])
     long = remembered(s, 1, io, p[4])
@@ -55,7 +57,7 @@ def law(p, s, io):
                 force += factor * series(p, at, count, wave)
                 at += count
         now, following = following, 2.0 * speed * following - now
-    io[OUT] = force
+    io[OUT] = inside * force
 
 
 ORDERS = {
