@@ -16,12 +16,13 @@ from identify.whiteness import Correlation, ResidualTests
 
 
 def section(subject: Subject) -> Section:
-    """A picture for each axis, and what it says."""
+    """A picture for each axis, what it says, and why this residual is the one tested."""
     blocks: list[Block] = []
     for axis in subject.axes:
         if heading := subject.heading(axis.axis):
             blocks.append(Heading(heading))
         blocks += _blocks(axis)
+    blocks.append(Listing(tuple(dict.fromkeys(axis.tests.reason for axis in subject.axes))))
     return Section("tests", "Is what is left noise?", blocks)
 
 
@@ -35,7 +36,7 @@ def _blocks(axis: AxisComparison) -> list[Block]:
     )
     words = [c.in_words() for c in tests.correlations]
     items = [f"{w[:1].upper()}{w[1:]}." for w in words]
-    return [Picture(_figure(tests), caption), Listing([*items, tests.reason])]
+    return [Picture(_figure(tests), caption), Listing(items)]
 
 
 def _figure(tests: ResidualTests) -> Figure:
