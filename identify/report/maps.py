@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -54,7 +56,7 @@ def _draw(axes: Axes, found: MisfitMap, scale: Scale, lowest: float) -> None:
     edges = along(np.append(found.low, found.high[-1]))
     visited = np.where(found.visited > 0.0, found.rms, np.nan)
     low = 0.5 * float(scale(lowest))
-    noise = {"fill": True, "color": FLOOR, "alpha": 0.7, "label": "noise floor"}
+    noise: dict[str, Any] = {"fill": True, "color": FLOOR, "alpha": 0.7, "label": "noise floor"}
     axes.stairs(scale(found.floor), edges, baseline=low, **noise)
     axes.stairs(
         scale(visited), edges, baseline=None, color=BLUE, linewidth=1.4, label="force error"
