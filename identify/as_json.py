@@ -10,6 +10,7 @@ from identify.candidates import Candidate
 from identify.compare import AxisComparison
 from identify.diagnose import Step
 from identify.uncertainty import Estimate
+from identify.whiteness import ResidualTests
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
 from twin.log.check import CheckReport
@@ -76,10 +77,34 @@ def _axis_comparison(c: AxisComparison) -> dict[str, Any]:
             m.coordinate: {
                 "unit": m.unit, "centre": m.centre.tolist(), "force_error": m.rms.tolist(),
                 "mean": m.mean.tolist(), "share": m.share.tolist(),
+                "noise_floor": m.floor.tolist(),
             }
             for m in c.maps
         },
         "worst": [r.in_words() for r in c.worst],
+        "residual_tests": _residual_tests(c.tests),
+    }  # fmt: skip
+
+
+def _residual_tests(t: ResidualTests) -> dict[str, Any]:
+    return {
+        "tested": "force residual",
+        "loop": t.loop.name.lower(),
+        "reason": t.reason,
+        "samples": t.samples,
+        "passed": t.passes,
+        "histogram": {
+            "edges": t.edges.tolist(), "unit": "N", "density": t.density.tolist(),
+            "density_unit": "1/N", "normal_rms": t.floor, "share_within_90": t.within,
+        },
+        "correlations": {
+            c.signal: {
+                "lag": c.lag.tolist(), "lag_unit": "s", "value": c.value.tolist(),
+                "tested": c.tested.tolist(), "bound_90": c.bound, "limit_all_99": c.limit,
+                "share_outside": c.outside, "passed": c.passes,
+            }
+            for c in t.correlations
+        },
     }  # fmt: skip
 
 
@@ -138,6 +163,7 @@ def add_json(result: Addition) -> dict[str, Any]:
     return {
         "effect": step.effect,
         "axis": step.axis,
+        "is_description": result.candidate.effect.is_description,
         "kept": result.kept,
         "fit_error_before": step.fit_error_before,
         "fit_error_after": step.fit_error_after,
@@ -159,6 +185,7 @@ def effect_json(effect: Effect) -> dict[str, Any]:
     return {
         "name": effect.name,
         "kind": effect.kind.name.lower(),
+        "is_description": effect.is_description,
         "summary": effect.summary,
         "equation": effect.equation,
         "source": effect.source,

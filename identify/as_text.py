@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from identify.candidates import Candidate
+from identify.describe import described_labels, in_words
 from identify.diagnose import Step
 from identify.uncertainty import Estimate
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
+from twin.effects import load_catalogue
 from twin.log.check import CheckReport
 
 
@@ -23,8 +25,13 @@ def fit_text(result: FitResult) -> str:
             f"(ratio {fit.ratio:.2f})"
         )
         lines.append(f"  {fit.outcome.value}")
-        for e in result.estimates[axis]:
-            lines.append(f"  {e.label:34s} {_with_interval(e)}")
+        hidden = described_labels(fit.axis)
+        lines += [
+            f"  {e.label:34s} {_with_interval(e)}"
+            for e in result.estimates[axis]
+            if e.label not in hidden
+        ]
+        lines += [f"  {in_words(f)}" for f in fit.axis.effects if f.effect.is_description]
     return "\n".join(lines)
 
 
@@ -49,6 +56,8 @@ def compare_text(result: Comparison) -> str:
         lines += [f"  worst: {region.in_words()}" for region in c.worst]
         if not c.worst:
             lines.append("  nowhere does the error stand above the noise")
+        lines += [f"  {test.in_words()}" for test in c.tests.correlations]
+    lines += dict.fromkeys(c.tests.reason for c in result.axes.values())
     return "\n".join(lines)
 
 
@@ -71,6 +80,7 @@ def diagnose_text(result: Diagnosis) -> str:
                 f"  {100 * s.share_of_error:.0f} % of the squared error depends on "
                 f"{s.depends_on.replace('_', ' ')}{again}"
             )
+            lines.append(f"  {advice()}")
         lines += [_ranking_line(c) for c in d.ranking[:4]]
         lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
     return "\n".join(lines)
@@ -82,6 +92,15 @@ def _step_line(number: int, step: Step) -> str:
     return (
         f"  step {number}: with {step.candidate.effect.name} the held-out error falls from "
         f"{gain.before:.4g} to {gain.after:.4g} N{dropped}"
+    )
+
+
+def advice() -> str:
+    """What lowers the error where no physical effect does."""
+    known = [e.name for e in load_catalogue().values() if e.is_description]
+    return (
+        f"twin add {' or '.join(known)} describes what is left without explaining it, and lowers "
+        "the error"
     )
 
 

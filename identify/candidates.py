@@ -64,7 +64,9 @@ def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
     return [
         e
         for e in catalogue.values()
-        if e.name not in axis.names and (e.kind is not Kind.MODIFIER or has_friction)
+        if e.name not in axis.names
+        and (e.kind is not Kind.MODIFIER or has_friction)
+        and not e.is_description
     ]
 
 

@@ -12,8 +12,10 @@ from identify.fit import rms, sticks
 from identify.freerun import free_run, rms_error
 from identify.noise import noise_floor
 from identify.residual import Windowed, moving, residual
+from identify.spectrum import bands
 from identify.structure import UNITS, gathered
 from identify.study import Study
+from identify.whiteness import ResidualTests, loop_of, residual_tests
 from twin.effect import Kind
 from twin.log import Log
 from twin.model import AxisModel, StageModel
@@ -30,7 +32,9 @@ PITCH = 0.034  # m, of the rollers, where the model has no other
 class MisfitMap:
     """Misfit along one coordinate: bin centres (n,), mean and RMS force error (n,) N.
 
-    share (n,): part of the whole squared force error in each bin; visited (n,): part of the time.
+    share (n,): part of the whole squared force error in each bin; visited (n,): part of the time,
+    or by frequency of the squared force that is to be explained. floor (n,): RMS of what noise
+    alone leaves in each bin, N. By frequency there is no mean.
     """
 
     coordinate: str
@@ -42,6 +46,7 @@ class MisfitMap:
     rms: Array
     share: Array
     visited: Array
+    floor: Array
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ class AxisComparison:
     """One axis over some logs.
 
     force_error: N RMS of the windowed residual, by log. floor: N. position_error: m RMS of the free
-    run, by log. residual (n,) N, time (n,) s in its log, coordinates name -> (n,). maps, worst.
+    run, by log. residual (n,) N, coordinates name -> (n,). maps, worst regions, residual tests.
     """
 
     axis: str
@@ -86,6 +91,7 @@ class AxisComparison:
     coordinates: Mapping[str, Array]
     maps: Sequence[MisfitMap]
     worst: Sequence[Region]
+    tests: ResidualTests
 
     @property
     def total_error(self) -> float:
@@ -104,12 +110,13 @@ def compare_axis(
     """Force errors of one axis over the study's fit logs, with maps of where they are."""
     axis = model.axes[study.axis]
     kept = moving(study.fit, sticks(axis))
-    force = residual(axis, study.fit)
+    every = residual(axis, study.fit)
     floor = noise_floor(axis, [(w.motion, w.window) for w in study.fit])
     where = gathered(study.fit)
     where["roller_phase"] = np.mod(where["position"], roller_pitch(axis))
-    force, where = force[kept], {k: v[kept] for k, v in where.items()}
-    maps = [misfit_map(name, force, values) for name, values in where.items()]
+    force, where = every[kept], {k: v[kept] for k, v in where.items()}
+    maps = [misfit_map(name, force, values, floor) for name, values in where.items()]
+    maps.append(misfit_by_frequency(axis, study.fit))
     noise = float(np.mean([w.motion.position_noise for w in study.fit]))
     return AxisComparison(
         axis=study.axis,
@@ -121,7 +128,8 @@ def compare_axis(
         logs=study.fit,
         coordinates=where,
         maps=maps,
-        worst=worst_regions(maps, floor),
+        worst=worst_regions(maps),
+        tests=residual_tests(study.fit, every, kept, floor, loop_of(logs, study.axis)),
     )
 
 
@@ -150,8 +158,8 @@ def roller_pitch(axis: AxisModel) -> float:
     return PITCH
 
 
-def misfit_map(name: str, residual: Array, coordinate: Array) -> MisfitMap:
-    """Misfit of a residual (n,) N over bins of equal width of a coordinate (n,)."""
+def misfit_map(name: str, residual: Array, coordinate: Array, floor: float) -> MisfitMap:
+    """Misfit of a residual (n,) N over bins of equal width of a coordinate (n,); floor in N."""
     if name == "direction":
         edges = np.array([-1.5, 0.0, 1.5])
     else:
@@ -170,17 +178,36 @@ def misfit_map(name: str, residual: Array, coordinate: Array) -> MisfitMap:
         rms=np.sqrt(square / count),
         share=square / max(square.sum(), np.finfo(float).tiny),
         visited=np.bincount(index, minlength=bins) / len(index),
+        floor=np.full(bins, floor),
     )
 
 
-def worst_regions(maps: Sequence[MisfitMap], floor: float, count: int = 3) -> list[Region]:
+def misfit_by_frequency(axis: AxisModel, logs: Sequence[Windowed]) -> MisfitMap:
+    """Misfit of a model by frequency band, beside the noise's spectrum in the same bands."""
+    found = bands(axis, logs)
+    square = found.error**2
+    return MisfitMap(
+        coordinate="frequency",
+        unit="Hz",
+        centre=np.sqrt(found.low * found.high),
+        low=found.low,
+        high=found.high,
+        mean=np.full(len(square), np.nan),
+        rms=found.error,
+        share=square / max(square.sum(), np.finfo(float).tiny),
+        visited=found.to_explain**2 / max(np.sum(found.to_explain**2), np.finfo(float).tiny),
+        floor=found.noise,
+    )
+
+
+def worst_regions(maps: Sequence[MisfitMap], count: int = 3) -> list[Region]:
     """The regions with most error against the time spent there, one a coordinate.
 
     None where the error is at the noise floor.
     """
     found = []
     for m in maps:
-        excess = np.where(m.rms > ABOVE_FLOOR * floor, m.share - m.visited, 0.0)
+        excess = np.where(m.rms > ABOVE_FLOOR * m.floor, m.share - m.visited, 0.0)
         i = int(np.argmax(excess))
         if excess[i] < LEAST_SHARE:
             continue
@@ -189,7 +216,7 @@ def worst_regions(maps: Sequence[MisfitMap], floor: float, count: int = 3) -> li
                 float(excess[i]),
                 Region(
                     m.coordinate, m.unit, float(m.low[i]), float(m.high[i]), float(m.rms[i]),
-                    float(m.rms[i] / floor), float(m.share[i]),
+                    float(m.rms[i] / m.floor[i]), float(m.share[i]),
                 ),
             )
         )  # fmt: skip

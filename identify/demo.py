@@ -147,6 +147,7 @@ def _can_hide(effect: Effect, machine: StageModel) -> bool:
     return (
         effect.name not in machine.axes[AXIS].names
         and effect.kind in (Kind.FORCE, Kind.MODIFIER, Kind.ACTUATION)
+        and not effect.is_description
     )  # fmt: skip
 
 

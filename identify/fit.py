@@ -18,6 +18,7 @@ from identify.levenberg_marquardt import minimise
 from identify.noise import noise_floor
 from identify.residual import Windowed, jacobian, moving, residual
 from identify.scaling import Scaling
+from identify.smoothing import described, smoothing
 from twin.effect import Kind
 from twin.model import AxisModel, Coordinate, coordinates
 
@@ -76,10 +77,16 @@ def sticks(axis: AxisModel) -> bool:
 
 
 def _is_added(axis: AxisModel, c: Coordinate) -> bool:
-    """Whether zero means the absence of an effect beside mass and friction."""
-    return (
-        bool(c.effect) and c.parameter.strength and axis[c.effect].effect.kind is not Kind.FRICTION
-    )
+    """Whether zero means the absence of a physical effect beside mass and friction."""
+    if not (c.effect and c.parameter.strength):
+        return False
+    effect = axis[c.effect].effect
+    return effect.kind is not Kind.FRICTION and not effect.is_description
+
+
+def _describes(axis: AxisModel, c: Coordinate) -> bool:
+    """Whether it is a strength of a description."""
+    return bool(c.effect) and c.parameter.strength and axis[c.effect].effect.is_description
 
 
 def rms(values: Array) -> float:
@@ -93,6 +100,8 @@ class _Problem:
     The prior on what is added to the friction is a force of a tenth of what is to be explained; it
     matters only along directions that the data cannot tell apart, such as a constant force and a
     Coulomb asymmetry, where it shares the force out instead of opposing large ones to each other.
+    Beside a description the physical effects are pulled to where they were: what both could explain
+    stays with the physics. The description itself is smoothed.
     """
 
     def __init__(self, axis: AxisModel, logs: Sequence[Windowed]) -> None:
@@ -103,8 +112,12 @@ class _Problem:
         self.bounds = self.scaling.bounds()
         self.start = np.clip(self.scaling.inside(axis), *self.bounds)
         self.added = np.array([_is_added(axis, c) for c in self.scaling.where], dtype=bool)
-        self.centre = np.where(self.added, 0.0, self.start)
+        self.centre = np.where(self.added & (not described(axis)), 0.0, self.start)
         self.pull = np.zeros(len(self.start))
+        self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
+        # A description is linear in its strengths: their columns are taken once.
+        self.constant = np.array([_describes(axis, c) for c in self.scaling.where], dtype=bool)
+        self.described = jacobian(axis, logs, self._where(self.constant))
 
     def set_priors(self, internal: Array) -> None:
         """Weigh the priors by the residual's size, its colour, and the force to be explained."""
@@ -120,17 +133,27 @@ class _Problem:
         self.pull = np.where(self.added, noise * size / expected, 0.0)
         self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD
 
+    def _where(self, mask: NDArray[np.bool_]) -> list[Coordinate]:
+        return [c for c, wanted in zip(self.scaling.where, mask, strict=True) if wanted]
+
+    def jacobian(self, axis: AxisModel) -> Array:
+        """Derivative of the residual by the free coordinates, (n, k) N per unit."""
+        columns = np.empty((len(self.kept), len(self.constant)))
+        columns[:, self.constant] = self.described
+        columns[:, ~self.constant] = jacobian(axis, self.logs, self._where(~self.constant))
+        return columns
+
     def columns(self, internal: Array) -> Array:
         axis = self.scaling.outside(self.axis, internal)
-        raw = jacobian(axis, self.logs, self.scaling.where)
-        return self.scaling.chain(axis, raw)[self.kept]
+        return self.scaling.chain(axis, self.jacobian(axis))[self.kept]
 
     def rows(self, internal: Array) -> Array:
         force = residual(self.scaling.outside(self.axis, internal), self.logs)[self.kept]
-        return np.concatenate([force, self.pull * (internal - self.centre)])
+        pulled = self.pull * (internal - self.centre)
+        return np.concatenate([force, pulled, self.smooth @ internal])
 
     def slopes(self, internal: Array) -> Array:
-        return np.vstack([self.columns(internal), np.diag(self.pull)])
+        return np.vstack([self.columns(internal), np.diag(self.pull), self.smooth])
 
     def solve(self, internal: Array, tolerance: float) -> tuple[Array, bool]:
         """Least squares from these values; the solution and whether it converged."""

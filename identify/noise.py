@@ -38,6 +38,16 @@ def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, Window]]) -> float
 
 
 def _variance(axis: AxisModel, motion: Motion, window: Window) -> float:
+    frequency, passed, segment = noise_spectrum(axis, motion)
+    response = window.response(motion.sample_period, segment)
+    return float(np.trapezoid(passed * response, frequency))
+
+
+def noise_spectrum(axis: AxisModel, motion: Motion) -> tuple[Array, Array, int]:
+    """What measurement noise leaves in a force residual: frequencies (k,) Hz, power (k,) N^2/Hz.
+
+    One-sided, before any window; and the samples that the frequencies belong to.
+    """
     dt = motion.sample_period
     mass = axis.mass
     velocity = motion.raw[0]
@@ -54,8 +64,7 @@ def _variance(axis: AxisModel, motion: Motion, window: Window) -> float:
     bend = ((2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * dt)) * mass / dt**2) ** 2
     band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < BAND[2] / dt)
     levels = _fit_levels(np.stack([half, bend], axis=1)[band], power[band])
-    passed = levels[0] + levels[1] * bend
-    return float(np.trapezoid(passed * window.response(dt, segment), frequency))
+    return frequency, levels[0] + levels[1] * bend, segment
 
 
 def _between_samples(force: Array, motion: Motion) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 
 from identify.candidates import Candidate, score, try_effect
 from identify.compare import AxisComparison, compare_axis, position_errors
+from identify.describe import describe, in_words, physics_alone
 from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
 from identify.fit import Fit, error_on, rms
 from identify.freerun import free_run, rms_error
@@ -148,8 +149,11 @@ def diagnose(
     window: float | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
-    """Fit the model, then find which effect of the catalogue it lacks. Raises InputError."""
-    result = fit(model, logs, holdout, window=window, progress=progress)
+    """Fit the model, then find which effect of the catalogue it lacks. Raises InputError.
+
+    Descriptions that the model holds are set aside: what they describe is to be explained.
+    """
+    result = fit(physics_alone(model), logs, holdout, window=window, progress=progress)
     axes = {
         axis: diagnose_axis(
             fitted,
@@ -176,8 +180,10 @@ def add(
 ) -> Addition:
     """Add an effect to the axis that it helps most (or the one given), refit, record the errors.
 
-    Raises InputError where the axis has the effect already.
+    Descriptions that the model holds make way for a physical effect. Raises InputError where the
+    axis has the effect already.
     """
+    given, model = model, model if effect.is_description else physics_alone(model)
     before = fit(model, logs, holdout, window=window, progress=progress)
     names = [axis] if axis else list(before.fits)
     for name in names:
@@ -189,16 +195,22 @@ def add(
         raise InputError(
             f"axis {', '.join(names)} has the effect '{effect.name}' already; `twin fit` refits it"
         )
-    tried = [try_effect(before.fits[n], before.studies[n], effect) for n in open_axes]
+    attempt = describe if effect.is_description else try_effect
+    tried = [attempt(before.fits[n], before.studies[n], effect) for n in open_axes]
     best = max(tried, key=lambda c: c.delta_bic)
     progress("adding", 1, 1)
-    return _addition(best, before, logs)
+    return _addition(best, before, logs, given)
 
 
-def _addition(best: Candidate, before: FitResult, logs: Logs) -> Addition:
+def _addition(best: Candidate, before: FitResult, logs: Logs, given: StageModel) -> Addition:
     name = best.axis
     base, study = before.fits[name], before.studies[name]
     notes = moved_parameters(base, best.fit)
+    if best.effect.is_description:
+        notes = (in_words(best.fit.axis[best.effect.name]), *notes)
+    gone = [n for n in given.axes[name].names if n not in before.model.axes[name].names]
+    if gone:
+        notes = (*notes, f"{', '.join(gone)} made way; add it again for what is left")
     step = HistoryStep(
         action="add",
         effect=best.effect.name,

@@ -123,8 +123,23 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Part:
+    """Strengths of a description that belong to one curve, and how little they may bend.
+
+    strengths: names, in order along the curve. stiffness: name of the parameter (a ratio) that says
+    how little; chosen from the data. rows: number of strengths n -> (m, n) such that a fit adds the
+    square of stiffness x rows @ strengths to the mean square of the residual.
+    """
+
+    name: str
+    strengths: tuple[str, ...]
+    stiffness: str
+    rows: Callable[[int], Any]
+
+
+@dataclass(frozen=True)
 class Effect:
-    """One physical effect.
+    """One physical effect, or a description of a force that none explains.
 
     equation and source: as printed in `twin effects NAME`. states: names of internal states.
     fingerprint: what is left in the residual when the effect is missing. excited_by: the motion
@@ -134,7 +149,8 @@ class Effect:
     two states are then the position (m) and speed (m/s) of the joint built. added_mass: values by
     name -> what the effect adds to the moved mass, as a part of it. sticks: a friction that holds
     the axis at rest by whatever force that takes. simplest: the same force in simpler values, such
-    as a pitch of which only harmonics were used.
+    as a pitch of which only harmonics were used. parts: of a description, whose force is linear in
+    its strengths, what these are grouped in. A description is no physics and never a diagnosis.
     """
 
     kind: Kind
@@ -151,6 +167,7 @@ class Effect:
     added_mass: Callable[[Mapping[str, float]], float] | None = None
     sticks: bool = False
     simplest: Callable[[Mapping[str, float]], dict[str, float]] | None = None
+    parts: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]
@@ -182,6 +199,11 @@ class Effect:
     def name(self) -> str:
         """The name of the file that holds the law."""
         return Path(inspect.getfile(self.law)).stem
+
+    @property
+    def is_description(self) -> bool:
+        """Whether it describes a force without explaining it."""
+        return bool(self.parts)
 
     @property
     def strengths(self) -> tuple[Parameter, ...]:

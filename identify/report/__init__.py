@@ -19,6 +19,8 @@ from identify.report import (
     ranking,
     regions,
     residuals,
+    shape,
+    whiteness,
 )
 from identify.report.blocks import Section
 from identify.report.drawing import data_uri, drawing_style
@@ -34,6 +36,8 @@ SECTIONS: tuple[Callable[[Subject], Section | None], ...] = (
     overlay.section,
     residuals.section,
     regions.section,
+    whiteness.section,
+    shape.section,
     ranking.section,
     growth.section,
     equations.section,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from identify.as_text import advice
 from identify.candidates import Candidate
 from identify.compare import AxisComparison
 from identify.diagnose import AxisDiagnosis, Verdict
@@ -32,6 +33,8 @@ def _diagnosed(axis: AxisComparison, found: AxisDiagnosis) -> Answer:
     if found.best is not None:
         remarks.append(_left_over(found.best))
     remarks.extend(_runner_up(found))
+    if found.unexplained is not None:
+        remarks.append(f"{advice()}.")
     return Answer(
         headline=f"Axis {axis.axis}: {_headline(found)}",
         sentence=sentence,

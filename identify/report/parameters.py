@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from identify.describe import described_labels
 from identify.diagnose import AxisDiagnosis
 from identify.fit import Fit
 from identify.report.blocks import Block, Column, Heading, Row, Section, Table, Tone
@@ -29,9 +30,12 @@ def _given(axis: AxisModel) -> Table:
     """Values as the model has them."""
     meanings = _meanings(axis)
     rows = [Row(("mass", quantity(axis.mass, "kg"), meanings["mass"]))]
+    hidden = described_labels(axis)
     for fitted in axis.effects:
         for p in fitted.effect.parameters:
             label = f"{fitted.effect.name}.{p.name}"
+            if label in hidden:
+                continue
             rows.append(Row((label, quantity(fitted.values[p.name], p.unit), meanings[label])))
     columns = (Column("Parameter"), Column("Value", numeric=True), Column("Meaning"))
     return Table(columns, rows, "Values of the model as it was given; twin fit adds intervals.")

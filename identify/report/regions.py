@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from identify.compare import AxisComparison, Region
 from identify.diagnose import AxisDiagnosis
 from identify.fit import AT_FLOOR
+from identify.report import maps
 from identify.report.blocks import Block, Heading, Listing, Picture, Section
 from identify.report.drawing import BLUE, GREY, new_figure
 from identify.report.subject import Subject
@@ -30,6 +31,7 @@ def _blocks(axis: AxisComparison, found: AxisDiagnosis | None) -> list[Block]:
     blocks: list[Block] = []
     if axis.worst:
         blocks.append(Listing([in_words(region) for region in axis.worst]))
+    blocks.append(maps.picture(axis))
     if found is not None and found.unexplained is not None:
         blocks.append(_picture(found.unexplained))
     return blocks

@@ -1,0 +1,128 @@
+"""A drive with an effect that its model lacks, diagnosed, for the tests of the report."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from identify import workflow
+from identify.diagnose import AxisDiagnosis
+from identify.report import sections, write_report
+from identify.report.blocks import Answer, Picture, Section
+from identify.report.drawing import drawing_style
+from identify.report.subject import Subject
+from identify.workflow import Addition, Diagnosis
+from twin.effects import Catalogue, load_catalogue
+from twin.experiments import simulate
+from twin.log import Log
+from twin.model import AxisModel, Fitted, Hardware, StageModel
+from twin.simulator import ReducedStage
+
+HARDWARE = Hardware(
+    travel=(-0.1, 0.1), encoder_noise=1e-9, current_noise=1e-3, force_constant=10.0, velocity=0.2,
+    acceleration=2.0, jerk=100.0,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Case:
+    """A drive with cogging that its model lacks: the model, its logs and what was found."""
+
+    model: StageModel
+    fit: dict[str, Log]
+    held: dict[str, Log]
+    diagnosis: Diagnosis
+    addition: Addition
+
+    @property
+    def x(self) -> AxisDiagnosis:
+        return self.diagnosis.axes["x"]
+
+    def subject(self, diagnosis: Diagnosis | None) -> Subject:
+        history = self.addition.model.history
+        return Subject("Report", diagnosis, self.diagnosis.comparison, history, [self.addition])
+
+    def concluding(self, x: AxisDiagnosis) -> Diagnosis:
+        """The same diagnosis with another conclusion."""
+        return Diagnosis(self.diagnosis.model, {"x": x}, self.diagnosis.comparison)
+
+    def write(self, path: Path, **changes: object) -> str:
+        arguments = {
+            "title": "Report",
+            "diagnosis": self.diagnosis,
+            "comparison": self.diagnosis.comparison,
+            "history": self.addition.model.history,
+            "additions": [self.addition],
+        }
+        write_report(path, **(arguments | changes))  # type: ignore[arg-type]
+        return path.read_text(encoding="utf-8")
+
+
+@cache
+def cogging_case() -> Case:
+    """The drive with two short logs, diagnosed among two effects."""
+    catalogue = load_catalogue()
+    effects = [("coulomb_viscous", {"Fc": 0.3, "Fs": 0.3, "sigma2": 0.5}), ("constant_force", {})]
+    axis = AxisModel(
+        5.0, HARDWARE, tuple(Fitted.at_start(catalogue[n], values) for n, values in effects)
+    )
+    model = StageModel("drive", {"x": axis}, 2000.0)
+    hidden = Fitted.at_start(catalogue["cogging"], {"p": 0.025, "a1": 0.1})
+    truth = model.with_axis("x", axis.with_effect(hidden))
+    first, second = (
+        simulate(truth, "tracking", seed=seed, duration=6.0, stage=ReducedStage) for seed in (1, 2)
+    )
+    fit, held = {"run 1": first}, {"run 2": second}
+    few = Catalogue([catalogue["cogging"], catalogue["quadratic_drag"]])
+    return Case(
+        model, fit, held,
+        workflow.diagnose(model, fit, held, catalogue=few),
+        workflow.add(catalogue["cogging"], model, fit, held),
+    )  # fmt: skip
+
+
+def pictures_in(page: str) -> list[str]:
+    """SVG texts of the pictures of a page."""
+    found = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', page)
+    return [base64.b64decode(text).decode() for text in found]
+
+
+class Outline(HTMLParser):
+    """Tags, attributes and visible text of a page."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.attributes: list[tuple[str, str | None]] = []
+        self.text = ""
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += attrs
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def made(subject: Subject) -> dict[str, Section]:
+    with drawing_style():
+        return {section.anchor: section for section in sections(subject)}
+
+
+def figures(subject: Subject) -> Iterator[Figure]:
+    for section in made(subject).values():
+        for block in section.blocks:
+            if isinstance(block, Picture):
+                yield block.figure
+
+
+def answers(subject: Subject) -> list[Answer]:
+    return [b for b in made(subject)["answer"].blocks if isinstance(b, Answer)]

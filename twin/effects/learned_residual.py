@@ -1,0 +1,112 @@
+"""A small data-driven model of what is left, for what curves of single coordinates cannot hold.
+
+F = sum c_ijab cos(pi i q) T_j(v/speed) z1^a z2^b over the hyperbolic cross
+(1 + i)(1 + j)(1 + a)(1 + b) <= 24, j <= 3, a, b <= 1: fine in one coordinate or coarse in several,
+which is what few data can tell. q is the place along the covered travel, 0..1; T_j a Chebyshev
+polynomial; z1 and z2 the direction with a memory of the distance since the reversal, short and
+long, dz/dt = (v - |v| z)/reach. A description, not physics: it is learned from the logs, holds only
+where they went, and its numbers mean nothing one by one. Beyond the covered travel it fades to zero
+within a 24th of it; beyond the covered speed it holds its value. A fit adds ``stiff``^2 times the
+squares of the c_ijab, each times its product above, to the mean square of the residual (ridge).
+D. Dung, V. Temlyakov, T. Ullrich, Hyperbolic Cross Approximation, Birkhaeuser (2018).
+"""
+
+from math import copysign, cos, expm1, pi
+
+import numpy as np
+from numba.extending import register_jitable
+
+from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, Part, V, X
+
+OWN = 6  # where the coefficients begin
+CROSS = 24
+SPEEDS = 4  # powers of speed, from 0
+
+
+@register_jitable
+def remembered(s, i, io, reach):
+    """Direction with the memory of a distance, at the wanted instant; steps the state."""
+    change = -expm1(-abs(io[V]) * io[DT] / reach) * (copysign(1.0, io[V]) - s[i])
+    s[i] += change
+    return s[i] - (1.0 - io[WHEN]) * change
+
+
+@register_jitable
+def series(p, first, count, wave):
+    """Sum of p[first + i] cos(i t) over ``count`` terms, wave = cos(t)."""
+    total, now, following = 0.0, 1.0, wave
+    for i in range(count):
+        total += p[first + i] * now
+        now, following = following, 2.0 * wave * following - now
+    return total
+
+
+def law(p, s, io):
+    place = (io[X] - p[0]) / p[1]
+    inside = max(1.0 - CROSS * max(-place, place - 1.0, 0.0), 0.0)
+    wave = cos(pi * min(max(place, 0.0), 1.0))
+    speed = min(max(io[V] / p[2], -1.0), 1.0)
+    short = remembered(s, 0, io, p[3])
+    long = remembered(s, 1, io, p[4])
+    at, force, now, following = OWN, 0.0, 1.0, speed
+    for j in range(SPEEDS):
+        for a in range(2):
+            for b in range(2):
+                count = CROSS // ((1 + j) * (1 + a) * (1 + b))
+                factor = now * (short if a else 1.0) * (long if b else 1.0)
+                force += factor * series(p, at, count, wave)
+                at += count
+        now, following = following, 2.0 * speed * following - now
+    io[OUT] = inside * force
+
+
+ORDERS = {
+    f"c_{i}_{j}_{a}_{b}": float((1 + i) * (1 + j) * (1 + a) * (1 + b))
+    for j in range(SPEEDS)
+    for a in range(2)
+    for b in range(2)
+    for i in range(CROSS // ((1 + j) * (1 + a) * (1 + b)))
+}
+
+
+def ridge(count: int) -> np.ndarray:
+    """Each coefficient by itself, the finer and the more involved the smaller."""
+    return np.diag(list(ORDERS.values())[:count])
+
+
+EFFECT = Effect(
+    kind=Kind.FORCE,
+    summary="a description, not physics: small learned model of position, speed and reversals",
+    equation="F = sum c_ijab cos(pi i q) T_j(v/speed) z1^a z2^b,  "
+    "(1+i)(1+j)(1+a)(1+b) <= 24;  dz/dt = (v - |v| z)/reach",
+    source="no physics; basis after Dung, Temlyakov, Ullrich, Hyperbolic Cross Approximation, 2018",
+    parameters=(
+        Parameter(
+            "start", "m", -0.15, -1e3, 1e3, "where the covered travel begins", fixed=True,
+            start_rule=lambda e: e.position_low,
+        ),
+        Parameter(
+            "length", "m", 0.3, 1e-6, 1e3, "length of the covered travel", fixed=True,
+            start_rule=lambda e: e.travel,
+        ),
+        Parameter(
+            "speed", "m/s", 0.2, 1e-6, 1e3, "highest speed covered", fixed=True,
+            start_rule=lambda e: e.speed_max,
+        ),
+        Parameter(
+            "reach1", "m", 3e-4, 1e-9, 10.0, "short memory of a reversal", fixed=True,
+            start_rule=lambda e: 1e-3 * e.travel,
+        ),
+        Parameter(
+            "reach2", "m", 0.015, 1e-9, 10.0, "long memory of a reversal", fixed=True,
+            start_rule=lambda e: 0.05 * e.travel,
+        ),
+        Parameter("stiff", "1", 0.1, 1e-9, 1e9, "ridge on the coefficients", fixed=True),
+        *(Parameter(n, "N", 0.0, -1e4, 1e4, "a coefficient", strength=True) for n in ORDERS),
+    ),
+    states=("z1", "z2"),
+    law=law,
+    fingerprint="what is left depends on several coordinates together",
+    excited_by="varied motion over the whole range of position, speed and reversals",
+    parts=(Part("all coordinates", tuple(ORDERS), "stiff", ridge),),
+)  # fmt: skip
