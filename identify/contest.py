@@ -10,7 +10,7 @@ W. G. Hunter, A. M. Reiner, "Designs for discriminating between two rival models
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import permutations
@@ -18,21 +18,19 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.evidence import evidence
-from identify.fit import fit_axis, sticks
+from identify.evidence import effective_samples, evidence
+from identify.fit import fit_axis, rms, sticks
 from identify.motion import motion_of
-from identify.noise import noise_floor
 from identify.residual import Windowed, jacobian, moving, residual
 from identify.search import orthonormal
-from identify.study import choose_window
 from twin.errors import InputError
 from twin.experiment import Experiment
 from twin.experiments import simulate
-from twin.log import Log
-from twin.model import AxisModel, StageModel, coordinates
+from twin.model import AxisModel, StageModel, coordinates, read
 from twin.simulator import ReducedStage
 
 Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
 
 SEED = 0  # of the random moves and the noise; `twin simulate` draws the same moves by default
 
@@ -49,16 +47,18 @@ class Explanation:
 class Trial:
     """An experiment as simulated.
 
-    difference: N RMS on its motion that the rival that comes nearest cannot take over. floor: noise
-    floor in N. delta_bic: evidence expected from all logs together. motion: the simulated log;
-    where: squared difference (n_windows,) N^2 on it. duration: s.
+    difference: N RMS on its motion that the rival that comes nearest cannot take over, and floor:
+    N RMS that the noise of the stage's hardware leaves there. gain: evidence (difference of BIC)
+    expected from all logs together. motion: the simulated log; where: squared difference
+    (n_windows,) N^2 on it. duration: s. Of a single model, gain is the information on its
+    parameters (nats), where what each window adds to it, and difference not a number.
     """
 
     experiment: Experiment
     duration: float
     difference: float
     floor: float
-    delta_bic: float
+    gain: float
     motion: Windowed
     where: Array
 
@@ -67,45 +67,48 @@ class Trial:
 class Arena:
     """What the experiments are tried on.
 
-    stage: all axes; name: the axis that is explained. logs: those there are, may be none. window:
-    of the weak form in s, or None to take it from the noise of each trial.
+    stage: all axes; name: the axis that is explained. window: of the weak form in s. logs: those
+    there are, may be none.
     """
 
     stage: StageModel
     name: str
     explanations: tuple[Explanation, ...]
+    window: float
     logs: tuple[Windowed, ...] = ()
-    window: float | None = None
 
     def record(self, truth: Explanation, experiment: Experiment) -> Windowed | None:
-        """The log that the experiment would give if that were the truth; None where it says nothing.
+        """The log that the experiment would give if that were the truth; None where it cannot run.
 
         Measurement noise is that of the stage's hardware.
         """
         machine = self.stage.with_axis(self.name, truth.axis)
         try:
             log = simulate(machine, experiment, seed=SEED, stage=ReducedStage)
-            return self._windowed(log)
+            return Windowed.of(motion_of(log, self.name, "planned"), self.window)
         except InputError:
             return None
 
-    def _windowed(self, log: Log) -> Windowed:
-        motion = motion_of(log, self.name, "planned")
-        return Windowed.of(motion, self.window or choose_window([motion]))
 
-
-def contest(arena: Arena, experiments: Sequence[Experiment]) -> list[Trial]:
+def contest(
+    arena: Arena, experiments: Sequence[Experiment], progress: Progress | None = None
+) -> list[Trial]:
     """Every experiment tried, best first; those that the stage cannot run are left out."""
-    first = arena.explanations[0]
-    logs = [arena.record(first, e) for e in experiments]
-    pairs = [(e, log) for e, log in zip(experiments, logs, strict=True) if log is not None]
-    # The laws run outside Python's lock; the simulation above sets a callback of the process.
+    tried = _discriminating if len(arena.explanations) > 1 else _informative
+    trials = []
+    # The laws run outside Python's lock; the simulation sets a callback of the whole process.
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        trials = list(pool.map(lambda pair: _trial(arena, *pair), pairs))
-    return sorted(trials, key=lambda t: -t.delta_bic)
+        for i, experiment in enumerate(experiments):
+            new = arena.record(arena.explanations[0], experiment)
+            if new is not None:
+                trials.append(pool.submit(tried, arena, experiment, new))
+            if progress:
+                progress("trying experiments", i + 1, len(experiments))
+    return sorted((t.result() for t in trials), key=lambda t: -t.gain)
 
 
-def _trial(arena: Arena, experiment: Experiment, new: Windowed) -> Trial:
+def _discriminating(arena: Arena, experiment: Experiment, new: Windowed) -> Trial:
+    """The evidence that the rival that comes nearest leaves behind, whichever is the truth."""
     logs = (*arena.logs, new)
     axes = [e.axis for e in arena.explanations]
     kept = moving(logs, any(map(sticks, axes)))
@@ -118,19 +121,51 @@ def _trial(arena: Arena, experiment: Experiment, new: Windowed) -> Trial:
         left = unabsorbed(forces[rival] - forces[truth], bases[rival])
         added = len(coordinates(axes[rival])) - len(coordinates(axes[truth]))
         found.append((evidence(np.hypot(noise, left), noise, added).delta_bic, left))
-    delta_bic, left = min(found, key=lambda pair: pair[0])
-    where = np.zeros(len(kept))
-    where[kept] = left**2
-    where = where[-len(new) :]
-    return Trial(
-        experiment=experiment,
-        duration=len(new.motion.time) * new.motion.period,
-        difference=float(np.sqrt(where.mean())),
-        floor=noise_floor(axes[0], [(new.motion, new.window)]),
-        delta_bic=delta_bic,
-        motion=new,
-        where=where,
-    )
+    gain, left = min(found, key=lambda pair: pair[0])
+    where = _spread(left**2, kept)[-len(new) :]
+    quiet = _spread(noise**2, kept)[-len(new) :]
+    return _trial(experiment, new, gain, where, float(np.sqrt(where.mean())), quiet)
+
+
+def _informative(arena: Arena, experiment: Experiment, new: Windowed) -> Trial:
+    """The information on the one model's parameters, in nats beside a prior of 100 % on each.
+
+    Half the log determinant of the information matrix (D-optimal design; A. C. Atkinson,
+    A. N. Donev, Optimum Experimental Designs, 1992).
+    """
+    axis = arena.explanations[0].axis
+    where = coordinates(axis)
+    logs = (*arena.logs, new)
+    kept = moving(logs, sticks(axis))
+    noise = residual(axis, logs)[kept]
+    prior = np.maximum(np.abs(read(axis, where)), [abs(c.parameter.start) for c in where])
+    tau = len(noise) / effective_samples(noise)
+    columns = jacobian(axis, logs, where)[kept] * prior / (rms(noise) * np.sqrt(tau))
+    information = np.eye(len(where)) + columns.T @ columns
+    leverage = np.sum(columns * np.linalg.solve(information, columns.T).T, axis=1)
+    gain = 0.5 * float(np.linalg.slogdet(information)[1])
+    seen = _spread(leverage, kept)[-len(new) :]
+    return _trial(experiment, new, gain, seen, float("nan"), _spread(noise**2, kept)[-len(new) :])
+
+
+def _trial(
+    experiment: Experiment,
+    new: Windowed,
+    gain: float,
+    where: Array,
+    difference: float,
+    quiet: Array,
+) -> Trial:
+    duration = len(new.motion.time) * new.motion.period
+    floor = float(np.sqrt(quiet.mean()))
+    return Trial(experiment, duration, difference, floor, gain, new, where)
+
+
+def _spread(values: Array, kept: NDArray[np.bool_]) -> Array:
+    """Values of the windows that were kept, zero in the others."""
+    out = np.zeros(len(kept))
+    out[kept] = values
+    return out
 
 
 def refit_basis(axis: AxisModel, logs: Sequence[Windowed], kept: NDArray[np.bool_]) -> Array:
@@ -149,21 +184,23 @@ def unabsorbed(force: Array, basis: Array) -> Array:
 def refitted(arena: Arena, trial: Trial) -> Trial:
     """The trial with each explanation in turn as the truth and its rivals truly refitted.
 
-    The linear step of `contest` is exact only for small differences; this is exact, and slower.
+    The linear step of `contest` is exact only for small differences; this is exact, and slower. Of
+    a single model, the trial as it is.
     """
-    worst = trial
+    found = []
     for truth, rival in permutations(arena.explanations, 2):
         new = arena.record(truth, trial.experiment)
         if new is None:
-            return replace(trial, delta_bic=0.0, difference=0.0)
+            return replace(trial, gain=0.0, difference=0.0)
         logs = (*arena.logs, new)
         fits = [fit_axis(e.axis, logs) for e in (truth, rival)]
         kept = fits[0].kept & fits[1].kept
         after, before = (residual(f.axis, logs)[kept] for f in fits)
         added = len(fits[1].scaling.where) - len(fits[0].scaling.where)
-        gain = evidence(before, after, added).delta_bic
-        if gain < worst.delta_bic or worst is trial:
-            excess = (before**2 - after**2)[-int(kept[-len(new) :].sum()) :]
-            difference = float(np.sqrt(max(excess.mean(), 0.0)))
-            worst = replace(trial, delta_bic=gain, difference=difference)
-    return worst
+        excess = _spread(before**2 - after**2, kept)[-len(new) :].mean()
+        difference = float(np.sqrt(max(excess, 0.0)))
+        found.append((evidence(before, after, added).delta_bic, difference))
+    if not found:
+        return trial
+    gain, difference = min(found)
+    return replace(trial, gain=gain, difference=difference)
