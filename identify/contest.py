@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from identify.evidence import effective_samples, evidence
 from identify.fit import fit_axis, rms, sticks
-from identify.motion import motion_of
+from identify.motion import Motion, motion_of
 from identify.residual import Windowed, jacobian, moving, residual
 from identify.search import orthonormal
+from identify.study import choose_window
 from twin.errors import InputError
 from twin.experiment import Experiment
 from twin.experiments import simulate
@@ -67,17 +68,17 @@ class Trial:
 class Arena:
     """What the experiments are tried on.
 
-    stage: all axes; name: the axis that is explained. window: of the weak form in s. logs: those
-    there are, may be none.
+    stage: all axes; name: the axis that is explained. logs: those there are, may be none. window:
+    of the weak form in s; chosen from the noise of all logs, as a diagnosis does, where None.
     """
 
     stage: StageModel
     name: str
     explanations: tuple[Explanation, ...]
-    window: float
     logs: tuple[Windowed, ...] = ()
+    window: float | None = None
 
-    def record(self, truth: Explanation, experiment: Experiment) -> Windowed | None:
+    def record(self, truth: Explanation, experiment: Experiment) -> Motion | None:
         """The log that the experiment would give if that were the truth; None where it cannot run.
 
         Measurement noise is that of the stage's hardware.
@@ -85,9 +86,18 @@ class Arena:
         machine = self.stage.with_axis(self.name, truth.axis)
         try:
             log = simulate(machine, experiment, seed=SEED, stage=ReducedStage)
-            return Windowed.of(motion_of(log, self.name, "planned"), self.window)
+            return motion_of(log, self.name, "planned")
         except InputError:
             return None
+
+    def logs_with(self, new: Motion) -> tuple[Windowed, ...]:
+        """The logs and the new one, all with the windows that a diagnosis would use."""
+        length = self.window or choose_window([*(log.motion for log in self.logs), new])
+        old = (
+            log if np.isclose(log.window.length, length) else Windowed.of(log.motion, length)
+            for log in self.logs
+        )
+        return (*old, Windowed.of(new, length))
 
 
 def contest(
@@ -107,9 +117,10 @@ def contest(
     return sorted((t.result() for t in trials), key=lambda t: -t.gain)
 
 
-def _discriminating(arena: Arena, experiment: Experiment, new: Windowed) -> Trial:
+def _discriminating(arena: Arena, experiment: Experiment, motion: Motion) -> Trial:
     """The evidence that the rival that comes nearest leaves behind, whichever is the truth."""
-    logs = (*arena.logs, new)
+    logs = arena.logs_with(motion)
+    new = logs[-1]
     axes = [e.axis for e in arena.explanations]
     kept = moving(logs, any(map(sticks, axes)))
     forces = [residual(axis, logs)[kept] for axis in axes]
@@ -127,7 +138,7 @@ def _discriminating(arena: Arena, experiment: Experiment, new: Windowed) -> Tria
     return _trial(experiment, new, gain, where, float(np.sqrt(where.mean())), quiet)
 
 
-def _informative(arena: Arena, experiment: Experiment, new: Windowed) -> Trial:
+def _informative(arena: Arena, experiment: Experiment, motion: Motion) -> Trial:
     """The information on the one model's parameters, in nats beside a prior of 100 % on each.
 
     Half the log determinant of the information matrix (D-optimal design; A. C. Atkinson,
@@ -135,7 +146,8 @@ def _informative(arena: Arena, experiment: Experiment, new: Windowed) -> Trial:
     """
     axis = arena.explanations[0].axis
     where = coordinates(axis)
-    logs = (*arena.logs, new)
+    logs = arena.logs_with(motion)
+    new = logs[-1]
     kept = moving(logs, sticks(axis))
     noise = residual(axis, logs)[kept]
     prior = np.maximum(np.abs(read(axis, where)), [abs(c.parameter.start) for c in where])
@@ -189,15 +201,15 @@ def refitted(arena: Arena, trial: Trial) -> Trial:
     """
     found = []
     for truth, rival in permutations(arena.explanations, 2):
-        new = arena.record(truth, trial.experiment)
-        if new is None:
+        motion = arena.record(truth, trial.experiment)
+        if motion is None:
             return replace(trial, gain=0.0, difference=0.0)
-        logs = (*arena.logs, new)
+        logs = arena.logs_with(motion)
         fits = [fit_axis(e.axis, logs) for e in (truth, rival)]
         kept = fits[0].kept & fits[1].kept
         after, before = (residual(f.axis, logs)[kept] for f in fits)
         added = len(fits[1].scaling.where) - len(fits[0].scaling.where)
-        excess = _spread(before**2 - after**2, kept)[-len(new) :].mean()
+        excess = _spread(before**2 - after**2, kept)[-len(logs[-1]) :].mean()
         difference = float(np.sqrt(max(excess, 0.0)))
         found.append((evidence(before, after, added).delta_bic, difference))
     if not found:

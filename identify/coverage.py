@@ -14,6 +14,7 @@ from identify.structure import since_reversal
 Array = NDArray[np.float64]
 
 HEART = (0.25, 0.75)  # quantiles of the squared difference between which it is said to live
+SELDOM = 0.01  # share of the data below which one motion is missed as much as another
 RARE = 0.05  # share of the data below which a motion counts as missing
 
 
@@ -42,16 +43,13 @@ class Gap:
 
     def in_words(self) -> str:
         """One sentence."""
-        span = f"{self.low:.3g} to {self.high:.3g} {self.unit}"
+        where = f"{self.feature} {self.low:.3g} to {self.high:.3g} {self.unit}"
         if self.share is None:
-            return f"the explanations differ at a {self.feature} of {span}"
+            return f"it shows most at {where}"
         held = f"{100.0 * self.share:.1f} % of the data is there"
         if self.share < RARE:
-            return f"missing is a {self.feature} of {span}: {held}"
-        return (
-            f"no single motion is missing, but enough of it: the explanations differ at a "
-            f"{self.feature} of {span}, and {held}"
-        )
+            return f"missing motion: {where}; {held}"
+        return f"no motion is missing, but more of it is needed at {where}; {held}"
 
 
 def _speed(log: Windowed) -> Array:
@@ -98,8 +96,8 @@ FEATURES = (
 def gap(motion: Windowed, where: Array, logs: Sequence[Windowed]) -> Gap:
     """The property of motion in which the logs miss the difference most.
 
-    where: squared difference (n_windows,) on the planned motion. Where there are no logs, the one
-    that tells the windows of the difference from the others best.
+    where: squared difference (n_windows,) on the planned motion. Among those that the logs miss
+    alike, the property that tells the windows of the difference from the others best.
     """
     found = []
     for feature in FEATURES:
@@ -107,9 +105,12 @@ def gap(motion: Windowed, where: Array, logs: Sequence[Windowed]) -> Gap:
         low, high = _weighted_quantiles(values, where)
         if not high > 0.0:
             continue
-        data = [feature.of(log) for log in logs] or [values]
-        share = float(np.mean([_inside(v, low, high) for v in data]))
-        found.append((share, Gap(feature.name, feature.unit, low, high, share if logs else None)))
+        share = None
+        if logs:
+            share = _inside(np.concatenate([feature.of(log) for log in logs]), low, high)
+        missed = 1.0 if share is None else share + SELDOM
+        merit = missed * _inside(values, low, high)
+        found.append((merit, Gap(feature.name, feature.unit, low, high, share)))
     return min(found, key=lambda pair: pair[0])[1]
 
 

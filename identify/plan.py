@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from identify.candidates import Candidate
 from identify.contest import Arena, Explanation, Trial, contest, refitted
@@ -86,7 +86,7 @@ def plan(
         model.axis(axis)
     require_different(between)
     study = _study(model, logs or {}, holdout or {}, between, axis, window)
-    arena = _arena(model, study, bool(logs), between, catalogue)
+    arena = replace(_arena(model, study, bool(logs), between, catalogue), window=window)
     return _planned(arena, duration, VERIFIED, not logs, _named(between, catalogue), progress)
 
 
@@ -166,7 +166,7 @@ def _arena(
     logs = study.fit if recorded else ()
     if between:
         known = explained(between, model, study, recorded)
-        return Arena(model, study.axis, known, study.window, logs)
+        return Arena(model, study.axis, known, logs)
     own = model.axes[study.axis]
     if recorded:
         base = fit_thoroughly(own, study)
@@ -178,9 +178,9 @@ def _arena(
             return _between_candidates(
                 model, study, rivals if len(rivals) > 1 else found.ranking[:2]
             )
-    return Arena(model, study.axis, (Explanation(model.name, own),), study.window, logs)
+    return Arena(model, study.axis, (Explanation(model.name, own),), logs)
 
 
 def _between_candidates(model: StageModel, study: Study, rivals: Sequence[Candidate]) -> Arena:
     known = tuple(Explanation(c.effect.name, c.fit.axis) for c in rivals)
-    return Arena(model, study.axis, known, study.window, study.fit)
+    return Arena(model, study.axis, known, study.fit)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from identify.motion import Motion, excitation, motion_of
 from identify.noise import noise_floor
 from identify.residual import Windowed
-from identify.weak import Window
+from identify.weak import LEAST_BLOCKS, Window
 from twin.effect import Excitation
 from twin.errors import InputError
 from twin.log import Log
@@ -95,7 +95,8 @@ def choose_window(motions: Iterable[Motion]) -> float:
     """The shortest window (s) whose noise floor is small against what is to be explained."""
     motions = list(motions)
     mass = inertia(motions)
-    for length in WINDOWS:
+    shortest = LEAST_BLOCKS * max(m.period for m in motions)
+    for length in (w for w in WINDOWS if w >= shortest):
         windows = [Window.of_length(length, m.period) for m in motions]
         rest = np.concatenate(
             [

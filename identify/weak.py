@@ -18,6 +18,7 @@ from twin.errors import InputError
 Array = NDArray[np.float64]
 
 OVERLAP = 4  # windows that cover one instant
+LEAST_BLOCKS = 8  # in a window
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +37,12 @@ class Window:
 
     @classmethod
     def of_length(cls, length: float, period: float) -> Window:
-        """Window of that length (s); InputError where it spans fewer than 8 blocks."""
+        """Window of that length (s); InputError where it spans fewer than LEAST_BLOCKS."""
         n = round(length / period)
-        if n < 8:
+        if n < LEAST_BLOCKS:
             raise InputError(
-                f"window = {length:g} s: shorter than 8 blocks of {period:g} s; give at least "
-                f"{8 * period:g} s"
+                f"window = {length:g} s: shorter than {LEAST_BLOCKS} blocks of {period:g} s; give "
+                f"at least {LEAST_BLOCKS * period:g} s"
             )
         return cls._of_blocks(n, period, max(n // OVERLAP, 1))
 
