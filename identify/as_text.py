@@ -96,8 +96,11 @@ SHOWN = 4  # trials of a plan that are printed
 def plan_text(result: Plan) -> str:
     """What is decided, the chosen experiment and what it shows, and the next best."""
     several = len(result.between) > 1
-    asked = " or ".join(result.between) if several else f"the parameters of {result.between[0]}"
-    verdict = "decided by" if result.decides else "not decided by any experiment; the best is"
+    asked, verdict = " or ".join(result.between), "decided by"
+    if not several:
+        asked, verdict = f"the parameters of {asked}", "best shown by"
+    elif not result.decides:
+        verdict = "not decided by any experiment of this length; the nearest is"
     lines = [f"axis {result.axis}: {asked}, {verdict}", f"  {in_short(result.chosen.experiment)}"]
     lines += [f"  {result.gap.in_words()}"]
     lines += [f"  {name} shows in {motion}" for name, motion in result.excited_by.items()]

@@ -100,6 +100,20 @@ class Arena:
         return (*old, Windowed.of(new, length))
 
 
+def favoured(arena: Arena) -> tuple[str, float]:
+    """The explanation that the logs favour, and their evidence for it over the nearest rival.
+
+    Zero evidence where there are no logs or no rivals.
+    """
+    axes = [e.axis for e in arena.explanations]
+    if not arena.logs or len(axes) < 2:
+        return arena.explanations[0].name, 0.0
+    kept = moving(arena.logs, any(map(sticks, axes)))
+    left = {e.name: residual(e.axis, arena.logs)[kept] for e in arena.explanations}
+    best, second = sorted(left, key=lambda name: rms(left[name]))[:2]
+    return best, evidence(left[second], left[best], 0).delta_bic
+
+
 def contest(
     arena: Arena, experiments: Sequence[Experiment], progress: Progress | None = None
 ) -> list[Trial]:

@@ -57,14 +57,14 @@ def _speed(log: Windowed) -> Array:
 
 
 def _rest(log: Windowed) -> Array:
-    """Time (s) that the axis had stood when it last began to move."""
+    """Time (s) that the axis stood before it last began to move, to a tenth: it settles slowly."""
     m = log.motion
     still = np.abs(m.velocity) < REST_SPEED * np.abs(m.velocity).max()
     index = np.arange(len(still))
     begun = np.maximum.accumulate(np.where(still, 0, index + 1))
     stood = np.where(still, index + 1 - begun, 0.0)
     ended = np.maximum.accumulate(np.where(still, index, 0))
-    return log.window.mean(stood[ended] * m.period)
+    return np.round(log.window.mean(stood[ended] * m.period), 1)
 
 
 def _force_rate(log: Windowed) -> Array:
