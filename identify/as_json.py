@@ -137,6 +137,7 @@ def plan_json(result: Plan) -> dict[str, Any]:
         "axis": result.axis,
         "between": list(result.between),
         "decides": result.decides,
+        "favoured_by_the_logs": result.favoured,
         "refitted_on_logs": not result.supposed,
         "missing_motion": result.gap.in_words(),
         "excited_by": dict(result.excited_by),

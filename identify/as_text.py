@@ -104,6 +104,8 @@ def plan_text(result: Plan) -> str:
     lines = [f"axis {result.axis}: {asked}, {verdict}", f"  {in_short(result.chosen.experiment)}"]
     lines += [f"  {result.gap.in_words()}"]
     lines += [f"  {name} shows in {motion}" for name, motion in result.excited_by.items()]
+    if result.favoured:
+        lines.append(f"  the logs at hand favour {result.favoured} already")
     if result.supposed and several:
         lines.append(f"  without logs: effects at start values, {STRENGTH:g} times the noise floor")
     return "\n".join([*lines, *(_trial_line(t, several) for t in result.ranking[:SHOWN])])

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from identify.candidates import Candidate
-from identify.contest import Arena, Explanation, Trial, contest, refitted
+from identify.contest import Arena, Explanation, Trial, contest, favoured, refitted
 from identify.coverage import Gap, gap
 from identify.diagnose import LEAST_SEPARATION, AxisDiagnosis, Verdict, diagnose_axis
 from identify.explanations import (
@@ -40,7 +40,8 @@ class Plan:
 
     axis: the one explained. between: names of the explanations; one, where the experiment is to
     constrain a model. ranking: trials by falling evidence; the first is chosen. gap: where the data
-    lack motion. excited_by: effect -> the motion that shows it. supposed: whether the explanations
+    lack motion. favoured: the explanation that the logs separate from the others already, if any.
+    excited_by: effect -> the motion that shows it. supposed: whether the explanations
     are not fitted to any data.
     """
 
@@ -48,6 +49,7 @@ class Plan:
     between: tuple[str, ...]
     ranking: tuple[Trial, ...]
     gap: Gap
+    favoured: str | None
     excited_by: Mapping[str, str]
     supposed: bool
 
@@ -114,6 +116,11 @@ def _planned(
     effects: Mapping[str, Effect],
     progress: Progress | None = None,
 ) -> Plan:
+    logs = arena.logs
+    favourite, evidence = favoured(arena)
+    if evidence > LEAST_SEPARATION:
+        # A rival that the logs refute already would lose by them alone, on any experiment.
+        arena = replace(arena, logs=())
     trials = contest(arena, proposals(arena.stage, arena.name, duration), progress)
     if not trials:
         raise InputError(
@@ -126,7 +133,8 @@ def _planned(
         axis=arena.name,
         between=names,
         ranking=(*again, *trials[verified:]),
-        gap=gap(chosen.motion, chosen.where, arena.logs),
+        gap=gap(chosen.motion, chosen.where, logs),
+        favoured=favourite if evidence > LEAST_SEPARATION else None,
         excited_by={n: effects[n].excited_by for n in names if n in effects},
         supposed=supposed,
     )
