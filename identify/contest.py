@@ -27,6 +27,7 @@ from identify.study import choose_window
 from twin.errors import InputError
 from twin.experiment import Experiment
 from twin.experiments import simulate
+from twin.log import Log
 from twin.model import AxisModel, StageModel, coordinates, read
 from twin.simulator import ReducedStage
 
@@ -81,12 +82,13 @@ class Arena:
     def record(self, truth: Explanation, experiment: Experiment) -> Motion | None:
         """The log that the experiment would give if that were the truth; None where it cannot run.
 
+        It cannot where the axis would leave its travel or ask for more than its force limit.
         Measurement noise is that of the stage's hardware.
         """
         machine = self.stage.with_axis(self.name, truth.axis)
         try:
             log = simulate(machine, experiment, seed=SEED, stage=ReducedStage)
-            return motion_of(log, self.name, "planned")
+            return motion_of(log, self.name, "planned") if within_limits(machine, log) else None
         except InputError:
             return None
 
@@ -98,6 +100,18 @@ class Arena:
             for log in self.logs
         )
         return (*old, Windowed.of(new, length))
+
+
+def within_limits(stage: StageModel, log: Log) -> bool:
+    """Whether a simulated log keeps to the travel and the force limit of every axis."""
+    for name, axis in stage.axes.items():
+        h = axis.hardware
+        position = log.truth[name]["position"]
+        if np.abs(log.axes[name].force).max() >= h.force_limit:
+            return False
+        if h.travel and not h.travel[0] <= position.min() <= position.max() <= h.travel[1]:
+            return False
+    return True
 
 
 def favoured(arena: Arena) -> tuple[str, float]:

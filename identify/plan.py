@@ -30,7 +30,8 @@ Progress = Callable[[str, int, int], None]
 
 DURATION = 20.0  # s of a planned experiment
 NEXT_DURATION = 10.0  # s of the one that a diagnosis proposes
-VERIFIED = 3  # best experiments that are tried again with a full refit
+VERIFIED = 6  # experiments at most that are tried again with a full refit
+NEXT_VERIFIED = 3  # the same for the one that a diagnosis proposes
 MOST_RIVALS = 3  # explanations that a diagnosis asks one experiment to separate
 
 
@@ -103,7 +104,9 @@ def next_experiment(found: AxisDiagnosis, model: StageModel) -> Plan | None:
     rivals = [c for c in found.ranking if c.effect.name in names]
     arena = _between_candidates(model, found.study, rivals)
     try:
-        return _planned(arena, NEXT_DURATION, 1, False, {c.effect.name: c.effect for c in rivals})
+        return _planned(
+            arena, NEXT_DURATION, NEXT_VERIFIED, False, {c.effect.name: c.effect for c in rivals}
+        )
     except InputError:
         return None
 
@@ -126,18 +129,32 @@ def _planned(
         raise InputError(
             f"axis {arena.name} can run none of the experiments; check its limits and force_limit"
         )
-    again = sorted((refitted(arena, t) for t in trials[:verified]), key=lambda t: -t.gain)
-    chosen = again[0]
+    chosen, *others = _verified(arena, trials, verified)
     names = tuple(e.name for e in arena.explanations)
     return Plan(
         axis=arena.name,
         between=names,
-        ranking=(*again, *trials[verified:]),
+        ranking=(chosen, *others),
         gap=gap(chosen.motion, chosen.where, logs),
         favoured=favourite if evidence > LEAST_SEPARATION else None,
         excited_by={n: effects[n].excited_by for n in names if n in effects},
         supposed=supposed,
     )
+
+
+def _verified(arena: Arena, trials: Sequence[Trial], most: int) -> list[Trial]:
+    """The trials with the best truly refitted, until one of those refitted leads; it comes first.
+
+    trials: by falling evidence. most: how many are refitted at most.
+    """
+    waiting = list(trials)
+    done: list[Trial] = []
+    while waiting and len(done) < most:
+        done.append(refitted(arena, waiting.pop(0)))
+        done.sort(key=lambda t: -t.gain)
+        if waiting and done[0].gain >= waiting[0].gain:
+            break
+    return [*done, *waiting]
 
 
 def _named(between: Sequence[Rival], catalogue: Catalogue) -> dict[str, Effect]:

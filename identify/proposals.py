@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.errors import InputError
-from twin.experiment import Experiment, gentle, stage_limits
+from twin.experiment import Experiment, OneAxis, gentle, stage_limits
 from twin.experiment_kinds import (
     Moves,
     Passes,
@@ -31,6 +31,7 @@ EFFORTS = (1.0, 0.3)  # parts of the acceleration limit that steps use in turn
 STEP_DWELL = 0.05  # s
 MARGIN = 0.5  # part of the allowed force that a sweep uses; the loop adds to it near its bandwidth
 GENTLE = 0.5  # part of the acceleration limit that the passes under a sweep use
+FORCE_USED = 0.4  # part of the force limit that moves use; friction and the loop need theirs
 MOST_REPEATS = 1000
 
 
@@ -48,12 +49,26 @@ def proposals(model: StageModel, axis: str, duration: float) -> list[Experiment]
         *_accelerating(limits, axis, duration),
         *_swept(model, limits, axis, duration),
     )
-    found = [e for e in drafts if _fits(e, model, duration)]
+    effort = _affordable(model, axis)
+    found = [e for d in drafts if _fits(e := _eased(d, effort), model, duration)]
     if not found:
         raise InputError(
             f"no experiment of {duration:g} s fits axis {axis}; give a longer --duration (s)"
         )
     return found
+
+
+def _affordable(model: StageModel, axis: str) -> float:
+    """Part of the acceleration limit that the motor's force allows, 0..1."""
+    h, mass = model.axes[axis].hardware, model.axes[axis].mass
+    return min(1.0, FORCE_USED * h.force_limit / (mass * h.acceleration))
+
+
+def _eased(draft: Experiment, effort: float) -> Experiment:
+    """The experiment with its moves no harder than that part of the limits."""
+    if effort < 1.0 and isinstance(draft, OneAxis):
+        return replace(draft, effort=neat(effort * draft.effort))
+    return draft
 
 
 def _fits(experiment: Experiment, model: StageModel, duration: float) -> bool:
