@@ -24,6 +24,7 @@ from identify.motion import Motion, motion_of
 from identify.residual import Windowed, jacobian, moving, residual
 from identify.search import orthonormal
 from identify.study import choose_window
+from identify.weak import LEAST_BLOCKS
 from twin.errors import InputError
 from twin.experiment import Experiment
 from twin.experiments import simulate
@@ -82,15 +83,18 @@ class Arena:
     def record(self, truth: Explanation, experiment: Experiment) -> Motion | None:
         """The log that the experiment would give if that were the truth; None where it cannot run.
 
-        It cannot where the axis would leave its travel or ask for more than its force limit.
+        It cannot where the axis would leave its travel or ask for more than its force limit, and
+        where it moves too slowly for the window.
         Measurement noise is that of the stage's hardware.
         """
         machine = self.stage.with_axis(self.name, truth.axis)
         try:
             log = simulate(machine, experiment, seed=SEED, stage=ReducedStage)
-            return motion_of(log, self.name, "planned") if within_limits(machine, log) else None
+            motion = motion_of(log, self.name, "planned")
         except InputError:
             return None
+        slow = self.window is not None and self.window < LEAST_BLOCKS * motion.period
+        return None if slow or not within_limits(machine, log) else motion
 
     def logs_with(self, new: Motion) -> tuple[Windowed, ...]:
         """The logs and the new one, all with the windows that a diagnosis would use."""
@@ -158,7 +162,7 @@ def _discriminating(arena: Arena, experiment: Experiment, motion: Motion) -> Tri
     found = []
     for truth, rival in permutations(range(len(axes)), 2):
         left = unabsorbed(forces[rival] - forces[truth], bases[rival])
-        added = len(coordinates(axes[rival])) - len(coordinates(axes[truth]))
+        added = len(coordinates(axes[truth])) - len(coordinates(axes[rival]))
         found.append((evidence(np.hypot(noise, left), noise, added).delta_bic, left))
     gain, left = min(found, key=lambda pair: pair[0])
     where = _spread(left**2, kept)[-len(new) :]
@@ -236,7 +240,7 @@ def refitted(arena: Arena, trial: Trial) -> Trial:
         fits = [fit_axis(e.axis, logs) for e in (truth, rival)]
         kept = fits[0].kept & fits[1].kept
         after, before = (residual(f.axis, logs)[kept] for f in fits)
-        added = len(fits[1].scaling.where) - len(fits[0].scaling.where)
+        added = len(fits[0].scaling.where) - len(fits[1].scaling.where)
         excess = _spread(before**2 - after**2, kept)[-len(logs[-1]) :].mean()
         difference = float(np.sqrt(max(excess, 0.0)))
         found.append((evidence(before, after, added).delta_bic, difference))

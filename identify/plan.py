@@ -93,8 +93,12 @@ def plan(
     return _planned(arena, duration, VERIFIED, not logs, _named(between, catalogue), progress)
 
 
-def next_experiment(found: AxisDiagnosis, model: StageModel) -> Plan | None:
+def next_experiment(
+    found: AxisDiagnosis, model: StageModel, window: float | None = None
+) -> Plan | None:
     """The experiment that separates the explanations that an ambiguous diagnosis left.
+
+    window: the one that the diagnosis was asked to use, s.
 
     None for any other verdict, and where the model does not say how far its axes may travel.
     """
@@ -102,7 +106,7 @@ def next_experiment(found: AxisDiagnosis, model: StageModel) -> Plan | None:
         return None
     names = (found.ranking[0].effect.name, *found.ambiguous_with)[:MOST_RIVALS]
     rivals = [c for c in found.ranking if c.effect.name in names]
-    arena = _between_candidates(model, found.study, rivals)
+    arena = replace(_between_candidates(model, found.study, rivals), window=window)
     try:
         return _planned(
             arena, NEXT_DURATION, NEXT_VERIFIED, False, {c.effect.name: c.effect for c in rivals}

@@ -42,6 +42,8 @@ def proposals(model: StageModel, axis: str, duration: float) -> list[Experiment]
     """
     model.axis(axis)
     limits = dict(zip(model.axes, stage_limits(model), strict=True))
+    effort = _affordable(model, axis)
+    limits[axis] = gentle(limits[axis], effort)
     drafts = (
         *_random(duration),
         *_passes(limits, axis, duration),
@@ -49,7 +51,6 @@ def proposals(model: StageModel, axis: str, duration: float) -> list[Experiment]
         *_accelerating(limits, axis, duration),
         *_swept(model, limits, axis, duration),
     )
-    effort = _affordable(model, axis)
     found = [e for d in drafts if _fits(e := _eased(d, effort), model, duration)]
     if not found:
         raise InputError(

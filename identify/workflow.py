@@ -164,7 +164,7 @@ def diagnose(
         )
         for axis, fitted in result.fits.items()
     }
-    plans = {axis: next_experiment(found, result.model) for axis, found in axes.items()}
+    plans = {axis: next_experiment(found, result.model, window) for axis, found in axes.items()}
     return Diagnosis(
         result.model,
         axes,
