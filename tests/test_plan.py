@@ -14,6 +14,7 @@ import identify.contest
 from identify import diagnose, plan
 from identify.as_json import diagnose_json
 from identify.as_text import diagnose_text, plan_text
+from identify.cli.shared import app
 from identify.contest import Arena, Explanation, contest, within_limits
 from identify.diagnose import LEAST_SEPARATION, Verdict
 from identify.proposals import TOLERANCE, proposals
@@ -96,8 +97,8 @@ def test_an_experiment_beyond_the_limits_is_caught_by_the_same_law():
 def test_what_a_weak_motor_cannot_do_is_not_planned():
     stage = one_axis(STAGES["weak"])
     arena = Arena(stage, "x", (Explanation("as it is", stage.axes["x"]),))
-    trials = contest(arena, proposals(stage, "x", 5.0))
-    assert len(trials) > 10
+    trials = contest(arena, proposals(stage, "x", 20.0))
+    assert len(trials) > 5
     for trial in trials:
         log = simulate(stage, trial.experiment, stage=ReducedStage)
         low, high = stage.axes["x"].hardware.travel
@@ -154,8 +155,8 @@ CASES = {
     # At one high speed the dry friction is one number, and so is its asymmetry.
     "asymmetry": Case(
         stage_of(effect("stribeck", Fc=0.285, Fs=0.335, v0=0.01, sigma2=0.018)),
-        {"constant_force": {"F0": 2.6e-3}, "asymmetric_friction": {"coulomb": -0.0091}},
-        Passes("x", span=0.3, speed=0.25, repeats=3),
+        {"constant_force": {"F0": 2.4e-3}, "asymmetric_friction": {"coulomb": -0.0084}},
+        Passes("x", span=0.3, speed=0.25, repeats=4),
     ),
 }
 TRUTHS = [(name, truth) for name, case in CASES.items() for truth in case.pair]
@@ -226,7 +227,7 @@ def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     assert "rate of change of the motor force" in following["missing_motion"]
     assert following["expected_difference"] > 0.1 * following["noise_floor"]
     assert "passes" in diagnose_text(found)
-    card = next(s for s in sections_of(found) if s.name == "answer").blocks[0]
+    card = next(s for s in sections_of(found) if s.anchor == "answer").blocks[0]
     assert any("twin plan" in remark for remark in card.remarks)
 
 
@@ -339,14 +340,27 @@ def test_the_command_writes_an_experiment_that_simulate_runs(tmp_path):
     assert read_log(tmp_path / "l.mcap").attachments["experiment.toml"]
 
 
-def test_bad_input_of_the_command_is_refused_in_one_line(tmp_path):
-    for arguments, said in (
-        (("proton_xy", "--between", "coging", "lugre"), "'cogging'"),
-        (("proton_xy", "--between", "cogging", "cogging"), "different"),
-        (("proton_xy", "--axis", "z"), "x, y"),
-        (("proton_xy", "--duration", "-1"), "s"),
-        (("proton_xy", "-o", "next.mcap"), ".toml"),
-        (("proton_xy", "-o", "no/where.toml"), "no/where.toml"),
-    ):
-        assert said in refusal("plan", *arguments, folder=tmp_path)
-    assert "twin plan" in refusal("simulate", "nowhere.toml", folder=tmp_path)
+BAD_INPUT = (
+    (("plan", "proton_xy", "--between", "coging", "lugre"), "'cogging'"),
+    (("plan", "proton_xy", "--between", "cogging", "cogging"), "different"),
+    (("plan", "proton_xy", "--axis", "z"), "x, y"),
+    (("plan", "proton_xy", "--duration", "-1"), "0 s"),
+    (("plan", "proton_xy", "-o", "next.mcap"), ".toml"),
+    (("plan", "proton_xy", "-o", "no/where.toml"), "no/where.toml"),
+    (("simulate", "nowhere.toml"), "twin plan"),
+    (("simulate", "next.toml", "--duration", "3"), "duration"),
+)
+
+
+@pytest.mark.parametrize(("arguments", "said"), BAD_INPUT)
+def test_bad_input_of_the_commands_is_refused(arguments, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    save_experiment(EXPERIMENTS[0], "next.toml")
+    with pytest.raises(InputError) as refused:
+        app(list(arguments), standalone_mode=False)
+    assert said in str(refused.value)
+    assert [f.name for f in tmp_path.iterdir()] == ["next.toml"], "something was written"
+
+
+def test_a_refusal_is_one_line_with_exit_code_two(tmp_path):
+    assert "s" in refusal("plan", "proton_xy", "--duration", "0", folder=tmp_path)
