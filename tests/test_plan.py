@@ -113,11 +113,15 @@ def test_what_a_weak_motor_cannot_do_is_not_planned():
 
 @dataclass(frozen=True)
 class Case:
-    """Two effects, each with the values of a machine; the model that lacks both; poor motion."""
+    """Two effects, each with the values of a machine; the model that lacks both; poor motion.
+
+    seed: of the noise of the first log; with some noises even this motion tells the two apart.
+    """
 
     stage: StageModel
     pair: dict[str, dict[str, float]]
     poor: Experiment
+    seed: int = 1
 
     def machine(self, truth: str) -> StageModel:
         planted = Fitted.at_start(CATALOGUE[truth], self.pair[truth])
@@ -155,8 +159,9 @@ CASES = {
     # At one high speed the dry friction is one number, and so is its asymmetry.
     "asymmetry": Case(
         stage_of(effect("stribeck", Fc=0.285, Fs=0.335, v0=0.01, sigma2=0.018)),
-        {"constant_force": {"F0": 2.4e-3}, "asymmetric_friction": {"coulomb": -0.0084}},
-        Passes("x", span=0.3, speed=0.25, repeats=4),
+        {"constant_force": {"F0": 2.6e-3}, "asymmetric_friction": {"coulomb": -0.0091}},
+        Passes("x", span=0.3, speed=0.25, repeats=1),
+        seed=7,
     ),
 }
 TRUTHS = [(name, truth) for name, case in CASES.items() for truth in case.pair]
@@ -174,8 +179,8 @@ def test_after_the_planned_experiment_the_ambiguity_is_gone(name, truth):
 
 def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
     machine = case.machine(truth)
-    poor = {"poor": simulate(machine, case.poor, seed=1, stage=ReducedStage)}
-    held = {"held": simulate(machine, case.poor, seed=2, stage=ReducedStage)}
+    poor = {"poor": simulate(machine, case.poor, seed=case.seed, stage=ReducedStage)}
+    held = {"held": simulate(machine, case.poor, seed=case.seed + 10, stage=ReducedStage)}
     before = diagnose(case.stage, poor, held, catalogue=catalogue, window=WINDOW)
     assert abs(separation(before.axes["x"].ranking)) < LEAST_SEPARATION
     found = before.next_experiments.get("x")
@@ -200,7 +205,7 @@ def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
 @pytest.mark.parametrize(("name", "truth"), TRUTHS)
 def test_the_same_among_the_whole_catalogue(name, truth):
     machine, case = CASES[name].machine(truth), CASES[name]
-    poor = {"poor": simulate(machine, case.poor, seed=1, stage=ReducedStage)}
+    poor = {"poor": simulate(machine, case.poor, seed=case.seed, stage=ReducedStage)}
     rivals = [CATALOGUE[e] for e in case.pair]
     found = plan(case.stage, poor, between=rivals, catalogue=CATALOGUE, window=WINDOW)
     new = {
