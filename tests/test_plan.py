@@ -172,7 +172,13 @@ def separation(ranking) -> float:
     return ranking[0].delta_bic - ranking[1].delta_bic
 
 
-@pytest.mark.parametrize(("name", "truth"), TRUTHS)
+LONG = ("ripple", "force_constant_ripple")  # the search for two pitches takes its time
+
+
+@pytest.mark.parametrize(
+    ("name", "truth"),
+    [pytest.param(*t, marks=pytest.mark.slow) if t == LONG else t for t in TRUTHS],
+)
 def test_after_the_planned_experiment_the_ambiguity_is_gone(name, truth):
     assert_resolved(CASES[name], truth, Catalogue([CATALOGUE[e] for e in CASES[name].pair]))
 
