@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.figures import Figure, Target
 from benchmarks.timing import interleaved, ratio
 from twin.effects import load_catalogue
-from twin.experiments import EXPERIMENTS
+from twin.experiment_kinds import Tracking
 from twin.model import StageModel
 from twin.model_file import load_model
 from twin.mujoco_link import call_step, step_address
@@ -61,7 +61,7 @@ class _Simulation:
 def measure() -> list[Figure]:
     """Ratios of steps per second, of whole runs and of the stepping alone."""
     model = load_model("proton_xy", load_catalogue())
-    setpoint = EXPERIMENTS["tracking"].setpoint(model, 0, DURATION, np.random.default_rng(1))
+    setpoint = Tracking(DURATION).setpoint(model, np.random.default_rng(1))
     n = len(setpoint.position)
     bare_model = MujocoStage(model, model.table()).model
     bare_data = mujoco.MjData(bare_model)

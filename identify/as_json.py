@@ -8,11 +8,15 @@ from typing import Any
 
 from identify.candidates import Candidate
 from identify.compare import AxisComparison
+from identify.contest import Trial
 from identify.diagnose import Step
+from identify.plan import Plan
 from identify.uncertainty import Estimate
 from identify.whiteness import ResidualTests
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
+from twin.experiment_file import parameters
+from twin.experiment_kinds import kind_of
 from twin.log.check import CheckReport
 
 
@@ -118,6 +122,7 @@ def diagnose_json(result: Diagnosis) -> dict[str, Any]:
 def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
     d = result.axes[axis]
     structure = d.unexplained
+    following = result.next_experiments.get(axis)
     return {
         "verdict": d.verdict.name.lower(),
         "explanation": d.verdict.value,
@@ -137,7 +142,7 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "force_error": d.base.error,
         "noise_floor": d.base.floor,
         "unit": "N",
-        "next_experiment": None,
+        "next_experiment": following and plan_json(following),
     }
 
 
@@ -154,6 +159,34 @@ def _candidate(c: Candidate) -> dict[str, Any]:
         "unit": "N",
         "supported": c.supported,
         "parameters": dict(c.fit.axis[c.effect.name].values),
+    }
+
+
+def plan_json(result: Plan) -> dict[str, Any]:
+    """The chosen experiment, what it is expected to show, and those it was chosen from."""
+    several = len(result.between) > 1
+    return {
+        "axis": result.axis,
+        "between": list(result.between),
+        "decides": result.decides,
+        "favoured_by_the_logs": result.favoured,
+        "refitted_on_logs": not result.supposed,
+        "missing_motion": result.gap.in_words(),
+        "excited_by": dict(result.excited_by),
+        **_trial(result.chosen, several),
+        "ranking": [_trial(t, several) for t in result.ranking],
+    }
+
+
+def _trial(t: Trial, several: bool) -> dict[str, Any]:
+    return {
+        "experiment": {"kind": kind_of(t.experiment), **parameters(t.experiment)},
+        "duration": t.duration,
+        "duration_unit": "s",
+        "expected_difference": t.difference,
+        "noise_floor": t.floor,
+        "unit": "N",
+        "delta_bic" if several else "information": t.gain,
     }
 
 

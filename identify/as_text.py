@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 
 from identify.candidates import Candidate
+from identify.contest import Trial
 from identify.describe import described_labels, in_words
 from identify.diagnose import Step
+from identify.explanations import STRENGTH
+from identify.plan import Plan
 from identify.uncertainty import Estimate
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
 from twin.effects import load_catalogue
+from twin.experiment import Experiment
+from twin.experiment_file import parameters
+from twin.experiment_kinds import kind_of
 from twin.log.check import CheckReport
 
 
@@ -73,6 +80,8 @@ def diagnose_text(result: Diagnosis) -> str:
         )
         if d.ambiguous_with:
             lines.append(f"  cannot be told apart from: {', '.join(d.ambiguous_with)}")
+        if axis in result.next_experiments:
+            lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         if d.unexplained:
             s = d.unexplained
             again = f", period {s.period:.4g} {s.unit}" if s.period else ""
@@ -109,6 +118,50 @@ def _ranking_line(c: Candidate) -> str:
         f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   held-out error "
         f"{c.gain.before:.4g} -> {c.gain.after:.4g} N{'' if c.supported else '   not supported'}"
     )
+
+
+SHOWN = 4  # trials of a plan that are printed
+
+
+def plan_text(result: Plan) -> str:
+    """What is decided, the chosen experiment and what it shows, and the next best."""
+    several = len(result.between) > 1
+    asked, verdict = " or ".join(result.between), "decided by"
+    if not several:
+        asked, verdict = f"the parameters of {asked}", "best shown by"
+    elif not result.decides:
+        verdict = "not decided by any experiment of this length; the nearest is"
+    lines = [f"axis {result.axis}: {asked}, {verdict}", f"  {in_short(result.chosen.experiment)}"]
+    lines += [f"  {result.gap.in_words()}"]
+    lines += [f"  {name} shows in {motion}" for name, motion in result.excited_by.items()]
+    if result.favoured:
+        lines.append(f"  the logs at hand favour {result.favoured} already")
+    if result.supposed and several:
+        lines.append(f"  without logs: effects at start values, {STRENGTH:g} times the noise floor")
+    return "\n".join([*lines, *(_trial_line(t, several) for t in result.ranking[:SHOWN])])
+
+
+def in_short(experiment: Experiment) -> str:
+    """Kind and parameters with their units, on one line."""
+    units = {f.name: f.metadata.get("unit", "") for f in fields(experiment)}
+    values = (f"{k} {_plain(v)} {units[k]}".strip() for k, v in parameters(experiment).items())
+    return f"{kind_of(experiment)}: {', '.join(values)}"
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, tuple):
+        return " ".join(f"{v:g}" for v in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _trial_line(t: Trial, several: bool) -> str:
+    tail = f"{t.gain:8.1f} nats on the parameters"
+    if several:
+        tail = (
+            f"{t.difference:.3g} N left to the rival ({t.difference / t.floor:.1f} x noise floor), "
+            f"evidence {t.gain:.1f}"
+        )
+    return f"  {kind_of(t.experiment):10s} {t.duration:5.1f} s   {tail}"
 
 
 def add_text(result: Addition) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from identify.motion import Motion, excitation, motion_of
 from identify.noise import noise_floor
 from identify.residual import Windowed
-from identify.weak import FEWEST_BLOCKS, Window
+from identify.weak import LEAST_BLOCKS, Window
 from twin.effect import Excitation
 from twin.errors import InputError
 from twin.log import Log
@@ -112,7 +112,7 @@ def choose_window(motions: Iterable[Motion]) -> float:
     mass = inertia(motions)
     longest_block = max(m.period for m in motions)
     for length in WINDOWS:
-        if length < FEWEST_BLOCKS * longest_block:
+        if length < LEAST_BLOCKS * longest_block:
             continue
         windows = [Window.of_length(length, m.period) for m in motions]
         rest = np.concatenate(

@@ -18,7 +18,7 @@ from twin.errors import InputError
 Array = NDArray[np.float64]
 
 OVERLAP = 4  # windows that cover one instant
-FEWEST_BLOCKS = 8  # that a window spans
+LEAST_BLOCKS = 8  # that a window spans
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +39,10 @@ class Window:
     def of_length(cls, length: float, period: float) -> Window:
         """Window of that length (s); InputError where it spans too few blocks."""
         n = round(length / period)
-        if n < FEWEST_BLOCKS:
+        if n < LEAST_BLOCKS:
             raise InputError(
-                f"window = {length:g} s: shorter than {FEWEST_BLOCKS} blocks of {period:g} s; "
-                f"give at least {FEWEST_BLOCKS * period:g} s"
+                f"window = {length:g} s: shorter than {LEAST_BLOCKS} blocks of {period:g} s; "
+                f"give at least {LEAST_BLOCKS * period:g} s"
             )
         return cls._of_blocks(n, period, max(n // OVERLAP, 1))
 

@@ -1,4 +1,4 @@
-"""The loop in Python: fit, compare, diagnose and add, each on a whole stage and its logs."""
+"""The loop in Python: fit, compare, diagnose, add and plan, on a whole stage and its logs."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from identify.describe import describe, in_words, physics_alone
 from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
 from identify.fit import Fit, error_on, rms
 from identify.freerun import free_run, rms_error
+from identify.plan import Plan, next_experiment, plan
 from identify.search import fit_thoroughly
 from identify.study import Study, studies
 from identify.uncertainty import Estimate, estimates, half_widths
@@ -53,11 +54,15 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """Diagnoses by axis; the answer is that of the axis with the strongest evidence."""
+    """Diagnoses by axis; the answer is that of the axis with the strongest evidence.
+
+    next_experiments: for an axis whose diagnosis is ambiguous, the experiment that decides.
+    """
 
     model: StageModel
     axes: Mapping[str, AxisDiagnosis]
     comparison: Comparison
+    next_experiments: Mapping[str, Plan] = field(default_factory=dict)
 
     @property
     def leading(self) -> AxisDiagnosis:
@@ -163,8 +168,12 @@ def diagnose(
         )
         for axis, fitted in result.fits.items()
     }
+    plans = {axis: next_experiment(found, result.model, window) for axis, found in axes.items()}
     return Diagnosis(
-        result.model, axes, compare(result.model, logs, window=window, progress=progress)
+        result.model,
+        axes,
+        compare(result.model, logs, window=window, progress=progress),
+        {axis: found for axis, found in plans.items() if found is not None},
     )
 
 
@@ -272,5 +281,6 @@ __all__ = [
     "compare",
     "diagnose",
     "fit",
+    "plan",
     "score",
 ]

@@ -27,7 +27,7 @@ def run(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
 
 def test_the_loop_runs_as_printed_and_the_error_falls(tmp_path):
     commands = [line for line in blocks("sh")[1].splitlines() if line.startswith("twin ")]
-    assert len(commands) == 8
+    assert len(commands) == 10
     if shutil.which("twin", path=str(Path(sys.executable).parent)) is None:
         pytest.skip("the package is not installed, so there is no `twin` command")
     for command in commands:
@@ -40,6 +40,7 @@ def test_the_loop_runs_as_printed_and_the_error_falls(tmp_path):
         ["twin", "fit", "better.toml", "fit.mcap", "--holdout", "held.mcap"], tmp_path
     ).stdout  # fmt: skip
     assert (tmp_path / "after.html").stat().st_size > 10_000
+    assert (tmp_path / "next.mcap").stat().st_size > 10_000
 
 
 def test_the_python_example_runs_and_names_the_effect(tmp_path):

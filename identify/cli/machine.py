@@ -23,11 +23,15 @@ from identify.cli.shared import (
 
 @app.command()
 def simulate(
-    experiment: Annotated[str, typer.Argument(help="tracking, moves, cable_pass, ...")],
+    experiment: Annotated[
+        str, typer.Argument(help="tracking, moves, cable_pass, ...; or a .toml from `twin plan`.")
+    ],
     model: Annotated[str, typer.Option("--model", help="Stage model (.toml).")] = "proton_xy",
     out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")] = Path("log.mcap"),
     seed: Annotated[int, typer.Option(help="Same seed, same log.")] = 0,
-    duration: Annotated[float, typer.Option(help="s")] = 20.0,
+    duration: Annotated[
+        float | None, typer.Option(help="s, 20 if left out; a file has its own.")
+    ] = None,
     axis: Annotated[str | None, typer.Option(help="Axis that moves, where one does.")] = None,
     effects: Effects = None,
     as_json_: Json = False,
@@ -35,14 +39,16 @@ def simulate(
     """Run an experiment on the twin in MuJoCo and log it as MCAP."""
     from functools import partial
 
+    from twin.experiment_file import SUFFIX, load_experiment
     from twin.experiments import simulate as run
     from twin.log import write_log
 
     require_folder(out)
     stage = stage_model(model, catalogue_with(effects))
+    chosen = load_experiment(experiment) if experiment.endswith(SUFFIX) else experiment
     with bars_on_stderr() as bars:
         log = run(
-            stage, experiment, seed=seed, duration=duration, axis=axis,
+            stage, chosen, seed=seed, duration=duration, axis=axis,
             progress=partial(bars, "simulating"),
         )  # fmt: skip
         write_log(log, out, progress=partial(bars, "writing"))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from identify.as_text import advice
+from identify.as_text import advice, in_short
 from identify.candidates import Candidate
 from identify.compare import AxisComparison
 from identify.diagnose import AxisDiagnosis, Verdict
 from identify.fit import AT_FLOOR
+from identify.plan import Plan
 from identify.report.blocks import Answer, Section, Tile, Tone
 from identify.report.subject import Subject
 from identify.report.units import Scale, number, quantity, spaced
@@ -21,11 +22,12 @@ def section(subject: Subject) -> Section:
         cards.append(_added(subject.additions[-1]))
     for axis in subject.axes:
         found = subject.diagnosed(axis.axis)
-        cards.append(_compared(axis) if found is None else _diagnosed(axis, found))
+        following = subject.next_experiment(axis.axis)
+        cards.append(_compared(axis) if found is None else _diagnosed(axis, found, following))
     return Section("answer", "Answer", cards)
 
 
-def _diagnosed(axis: AxisComparison, found: AxisDiagnosis) -> Answer:
+def _diagnosed(axis: AxisComparison, found: AxisDiagnosis, following: Plan | None) -> Answer:
     remarks = []
     sentence = found.verdict.value
     if found.unexplained is not None:
@@ -35,6 +37,8 @@ def _diagnosed(axis: AxisComparison, found: AxisDiagnosis) -> Answer:
     remarks.extend(_runner_up(found))
     if found.unexplained is not None:
         remarks.append(f"{advice()}.")
+    if following is not None:
+        remarks.append(_next_step(following))
     return Answer(
         headline=f"Axis {axis.axis}: {_headline(found)}",
         sentence=sentence,
@@ -89,6 +93,16 @@ def _runner_up(found: AxisDiagnosis) -> list[str]:
         f"{role}: {spaced(second.effect.name)}, ΔBIC {number(second.delta_bic)}, "
         f"{tested_on(found)} error {change}, {verdict}."
     ]
+
+
+def _next_step(following: Plan) -> str:
+    chosen = following.chosen
+    what = "decides" if following.decides else "comes nearest to deciding, but is too short"
+    return (
+        f"The experiment that {what} ({quantity(chosen.duration, 's')}; twin plan writes it): "
+        f"{in_short(chosen.experiment)}. It leaves {quantity(chosen.difference, 'N')} RMS to the "
+        f"rival, where noise is {quantity(chosen.floor, 'N')}; {following.gap.in_words()}."
+    )
 
 
 def _change(unit: str, before: float, after: float) -> str:

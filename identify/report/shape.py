@@ -11,7 +11,7 @@ from identify.report.blocks import Block, Heading, Listing, Picture, Section
 from identify.report.drawing import BLUE, ORANGE, binned_mean, new_figure
 from identify.report.subject import Subject
 from identify.report.units import Scale, spaced
-from identify.residual import forces
+from identify.residual import on_blocks, total_force
 from twin.model import AxisModel, Fitted
 
 
@@ -38,7 +38,7 @@ def _picture(axis: AxisComparison, fitted: Fitted) -> Picture:
 
 def _figure(axis: AxisComparison, fitted: Fitted) -> Figure:
     alone = AxisModel(1.0, effects=(fitted,))
-    force = np.concatenate([forces(alone, log.motion)[fitted.effect.name] for log in axis.logs])
+    force = np.concatenate([total_force(on_blocks(alone), log.motion) for log in axis.logs])
     position = np.concatenate([log.motion.position for log in axis.logs])
     velocity = np.concatenate([log.motion.velocity for log in axis.logs])
     figure = new_figure(3.0)

@@ -1,0 +1,83 @@
+"""The command that plans the next experiment."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from identify.cli.shared import (
+    Effects,
+    Holdout,
+    Json,
+    Model,
+    Window,
+    app,
+    bars_on_stderr,
+    catalogue_with,
+    checked,
+    read_logs,
+    require_folder,
+    say,
+    stage_model,
+)
+from twin.errors import InputError
+
+if TYPE_CHECKING:
+    from identify.explanations import Rival
+    from twin.effects import Catalogue
+
+
+@app.command()
+def plan(
+    model: Model,
+    logs: Annotated[
+        list[Path] | None, typer.Argument(metavar="[LOG...]", help="MCAP logs that there are.")
+    ] = None,
+    between: Annotated[
+        tuple[str, str] | None,
+        typer.Option(help="Two effects to add to the model, or two fitted models (.toml)."),
+    ] = None,
+    axis: Annotated[str | None, typer.Option(help="Axis that is explained.")] = None,
+    duration: Annotated[float, typer.Option(help="About that of the experiment, s.")] = 20.0,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Experiment to write (.toml).")] = Path(
+        "experiment.toml"
+    ),
+    holdout: Holdout = None,
+    window: Window = None,
+    effects: Effects = None,
+    as_json_: Json = False,
+) -> None:
+    """Choose the experiment that decides between explanations; `twin simulate` runs it."""
+    from identify import as_json, as_text, workflow
+    from twin.experiment_file import SUFFIX, save_experiment
+
+    if out.suffix != SUFFIX:
+        raise InputError(f"{out}: an experiment is a {SUFFIX} file; give such a name")
+    require_folder(out)
+    catalogue = catalogue_with(effects)
+    stage = stage_model(model, catalogue)
+    rivals = [_rival(name, catalogue) for name in between or ()]
+    recorded = read_logs(logs)
+    with bars_on_stderr() as bars:
+        result = workflow.plan(
+            stage, recorded, read_logs(holdout), between=rivals, catalogue=catalogue, axis=axis,
+            duration=duration, window=window, progress=bars,
+        )  # fmt: skip
+    text = as_text.plan_text(result)
+    if result.decides:
+        save_experiment(result.chosen.experiment, out, *text.splitlines()[:3])
+        text += f"\n{out}: run it on the machine, or `twin simulate {out} --model MODEL -o LOG`"
+    summary = {**as_json.plan_json(result), "file": str(out) if result.decides else None}
+    say(text, summary, as_json_, checked(recorded))
+    if not result.decides:
+        raise typer.Exit(1)
+
+
+def _rival(name: str, catalogue: Catalogue) -> Rival:
+    """The model of that file, or the effect of that name."""
+    if name.endswith(".toml"):
+        return replace(stage_model(name, catalogue), name=name)
+    return catalogue[name]

@@ -1,0 +1,377 @@
+"""The planned experiment stays within the stage's limits, and the ambiguity is gone after it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from machines import one_axis
+from test_command_line import refusal, twin
+
+import identify.contest
+from identify import diagnose, plan
+from identify.as_json import diagnose_json
+from identify.as_text import diagnose_text, plan_text
+from identify.cli.shared import app
+from identify.contest import Arena, Explanation, contest, within_limits
+from identify.diagnose import LEAST_SEPARATION, Verdict
+from identify.proposals import TOLERANCE, proposals
+from identify.report import sections
+from identify.report.drawing import drawing_style
+from identify.report.subject import Subject
+from twin.effects import Catalogue, load_catalogue
+from twin.errors import InputError
+from twin.experiment import Experiment
+from twin.experiment_file import format_experiment, load_experiment, parameters, save_experiment
+from twin.experiment_kinds import KINDS, Passes, Rests, Steps, Sweep
+from twin.experiments import simulate
+from twin.log import read_log
+from twin.model import Fitted, StageModel
+from twin.model_file import load_model
+from twin.simulator import ReducedStage
+
+CATALOGUE = load_catalogue()
+PROTON = load_model("proton_xy", CATALOGUE)
+RATE = 2500.0  # Hz, of the machines that are identified: quicker than 10 kHz, and enough
+WINDOW = 0.02  # s
+DURATION = 8.0  # s of the planned experiments
+
+
+def with_limits(**changed: float | tuple[float, float]) -> StageModel:
+    """The stage with other limits on x."""
+    x = PROTON.axes["x"]
+    return PROTON.with_axis("x", replace(x, hardware=replace(x.hardware, **changed)))
+
+
+STAGES = {
+    "proton": PROTON,
+    "one axis": one_axis(PROTON),
+    "short and slow": with_limits(travel=(0.01, 0.04), velocity=0.02, acceleration=0.1),
+    "weak": with_limits(force_limit=2.0, jerk=5.0),
+    "emps": load_model("examples/emps.toml", CATALOGUE),
+}
+
+
+# Every experiment that is proposed stays within the stage's limits.
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_every_proposal_stays_within_the_limits_of_the_stage(name):
+    stage = STAGES[name]
+    for experiment in proposals(stage, "x", 5.0):
+        assert_within_limits(stage, experiment)
+
+
+def assert_within_limits(stage: StageModel, experiment: Experiment) -> None:
+    """Position, speed, acceleration and jerk asked for, the force of a sweep included."""
+    setpoint = experiment.setpoint(stage, np.random.default_rng(0))
+    assert setpoint.duration < TOLERANCE * 5.0
+    for i, axis in enumerate(stage.axes.values()):
+        h = axis.hardware
+        low, high = h.travel
+        position, velocity = setpoint.position[:, i], setpoint.velocity[:, i]
+        pushed = setpoint.acceleration[:, i] + setpoint.force[:, i] / axis.mass
+        assert low - 1e-9 <= position.min() <= position.max() <= high + 1e-9
+        assert np.abs(velocity).max() <= h.velocity * (1.0 + 1e-6)
+        assert np.abs(pushed).max() <= h.acceleration * (1.0 + 1e-6)
+        assert np.abs(np.diff(pushed)).max() * stage.sample_rate <= h.jerk * (1.0 + 1e-3)
+        assert np.abs(setpoint.force[:, i]).max() <= h.force_limit
+
+
+def test_an_experiment_beyond_the_limits_is_caught_by_the_same_law():
+    soft = with_limits(jerk=10.0)
+    hard = Passes("x", span=0.1, speed=0.1, repeats=1)
+    assert_within_limits(PROTON, hard)
+    setpoint = hard.setpoint(PROTON, np.random.default_rng(0))
+
+    class Forged(Passes):
+        def setpoint(self, model, rng):
+            return setpoint
+
+    with pytest.raises(AssertionError):
+        assert_within_limits(soft, Forged("x", span=0.1, speed=0.1, repeats=1))
+
+
+def test_what_a_weak_motor_cannot_do_is_not_planned():
+    stage = one_axis(STAGES["weak"])
+    arena = Arena(stage, "x", (Explanation("as it is", stage.axes["x"]),))
+    trials = contest(arena, proposals(stage, "x", 20.0))
+    assert len(trials) > 5
+    for trial in trials:
+        log = simulate(stage, trial.experiment, stage=ReducedStage)
+        low, high = stage.axes["x"].hardware.travel
+        assert low < log.truth["x"]["position"].min() < log.truth["x"]["position"].max() < high
+        assert np.abs(log.axes["x"].force).max() < stage.axes["x"].hardware.force_limit
+    wild = Passes("x", span=0.3, speed=0.2, repeats=1)
+    assert not within_limits(stage, simulate(stage, wild, stage=ReducedStage))
+
+
+# Ambiguous pairs: poor motion, then the planned experiment, with each explanation as the truth.
+
+
+@dataclass(frozen=True)
+class Case:
+    """Two effects, each with the values of a machine; the model that lacks both; poor motion.
+
+    seed: of the noise of the first log; with some noises even this motion tells the two apart.
+    """
+
+    stage: StageModel
+    pair: dict[str, dict[str, float]]
+    poor: Experiment
+    seed: int = 1
+
+    def machine(self, truth: str) -> StageModel:
+        planted = Fitted.at_start(CATALOGUE[truth], self.pair[truth])
+        return self.stage.with_axis("x", self.stage.axes["x"].with_effect(planted))
+
+
+def stage_of(friction: Fitted | None = None, *forces: Fitted) -> StageModel:
+    """One axis of the stage with a friction, its own where None, and some forces."""
+    stage = replace(one_axis(PROTON), sample_rate=RATE)
+    x = stage.axes["x"]
+    quiet = replace(x.hardware, current_noise=0.5 * x.hardware.current_noise)
+    return stage.with_axis(
+        "x", replace(x, hardware=quiet, effects=(friction or x["lugre"], *forces))
+    )
+
+
+def effect(name: str, **values: float) -> Fitted:
+    return Fitted.at_start(CATALOGUE[name], values)
+
+
+GENTLE = Passes("x", span=0.3, speed=0.05, repeats=1, effort=0.02)
+CASES = {
+    # The command changes slowly, so that a dead time and a time constant do the same.
+    "delay": Case(
+        stage_of(),
+        {"actuator_delay": {"tau": 2e-4}, "actuator_lag": {"tau": 2e-4}},
+        replace(GENTLE, effort=0.05),
+    ),
+    # Against a load of 100 N the motor force hardly varies at any place.
+    "ripple": Case(
+        stage_of(None, effect("constant_force", F0=100.0)),
+        {"cogging": {"a1": 2.5e-3}, "force_constant_ripple": {"a1": 2.5e-3 / 100.0}},
+        GENTLE,
+    ),
+    # At one high speed the dry friction is one number, and so is its asymmetry.
+    "asymmetry": Case(
+        stage_of(effect("stribeck", Fc=0.285, Fs=0.335, v0=0.01, sigma2=0.018)),
+        {"constant_force": {"F0": 2.6e-3}, "asymmetric_friction": {"coulomb": -0.0091}},
+        Passes("x", span=0.3, speed=0.25, repeats=1),
+        seed=7,
+    ),
+}
+TRUTHS = [(name, truth) for name, case in CASES.items() for truth in case.pair]
+
+
+def separation(ranking) -> float:
+    """Evidence of the best explanation over the other."""
+    return ranking[0].delta_bic - ranking[1].delta_bic
+
+
+LONG = ("ripple", "force_constant_ripple")  # the search for two pitches takes its time
+
+
+@pytest.mark.parametrize(
+    ("name", "truth"),
+    [pytest.param(*t, marks=pytest.mark.slow) if t == LONG else t for t in TRUTHS],
+)
+def test_after_the_planned_experiment_the_ambiguity_is_gone(name, truth):
+    assert_resolved(CASES[name], truth, Catalogue([CATALOGUE[e] for e in CASES[name].pair]))
+
+
+def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
+    machine = case.machine(truth)
+    poor = {"poor": simulate(machine, case.poor, seed=case.seed, stage=ReducedStage)}
+    held = {"held": simulate(machine, case.poor, seed=case.seed + 10, stage=ReducedStage)}
+    before = diagnose(case.stage, poor, held, catalogue=catalogue, window=WINDOW)
+    assert abs(separation(before.axes["x"].ranking)) < LEAST_SEPARATION
+    found = before.next_experiments.get("x")
+    if before.axes["x"].verdict is not Verdict.AMBIGUOUS:
+        assert found is None
+        rivals = [CATALOGUE[e] for e in case.pair]
+        found = plan(
+            case.stage, poor, between=rivals, catalogue=catalogue, duration=DURATION, window=WINDOW
+        )
+    assert found.decides
+    assert set(found.between) == set(case.pair)
+    new = {"new": simulate(machine, found.chosen.experiment, seed=3, stage=ReducedStage)}
+    after = diagnose(case.stage, {**poor, **new}, held, catalogue=catalogue, window=WINDOW).axes[
+        "x"
+    ]
+    assert after.verdict is Verdict.MISSING_EFFECT
+    assert after.ranking[0].effect.name == truth
+    assert separation(after.ranking) > LEAST_SEPARATION
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "truth"), TRUTHS)
+def test_the_same_among_the_whole_catalogue(name, truth):
+    machine, case = CASES[name].machine(truth), CASES[name]
+    poor = {"poor": simulate(machine, case.poor, seed=case.seed, stage=ReducedStage)}
+    rivals = [CATALOGUE[e] for e in case.pair]
+    found = plan(case.stage, poor, between=rivals, catalogue=CATALOGUE, window=WINDOW)
+    new = {
+        f"new {seed}": simulate(machine, found.chosen.experiment, seed=seed, stage=ReducedStage)
+        for seed in (3, 4)
+    }
+    after = diagnose(case.stage, {**poor, **new}, catalogue=CATALOGUE, window=WINDOW).axes["x"]
+    ranks = [c.effect.name for c in after.ranking]
+    (other,) = set(case.pair) - {truth}
+    assert ranks.index(truth) < ranks.index(other)
+    assert other not in after.ambiguous_with
+
+
+def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
+    case = CASES["delay"]
+    machine = case.machine("actuator_delay")
+    logs = [{"log": simulate(machine, case.poor, seed=s, stage=ReducedStage)} for s in (1, 2)]
+    catalogue = Catalogue([CATALOGUE[e] for e in case.pair])
+    found = diagnose(case.stage, *logs, catalogue=catalogue, window=WINDOW)
+    assert found.axes["x"].verdict is Verdict.AMBIGUOUS
+    following = diagnose_json(found)["next_experiment"]
+    assert following["decides"]
+    assert following["experiment"]["kind"] in KINDS
+    assert "rate of change of the motor force" in following["missing_motion"]
+    assert following["expected_difference"] > 0.1 * following["noise_floor"]
+    assert "passes" in diagnose_text(found)
+    card = next(s for s in sections_of(found) if s.anchor == "answer").blocks[0]
+    assert any("twin plan" in remark for remark in card.remarks)
+
+
+def sections_of(found):
+    """The sections of the report of a diagnosis."""
+    subject = Subject("test", found, found.comparison, (), ())
+    with drawing_style():
+        return sections(subject)
+
+
+def test_what_no_motion_tells_apart_is_said():
+    # The cable of this stage has a constant force of its own, which takes over the first.
+    rivals = [CATALOGUE["constant_force"], CATALOGUE["asymmetric_friction"]]
+    found = plan(one_axis(PROTON), between=rivals, catalogue=CATALOGUE, duration=4.0)
+    assert not found.decides
+    assert "not decided" in plan_text(found)
+
+
+def test_without_rivals_the_experiment_says_most_about_the_model():
+    stage = stage_of()
+    found = plan(stage, catalogue=CATALOGUE, duration=4.0)
+    assert found.decides
+    assert found.between == (stage.name,)
+    slow = [t for t in found.ranking if t.motion.motion.velocity.max() < 0.01]
+    assert found.chosen.gain > max(t.gain for t in slow) + 1.0
+
+
+def assert_only_what_a_refit_leaves_counts() -> None:
+    """Two models that differ in values that a refit takes over are not told apart."""
+    stage = stage_of()
+    x = stage.axes["x"]
+    lugre = {**x["lugre"].values, "Fc": 0.3, "Fs": 0.36, "sigma2": 0.03}
+    other = replace(x.with_effect(effect("lugre", **lugre)), mass=15.2)
+    arena = Arena(stage, "x", (Explanation("a", x), Explanation("b", other)), window=WINDOW)
+    for trial in contest(arena, proposals(stage, "x", 4.0)):
+        assert trial.gain < LEAST_SEPARATION
+
+
+def test_only_what_a_refit_leaves_counts(monkeypatch):
+    assert_only_what_a_refit_leaves_counts()
+    monkeypatch.setattr(identify.contest, "unabsorbed", lambda force, basis: force)
+    with pytest.raises(AssertionError):
+        assert_only_what_a_refit_leaves_counts()
+
+
+def test_two_explanations_that_are_one_are_refused():
+    with pytest.raises(InputError, match="different"):
+        plan(PROTON, between=[CATALOGUE["cogging"]] * 2, catalogue=CATALOGUE)
+
+
+# Experiment files and the command.
+
+EXPERIMENTS = (
+    Passes("x", span=0.1, speed=0.05, repeats=2, at=(0.01, -0.02), other=0.1),
+    Rests("y", span=1e-3, speed=1e-3, rests=(0.1, 2.0)),
+    Steps("x", span=0.1, step=0.02, efforts=(1.0, 0.2)),
+    Sweep("x", 0.1, 0.02, 1, amplitude=0.5, lowest=2.0, highest=60.0, effort=0.5),
+)
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda e: type(e).__name__)
+def test_an_experiment_file_says_the_same_when_it_is_read_again(experiment, tmp_path):
+    save_experiment(experiment, tmp_path / "e.toml", "why")
+    assert load_experiment(tmp_path / "e.toml") == experiment
+    assert [f.name for f in tmp_path.iterdir()] == ["e.toml"]
+    text = format_experiment(experiment)
+    assert all(f"{name} = " in text for name in parameters(experiment))
+
+
+PASSES = '[experiment]\nkind = "passes"\naxis = "x"\nspan = 0.1\nspeed = 0.05\nrepeats = 1\n'
+FAULTS = {
+    "unknown kind": (PASSES.replace("passes", "pases"), "'passes'"),
+    "unknown entry": (PASSES.replace("speed", "sped"), "'speed'"),
+    "missing entry": (PASSES.replace("speed = 0.05", ""), "m/s"),
+    "text for a number": (PASSES.replace("0.05", "'fast'"), "m/s"),
+    "negative": (PASSES.replace("0.05", "-0.05"), "m/s"),
+    "not finite": (PASSES.replace("0.05", "inf"), "m/s"),
+    "a list": (PASSES.replace("0.05", "[0.05]"), "m/s"),
+    "half a repeat": (PASSES.replace("repeats = 1", "repeats = 1.5"), "whole number"),
+    "beyond the speed": (PASSES.replace("0.05", "0.5"), "0.25 m/s"),
+    "beyond the travel": (PASSES.replace("0.1", "0.5"), "0.17 m"),
+    "unknown axis": (PASSES.replace('"x"', '"z"'), "x, y"),
+    "no table": ("kind = 1\n", "[experiment]"),
+    "no TOML": ("kind = = 1\n", "TOML"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_bad_experiment_file_is_refused_in_one_line(fault, tmp_path):
+    text, said = FAULTS[fault]
+    (tmp_path / "e.toml").write_text(text)
+    with pytest.raises(InputError) as refused:
+        simulate(PROTON, load_experiment(tmp_path / "e.toml"), stage=ReducedStage)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value) or "TOML" in said
+
+
+def test_the_command_writes_an_experiment_that_simulate_runs(tmp_path):
+    answer = twin(
+        "plan", "proton_xy", "--between", "cogging", "force_constant_ripple", "--duration", "4",
+        "-o", "next.toml", "--json", folder=tmp_path,
+    )  # fmt: skip
+    assert answer.returncode == 0, answer.stderr
+    result = json.loads(answer.stdout)
+    assert result["between"] == ["cogging", "force_constant_ripple"]
+    assert result["expected_difference"] > result["noise_floor"]
+    assert result["file"] == "next.toml"
+    ran = twin("simulate", "next.toml", "--model", "proton_xy", "-o", "l.mcap", folder=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    assert read_log(tmp_path / "l.mcap").attachments["experiment.toml"]
+
+
+BAD_INPUT = (
+    (("plan", "proton_xy", "--between", "coging", "lugre"), "'cogging'"),
+    (("plan", "proton_xy", "--between", "cogging", "cogging"), "different"),
+    (("plan", "proton_xy", "--axis", "z"), "x, y"),
+    (("plan", "proton_xy", "--duration", "-1"), "0 s"),
+    (("plan", "proton_xy", "-o", "next.mcap"), ".toml"),
+    (("plan", "proton_xy", "-o", "no/where.toml"), "no/where.toml"),
+    (("simulate", "nowhere.toml"), "twin plan"),
+    (("simulate", "next.toml", "--duration", "3"), "duration"),
+)
+
+
+@pytest.mark.parametrize(("arguments", "said"), BAD_INPUT)
+def test_bad_input_of_the_commands_is_refused(arguments, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    save_experiment(EXPERIMENTS[0], "next.toml")
+    with pytest.raises(InputError) as refused:
+        app(list(arguments), standalone_mode=False)
+    assert said in str(refused.value)
+    assert [f.name for f in tmp_path.iterdir()] == ["next.toml"], "something was written"
+
+
+def test_a_refusal_is_one_line_with_exit_code_two(tmp_path):
+    assert "s" in refusal("plan", "proton_xy", "--duration", "0", folder=tmp_path)
