@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from identify.explanations import Rival
     from twin.effects import Catalogue
 
+Out = Annotated[Path, typer.Option("--out", "-o", help="Experiment to write (.toml).")]
+
 
 @app.command()
 def plan(
@@ -42,9 +44,7 @@ def plan(
     ] = None,
     axis: Annotated[str | None, typer.Option(help="Axis that is explained.")] = None,
     duration: Annotated[float, typer.Option(help="About that of the experiment, s.")] = 20.0,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Experiment to write (.toml).")] = Path(
-        "experiment.toml"
-    ),
+    out: Out = Path("experiment.toml"),
     holdout: Holdout = None,
     window: Window = None,
     effects: Effects = None,
@@ -66,12 +66,12 @@ def plan(
             stage, recorded, read_logs(holdout), between=rivals, catalogue=catalogue, axis=axis,
             duration=duration, window=window, progress=bars,
         )  # fmt: skip
-    text = as_text.plan_text(result)
+    text, file = as_text.plan_text(result), None
     if result.decides:
+        file = str(out)
         save_experiment(result.chosen.experiment, out, *text.splitlines()[:3])
         text += f"\n{out}: run it on the machine, or `twin simulate {out} --model MODEL -o LOG`"
-    summary = {**as_json.plan_json(result), "file": str(out) if result.decides else None}
-    say(text, summary, as_json_, checked(recorded))
+    say(text, {**as_json.plan_json(result), "file": file}, as_json_, checked(recorded))
     if not result.decides:
         raise typer.Exit(1)
 
