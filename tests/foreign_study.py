@@ -1,0 +1,147 @@
+"""Diagnosis of machines of the second simulator, by hand: python tests/foreign_study.py --help."""
+
+from __future__ import annotations
+
+import argparse
+import time
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from foreign_effects import INSIDE, OUTSIDE, Planted
+from foreign_machine import Machine, drawn, gaussian, logs_of, run
+from machines import one_axis
+
+from identify import workflow
+from twin.effects import load_catalogue
+from twin.model_file import load_model
+
+CATALOGUE = load_catalogue()
+STAGE = one_axis(load_model("proton_xy", CATALOGUE))
+EFFECTS = INSIDE | OUTSIDE
+TRIAL = 8.0  # s of the log on which the size of an effect is set
+FIELDS = (
+    "planted", "seed", "floors", "size", "verdict", "named", "mark", "with", "top", "held", "s",
+)  # fmt: skip
+
+
+def model_for(planted: Planted):
+    """The nominal model, less what is to be found again."""
+    axis = STAGE.axes["x"]
+    kept = tuple(f for f in axis.effects if f.effect.name not in planted.drop)
+    return STAGE.with_axis("x", replace(axis, effects=kept))
+
+
+def excess(machine: Machine, model, seed: int) -> float:
+    """How far the fitted model's error stands above its floor, in floors."""
+    fit = workflow.fit(model, {"trial": run(machine, seed, TRIAL)}).fits["x"]
+    return float(np.sqrt(max(fit.ratio**2 - 1.0, 1e-4)))
+
+
+def sized(planted: Planted, base: Machine, model, wanted: float, seed: int):
+    """The machine with the effect as large as leaves that many floors of error in the model."""
+    size = planted.start
+
+    def make(size):
+        return planted.make(base, size, np.random.default_rng(seed))
+
+    if planted.fixed:
+        return make(1.0), 1.0
+    for _ in range(4):
+        seen = excess(make(size), model, seed)
+        if 0.8 < seen / wanted < 1.25 or (size == planted.largest and seen < wanted):
+            break
+        size = min(size * np.clip(wanted / seen, 0.02, 20.0), planted.largest)
+    return make(size), size
+
+
+def describe(found, planted: Planted) -> dict:
+    """The answer in a line."""
+    d = found.leading
+    name = found.effect.name if found.effect else "-"
+    if not found.effect:
+        mark = "quiet"
+    else:
+        mark = next(
+            (m for m in ("right", "near") if name in getattr(planted, m)),
+            "among" if set(d.ambiguous_with) & {*planted.right, *planted.near} else "WRONG",
+        )
+    top = ", ".join(
+        f"{c.effect.name} {c.delta_bic:.0f}{'' if c.supported else '-'} "
+        f"x{c.fit.ratio:.2f}" for c in d.ranking[:3]
+    )  # fmt: skip
+    gain = d.ranking[0].gain
+    floor = d.base.floor
+    return {
+        "floors": f"{d.base.ratio:.2f}", "verdict": d.verdict.name.lower(), "named": name,
+        "mark": mark, "with": " ".join(d.ambiguous_with), "top": top,
+        "held": f"{gain.before / floor:.2f}>{gain.after / floor:.2f}",
+    }  # fmt: skip
+
+
+def study(name: str, wanted: float, seed: int) -> dict:
+    """One machine, diagnosed."""
+    planted = EFFECTS[name]
+    code = 1000 * seed + zlib.crc32(name.encode()) % 997
+    base, model = drawn(np.random.default_rng(code)), model_for(planted)
+    machine, size = sized(planted, base, model, wanted, code)
+    logs, held = logs_of(machine, code)
+    begun = time.perf_counter()
+    found = workflow.diagnose(model, logs, held, catalogue=CATALOGUE)
+    row = {"planted": f"{name} @{wanted:g}", "seed": seed, "size": f"{size:.3g}"}
+    return row | describe(found, planted) | {"s": f"{time.perf_counter() - begun:.0f}"}
+
+
+def empty(seed: int) -> dict:
+    """A machine on which nothing is planted, of any rate, control and noise."""
+    rng = np.random.default_rng(90_000 + seed)
+    rate, log_rate = [(10e3, 10e3), (10e3, 4e3), (4e3, 4e3), (1e3, 1e3), (10e3, 1e3)][seed % 5]
+    if (rate, log_rate) == (10e3, 4e3):
+        rate, log_rate = 20e3, 4e3
+    noise = {
+        "encoder_noise": 10.0 ** rng.uniform(-9.5, -7.5), "resolution": 10.0 ** rng.uniform(-9, -8),
+        "current_noise": 10.0 ** rng.uniform(-4.5, -3.0),
+    }  # fmt: skip
+    bump = {"bump": gaussian} if seed >= 1000 else {}
+    machine = drawn(rng, rate, log_rate, **noise, **bump)
+    logs, held = logs_of(machine, 90_000 + seed)
+    begun = time.perf_counter()
+    found = workflow.diagnose(STAGE, logs, held, catalogue=CATALOGUE)
+    label = f"empty {rate / 1e3:g}/{log_rate / 1e3:g} kHz{' Gaussian bumps' if bump else ''}"
+    row = {"planted": label, "seed": seed, "size": f"{noise['encoder_noise']:.1e} m"}
+    return row | describe(found, Planted(None)) | {"s": f"{time.perf_counter() - begun:.0f}"}
+
+
+def line(row: dict) -> str:
+    return "| " + " | ".join(str(row[f]) for f in FIELDS) + " |\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--empty", type=int, nargs=2, metavar=("FIRST", "END"))
+    parser.add_argument("--effects", nargs="*", default=[], help="names, or inside, or outside")
+    parser.add_argument("--floors", type=float, nargs="*", default=[5.0, 20.0])
+    parser.add_argument("--seeds", type=int, nargs="*", default=[1])
+    parser.add_argument("-o", "--out", type=Path, default=Path("foreign.md"))
+    given = parser.parse_args()
+    groups = {"inside": list(INSIDE), "outside": list(OUTSIDE)}
+    names = [n for g in given.effects for n in groups.get(g, [g])]
+    jobs = [(empty, (s,)) for s in range(*given.empty)] if given.empty else []
+    for seed in given.seeds:
+        for n in names:
+            levels = given.floors[:1] if EFFECTS[n].fixed else given.floors
+            jobs += [(study, (n, floors, seed)) for floors in levels]
+    if not given.out.exists():
+        given.out.write_text(line({f: f for f in FIELDS}) + "|---" * len(FIELDS) + "|\n")
+    for job, args in jobs:
+        try:
+            text = line(job(*args))
+        except Exception as error:  # one that fails must not end the study
+            text = f"| {args} FAILED | {type(error).__name__}: {error} |\n"
+        with given.out.open("a") as out:
+            out.write(text)
+
+
+if __name__ == "__main__":
+    main()
