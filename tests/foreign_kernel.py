@@ -66,6 +66,7 @@ class Plant(NamedTuple):
     couple_viscous: float = 0.0
     reading_delay: float = 0.0
     resolution: float = 0.0
+    turn: float = 5e-5  # m of travel that turns a bump's braking round; 0: it is gone at rest
 
 
 class Gains(NamedTuple):
@@ -138,7 +139,7 @@ def simulate(p, gains, setpoint, other, tables, drag, disturbance, noise, rate):
     heat, rest, extra, distance = 0.0, 0.0, 0.0, 0.0
     previous, speed, integral = x, 0.0, 0.0
     late = round(p.reading_delay / h)
-    fine = 0
+    fine, side = 0, 0.0
     for k in range(n):
         history[fine % HISTORY] = x
         seen = history[(fine - late) % HISTORY] if fine >= late else history[0]
@@ -200,8 +201,8 @@ def simulate(p, gains, setpoint, other, tables, drag, disturbance, noise, rate):
             loop += v * h / p.loop_length * (1.0 - abs(loop) * (0.5 + 0.5 * np.sign(v * loop)))
             force = actual - held - viscous - p.loop_force * loop
             force += look_up(tables[FORCE], HALF_SPAN, x) - look_up(drag, TOP_SPEED, v)
-            bump = look_up(tables[AHEAD if v > 0.0 else BEHIND], HALF_SPAN, x)
-            force -= bump * sign
+            side = min(max(side + 2.0 * v * h / p.turn, -1.0), 1.0) if p.turn > 0.0 else sign
+            force -= side * look_up(tables[AHEAD if side > 0.0 else BEHIND], HALF_SPAN, x)
             force += disturbance[k] + since * (disturbance[k1] - disturbance[k])
             force -= p.couple_inertia * other_a + p.couple_viscous * other_v
             if x > p.stop_high:
