@@ -26,6 +26,8 @@ def random_moves(rng, duration, rate, span=0.16, fastest=0.25, acceleration=2.0,
         else:
             target, speed = place + rng.uniform(-3e-4, 3e-4), 2e-3
         target = np.clip(target, -span, span)
+        if abs(target - place) < 1e-5:
+            continue
         move = trapezoid(target - place, speed, acceleration * rng.uniform(0.3, 1.0), rate)
         rest = np.zeros(int(rng.uniform(0.03, 0.3) * rate))
         parts += [move, rest]

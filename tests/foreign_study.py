@@ -14,12 +14,14 @@ from foreign_machine import Machine, drawn, gaussian, logs_of, run
 from machines import one_axis
 
 from identify import workflow
+from identify.diagnose import diagnose_axis
 from twin.effects import load_catalogue
 from twin.model_file import load_model
 
 CATALOGUE = load_catalogue()
 STAGE = one_axis(load_model("proton_xy", CATALOGUE))
 EFFECTS = INSIDE | OUTSIDE
+DURATION = 10.0  # s of each log
 TRIAL = 8.0  # s of the log on which the size of an effect is set
 FIELDS = (
     "planted", "seed", "floors", "size", "verdict", "named", "mark", "with", "top", "held", "s",
@@ -56,11 +58,16 @@ def sized(planted: Planted, base: Machine, model, wanted: float, seed: int):
     return make(size), size
 
 
-def describe(found, planted: Planted) -> dict:
+def diagnosed(model, machine: Machine, seed: int):
+    """The diagnosis of the x axis from two logs and one held out, less the free runs."""
+    fitted = workflow.fit(model, *logs_of(machine, seed, DURATION))
+    return diagnose_axis(fitted.fits["x"], fitted.studies["x"], CATALOGUE)
+
+
+def describe(d, planted: Planted) -> dict:
     """The answer in a line."""
-    d = found.leading
-    name = found.effect.name if found.effect else "-"
-    if not found.effect:
+    name = d.best.effect.name if d.best else "-"
+    if not d.best:
         mark = "quiet"
     else:
         mark = next(
@@ -86,9 +93,8 @@ def study(name: str, wanted: float, seed: int) -> dict:
     code = 1000 * seed + zlib.crc32(name.encode()) % 997
     base, model = drawn(np.random.default_rng(code)), model_for(planted)
     machine, size = sized(planted, base, model, wanted, code)
-    logs, held = logs_of(machine, code)
     begun = time.perf_counter()
-    found = workflow.diagnose(model, logs, held, catalogue=CATALOGUE)
+    found = diagnosed(model, machine, code)
     row = {"planted": f"{name} @{wanted:g}", "seed": seed, "size": f"{size:.3g}"}
     return row | describe(found, planted) | {"s": f"{time.perf_counter() - begun:.0f}"}
 
@@ -111,9 +117,8 @@ def empty(seed: int) -> dict:
     machine = drawn(rng, rate, log_rate, **noise, **bump)
     if variant == "no bumps at rest":
         machine = machine.having(turn=0.0)
-    logs, held = logs_of(machine, 90_000 + seed)
     begun = time.perf_counter()
-    found = workflow.diagnose(STAGE, logs, held, catalogue=CATALOGUE)
+    found = diagnosed(STAGE, machine, 90_000 + seed)
     row = {
         "planted": f"empty {variant} {rate / 1e3:g}/{log_rate / 1e3:g} kHz", "seed": seed,
         "size": f"{noise['encoder_noise']:.1e} m, {noise['current_noise']:.1e} A",
