@@ -60,6 +60,7 @@ class Machine:
     drag: np.ndarray = field(default_factory=lambda: np.zeros(SPEEDS))
     disturbance: object = None  # (time s, generator) -> N
     other: bool = False  # whether the other axis moves too
+    early: float = 0.0  # samples by which the command is logged before it acts as held
     motion: dict = field(default_factory=dict)
 
     def having(self, **values):
@@ -136,7 +137,9 @@ def _signals(machine, setpoint, second, push, rng):
 
 def _axis_log(machine, setpoint, signals, rng):
     keep = slice(None, None, round(machine.rate / machine.log_rate))
-    current = signals[keep, 1] / FORCE_CONSTANT
+    command = signals[keep, 1]
+    at = np.arange(len(command))
+    current = np.interp(at - machine.early, at, command) / FORCE_CONSTANT
     current = current + machine.current_noise * rng.standard_normal(len(current))
     names = ("setpoint_position", "setpoint_velocity", "setpoint_acceleration")
     columns = {n: setpoint[keep, i].copy() for i, n in enumerate(names)}

@@ -22,7 +22,8 @@ CATALOGUE = load_catalogue()
 STAGE = one_axis(load_model("proton_xy", CATALOGUE))
 EFFECTS = INSIDE | OUTSIDE
 DURATION = 10.0  # s of each log
-TRIAL = 8.0  # s of the log on which the size of an effect is set
+VARIANTS = ("", "Gaussian bumps", "no bumps at rest", "decimated", "half early", "one early")
+EARLY = {"half early": 0.5, "one early": 1.0}  # samples
 FIELDS = (
     "planted", "seed", "floors", "size", "verdict", "named", "mark", "with", "top", "held", "s",
 )  # fmt: skip
@@ -37,7 +38,7 @@ def model_for(planted: Planted):
 
 def excess(machine: Machine, model, seed: int) -> float:
     """How far the fitted model's error stands above its floor, in floors."""
-    fit = workflow.fit(model, {"trial": run(machine, seed, TRIAL)}).fits["x"]
+    fit = workflow.fit(model, {"log 1": run(machine, 1000 * seed + 1, DURATION)}).fits["x"]
     return float(np.sqrt(max(fit.ratio**2 - 1.0, 1e-4)))
 
 
@@ -50,11 +51,11 @@ def sized(planted: Planted, base: Machine, model, wanted: float, seed: int):
 
     if planted.fixed:
         return make(1.0), 1.0
-    for _ in range(4):
+    for _ in range(5):
         seen = excess(make(size), model, seed)
         if 0.8 < seen / wanted < 1.25 or (size == planted.largest and seen < wanted):
             break
-        size = min(size * np.clip(wanted / seen, 0.02, 20.0), planted.largest)
+        size = min(size * np.clip(wanted / seen, 0.1, 10.0), planted.largest)
     return make(size), size
 
 
@@ -103,12 +104,13 @@ def empty(seed: int) -> dict:
     """A machine on which nothing is planted, of any rate, control and noise.
 
     From 1000 on its bumps have another form, from 2000 on they are gone at rest, from 3000 on the
-    log keeps one sample in five of a faster control.
+    log keeps every other sample of a faster control, from 4000 on it has the command half a sample
+    early (force steered continuously), from 5000 on the reading of one sample later.
     """
     rng = np.random.default_rng(90_000 + seed)
     rate = (10e3, 4e3, 1e3)[seed % 3]
-    variant = ("", "Gaussian bumps", "no bumps at rest", "decimated")[seed // 1000]
-    log_rate, rate = rate, min(5.0 * rate, 20e3) if variant == "decimated" else rate
+    variant = VARIANTS[seed // 1000]
+    log_rate, rate = rate, 2.0 * rate if variant == "decimated" else rate
     noise = {
         "encoder_noise": 10.0 ** rng.uniform(-9.5, -7.5), "resolution": 10.0 ** rng.uniform(-9, -8),
         "current_noise": 10.0 ** rng.uniform(-4.5, -3.0),
@@ -118,7 +120,7 @@ def empty(seed: int) -> dict:
     if variant == "no bumps at rest":
         machine = machine.having(turn=0.0)
     begun = time.perf_counter()
-    found = diagnosed(STAGE, machine, 90_000 + seed)
+    found = diagnosed(STAGE, replace(machine, early=EARLY.get(variant, 0.0)), 90_000 + seed)
     row = {
         "planted": f"empty {variant} {rate / 1e3:g}/{log_rate / 1e3:g} kHz", "seed": seed,
         "size": f"{noise['encoder_noise']:.1e} m, {noise['current_noise']:.1e} A",
