@@ -1,0 +1,232 @@
+"""A second simulator of one axis, on its own equations: stepped at 100 kHz, sampled by its control.
+
+It shares no code with the product. Whatever depends on position, speed or time alone is a table;
+what has a memory is written out here.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+STEP = 1e-5  # s
+LUGRE, DAHL, SLIP_ELEMENTS, COULOMB = range(4)
+FORCE, AHEAD, BEHIND, FRICTION, STRIBECK, MOTOR, READING = range(7)  # rows of the position tables
+HALF_SPAN, PLACES = 0.25, 50001  # m, and number, of the position tables
+TOP_SPEED, SPEEDS = 1.0, 20001  # m/s, and number, of the drag table
+SMOOTH_SIGN = 5e-4  # m/s, over which direction changes
+HISTORY = 4096  # true positions kept for the delayed reading
+
+
+class Plant(NamedTuple):
+    """Constants of a machine in SI units; what is zero is absent."""
+
+    mass: float
+    Fc: float
+    Fs: float
+    v0: float
+    s2: float
+    s0: float
+    s1: float
+    n: float = 2.0
+    kind: int = LUGRE
+    slip_rate: float = 8.0  # N/s, of the slip elements
+    asymmetry: float = 0.0  # of Coulomb friction by direction
+    viscous_asymmetry: float = 0.0
+    warm_gain: float = 0.0  # 1/J, logarithmic loss of friction with heat
+    warm_time: float = 20.0
+    dwell_force: float = 0.0
+    dwell_time: float = 0.2
+    load_gain: float = 0.0  # s^2/m, of friction with the other axis' acceleration
+    wear_rate: float = 0.0  # 1/m
+    accel_gain: float = 0.0  # s^2/m
+    loop_force: float = 0.0  # N, cable hysteresis
+    loop_length: float = 2e-3
+    lag: float = 0.0
+    delay: float = 0.0
+    deadband: float = 0.0
+    saturation: float = 1e9
+    current_drop: float = 0.0  # 1/N
+    remanence: float = 0.0  # N, of the motor with the history of its current
+    remanence_width: float = 2.0  # N
+    rate_limit: float = 1e12  # N/s
+    mass_rate: float = 0.0  # kg/s
+    mass2: float = 0.0
+    k2: float = 0.0
+    c2: float = 0.0
+    gap: float = 0.0
+    frame_mass: float = 0.0
+    frame_k: float = 0.0
+    frame_c: float = 0.0
+    stop_low: float = -1.0
+    stop_high: float = 1.0
+    stop_k: float = 2e3
+    stop_c: float = 20.0
+    couple_inertia: float = 0.0
+    couple_viscous: float = 0.0
+    reading_delay: float = 0.0
+    resolution: float = 0.0
+    turn: float = 5e-5  # m of travel that turns a bump's braking round; 0: it is gone at rest
+
+
+class Gains(NamedTuple):
+    """Cascaded control: position P, speed PI on a filtered difference, feedforward."""
+
+    position: float  # 1/s
+    speed: float  # N s/m
+    integral: float  # N/m
+    filter: float  # 1, share of the new difference
+    mass: float  # kg
+    friction: float  # N
+    limit: float  # N
+
+
+@njit(cache=True, inline="always")
+def look_up(table, half_span, at):
+    place = (at + half_span) / (2.0 * half_span) * (table.size - 1)
+    i = min(max(int(place), 0), table.size - 2)
+    return table[i] + (place - i) * (table[i + 1] - table[i])
+
+
+@njit(cache=True)
+def friction_rate(p, z, v, g):
+    """Rate of the bristle (m/s) or of the force (N/s, Dahl)."""
+    if p.kind == LUGRE:
+        return v - p.s0 * abs(v) * z / g
+    return p.s0 * (v - abs(v) * z / g)
+
+
+@njit(cache=True)
+def friction_force(p, z, elements, v, g, h):
+    """Advance the friction's memory over one step; force opposing motion less the viscous part."""
+    if p.kind == COULOMB:
+        return z, g * np.tanh(v / 1e-4)
+    if p.kind == SLIP_ELEMENTS:
+        total, share = 0.0, 1.0 / elements.size
+        for i in range(elements.size):
+            stiffness = p.s0 * 2.0 * (elements.size - i) * share / (elements.size + 1)
+            trial = elements[i] + stiffness * v * h
+            if abs(trial) > share * g and trial * v > 0.0:
+                target = share * g * np.sign(v)
+                trial = elements[i] + h * p.slip_rate * (target - elements[i]) / g
+                if abs(elements[i]) < abs(target) * 0.999:
+                    trial = target
+            elements[i] = trial
+            total += trial
+        return z, total
+    first = friction_rate(p, z, v, g)
+    second = friction_rate(p, z + h * first, v, g)
+    z += 0.5 * h * (first + second)
+    if p.kind == LUGRE:
+        return z, p.s0 * z + p.s1 * friction_rate(p, z, v, g)
+    return z, z
+
+
+@njit(cache=True)
+def simulate(p, gains, setpoint, other, tables, drag, disturbance, noise, rate):
+    """Run under control; (n, 4): reading m, command N, true position m, true speed m/s.
+
+    setpoint (n, 3), other (n, 2: speed, acceleration of the other axis), disturbance (n,) N and
+    noise (n,) m are sampled at the control's rate (Hz).
+    """
+    n, h = len(setpoint), STEP
+    inner = round(1.0 / (rate * h))
+    out = np.zeros((n, 4))
+    history, elements = np.full(HISTORY, setpoint[0, 0]), np.zeros(4)
+    x, v, a, z = setpoint[0, 0], 0.0, 0.0, 0.0
+    x2, v2, xf, vf = x, 0.0, 0.0, 0.0
+    motor, loop, remanence, old_motor = 0.0, 0.0, 0.0, 0.0
+    heat, rest, extra, distance = 0.0, 0.0, 0.0, 0.0
+    previous, speed, integral = x, 0.0, 0.0
+    late = round(p.reading_delay / h)
+    fine, side = 0, 0.0
+    for k in range(n):
+        history[fine % HISTORY] = x
+        seen = history[(fine - late) % HISTORY] if fine >= late else history[0]
+        reading = seen + look_up(tables[READING], HALF_SPAN, seen) + noise[k]
+        if p.resolution > 0.0:
+            reading = np.floor(reading / p.resolution + 0.5) * p.resolution
+        if k == 0:
+            previous = reading
+        speed += gains.filter * ((reading - previous) * rate - speed)
+        previous = reading
+        wanted = setpoint[k, 1] + gains.position * (setpoint[k, 0] - reading)
+        integral += gains.integral * (wanted - speed) / rate
+        command = gains.speed * (wanted - speed) + integral + gains.mass * setpoint[k, 2]
+        command += gains.friction * np.tanh(setpoint[k, 1] / 2e-3)
+        command = min(max(command, -gains.limit), gains.limit)
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = reading, command, x, v
+        for i in range(inner):
+            history[fine % HISTORY] = x
+            fine += 1
+            since = (i + 0.5) * h * rate
+            # Drive: the command of a while ago, dead zone, rate, lag, limit, then the motor.
+            j = k + int(np.floor(since - p.delay * rate))
+            u = 0.0 if j < 0 else out[j, 1]
+            u = np.sign(u) * max(abs(u) - p.deadband, 0.0)
+            u = motor + min(max(u - motor, -p.rate_limit * h), p.rate_limit * h)
+            if p.lag > 0.0:
+                motor += (1.0 - np.exp(-h / p.lag)) * (u - motor)
+            else:
+                motor = u
+            actual = min(max(motor, -p.saturation), p.saturation)
+            change, old_motor = actual - old_motor, actual
+            remanence += (np.sign(change) - remanence) * min(abs(change) / p.remanence_width, 1.0)
+            actual += p.remanence * remanence - p.current_drop * actual * abs(actual)
+            actual *= look_up(tables[MOTOR], HALF_SPAN, x)
+            # Friction.
+            k1 = min(k + 1, n - 1)
+            other_v = other[k, 0] + since * (other[k1, 0] - other[k, 0])
+            other_a = other[k, 1] + since * (other[k1, 1] - other[k, 1])
+            sign = np.tanh(v / SMOOTH_SIGN)
+            level = look_up(tables[FRICTION], HALF_SPAN, x) * (1.0 + p.asymmetry * sign)
+            level *= 1.0 + p.load_gain * abs(other_a) + p.wear_rate * distance
+            level *= 1.0 + p.accel_gain * abs(a)
+            cold = np.exp(-p.warm_gain * heat)
+            if p.dwell_force != 0.0:
+                if abs(v) < 2e-4:
+                    rest += h
+                    extra = max(extra, 1.0 - np.exp(-rest / p.dwell_time))
+                else:
+                    rest = 0.0
+                    extra *= np.exp(-abs(v) * h / 5e-4)
+            v0 = p.v0 * look_up(tables[STRIBECK], HALF_SPAN, x)
+            curve = p.Fc + (p.Fs - p.Fc) * np.exp(-((abs(v) / v0) ** p.n))
+            g = (curve * cold + p.dwell_force * extra) * level
+            z, held = friction_force(p, z, elements, v, g, h)
+            viscous = p.s2 * cold * (1.0 + p.viscous_asymmetry * sign) * v
+            heat += h * ((held + viscous) * v - heat / p.warm_time)
+            distance += abs(v) * h
+            # Everything else that acts on the carriage.
+            loop += v * h / p.loop_length * (1.0 - abs(loop) * (0.5 + 0.5 * np.sign(v * loop)))
+            force = actual - held - viscous - p.loop_force * loop
+            force += look_up(tables[FORCE], HALF_SPAN, x) - look_up(drag, TOP_SPEED, v)
+            side = min(max(side + 2.0 * v * h / p.turn, -1.0), 1.0) if p.turn > 0.0 else sign
+            force -= side * look_up(tables[AHEAD if side > 0.0 else BEHIND], HALF_SPAN, x)
+            force += disturbance[k] + since * (disturbance[k1] - disturbance[k])
+            force -= p.couple_inertia * other_a + p.couple_viscous * other_v
+            if x > p.stop_high:
+                force -= p.stop_k * (x - p.stop_high) + p.stop_c * v
+            elif x < p.stop_low:
+                force -= p.stop_k * (x - p.stop_low) + p.stop_c * v
+            mass = p.mass - p.mass2 + p.mass_rate * (k + since) / rate
+            on_frame = -force
+            if p.mass2 > 0.0:
+                apart = x2 - x
+                squeeze = np.sign(apart) * max(abs(apart) - p.gap, 0.0)
+                link = 0.0
+                if squeeze != 0.0 or p.gap == 0.0:
+                    link = p.k2 * squeeze + p.c2 * (v2 - v)
+                force += link
+            shake = 0.0
+            if p.frame_mass > 0.0:
+                shake = (on_frame - p.frame_k * xf - p.frame_c * vf) / p.frame_mass
+                vf += h * shake
+                xf += h * vf
+            if p.mass2 > 0.0:
+                v2 += h * (-link / p.mass2 - shake)
+                x2 += h * v2
+            a = force / mass - shake
+            x += h * (v + 0.5 * h * a)
+            v += h * a
+    return out

@@ -1,0 +1,162 @@
+"""Diagnosis of machines of the second simulator, by hand: python tests/foreign_study.py --help."""
+
+from __future__ import annotations
+
+import argparse
+import time
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from foreign_effects import INSIDE, OUTSIDE, Planted
+from foreign_machine import Machine, drawn, gaussian, logs_of, run
+from machines import one_axis
+
+from identify import workflow
+from identify.diagnose import diagnose_axis
+from twin.effects import load_catalogue
+from twin.model_file import load_model
+
+CATALOGUE = load_catalogue()
+STAGE = one_axis(load_model("proton_xy", CATALOGUE))
+EFFECTS = INSIDE | OUTSIDE
+DURATION = 10.0  # s of each log
+VARIANTS = ("", "Gaussian bumps", "no bumps at rest", "decimated", "half early", "one early")
+EARLY = {"half early": 0.5, "one early": 1.0}  # samples
+FIELDS = (
+    "planted", "seed", "floors", "size", "verdict", "named", "mark", "with", "top", "held", "s",
+)  # fmt: skip
+
+
+def model_for(planted: Planted):
+    """The nominal model, less what is to be found again."""
+    axis = STAGE.axes["x"]
+    kept = tuple(f for f in axis.effects if f.effect.name not in planted.drop)
+    return STAGE.with_axis("x", replace(axis, effects=kept))
+
+
+def excess(machine: Machine, model, seed: int) -> float:
+    """How far the fitted model's error stands above its floor, in floors."""
+    fit = workflow.fit(model, {"log 1": run(machine, 1000 * seed + 1, DURATION)}).fits["x"]
+    return float(np.sqrt(max(fit.ratio**2 - 1.0, 1e-4)))
+
+
+def sized(planted: Planted, base: Machine, model, wanted: float, seed: int):
+    """The machine with the effect as large as leaves that many floors of error in the model."""
+    size = planted.start
+
+    def make(size):
+        return planted.make(base, size, np.random.default_rng(seed))
+
+    if planted.fixed:
+        return make(1.0), 1.0
+    for _ in range(5):
+        seen = excess(make(size), model, seed)
+        if 0.8 < seen / wanted < 1.25 or (size == planted.largest and seen < wanted):
+            break
+        size = min(size * np.clip(wanted / seen, 0.1, 10.0), planted.largest)
+    return make(size), size
+
+
+def diagnosed(model, machine: Machine, seed: int):
+    """The diagnosis of the x axis from two logs and one held out, less the free runs."""
+    fitted = workflow.fit(model, *logs_of(machine, seed, DURATION))
+    return diagnose_axis(fitted.fits["x"], fitted.studies["x"], CATALOGUE)
+
+
+def describe(d, planted: Planted) -> dict:
+    """The answer in a line."""
+    name = d.best.effect.name if d.best else "-"
+    if not d.best:
+        mark = "quiet"
+    else:
+        mark = next(
+            (m for m in ("right", "near") if name in getattr(planted, m)),
+            "among" if set(d.ambiguous_with) & {*planted.right, *planted.near} else "WRONG",
+        )
+    top = ", ".join(
+        f"{c.effect.name} {c.delta_bic:.0f}{'' if c.supported else '-'} "
+        f"x{c.fit.ratio:.2f}" for c in d.ranking[:3]
+    )  # fmt: skip
+    gain = d.ranking[0].gain
+    floor = d.base.floor
+    return {
+        "floors": f"{d.base.ratio:.2f}", "verdict": d.verdict.name.lower(), "named": name,
+        "mark": mark, "with": " ".join(d.ambiguous_with), "top": top,
+        "held": f"{gain.before / floor:.2f}>{gain.after / floor:.2f}",
+    }  # fmt: skip
+
+
+def study(name: str, wanted: float, seed: int) -> dict:
+    """One machine, diagnosed."""
+    planted = EFFECTS[name]
+    code = 1000 * seed + zlib.crc32(name.encode()) % 997
+    base, model = drawn(np.random.default_rng(code)), model_for(planted)
+    machine, size = sized(planted, base, model, wanted, code)
+    begun = time.perf_counter()
+    found = diagnosed(model, machine, code)
+    row = {"planted": f"{name} @{wanted:g}", "seed": seed, "size": f"{size:.3g}"}
+    return row | describe(found, planted) | {"s": f"{time.perf_counter() - begun:.0f}"}
+
+
+def empty(seed: int) -> dict:
+    """A machine on which nothing is planted, of any rate, control and noise.
+
+    From 1000 on its bumps have another form, from 2000 on they are gone at rest, from 3000 on the
+    log keeps every other sample of a faster control, from 4000 on it has the command half a sample
+    early (force steered continuously), from 5000 on the reading of one sample later.
+    """
+    rng = np.random.default_rng(90_000 + seed)
+    rate = (10e3, 4e3, 1e3)[seed % 3]
+    variant = VARIANTS[seed // 1000]
+    log_rate, rate = rate, 2.0 * rate if variant == "decimated" else rate
+    noise = {
+        "encoder_noise": 10.0 ** rng.uniform(-9.5, -7.5), "resolution": 10.0 ** rng.uniform(-9, -8),
+        "current_noise": 10.0 ** rng.uniform(-4.5, -3.0),
+    }  # fmt: skip
+    bump = {"bump": gaussian} if variant == "Gaussian bumps" else {}
+    machine = drawn(rng, rate, log_rate, **noise, **bump)
+    if variant == "no bumps at rest":
+        machine = machine.having(turn=0.0)
+    begun = time.perf_counter()
+    found = diagnosed(STAGE, replace(machine, early=EARLY.get(variant, 0.0)), 90_000 + seed)
+    row = {
+        "planted": f"empty {variant} {rate / 1e3:g}/{log_rate / 1e3:g} kHz", "seed": seed,
+        "size": f"{noise['encoder_noise']:.1e} m, {noise['current_noise']:.1e} A",
+    }  # fmt: skip
+    return row | describe(found, Planted(None)) | {"s": f"{time.perf_counter() - begun:.0f}"}
+
+
+def line(row: dict) -> str:
+    return "| " + " | ".join(str(row[f]) for f in FIELDS) + " |\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--empty", type=int, nargs=2, metavar=("FIRST", "END"))
+    parser.add_argument("--effects", nargs="*", default=[], help="names, or inside, or outside")
+    parser.add_argument("--floors", type=float, nargs="*", default=[5.0, 20.0])
+    parser.add_argument("--seeds", type=int, nargs="*", default=[1])
+    parser.add_argument("-o", "--out", type=Path, default=Path("foreign.md"))
+    given = parser.parse_args()
+    groups = {"inside": list(INSIDE), "outside": list(OUTSIDE)}
+    names = [n for g in given.effects for n in groups.get(g, [g])]
+    jobs = [(empty, (s,)) for s in range(*given.empty)] if given.empty else []
+    for seed in given.seeds:
+        for n in names:
+            levels = given.floors[:1] if EFFECTS[n].fixed else given.floors
+            jobs += [(study, (n, floors, seed)) for floors in levels]
+    if not given.out.exists():
+        given.out.write_text(line({f: f for f in FIELDS}) + "|---" * len(FIELDS) + "|\n")
+    for job, args in jobs:
+        try:
+            text = line(job(*args))
+        except Exception as error:  # one that fails must not end the study
+            text = f"| {args} FAILED | {type(error).__name__}: {error} |\n"
+        with given.out.open("a") as out:
+            out.write(text)
+
+
+if __name__ == "__main__":
+    main()
