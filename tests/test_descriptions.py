@@ -14,13 +14,13 @@ from unexplained_effects import foreign
 from identify.candidates import absent_effects
 from identify.describe import describe
 from identify.fit import fit_axis
-from identify.residual import total_force
+from identify.residual import on_blocks, total_force
 from identify.workflow import add, fit
 from twin.effect import Effect
 from twin.effects import load_catalogue
 from twin.experiments import simulate
 from twin.log import Log
-from twin.model import Fitted, StageModel
+from twin.model import AxisModel, Fitted, StageModel
 from twin.model_file import load_model, save_model
 from twin.simulator import MujocoStage, ReducedStage
 
@@ -80,7 +80,7 @@ def test_the_shape_is_recovered_and_the_physics_keeps_its_values(tmp_path: Path)
     found = describe(base, study, CATALOGUE[MAP]).fit.axis
     motion = study.fit[0].motion
     shape, true = (
-        total_force(STAGE.axes["x"].__class__(1.0, effects=(part,)), motion)
+        total_force(on_blocks(AxisModel(1.0, effects=(part,))), motion)
         for part in (found[MAP], machine.axes["x"][chirp.name])
     )
     # A constant and the slow part of the curve are the cable's, which the model has already.
