@@ -59,10 +59,10 @@ def sized(planted: Planted, base: Machine, model, wanted: float, seed: int):
     return make(size), size
 
 
-def diagnosed(model, machine: Machine, seed: int):
+def diagnosed(model, machine: Machine, seed: int, duration=DURATION, catalogue=CATALOGUE):
     """The diagnosis of the x axis from two logs and one held out, less the free runs."""
-    fitted = workflow.fit(model, *logs_of(machine, seed, DURATION))
-    return diagnose_axis(fitted.fits["x"], fitted.studies["x"], CATALOGUE)
+    fitted = workflow.fit(model, *logs_of(machine, seed, duration))
+    return diagnose_axis(fitted.fits["x"], fitted.studies["x"], catalogue)
 
 
 def describe(d, planted: Planted) -> dict:
