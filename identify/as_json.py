@@ -11,6 +11,7 @@ from identify.compare import AxisComparison
 from identify.contest import Trial
 from identify.diagnose import Step
 from identify.plan import Plan
+from identify.remarks import remarks
 from identify.uncertainty import Estimate
 from identify.whiteness import ResidualTests
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
@@ -42,6 +43,8 @@ def fit_json(result: FitResult) -> dict[str, Any]:
                 "holdout_force_error": result.holdout_error[axis],
                 "noise_floor": fit.floor,
                 "unit": "N",
+                "force_shift": result.studies[axis].shift,
+                "force_shift_unit": "s",
                 "parameters": {e.label: _estimate(e) for e in result.estimates[axis]},
             }
             for axis, fit in result.fits.items()
@@ -142,6 +145,9 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "force_error": d.base.error,
         "noise_floor": d.base.floor,
         "unit": "N",
+        "force_shift": d.study.shift,
+        "force_shift_unit": "s",
+        "notes": list(remarks(d)),
         "next_experiment": following and plan_json(following),
     }
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 
+from identify.alignment import shift_in_words
 from identify.candidates import Candidate
 from identify.contest import Trial
 from identify.describe import described_labels, in_words
 from identify.diagnose import Step
 from identify.explanations import STRENGTH
 from identify.plan import Plan
+from identify.remarks import remarks
 from identify.uncertainty import Estimate
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
@@ -32,6 +34,8 @@ def fit_text(result: FitResult) -> str:
             f"(ratio {fit.ratio:.2f})"
         )
         lines.append(f"  {fit.outcome.value}")
+        if shifted := shift_in_words(result.studies[axis]):
+            lines.append(f"  {shifted}")
         hidden = described_labels(fit.axis)
         lines += [
             f"  {e.label:34s} {_with_interval(e)}"
@@ -92,6 +96,7 @@ def diagnose_text(result: Diagnosis) -> str:
             lines.append(f"  {advice()}")
         lines += [_ranking_line(c) for c in d.ranking[:4]]
         lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
+        lines += [f"  note: {remark}" for remark in remarks(d)]
     return "\n".join(lines)
 
 

@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.alignment import misalignment, realigned
 from identify.candidates import Candidate, absent_effects, levelled, score, try_effect
 from identify.evidence import held_out_gain
 from identify.fit import Fit, fit_axis, sticks
@@ -110,6 +111,10 @@ def diagnose_axis(
         steps.append(Step(best, tied, dropped))
         if final.at_floor:
             break
+        if ahead := misalignment(final, study):  # seen only now that more is explained
+            moved = realigned(study, study.shift + ahead)
+            again = fit_axis(base.axis, moved.fit)
+            return diagnose_axis(again, moved, catalogue, progress, workers)
         final, found = rank(final, study, catalogue, progress, workers)
     return _decided(base, study, ranking, tuple(steps), final)
 

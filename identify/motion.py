@@ -57,6 +57,15 @@ class Motion:
             raw=self.raw[:, : n * samples],
         )
 
+    def with_force_ahead(self, shift: float) -> Motion:
+        """The same with its command moved ahead by ``shift`` seconds."""
+        n = self.signals.shape[1]
+        at = np.arange(self.raw.shape[1], dtype=float)
+        command = np.interp(at + shift / self.sample_period, at, self.raw[1])
+        signals = self.signals.copy()
+        signals[2] = command.reshape(n, -1).mean(axis=1)
+        return replace(self, signals=signals, raw=np.stack([self.raw[0], command]))
+
     @property
     def time(self) -> Array:
         """(n,) s."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from identify.alignment import fit_aligned
 from identify.candidates import Candidate
 from identify.contest import Arena, Explanation, Trial, contest, favoured, refitted
 from identify.coverage import Gap, gap
@@ -17,7 +18,6 @@ from identify.explanations import (
     trial_study,
 )
 from identify.proposals import proposals
-from identify.search import fit_thoroughly
 from identify.study import Study, studies
 from twin.effect import Effect
 from twin.effects import Catalogue
@@ -200,7 +200,7 @@ def _arena(
         return Arena(model, study.axis, known, logs)
     own = model.axes[study.axis]
     if recorded:
-        base = fit_thoroughly(own, study)
+        study, base = fit_aligned(own, study)
         found = diagnose_axis(base, study, catalogue)
         own = base.axis
         if found.best is not None and len(found.ranking) > 1:

@@ -28,12 +28,16 @@ QUIET = 0.01  # noise floor wanted, as a part of the force that the inertia does
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """One axis: windowed fit logs, windowed held-out logs (may be none), and the motion covered."""
+    """One axis: windowed fit logs, windowed held-out logs (may be none), and the motion covered.
+
+    shift: s, by which the logs' force was moved ahead to where it acted.
+    """
 
     axis: str
     fit: tuple[Windowed, ...]
     holdout: tuple[Windowed, ...]
     excitation: Excitation
+    shift: float = 0.0
 
     @cached_property
     def heads(self) -> tuple[Windowed, ...]:

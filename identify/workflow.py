@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from identify.alignment import fit_aligned
 from identify.candidates import Candidate, score, try_effect
 from identify.compare import AxisComparison, compare_axis, position_errors
 from identify.describe import describe, in_words, physics_alone
@@ -15,7 +16,6 @@ from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
 from identify.fit import Fit, error_on, rms
 from identify.freerun import free_run, rms_error
 from identify.plan import Plan, next_experiment, plan
-from identify.search import fit_thoroughly
 from identify.study import Study, studies
 from identify.uncertainty import Estimate, estimates, half_widths
 from twin.effect import Effect
@@ -116,8 +116,8 @@ def fit(
     """
     found = studies(model, logs, holdout or {}, window)
     fits: dict[str, Fit] = {}
-    for i, (axis, study) in enumerate(found.items()):
-        fits[axis] = fit_thoroughly(model.axes[axis], study)
+    for i, (axis, study) in enumerate(list(found.items())):
+        found[axis], fits[axis] = fit_aligned(model.axes[axis], study)
         progress("fitting", i + 1, len(found))
     for axis, result in fits.items():
         model = model.with_axis(axis, result.axis)
