@@ -100,6 +100,8 @@ def _promising(base: Fit, start: Start) -> bool:
     """Whether a refit could make evidence of what the linear step gains."""
     samples = effective_samples(base.residual)
     before = float(np.sum(base.residual**2))
+    if before == 0.0:
+        return False
     gain = samples * np.log(before / max(start.squared_error, 1e-12 * before))
     free = len(start.fitted.effect.parameters) - len(start.fitted.fixed)
     return bool(gain > PROMISE * (LEAST_BIC + free * np.log(samples)))
@@ -109,7 +111,8 @@ def _glance(base: Fit, study: Study, fitted: Fitted) -> Fit:
     """The linear step as a fit, or the effect without strength where the step does harm."""
     axis = stepped(base, fitted, study.fit)
     if rms(residual(axis, study.fit)[base.kept]) > base.error:
-        absent = {p.name: 0.0 for p in fitted.effect.strengths}
+        free = (p.name for p in fitted.effect.strengths if p.name not in fitted.fixed)
+        absent = dict.fromkeys(free, 0.0)
         axis = base.axis.with_effect(replace(fitted, values={**fitted.values, **absent}))
     return finished(axis, base.begun, study.fit, Outcome.NOT_CONVERGED)
 

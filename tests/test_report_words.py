@@ -12,7 +12,7 @@ import pytest
 from report_cases import Case, Outline, answers, cogging_case, made, pictures_in
 
 from identify import workflow
-from identify.diagnose import Verdict
+from identify.diagnose import AxisDiagnosis, Verdict
 from identify.report.blocks import Heading
 from identify.report.drawing import binned_mean
 from identify.report.overlay import representative
@@ -47,9 +47,15 @@ def test_an_addition_is_the_answer_where_nothing_was_diagnosed(case: Case) -> No
     assert quantity(case.addition.position_error[1], "m") in values
 
 
+def ambiguous(case: Case) -> AxisDiagnosis:
+    """The diagnosis of the case, had drag explained as much."""
+    first = replace(case.x.steps[0], tied=("quadratic_drag",))
+    return replace(case.x, verdict=Verdict.AMBIGUOUS, steps=(first,))
+
+
 def test_every_verdict_has_its_words(case: Case) -> None:
     structure = Structure(0.63, "position", 0.027, "m", {"position": 0.63})
-    tied = replace(case.x, verdict=Verdict.AMBIGUOUS, ambiguous_with=("quadratic_drag",))
+    tied = ambiguous(case)
     lost = replace(case.x, verdict=Verdict.UNEXPLAINED, unexplained=structure)
     done = replace(case.x, verdict=Verdict.NOTHING_MISSING)
     expected = {
@@ -66,7 +72,7 @@ def test_every_verdict_has_its_words(case: Case) -> None:
 
 
 def test_only_named_effects_have_their_law_printed(case: Case) -> None:
-    tied = replace(case.x, verdict=Verdict.AMBIGUOUS, ambiguous_with=("quadratic_drag",))
+    tied = ambiguous(case)
     blocks = made(case.subject(case.concluding(tied)))["equations"].blocks
     assert [b.text for b in blocks if isinstance(b, Heading)] == [
         "Cogging on x", "Quadratic drag on x",
