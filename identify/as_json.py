@@ -147,6 +147,15 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "unit": "N",
         "force_shift": d.study.shift,
         "force_shift_unit": "s",
+        "repeats_not_general": d.repeat
+        and {
+            "period": d.repeat.period,
+            "period_unit": "m",
+            "amplitude": dict(d.repeat.amplitude),
+            "unit": "N",
+            "phase": dict(d.repeat.phase),
+            "phase_unit": "rad",
+        },
         "notes": list(remarks(d)),
         "next_experiment": following and plan_json(following),
     }

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import Enum
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from identify.alignment import misalignment, realigned
 from identify.candidates import Candidate, absent_effects, levelled, score, try_effect
 from identify.evidence import held_out_gain
 from identify.fit import AT_FLOOR, Fit, error_on, fit_axis, rms, sticks
+from identify.repeats import Repeat, not_general
 from identify.residual import moving, residual
 from identify.structure import Structure, explains, find_structure
 from identify.study import Study
@@ -68,6 +69,11 @@ class AxisDiagnosis:
     final: Fit
     verdict: Verdict
     unexplained: Structure | None
+
+    @cached_property
+    def repeat(self) -> Repeat | None:
+        """A force that repeats along the track in each log, but at other places in each."""
+        return None if self.final.at_floor else not_general(self.final, self.study)
 
     @property
     def named(self) -> tuple[str, ...]:

@@ -20,6 +20,8 @@ def remarks(found: AxisDiagnosis) -> tuple[str, ...]:
         if found.best.fit.outcome is not Outcome.CONVERGED:
             out.append(f"with {name}: {found.best.fit.outcome.value}")
         out += [f"with {name}, {m}" for m in moved_parameters(found.base, found.best.fit)]
+    if found.repeat is not None:
+        out.append(found.repeat.in_words())
     if not found.study.holdout:
         out.append(
             "no log was held out; candidates were judged on blocks left out of the fit, which is "

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from identify.diagnose import Verdict
+from identify.remarks import remarks
 from identify.workflow import add, diagnose
 from twin.effects import load_catalogue
 from twin.log import read_log, write_log
@@ -81,3 +82,11 @@ def test_then_it_stops_adding(added, emps):
 
 def test_without_a_window_the_answer_is_the_same(model, emps):
     assert diagnose(model, *emps, catalogue=CATALOGUE).effect is CATALOGUE["asymmetric_friction"]
+
+
+def test_the_term_of_a_screw_turn_is_present_in_each_run_but_not_general(found):
+    repeat = found.leading.repeat
+    assert repeat is not None
+    assert repeat.period == pytest.approx(2.5e-3, rel=0.005)
+    assert all(0.5 < a < 1.5 for a in repeat.amplitude.values())
+    assert any("not general" in note for note in remarks(found.leading))
