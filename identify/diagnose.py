@@ -29,6 +29,7 @@ Progress = Callable[[int, int], None]
 MOST_STEPS = 5  # effects added to one axis at most
 SETTLED = 0.999  # part of the error to which another start of the base must bring it
 NEARLY_ALL = 0.95  # part of the squared error above the floor that speaks for itself
+PARTIAL_BIC = 50.0  # evidence asked of an effect that leaves other structure behind
 LEAST_PART = 0.4  # part that must be explained where a dependence is gone
 TIE = 2.0  # |t| of the held-out difference below which two explanations cannot be told apart
 
@@ -112,7 +113,7 @@ def diagnose_axis(
     base, ranking = rank(base, study, catalogue, progress, workers)
     steps: list[Step] = []
     final, found = base, ranking
-    while found and found[0].supported and len(steps) < MOST_STEPS:
+    while not final.at_floor and found and found[0].supported and len(steps) < MOST_STEPS:
         best = found[0]
         tied = tuple(c.effect.name for c in found[1:] if c.supported and _tie(study, best, c))
         final, dropped = _looked_back(base, best.fit, study, [s.candidate for s in _kept(steps)])
@@ -211,7 +212,7 @@ def _decided(
         verdict = Verdict.AMBIGUOUS if tied else Verdict.MISSING_EFFECT
         if not steps:
             verdict = Verdict.NOTHING_MISSING
-    elif steps and (_part(base, final) > NEARLY_ALL or _gone(base, final, study)):
+    elif steps and (_part(base, final) > NEARLY_ALL or _gone(base, final, steps, study)):
         verdict = Verdict.AMBIGUOUS if _kept(steps)[0].tied else Verdict.MISSING_EFFECT
         structure = find_structure(final, study)
     else:
@@ -231,8 +232,10 @@ def _part(base: Fit, final: Fit) -> float:
     return 1.0 - left / was if was > 0.0 else 0.0
 
 
-def _gone(base: Fit, final: Fit, study: Study) -> bool:
-    return _part(base, final) > LEAST_PART and explains(base, final, study)
+def _gone(base: Fit, final: Fit, steps: Sequence[Step], study: Study) -> bool:
+    """Whether effects with much evidence took away what the residual depended on most."""
+    proven = all(s.candidate.delta_bic > PARTIAL_BIC for s in steps[:1])
+    return proven and _part(base, final) > LEAST_PART and explains(base, final, study)
 
 
 def _tie(study: Study, best: Candidate, other: Candidate) -> bool:

@@ -160,23 +160,31 @@ def _shares(
         backwards = share(residual * where["direction"], where[name])
         shares[name] = max(shares[name], backwards)
     periods = {}
-    for name in ("position", "time"):
-        found = line(residual, where[name])
+    restarts = np.flatnonzero(np.diff(where["time"]) < 0.0) + 1
+    for name, runs in (("position", []), ("time", restarts)):
+        found = line(residual, where[name], runs)
         if found is not None:
             periods[name], strength = found
             shares[name] = max(shares[name], strength)
     return shares, periods
 
 
-def line(residual: Array, coordinate: Array) -> tuple[float, float] | None:
-    """Period (unit of the coordinate) and share of the strongest line, if one stands out."""
+def line(
+    residual: Array, coordinate: Array, runs: Sequence[int] | NDArray[np.int64] = ()
+) -> tuple[float, float] | None:
+    """Period (unit of the coordinate) and share of the strongest line, if one stands out.
+
+    runs: where further runs begin, between which the line keeps its period but not its phase.
+    """
     span = float(np.ptp(coordinate))
     if span == 0.0:
         return None
     place = (coordinate - coordinate.min()) / span * (GRID - 1)
-    summed = np.bincount(np.rint(place).astype(int), residual, GRID)
-    power = np.abs(np.fft.rfft(summed, 4 * GRID)) ** 2  # in quarters of a cycle over the span
-    power /= len(residual) * np.sum(residual**2) / 2.0
+    cells = np.split(np.rint(place).astype(int), runs)
+    power = np.zeros(2 * GRID + 1)  # in quarters of a cycle over the span
+    for cell, part in zip(cells, np.split(residual, runs), strict=True):
+        power += np.abs(np.fft.rfft(np.bincount(cell, part, GRID), 4 * GRID)) ** 2 / len(part)
+    power /= np.sum(residual**2) / 2.0
     last = int(4 * min(len(residual) / 4.0, GRID / 8.0))
     best = FEWEST + int(np.argmax(power[FEWEST:last]))
     strength = float(min(power[best], 1.0))
