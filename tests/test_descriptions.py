@@ -27,6 +27,7 @@ from twin.simulator import MujocoStage, ReducedStage
 CATALOGUE = load_catalogue()
 STAGE = one_axis(load_model("proton_xy", CATALOGUE))
 MAP, LEARNED = "empirical_map", "learned_residual"
+SLOW = pytest.mark.slow
 DESCRIPTIONS = pytest.mark.parametrize("name", [MAP, LEARNED])
 Logs = dict[str, Log]
 
@@ -54,8 +55,8 @@ def test_descriptions_are_marked_and_never_a_diagnosis() -> None:
 
 @pytest.mark.parametrize(
     ("force", "height", "name", "fall"),
-    [("chirp", 0.05, MAP, 20.0), ("hill", 0.1, MAP, 20.0), ("sawtooth", 0.05, MAP, 3.5),
-     ("bend", 0.05, LEARNED, 4.0)],
+    [("chirp", 0.05, MAP, 20.0), pytest.param("hill", 0.1, MAP, 20.0, marks=SLOW),
+     pytest.param("sawtooth", 0.05, MAP, 3.5, marks=SLOW), ("bend", 0.05, LEARNED, 4.0)],
 )  # fmt: skip
 def test_a_force_of_no_known_effect_is_described(
     force: str, height: float, name: str, fall: float, tmp_path: Path
@@ -92,7 +93,7 @@ def test_the_shape_is_recovered_and_the_physics_keeps_its_values(tmp_path: Path)
 
 
 @DESCRIPTIONS
-@pytest.mark.parametrize("seed", [11, 21])
+@pytest.mark.parametrize("seed", [11, pytest.param(21, marks=SLOW)])
 def test_nothing_is_kept_on_an_honest_machine(name: str, seed: int) -> None:
     logs, held = recorded(STAGE, (seed, seed + 1)), recorded(STAGE, (seed + 2,))
     before = fit(STAGE, logs, held)
@@ -109,7 +110,7 @@ def test_pure_noise_is_not_described(name: str) -> None:
     for log in logs.values():
         log.axes["x"].columns["force"] = log.axes["x"].force + rng.normal(0.0, 0.3, len(log))
     held = {"log 3": logs.pop("log 3")}
-    for judged in (held, {}):
+    for judged in (held, {}):  # by held-out logs, or by left-out blocks
         before = fit(STAGE, logs, judged)
         found = describe(before.fits["x"], before.studies["x"], CATALOGUE[name])
         assert not found.supported
