@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 
 SAME_ERROR = 1.01  # error that simpler values may cost
 PROMISE = 0.3  # part of the evidence asked for that a first look must show
+AUDITION_EVALUATIONS = 12  # of a friction on the heads, twice
 RIDGE = 1e-4  # keeps the estimate of left-out blocks finite along directions nobody sees
 
 
@@ -121,7 +122,8 @@ def _audition(base: Fit, study: Study, fitted: Fitted) -> Fit | None:
     """Another friction fitted to the heads, where that shows it to be no better; else None."""
     if sum(map(len, study.heads)) > 0.5 * sum(map(len, study.fit)):
         return None
-    old, new = _on_heads(base, study), fit_axis(base.axis.with_effect(fitted), study.heads)
+    old = _on_heads(base, study)
+    new = fit_axis(base.axis.with_effect(fitted), study.heads, AUDITION_EVALUATIONS)
     either = moving(study.heads, sticks(old.axis) or sticks(new.axis))
     before, after = (residual(f.axis, study.heads)[either] for f in (old, new))
     gain = effective_samples(before) * evidence(before, after, 1).log_gain
@@ -152,17 +154,20 @@ def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
     shared = base.kept & fit.kept
     before, after = (f.residual[shared[f.kept]] for f in (base, fit))
     added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
+    proof = evidence(before, after, added)
     if study.holdout:
         held = moving(study.holdout, sticks(base.axis) or sticks(fit.axis))
         pair = [residual(f.axis, study.holdout)[held] for f in (base, fit)]
-    else:
+    elif proof.delta_bic > LEAST_BIC:
         pair = [_cross_validated(f, shared[f.kept]) for f in (base, fit)]
+    else:  # not supported, whatever blocks left out would say
+        pair = [before, after]
     return Candidate(
         effect=effect,
         axis=study.axis,
         fit=fit,
-        evidence=evidence(before, after, added),
-        gain=held_out_gain(pair[0], pair[1], fit.floor),
+        evidence=proof,
+        gain=held_out_gain(pair[0], pair[1], base.floor),
     )
 
 

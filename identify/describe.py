@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from identify.candidates import Candidate
 from identify.evidence import BLOCKS, Evidence, effective_samples, held_out_gain
-from identify.fit import Fit, fit_axis, sticks
+from identify.fit import Fit, finished, fit_axis, sticks
 from identify.motion import excitation
 from identify.residual import jacobian, moving, residual
 from identify.smoothing import part_rows, smoothing
@@ -217,15 +217,7 @@ def physics_alone(model: StageModel) -> StageModel:
 
 def _beside(fit: Fit, study: Study, effect: str) -> Fit:
     """The fit with the description taken out and its physics as it is."""
-    kept = [i for i, c in enumerate(fit.scaling.where) if c.effect != effect]
-    axis = fit.axis.without(effect)
-    return replace(
-        fit,
-        axis=axis,
-        scaling=replace(fit.scaling, where=tuple(fit.scaling.where[i] for i in kept)),
-        residual=residual(axis, study.fit)[fit.kept],
-        jacobian=fit.jacobian[:, kept],
-    )
+    return finished(fit.axis.without(effect), fit.begun, study.fit, fit.outcome)
 
 
 def _filled(

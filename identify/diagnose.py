@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from identify.alignment import misalignment, realigned
 from identify.candidates import Candidate, absent_effects, levelled, score, try_effect
 from identify.evidence import held_out_gain
-from identify.fit import Fit, fit_axis, sticks
+from identify.fit import AT_FLOOR, Fit, error_on, fit_axis, rms, sticks
 from identify.residual import moving, residual
 from identify.structure import Structure, explains, find_structure
 from identify.study import Study
@@ -27,6 +27,8 @@ Progress = Callable[[int, int], None]
 
 MOST_STEPS = 5  # effects added to one axis at most
 SETTLED = 0.999  # part of the error to which another start of the base must bring it
+NEARLY_ALL = 0.95  # part of the squared error above the floor that speaks for itself
+LEAST_PART = 0.4  # part that must be explained where a dependence is gone
 TIE = 2.0  # |t| of the held-out difference below which two explanations cannot be told apart
 
 
@@ -193,22 +195,38 @@ def _decided(
 ) -> AxisDiagnosis:
     """The verdict on what was added.
 
-    A name is given where the effects bring the error to the floor, or leave nothing of what the
-    residual depended on most. What stands in for another effect leaves that dependence behind.
+    A name is given where the effects bring the error to the floor, explain nearly all above it, or
+    leave nothing of what the residual depended on most. What stands in for another effect leaves
+    that dependence behind.
     """
     structure = None
-    if final.at_floor:
+    if final.at_floor or (steps and _held_at_floor(final, study)):
         tied = bool(steps) and _kept(steps)[0].tied
         verdict = Verdict.AMBIGUOUS if tied else Verdict.MISSING_EFFECT
         if not steps:
             verdict = Verdict.NOTHING_MISSING
-    elif steps and explains(base, final, study):
+    elif steps and (_part(base, final) > NEARLY_ALL or _gone(base, final, study)):
         verdict = Verdict.AMBIGUOUS if _kept(steps)[0].tied else Verdict.MISSING_EFFECT
         structure = find_structure(final, study)
     else:
         verdict = Verdict.UNEXPLAINED
         structure = find_structure(base, study)
     return AxisDiagnosis(study, base, ranking, steps, final, verdict, structure)
+
+
+def _held_at_floor(final: Fit, study: Study) -> bool:
+    """Whether the logs that the fit did not see are explained down to noise."""
+    return bool(study.holdout) and rms(error_on(final.axis, study.holdout)) < AT_FLOOR * final.floor
+
+
+def _part(base: Fit, final: Fit) -> float:
+    """Part of the squared error above the floor that is explained."""
+    was, left = base.error**2 - base.floor**2, final.error**2 - final.floor**2
+    return 1.0 - left / was if was > 0.0 else 0.0
+
+
+def _gone(base: Fit, final: Fit, study: Study) -> bool:
+    return _part(base, final) > LEAST_PART and explains(base, final, study)
 
 
 def _tie(study: Study, best: Candidate, other: Candidate) -> bool:

@@ -97,14 +97,14 @@ def held_out_gain(before: Array, after: Array, floor: float) -> Gain:
     return Gain(float(np.sqrt(np.mean(before**2))), float(np.sqrt(np.mean(after**2))), float(t))
 
 
-def left_out(residual: Array, jacobian: Array, scale: Array) -> Array:
-    """Residual (n,) each block would have if the fit had not seen it.
+def left_out(residual: Array, jacobian: Array, scale: Array, blocks: int = BLOCKS) -> Array:
+    """Residual (n,) each of some blocks would have if the fit had not seen it.
 
     Exact for a model linear in its parameters: (I - H_bb)^-1 r_b with the hat matrix H. scale (k,):
     pull of the priors in units of the columns, which keeps the inverse finite.
     """
     information = jacobian.T @ jacobian + np.diag(scale**2)
-    edges = np.linspace(0, len(residual), min(BLOCKS, len(residual)) + 1).astype(int)
+    edges = np.linspace(0, len(residual), min(blocks, len(residual)) + 1).astype(int)
     out = residual.copy()
     for a, b in pairwise(edges):
         block = jacobian[a:b]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,20 +46,32 @@ class Outcome(Enum):
 class Fit:
     """A fitted axis.
 
-    error: RMS force residual in N over the logs. floor: RMS noise floor in N. residual (n,) N and
-    jacobian (n, k) N per unit at the end, over the windows that carry information (kept). begun:
+    residual (n,): N at the end over the windows of the logs that carry information (kept). begun:
     the axis that the fit started from.
     """
 
     axis: AxisModel
+    logs: Sequence[Windowed]
     scaling: Scaling
     outcome: Outcome
-    error: float
-    floor: float
     residual: Array
-    jacobian: Array
     kept: NDArray[np.bool_]
     begun: AxisModel
+
+    @cached_property
+    def error(self) -> float:
+        """RMS force residual in N."""
+        return rms(self.residual)
+
+    @cached_property
+    def floor(self) -> float:
+        """RMS noise floor in N."""
+        return noise_floor(self.axis, [(log.motion, log.window) for log in self.logs])
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Derivative of the residual by the free coordinates, (n, k) N per unit."""
+        return jacobian(self.axis, self.logs, self.scaling.where)[self.kept]
 
     @property
     def at_floor(self) -> bool:
@@ -104,8 +117,9 @@ class _Problem:
     stays with the physics. The description itself is smoothed.
     """
 
-    def __init__(self, axis: AxisModel, logs: Sequence[Windowed]) -> None:
+    def __init__(self, axis: AxisModel, logs: Sequence[Windowed], most_evaluations: int) -> None:
         self.axis = axis
+        self.most_evaluations = most_evaluations
         self.logs = logs
         self.scaling = Scaling(coordinates(axis))
         self.kept = moving(logs, sticks(axis))
@@ -159,14 +173,16 @@ class _Problem:
         """Least squares from these values; the solution and whether it converged."""
         solution = minimise(
             self.rows, self.slopes, internal, self.bounds,
-            tolerance=tolerance, most_evaluations=MOST_EVALUATIONS,
+            tolerance=tolerance, most_evaluations=self.most_evaluations,
         )  # fmt: skip
         return solution.x, solution.converged
 
 
-def fit_axis(axis: AxisModel, logs: Sequence[Windowed]) -> Fit:
+def fit_axis(
+    axis: AxisModel, logs: Sequence[Windowed], most_evaluations: int = MOST_EVALUATIONS
+) -> Fit:
     """Fit the free parameters of an axis from its present values."""
-    problem = _Problem(axis, logs)
+    problem = _Problem(axis, logs, most_evaluations)
     internal, converged = problem.start, True
     if len(internal):
         problem.set_priors(internal)
@@ -179,17 +195,13 @@ def fit_axis(axis: AxisModel, logs: Sequence[Windowed]) -> Fit:
 
 def finished(axis: AxisModel, begun: AxisModel, logs: Sequence[Windowed], outcome: Outcome) -> Fit:
     """The fit that an axis is at its present values."""
-    scaling = Scaling(coordinates(axis))
     kept = moving(logs, sticks(axis))
-    force = residual(axis, logs)[kept]
     return Fit(
         axis=axis,
-        scaling=scaling,
+        logs=logs,
+        scaling=Scaling(coordinates(axis)),
         outcome=outcome,
-        error=rms(force),
-        floor=noise_floor(axis, [(log.motion, log.window) for log in logs]),
-        residual=force,
-        jacobian=jacobian(axis, logs, scaling.where)[kept],
+        residual=residual(axis, logs)[kept],
         kept=kept,
         begun=begun,
     )

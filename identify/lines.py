@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 
 MOST_LINES = 60
 PROMINENT = 4.0  # amplitude of a line over that of the spectrum around it
+CELLS = 1 << 16  # along the travel
+FEWEST_CYCLES = 20  # over the travel, of an error of the reading
+MOST_RIPPLES = 24
 AROUND = 61  # bins of the spectrum that are taken for what surrounds a line
 HIGHEST = 0.4  # of the block rate
 
@@ -38,6 +41,29 @@ def lines_of(forces: Sequence[tuple[Array, float]]) -> tuple[float, ...]:
         if all(abs(frequency - other) > width for other in kept):
             kept.append(frequency)
     return tuple(kept[:MOST_LINES])
+
+
+def ripples(motions: Sequence[Motion]) -> tuple[float, ...]:
+    """Periods (m) at which an error of the reading would repeat in position, strongest first.
+
+    An error A sin(2 pi x/p) looks like a force m A (2 pi v/p)^2 sin(2 pi x/p), so the force weighed
+    by v^2 has a line in position.
+    """
+    low = min(float(m.position.min()) for m in motions)
+    span = max(float(m.position.max()) for m in motions) - low
+    if span <= 0.0:
+        return ()
+    summed = np.zeros(CELLS)
+    for m in motions:
+        place = np.rint((m.position - low) / span * (CELLS - 1)).astype(int)
+        summed += np.bincount(place, _rest(m) * m.velocity**2, CELLS)
+    spectrum = np.abs(np.fft.rfft(summed, 2 * CELLS))  # in half cycles over the span
+    around = median_filter(spectrum, AROUND, mode="nearest")
+    prominence = spectrum / np.maximum(around, 1e-12 * spectrum.max(initial=1e-300))
+    first = FEWEST_CYCLES * 2
+    best = first + np.argsort(prominence[first : CELLS // 2])[::-1][:MOST_RIPPLES]
+    told = best[prominence[best] > PROMINENT]
+    return tuple(float(2.0 * span * CELLS / (CELLS - 1) / k) for k in told)
 
 
 def _rest(motion: Motion) -> Array:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.lines import lines
+from identify.lines import lines, ripples
 from twin.effect import Excitation
 from twin.errors import InputError
 from twin.log import Log
@@ -174,6 +174,7 @@ def excitation(motions: list[Motion], travel: tuple[float, float] | None) -> Exc
         period=motions[0].period,
         force_max=float(np.abs(command).max()),
         lines=lines(motions),
+        ripples=ripples(motions),
         resolution=max(resolution(m) for m in motions),
     )
 

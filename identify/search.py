@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from identify.fit import Fit, fit_axis
+from identify.actuation import parts_of
+from identify.evidence import effective_samples
+from identify.fit import Fit, finished, fit_axis
 from identify.lines import lines_of
 from identify.residual import Windowed, jacobian, residual
 from identify.study import Study
@@ -21,7 +23,8 @@ Array = NDArray[np.float64]
 
 RIDGE = 1e-4  # keeps the linear step finite along directions that the base explains already
 RESCORED_SHAPES = 24  # best shapes of a coarse scan that are tried with every strength
-FULL_SHAPES = 6  # best shapes on the logs' heads that are tried on all of the logs
+CHANCE = 4.0  # of the gain in log likelihood (times two) for each strength, found by searching
+FULL_SHAPES = 4  # best shapes on the logs' heads that are tried on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
 RESIDUAL_LINES = 12  # frequencies of the residual that are tried
 BETTER = 0.99  # part of the error that a new start must reach to be taken
@@ -46,16 +49,28 @@ def starts(base: Fit, study: Study, effect: Effect) -> list[Start]:
     strength, and the best of those on all of the logs.
     """
     excitation = _with_lines_left(base, study)
-    shapes = tried_shapes(effect, excitation)
-    found = [Start(0.0, shape, Fitted.at_start(effect)) for shape in shapes]
-    coarse = [p for p in effect.strengths if p.screened]
-    head = _Ground.of(base, study, effect, excitation, on_heads=True)
-    if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
-        found = _best(head, found, coarse, RESCORED_SHAPES)
-    if len(found) > FULL_SHAPES:
-        found = _best(head, found, effect.strengths, FULL_SHAPES)
+    found = [
+        Start(0.0, shape, Fitted.at_start(effect)) for shape in tried_shapes(effect, excitation)
+    ]
     whole = _Ground.of(base, study, effect, excitation, on_heads=False)
+    if len(found) > FULL_SHAPES:
+        head = _Ground.of(base, study, effect, excitation, on_heads=True)
+        coarse = [p for p in effect.strengths if p.screened]
+        if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
+            found = _best(head, found, coarse, RESCORED_SHAPES)
+        found = _best(head, found, effect.strengths, FULL_SHAPES)
+        if effect.kind is not Kind.FRICTION and not _worth_all(base, head, whole, found[0]):
+            found = found[:1]
     return _best(whole, found, effect.strengths, REFINED_STARTS)
+
+
+def _worth_all(base: Fit, head: _Ground, whole: _Ground, start: Start) -> bool:
+    """Whether what a shape gains on the heads is more than chance, so that others deserve a try."""
+    samples = effective_samples(base.residual)
+    before = float(np.sum(head.unchanged**2))
+    gain = samples * np.log(before / max(start.squared_error, 1e-12 * before))
+    free = len(start.fitted.effect.strengths)
+    return bool(gain * len(head.unchanged) / len(whole.unchanged) > CHANCE * free)
 
 
 def _best(
@@ -97,15 +112,7 @@ def fit_thoroughly(axis: AxisModel, study: Study) -> Fit:
 
 def _fit_without(fit: Fit, study: Study, name: str) -> Fit:
     """The fit with one effect taken out, its other parameters left where they are."""
-    kept = [i for i, c in enumerate(fit.scaling.where) if c.effect != name]
-    axis = fit.axis.without(name)
-    return replace(
-        fit,
-        axis=axis,
-        scaling=replace(fit.scaling, where=tuple(fit.scaling.where[i] for i in kept)),
-        residual=residual(axis, study.fit)[fit.kept],
-        jacobian=fit.jacobian[:, kept],
-    )
+    return finished(fit.axis.without(name), fit.begun, study.fit, fit.outcome)
 
 
 def _with_lines_left(base: Fit, study: Study) -> Excitation:
@@ -165,7 +172,9 @@ def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter
     where = [Coordinate(effect.name, p) for p in strengths if p.name not in first.fixed]
     silent = all(first.values[p.name] == 0.0 for p in effect.strengths)
     force = ground.unchanged if silent else residual(axis, ground.logs)[ground.kept]
-    columns = jacobian(axis, ground.logs, where)[ground.kept]
+    # That a reading's error moves the other forces too is of second order here.
+    alone = parts_of(axis, Kind.SENSING) if effect.kind is Kind.SENSING else axis
+    columns = jacobian(alone, ground.logs, where)[ground.kept]
     step, squared = _bounded_step(ground.basis, force, columns, where, first)
     moved = {c.parameter.name: s for c, s in zip(where, step, strict=True)}
     return Start(squared, shape, replace(first, values={**first.values, **moved}))

@@ -21,8 +21,8 @@ from twin.model import AxisModel, StageModel
 Array = NDArray[np.float64]
 
 WINDOWS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
-TRIED = 16.0  # s of motion on which the shapes of an effect are tried before all of it is used
-SHORTEST_HEAD = 4.0  # s of each log
+TRIED = 12.0  # s of motion on which the shapes of an effect are tried before all of it is used
+SHORTEST_HEAD = 3.0  # s of each log
 QUIET = 0.01  # noise floor wanted, as a part of the force that the inertia does not explain
 
 

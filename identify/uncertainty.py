@@ -1,8 +1,9 @@
 """Intervals that survive coloured residuals, and are refused on a wrong model.
 
 Sandwich covariance with blocks: (J'J)^-1 [sum_b J_b' r_b r_b' J_b] (J'J)^-1, where the blocks are
-longer than the residual's memory. H. White, Econometrica 48 (1980); K.-Y. Liang, S. L. Zeger,
-Biometrika 73 (1986) for blocks.
+longer than the residual's memory and r_b is what the fit without block b leaves there. H. White,
+Econometrica 48 (1980); K.-Y. Liang, S. L. Zeger, Biometrika 73 (1986) for blocks; R. M. Bell,
+D. F. McCaffrey, Survey Methodology 28 (2002) for left-out residuals.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from identify.evidence import left_out
 from identify.fit import Fit
 from twin.model import read
 
 Array = NDArray[np.float64]
 
 BLOCKS = 30
+RIDGE = 1e-6  # keeps a fit without one block finite
 INSEPARABLE = 0.9999  # correlation of two estimates from which they are one number
 CONFIDENCE = 0.90
 LARGEST_RATIO = 3.0  # of error to noise floor; above it the model is wrong and no interval holds
@@ -98,19 +101,17 @@ def half_widths(fit: Fit) -> Array:
     columns = fit.jacobian[:, seen] / norms[seen]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-12, hermitian=True)
     edges = np.linspace(0, len(fit.residual), BLOCKS + 1).astype(int)
-    scores = np.stack([columns[a:b].T @ fit.residual[a:b] for a, b in pairwise(edges)])
-    # Residuals are smaller than errors, by the degrees of freedom that the fit took.
-    spread = len(fit.residual) / max(len(fit.residual) - OVERCOUNT * seen.sum(), 1.0)
-    covariance = inverse @ (scores.T @ scores * spread * BLOCKS / (BLOCKS - 1)) @ inverse
+    # Residuals of a block are smaller than its errors, by what the fit took from it: left out of
+    # the fit they are not (jackknife, CR3).
+    honest = left_out(fit.residual, columns, np.full(columns.shape[1], RIDGE), BLOCKS)
+    scores = np.stack([columns[a:b].T @ honest[a:b] for a, b in pairwise(edges)])
+    covariance = inverse @ (scores.T @ scores * (BLOCKS - 1) / BLOCKS) @ inverse
     # What holds a parameter off the least squares, a prior or a bound, shifts it by this much.
     shift = np.abs(inverse @ (columns.T @ fit.residual))
     quantile = student.ppf(0.5 + CONFIDENCE / 2.0, BLOCKS - 1)
     spread_of = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     out[seen] = (quantile * spread_of + shift) / norms[seen]
     return out
-
-
-OVERCOUNT = 4.0  # windows overlap fourfold, so each parameter takes about four of them
 
 
 def _held(fit: Fit) -> list[Estimate]:

@@ -102,8 +102,7 @@ def frame(m, size, rng):
 
 
 def stops(m, size, rng):
-    m = replace(m, motion={"span": 0.165})
-    return m.having(stop_high=0.15, stop_low=-0.15, stop_k=1e3 * size, stop_c=5.0 * size)
+    return m.having(stop_high=0.09, stop_low=-0.09, stop_k=1e2 * size, stop_c=size)
 
 
 def reading_ripple(m, size, rng):
@@ -157,7 +156,7 @@ INSIDE = {
         lambda m, s, r: beside(m, couple_inertia=s, couple_viscous=0.3 * s), ("axis_coupling",)
     ),
     "periodic_disturbance": Planted(periodic, ("periodic_disturbance",)),
-    "end_stop": Planted(stops, ("end_stop",), largest=10.0),
+    "end_stop": Planted(stops, ("end_stop",), largest=10.0, start=0.03),
     "actuator_lag": Planted(
         value("lag", 5e-3), ("actuator_lag",), ("actuator_delay", "encoder_delay"), largest=1.0
     ),
@@ -166,7 +165,8 @@ INSIDE = {
     ),
     "actuator_deadband": Planted(value("deadband"), ("actuator_deadband",)),
     "actuator_saturation": Planted(
-        lambda m, s, r: m.having(saturation=20.0 / (1.0 + 20.0 * s)), ("actuator_saturation",)
+        lambda m, s, r: m.having(saturation=m.plant.mass * (2.0 - s)),
+        ("actuator_saturation",), start=0.3, largest=1.5,
     ),
     "base_vibration": Planted(frame, ("base_vibration",), largest=0.5),
     "flexible_mode": Planted(flexible, ("flexible_mode",), largest=0.5, start=0.05),

@@ -72,8 +72,8 @@ class Excitation:
     position_low, position_high (m, of the axis' travel where the model gives it), speed_max (m/s),
     dry_level (N, half the gap between the force in the two directions), duration (s), period (s,
     sample period), force_max (N, largest command), lines (Hz, frequencies at which the force
-    repeats in time; strongest first), resolution (m, step of the
-    readings; 0 where none shows).
+    repeats in time; strongest first), resolution (m, step of the readings; 0 where none shows),
+    ripples (m, periods at which the reading's error may repeat in position; strongest first).
     """
 
     position_low: float
@@ -84,6 +84,7 @@ class Excitation:
     period: float
     force_max: float = 1.0
     lines: tuple[float, ...] = ()
+    ripples: tuple[float, ...] = ()
     resolution: float = 0.0
 
     @property

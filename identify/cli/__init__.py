@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import sys
 
-from identify.cli import loop, machine, plan
+from identify.cli import loop, machine, plan, selftest
 from identify.cli.shared import app
 from twin.errors import InputError
 
-__all__ = ["loop", "machine", "main", "plan"]
+__all__ = ["loop", "machine", "main", "plan", "selftest"]
 
 
 def main() -> None:

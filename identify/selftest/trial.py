@@ -68,6 +68,16 @@ class Outcome:
         wrong = set(self.named) - set(self.case.effects)
         return set(self.case.effects) <= told and len(wrong) <= len(self.tied)
 
+    def in_words(self) -> str:
+        """One line: what was planted, and what the diagnosis said."""
+        planted = " and ".join(self.case.effects) or "nothing"
+        if not self.shown:
+            return f"{planted} cannot show on this stage's motion at {self.case.strength:g} floors"
+        known = "" if self.case.known else ", left out of the catalogue"
+        answer = " and ".join(self.named) or self.verdict.lower()
+        tied = f", ambiguous with {', '.join(self.tied)}" if self.tied else ""
+        return f"{planted} at {self.case.strength:g} floors{known}: {answer}{tied}"
+
     @property
     def quiet(self) -> bool:
         """Whether no name was given."""

@@ -37,9 +37,9 @@ def attach(mount, values):
 
 
 def frequencies(e: Excitation) -> tuple[float, ...]:
-    """Frequencies to try: steps of an eighth, from what the log's length resolves."""
+    """Frequencies to try: steps of a fifth, from what the log's length resolves."""
     lowest = max(0.3, 2.0 / e.duration)
-    return tuple(lowest * 1.125**k for k in range(max(int(log(20.0 / lowest) / log(1.125)), 1)))
+    return tuple(lowest * 1.2**k for k in range(max(int(log(20.0 / lowest) / log(1.2)), 1)))
 
 
 EFFECT = Effect(
@@ -57,7 +57,7 @@ EFFECT = Effect(
         ),
         Parameter(
             "damping", "1", 0.1, 1e-4, 0.5, "damping ratio of the isolator",
-            scan=lambda e: (0.03, 0.2),
+            scan=lambda e: (0.1,),
         ),
     ),
     states=("displacement", "speed"),

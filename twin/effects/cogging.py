@@ -23,9 +23,9 @@ def law(p, s, io):
 
 
 def pitches(e: Excitation) -> tuple[float, ...]:
-    """Pitches to try: equally spaced in cycles over the travel, half a cycle apart."""
+    """Pitches to try: half a cycle apart over the travel, from three cycles on."""
     cycles = int(min(e.travel / 2e-3, 120.0))
-    return tuple(2.0 * e.travel / k for k in range(4, 2 * cycles + 1))
+    return tuple(2.0 * e.travel / k for k in range(6, 2 * cycles + 1))
 
 
 def simplest(values: Mapping[str, float]) -> dict[str, float]:

@@ -8,7 +8,9 @@ interferometers", Applied Optics 20 (1981), to first order in the errors.
 
 from math import cos, pi, sin
 
-from twin.effect import READING, Effect, Kind, Parameter
+from twin.effect import READING, Effect, Excitation, Kind, Parameter
+
+SCALES = (2e-6, 4e-6, 8e-6, 1e-5, 1.6e-5, 2e-5, 4e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3)  # m
 
 
 def law(p, s, io):
@@ -20,13 +22,18 @@ def law(p, s, io):
     io[READING] += error
 
 
+def periods(e: Excitation) -> tuple[float, ...]:
+    """Signal periods of common scales, and those at which this log repeats."""
+    return (*SCALES, *e.ripples)
+
+
 EFFECT = Effect(
     kind=Kind.SENSING,
     summary="interpolation error of the encoder, periodic in position",
     equation="reading = x + sum_{k=1,2} a_k sin(2 pi k x/period) + b_k cos(2 pi k x/period)",
     source="Heydemann 1981, quadrature errors to first order",
     parameters=(
-        Parameter("period", "m", 2e-5, 1e-8, 0.1, "signal period of the scale", fixed=True),
+        Parameter("period", "m", 2e-5, 1e-8, 0.1, "signal period of the scale", scan=periods),
         *(
             Parameter(f"{c}{k}", "m", 0.0, -1e-4, 1e-4, f"{f} term of harmonic {k}", strength=True)
             for k in (1, 2)

@@ -8,6 +8,8 @@ stiffness is stable; along a measured motion, which no force changes, the law is
 
 from twin.effect import DT, MASS, OUT, Effect, Kind, Parameter, V, X
 
+STOPS = (0.005, 0.02, 0.06, 0.15, 0.3)  # places tried, parts of the travel from its ends
+
 
 def law(p, s, io):
     depth = 0.0
@@ -30,12 +32,12 @@ EFFECT = Effect(
         Parameter(
             "low", "m", 0.0, -1e3, 1e3, "lower stop",
             start_rule=lambda e: e.position_low,
-            scan=lambda e: tuple(e.position_low + k * e.travel for k in (0.005, 0.02, 0.06)),
+            scan=lambda e: tuple(e.position_low + k * e.travel for k in STOPS),
         ),
         Parameter(
             "high", "m", 0.0, -1e3, 1e3, "upper stop",
             start_rule=lambda e: e.position_high,
-            scan=lambda e: tuple(e.position_high - k * e.travel for k in (0.005, 0.02, 0.06)),
+            scan=lambda e: tuple(e.position_high - k * e.travel for k in STOPS),
         ),
         Parameter("stiffness", "N/m", 0.0, 0.0, 1e9, "stiffness of a stop", strength=True),
         Parameter(

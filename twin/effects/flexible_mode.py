@@ -56,7 +56,7 @@ EFFECT = Effect(
         ),
         Parameter(
             "damping", "1", 0.03, 1e-4, 0.5, "damping ratio with the motor side held",
-            scan=lambda e: (0.01, 0.1),
+            scan=lambda e: (0.03,),
         ),
     ),
     states=("displacement", "speed"),

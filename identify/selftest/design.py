@@ -1,0 +1,74 @@
+"""Which machines a self-test makes, and running them side by side."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.selftest.trial import STAGE, Case, Outcome, run
+from twin.effects import Catalogue, load_catalogue
+from twin.model_file import load_model
+
+PAIR_STRENGTH = 5.0  # times the noise floor, of each of two planted effects
+
+
+@dataclass(frozen=True)
+class Design:
+    """How much is tried: strengths (times the noise floor), and how many machines of each sort.
+
+    each: of every effect and strength. empty: with nothing planted. pairs: with two effects.
+    left_out: of every effect, at ``pair strength``, with the effect taken out of the catalogue.
+    """
+
+    strengths: tuple[float, ...] = (5.0,)
+    each: int = 1
+    empty: int = 10
+    pairs: int = 10
+    left_out: int = 1
+
+    def cases(self, seed: int, names: Sequence[str] | None = None) -> list[Case]:
+        """All machines; the same seed makes the same."""
+        catalogue = load_catalogue()
+        hidden = list(names or plantable(catalogue))
+        rng = np.random.default_rng(seed)
+        out = [Case((), 0.0, seed + i) for i in range(self.empty)]
+        for i in range(self.each):
+            out += [Case((n,), s, seed + i) for s in self.strengths for n in hidden]
+        for i in range(self.pairs):
+            first, second = rng.choice(hidden, 2, replace=False)
+            out.append(Case((str(first), str(second)), PAIR_STRENGTH, seed + i))
+        for i in range(self.left_out):
+            out += [Case((n,), PAIR_STRENGTH, seed + 1000 + i, known=False) for n in hidden]
+        return out
+
+
+QUICK = Design()
+FULL = Design(strengths=(2.0, 5.0, 20.0), each=3, empty=200, pairs=60, left_out=2)
+
+
+def plantable(catalogue: Catalogue) -> list[str]:
+    """Physical effects that the stage of the self-test lacks."""
+    own = load_model(STAGE, catalogue).axes["x"].names
+    return [e.name for e in catalogue.values() if e.name not in own and not e.is_description]
+
+
+def run_all(
+    cases: Sequence[Case],
+    workers: int | None = None,
+    progress: Callable[[Outcome, int, int], None] | None = None,
+) -> list[Outcome]:
+    """Run cases in as many processes as there are cores; in the order given."""
+    found: dict[Case, Outcome] = {}
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers or os.cpu_count(), mp_context=context) as pool:
+        for done in as_completed([pool.submit(run, case) for case in cases]):
+            outcome = done.result()
+            found[outcome.case] = outcome
+            if progress:
+                progress(outcome, len(found), len(cases))
+    return [found[case] for case in cases]

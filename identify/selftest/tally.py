@@ -1,0 +1,114 @@
+"""What a self-test adds up to: rates with their counts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from identify.selftest.trial import Outcome
+
+
+@dataclass(frozen=True)
+class Rate:
+    """How many of some trials came out as they should. target: least (or most) rate asked for."""
+
+    what: str
+    count: int
+    trials: int
+    target: str = ""
+
+    @property
+    def value(self) -> float:
+        """0..1; not a number without trials."""
+        return self.count / self.trials if self.trials else float("nan")
+
+    def in_words(self) -> str:
+        """E.g. "named, force 5 times the noise floor: 30 of 31 (97 %), asked: at least 95 %"."""
+        asked = f", asked: {self.target}" if self.target else ""
+        share = f" ({100 * self.value:.0f} %)" if self.trials else ""
+        return f"{self.what}: {self.count} of {self.trials}{share}{asked}"
+
+
+ASKED = {5.0: "at least 95 %", 2.0: "at least 80 %"}
+
+
+def rates(outcomes: Sequence[Outcome]) -> list[Rate]:
+    """All rates of a self-test."""
+    shown = [o for o in outcomes if o.shown]
+    one = [o for o in shown if len(o.case.effects) == 1 and o.case.known]
+    out = [
+        _rate(
+            f"named or in a declared ambiguity, force {s:g} times the noise floor",
+            [o for o in one if o.case.strength == s], _right, ASKED.get(s, ""),
+        )
+        for s in sorted({o.case.strength for o in one})
+    ]  # fmt: skip
+    empty = [o for o in shown if not o.case.effects]
+    two = [o for o in shown if len(o.case.effects) == 2]
+    out.append(_rate("false alarms, nothing planted", empty, _alarm, "at most 1 in 100"))
+    out.append(_rate("wrong names given with confidence, one planted", one, _wrong))
+    out.append(_rate("both of two named", two, _right, "at least 85 %"))
+    left_out = [o for o in shown if not o.case.known]
+    out.append(
+        _rate("effect outside the catalogue: floor reached or the right coordinate", left_out,
+              lambda o: o.honest, "at least 80 %")
+    )  # fmt: skip
+    covered = [c for o in empty for _, c in o.covered]
+    out.append(Rate("90 % intervals that hold the truth", sum(covered), len(covered), "85 to 95 %"))
+    return [r for r in out if r.trials]
+
+
+def _rate(
+    what: str, trials: Sequence[Outcome], good: Callable[[Outcome], bool], target: str = ""
+) -> Rate:
+    return Rate(what, sum(map(good, trials)), len(trials), target)
+
+
+def _right(o: Outcome) -> bool:
+    return o.right
+
+
+def _alarm(o: Outcome) -> bool:
+    return not o.quiet
+
+
+def _wrong(o: Outcome) -> bool:
+    return not o.quiet and not o.right
+
+
+def coverage(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
+    """Coverage of the intervals by parameter, of machines with nothing planted."""
+    found: dict[str, list[bool]] = {}
+    for o in outcomes:
+        for label, inside in o.covered:
+            found.setdefault(label, []).append(inside)
+    return {k: Rate(k, sum(v), len(v), "85 to 95 %") for k, v in found.items()}
+
+
+def confusion(outcomes: Sequence[Outcome]) -> dict[str, dict[str, float]]:
+    """Planted effect -> answer -> part of the trials: a name, "ambiguous", or none.
+
+    An ambiguity that holds the planted effect counts for it, in a column of its own.
+    """
+    one = [o for o in outcomes if o.shown and o.case.known and len(o.case.effects) <= 1]
+    table: dict[str, dict[str, float]] = {}
+    for o in one:
+        planted = o.case.effects[0] if o.case.effects else NOTHING
+        row = table.setdefault(planted, {})
+        row[_answer(o)] = row.get(_answer(o), 0.0) + 1.0
+    return {
+        name: {answer: n / sum(row.values()) for answer, n in row.items()}
+        for name, row in table.items()
+    }
+
+
+NOTHING, UNEXPLAINED, AMBIGUOUS = "nothing", "unexplained", "ambiguous with it"
+
+
+def _answer(o: Outcome) -> str:
+    if o.quiet:
+        return UNEXPLAINED if o.verdict == "UNEXPLAINED" else NOTHING
+    planted = o.case.effects[0] if o.case.effects else ""
+    if planted in o.named:
+        return planted
+    return AMBIGUOUS if planted in o.tied else o.named[0]
