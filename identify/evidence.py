@@ -85,6 +85,8 @@ def held_out_gain(before: Array, after: Array, floor: float) -> Gain:
     t is taken from the logarithm of the squared errors of each block, over the floor: a few blocks
     of hard motion then do not decide alone.
     """
+    if not len(before):  # at rest within every window
+        return Gain(np.nan, np.nan, 0.0)
     blocks = min(BLOCKS, len(before))
     edges = np.linspace(0, len(before), blocks + 1).astype(int)
     quiet = floor**2 * np.diff(edges)

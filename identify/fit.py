@@ -142,7 +142,7 @@ class _Problem:
         explained = rms((command - inertia)[self.kept])
         noise = rms(left) * np.sqrt(len(left) / effective_samples(left))
         columns = self.columns(internal)
-        size = np.linalg.norm(columns, axis=0) / np.sqrt(len(left))
+        size = np.linalg.norm(columns, axis=0) / np.sqrt(max(len(left), 1))
         expected = max(PRIOR_FORCE * explained, noise)
         self.pull = np.where(self.added, noise * size / expected, 0.0)
         self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD

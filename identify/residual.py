@@ -38,7 +38,8 @@ class Windowed:
     def of(cls, motion: Motion, length: float) -> Windowed:
         """Weak form with windows of that length (s)."""
         window = Window.of_length(length, motion.period)
-        fine = window.refined(round(motion.period / motion.sample_period))
+        samples = round(motion.period / motion.sample_period)
+        fine, window = window.refined(samples), window.sharpened(samples)
         velocity, command = motion.raw
         return cls(motion, window, fine, fine.mean(command), fine.acceleration(velocity))
 

@@ -3,11 +3,15 @@
 import json
 import subprocess
 import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
+from identify.cli import main
 from twin.effects import load_catalogue
 from twin.experiments import simulate
 from twin.log import AxisLog, Log, write_log
@@ -26,13 +30,22 @@ def twin(*arguments: object, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def refusal(*arguments: object, folder: Path) -> str:
-    """The one line on standard error of a refused command; nothing else may have happened."""
+    """The one line on standard error of a refused command; nothing else may have happened.
+
+    Within this process, which spares its start.
+    """
     before = sorted(folder.iterdir())
-    result = twin(*arguments, folder=folder)
-    assert result.returncode == 2, result.stderr
-    assert result.stdout == ""
-    lines = result.stderr.splitlines()
-    assert len(lines) == 1, result.stderr
+    out, err = StringIO(), StringIO()
+    command = ["twin", *map(str, arguments)]
+    with (
+        chdir(folder), redirect_stdout(out), redirect_stderr(err),
+        patch.object(sys, "argv", command), pytest.raises(SystemExit) as ended,
+    ):  # fmt: skip
+        main()
+    assert ended.value.code == 2, err.getvalue()
+    assert out.getvalue() == ""
+    lines = err.getvalue().splitlines()
+    assert len(lines) == 1, err.getvalue()
     assert lines[0].startswith("twin: ")
     assert sorted(folder.iterdir()) == before, "something was written"
     return lines[0]
@@ -63,7 +76,6 @@ def test_json_is_one_object_and_nothing_else(folder):
         ("effects",),
         ("effects", "lugre"),
         ("simulate", "reversals", "--duration", "1", "-o", "r.mcap"),
-        ("fit", "proton_xy", "log.mcap", "-o", "fitted.toml"),
         ("compare", "proton_xy", "log.mcap"),
     ):
         result = twin(*arguments, "--json", folder=folder)
@@ -83,7 +95,9 @@ def test_the_documented_keys_of_diagnose_are_there(folder):
 
 
 def test_a_fitted_model_can_be_used_again(folder):
-    assert twin("fit", "proton_xy", "log.mcap", "-o", "f.toml", folder=folder).returncode == 0
+    fitted = twin("fit", "proton_xy", "log.mcap", "-o", "f.toml", "--json", folder=folder)
+    assert fitted.returncode == 0, fitted.stderr
+    assert isinstance(json.loads(fitted.stdout), dict)
     again = twin("simulate", "reversals", "--model", "f.toml", "--duration", "1", folder=folder)
     assert again.returncode == 0, again.stderr
 
@@ -157,6 +171,9 @@ def test_an_output_folder_that_is_missing_is_refused_before_the_work(folder):
 
 def test_usage_errors_are_one_line(folder):
     assert "--help" in refusal("fit", folder=folder)
+    alone = twin("fit", folder=folder)
+    assert (alone.returncode, alone.stdout) == (2, "")
+    assert len(alone.stderr.splitlines()) == 1
     assert "--help" in refusal("simulat", folder=folder)
 
 

@@ -27,8 +27,10 @@ from twin.simulator import MujocoStage, ReducedStage
 CATALOGUE = load_catalogue()
 STAGE = one_axis(load_model("proton_xy", CATALOGUE))
 MAP, LEARNED = "empirical_map", "learned_residual"
+SLOW = pytest.mark.slow
 DESCRIPTIONS = pytest.mark.parametrize("name", [MAP, LEARNED])
 Logs = dict[str, Log]
+SHORT = 8.0  # s of a log that is enough for most
 
 
 def with_x(effect: Effect, **values: float) -> StageModel:
@@ -36,9 +38,9 @@ def with_x(effect: Effect, **values: float) -> StageModel:
     return STAGE.with_axis("x", STAGE.axes["x"].with_effect(fitted))
 
 
-def recorded(machine: StageModel, seeds: tuple[int, ...]) -> Logs:
+def recorded(machine: StageModel, seeds: tuple[int, ...], duration: float = 20.0) -> Logs:
     return {
-        f"log {s}": simulate(machine, "tracking", seed=s, duration=20.0, stage=ReducedStage)
+        f"log {s}": simulate(machine, "tracking", seed=s, duration=duration, stage=ReducedStage)
         for s in seeds
     }
 
@@ -54,8 +56,8 @@ def test_descriptions_are_marked_and_never_a_diagnosis() -> None:
 
 @pytest.mark.parametrize(
     ("force", "height", "name", "fall"),
-    [("chirp", 0.05, MAP, 20.0), ("hill", 0.1, MAP, 20.0), ("sawtooth", 0.05, MAP, 3.5),
-     ("bend", 0.05, LEARNED, 4.0)],
+    [("chirp", 0.05, MAP, 20.0), pytest.param("hill", 0.1, MAP, 20.0, marks=SLOW),
+     pytest.param("sawtooth", 0.05, MAP, 3.5, marks=SLOW), ("bend", 0.05, LEARNED, 4.0)],
 )  # fmt: skip
 def test_a_force_of_no_known_effect_is_described(
     force: str, height: float, name: str, fall: float, tmp_path: Path
@@ -92,7 +94,7 @@ def test_the_shape_is_recovered_and_the_physics_keeps_its_values(tmp_path: Path)
 
 
 @DESCRIPTIONS
-@pytest.mark.parametrize("seed", [11, 21])
+@pytest.mark.parametrize("seed", [11, pytest.param(21, marks=SLOW)])
 def test_nothing_is_kept_on_an_honest_machine(name: str, seed: int) -> None:
     logs, held = recorded(STAGE, (seed, seed + 1)), recorded(STAGE, (seed + 2,))
     before = fit(STAGE, logs, held)
@@ -105,11 +107,11 @@ def test_nothing_is_kept_on_an_honest_machine(name: str, seed: int) -> None:
 def test_pure_noise_is_not_described(name: str) -> None:
     """Noise ten times as loud as the encoder and amplifier have."""
     rng = np.random.default_rng(7)
-    logs = recorded(STAGE, (1, 2, 3))
+    logs = recorded(STAGE, (1, 2, 3), SHORT)
     for log in logs.values():
         log.axes["x"].columns["force"] = log.axes["x"].force + rng.normal(0.0, 0.3, len(log))
     held = {"log 3": logs.pop("log 3")}
-    for judged in (held, {}):
+    for judged in (held, {}):  # by held-out logs, or by left-out blocks
         before = fit(STAGE, logs, judged)
         found = describe(before.fits["x"], before.studies["x"], CATALOGUE[name])
         assert not found.supported
@@ -118,7 +120,7 @@ def test_pure_noise_is_not_described(name: str) -> None:
 @DESCRIPTIONS
 def test_a_refit_smooths_as_was_chosen(name: str, tmp_path: Path) -> None:
     machine = with_x(foreign("chirp", tmp_path), a=0.05)
-    before = fit(STAGE, recorded(machine, (1, 2)), {})
+    before = fit(STAGE, recorded(machine, (1,), SHORT), {})
     study = before.studies["x"]
     first = describe(before.fits["x"], study, CATALOGUE[name]).fit
     again = fit_axis(first.axis, study.fit)
@@ -152,7 +154,7 @@ def test_the_map_has_any_number_of_intervals(tmp_path: Path) -> None:
 
 def test_a_physical_effect_takes_the_place_of_a_description(tmp_path: Path) -> None:
     machine = with_x(CATALOGUE["cogging"], a1=0.05, p=0.03)
-    logs = recorded(machine, (1,))
+    logs = recorded(machine, (1,), SHORT)
     described = add(CATALOGUE[MAP], STAGE, logs).model
     better = add(CATALOGUE["cogging"], described, logs)
     assert better.kept

@@ -80,6 +80,7 @@ def test_then_it_stops_adding(added, emps):
     assert again.leading.verdict is Verdict.UNEXPLAINED
 
 
+@pytest.mark.slow
 def test_without_a_window_the_answer_is_the_same(model, emps):
     assert diagnose(model, *emps, catalogue=CATALOGUE).effect is CATALOGUE["asymmetric_friction"]
 

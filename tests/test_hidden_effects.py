@@ -22,10 +22,16 @@ HIDDEN = (
 )
 
 
-@pytest.mark.parametrize("effect", HIDDEN)
+WEAK, STRONG = 5.0 * FLOOR, 40.0 * FLOOR
+
+
 @pytest.mark.parametrize(
-    "force",
-    [pytest.param(5.0 * FLOOR, id="weak"), pytest.param(40.0 * FLOOR, id="strong", marks=SLOW)],
+    ("effect", "force"),
+    [
+        (HIDDEN[0], WEAK),
+        *(pytest.param(name, WEAK, marks=SLOW) for name in HIDDEN[1:]),
+        *(pytest.param(name, STRONG, marks=SLOW) for name in HIDDEN),
+    ],
 )
 def test_a_hidden_effect_is_named_first_and_adding_it_reaches_the_noise_floor(effect, force):
     seed = 1 + HIDDEN.index(effect)
@@ -40,7 +46,7 @@ def test_a_hidden_effect_is_named_first_and_adding_it_reaches_the_noise_floor(ef
     added = add(found.effect, found.model, hidden.logs, hidden.holdout)
     assert added.kept
     assert added.step.holdout_error_after < 1.5 * added.candidate.fit.floor
-    if force > 10.0 * FLOOR:  # below, the drift of half a second hardly shows the force
+    if force == STRONG:  # below, the drift of half a second hardly shows the force
         assert added.position_error[1] < 0.5 * added.position_error[0]
 
 
