@@ -10,7 +10,8 @@ from twin.control import Controller
 from twin.loop import POSITION_COLUMN
 from twin.model import AxisModel, Fitted, StageModel
 from twin.model_file import load_model
-from twin.simulator import MujocoStage, ReducedStage, run, stage_spec
+from twin.simulator import MujocoStage, ReducedStage, run
+from twin.stage import stage_spec
 from twin.trajectory import Setpoint
 
 BOTH = pytest.mark.parametrize("stage", [MujocoStage, ReducedStage])

@@ -1,0 +1,134 @@
+"""The self-test in small: what is planted is named, and the tally counts what it should."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from identify.as_json import plain
+from identify.cli import main
+from identify.selftest import (
+    Case,
+    Design,
+    Outcome,
+    confusion,
+    coverage,
+    draw,
+    rates,
+    selftest_json,
+)
+from identify.selftest.design import plantable
+from identify.selftest.trial import run
+from twin.effects import load_catalogue
+
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        Case(("cogging",), 5.0, 1),
+        pytest.param(Case(("thermal_drift",), 2.0, 2), marks=SLOW),
+        pytest.param(Case(("asymmetric_friction", "axis_coupling"), 5.0, 3), marks=SLOW),
+    ],
+    ids=lambda c: "+".join(c.effects),
+)
+def test_what_is_planted_is_named(case):
+    found = run(case)
+    assert found.right
+    assert found.left < 1.3 < found.ratio
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=SLOW) for s in (2, 3, 4, 5))])
+def test_nothing_planted_nothing_named(seed):
+    found = run(Case((), 0.0, seed))
+    assert found.quiet
+    assert found.covered
+
+
+def test_an_effect_taken_out_of_the_catalogue_is_unexplained_by_its_coordinate():
+    found = run(Case(("quadratic_drag",), 5.0, 1, known=False))
+    assert found.verdict == "UNEXPLAINED"
+    assert found.depends_on == "velocity"
+    assert found.honest
+
+
+def test_a_design_plants_every_physical_effect_the_stage_lacks():
+    names = plantable(load_catalogue())
+    assert len(names) > 25
+    cases = Design(strengths=(2.0, 5.0), each=2, empty=3, pairs=4, left_out=1).cases(1)
+    assert len(cases) == 3 + 2 * 2 * len(names) + 4 + len(names)
+    assert len(set(cases)) == len(cases)
+
+
+# --- the tally, on invented outcomes --------------------------------------------------------
+
+NAMED = Outcome(Case(("a",), 5.0, 1), "MISSING_EFFECT", ("a",), ratio=5.0, left=1.0)
+TIED = replace(NAMED, verdict="AMBIGUOUS", named=("b",), tied=("a",))
+WRONG = replace(NAMED, named=("b",))
+MISSED = replace(NAMED, verdict="UNEXPLAINED", named=())
+ALARM = Outcome(Case((), 0.0, 1), "MISSING_EFFECT", ("b",), covered=(("mass", False),))
+QUIET = Outcome(Case((), 0.0, 2), "NOTHING_MISSING", covered=(("mass", True),))
+LOST = Outcome(
+    Case(("a",), 5.0, 1, known=False), "UNEXPLAINED", left=5.0, depends_on="time",
+    coordinates=("position",),
+)  # fmt: skip
+
+
+def counts(outcomes):
+    return {r.what.split(",")[0]: (r.count, r.trials) for r in rates(outcomes)}
+
+
+def test_right_ambiguous_wrong_and_missed_are_told_apart():
+    assert [o.right for o in (NAMED, TIED, WRONG, MISSED)] == [True, True, False, False]
+    found = counts([NAMED, TIED, WRONG, MISSED])
+    assert found["named or in a declared ambiguity"] == (2, 4)
+    assert found["wrong names given with confidence"] == (1, 4)
+
+
+def test_false_alarms_and_coverage_are_counted():
+    assert counts([ALARM, QUIET])["false alarms"] == (1, 2)
+    assert coverage([ALARM, QUIET])["mass"].value == 0.5
+
+
+def test_an_unexplained_effect_needs_its_own_coordinate_or_the_floor():
+    assert not LOST.honest
+    assert replace(LOST, depends_on="position").honest
+    assert not replace(LOST, verdict="MISSING_EFFECT", named=("b",), left=1.5).honest
+    assert replace(LOST, verdict="MISSING_EFFECT", named=("b",), left=1.1).honest
+
+
+def test_one_of_two_named_is_not_enough():
+    both = replace(NAMED, case=Case(("a", "b"), 5.0, 1))
+    assert not both.right
+    assert replace(both, named=("b", "a")).right
+    assert not replace(both, named=("a", "b", "c")).right
+
+
+def test_the_picture_shows_every_answer(tmp_path):
+    table = confusion([NAMED, TIED, WRONG, MISSED, ALARM, QUIET])
+    assert table["a"] == {"a": 0.25, "ambiguous with it": 0.25, "b": 0.25, "unexplained": 0.25}
+    assert table["nothing"] == {"b": 0.5, "nothing": 0.5}
+    draw([NAMED, TIED, WRONG, MISSED, ALARM, QUIET], tmp_path / "matrix.svg")
+    text = (tmp_path / "matrix.svg").read_text(encoding="utf-8")
+    assert "<svg" in text
+
+
+def test_bad_input_is_one_line(tmp_path, capsys, monkeypatch):
+    for given, said in (
+        (["--only", "coging"], "did you mean 'cogging'?"),
+        (["-o", str(tmp_path / "no" / "m.png")], "folder does not exist"),
+    ):
+        monkeypatch.setattr("sys.argv", ["twin", "selftest", *given])
+        with pytest.raises(SystemExit) as stopped:
+            main()
+        assert stopped.value.code == 2
+        error = capsys.readouterr().err
+        assert said in error
+        assert error.count("\n") == 1
+
+
+def test_the_json_holds_every_trial():
+
+    text = json.dumps(plain(selftest_json([NAMED, QUIET])))
+    assert len(json.loads(text)["trials"]) == 2
