@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from math import inf
 from pathlib import Path
+from typing import Any
 
 PACKAGES = ("mujoco", "numba", "numpy", "scipy", "mcap")
 PREAMBLE = """\
@@ -69,27 +70,36 @@ def machine() -> str:
 
 
 def write_results(results: Mapping[str, Sequence[Figure]], folder: Path) -> None:
-    """Write RESULTS.md and RESULTS.json into the folder, whole or not at all."""
-    sections = "\n".join(f"## {title}\n\n{_table(f)}" for title, f in results.items())
+    """Bring RESULTS.md and RESULTS.json in the folder up to date, whole or not at all.
+
+    Benchmarks that were not run keep the figures they had.
+    """
+    kept = _kept(folder / "RESULTS.json")
+    fresh = {title: [_as_json(f) for f in figures] for title, figures in results.items()}
+    benchmarks = {**kept, **fresh}
+    sections = "\n".join(f"## {title}\n\n{_table(rows)}" for title, rows in benchmarks.items())
     _replace(folder / "RESULTS.md", f"{PREAMBLE}\n{machine()}\n\n{sections}")
-    content = {
-        "machine": machine(),
-        "benchmarks": {title: [_as_json(f) for f in figures] for title, figures in results.items()},
-    }
+    content = {"machine": machine(), "benchmarks": benchmarks}
     _replace(folder / "RESULTS.json", json.dumps(content, indent=1) + "\n")
 
 
-def _table(figures: Sequence[Figure]) -> str:
-    rows = ["| figure | value | unit | target | | note |", "|---|---|---|---|---|---|"]
+def _kept(path: Path) -> dict[str, list[dict[str, Any]]]:
+    return json.loads(path.read_text(encoding="utf-8"))["benchmarks"] if path.is_file() else {}
+
+
+def _table(figures: Sequence[Mapping[str, Any]]) -> str:
+    lines = ["| figure | value | unit | target | | note |", "|---|---|---|---|---|---|"]
     for f in figures:
-        value = "" if f.value is None else f"{f.value:.3g}"
-        rows.append(
-            f"| {f.what} | {value} | {f.unit} | {f.target or ''} | {f.verdict} | {f.note} |"
+        value = "" if f["value"] is None else f"{f['value']:.3g}"
+        verdict = {None: "", True: "pass", False: "FAIL"}[f["passed"]]
+        lines.append(
+            f"| {f['figure']} | {value} | {f['unit']} | {f['target'] or ''} | {verdict} "
+            f"| {f['note']} |"
         )
-    return "\n".join(rows) + "\n"
+    return "\n".join(lines) + "\n"
 
 
-def _as_json(figure: Figure) -> dict[str, object]:
+def _as_json(figure: Figure) -> dict[str, Any]:
     return {
         "figure": figure.what,
         "value": figure.value,

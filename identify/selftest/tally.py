@@ -10,12 +10,22 @@ from identify.selftest.trial import Outcome
 
 @dataclass(frozen=True)
 class Rate:
-    """How many of some trials came out as they should. target: least (or most) rate asked for."""
+    """How many of some trials came out so. asked: least and greatest rate wanted, 0..1, if any."""
 
     what: str
     count: int
     trials: int
-    target: str = ""
+    asked: tuple[float, float] | None = None
+
+    @property
+    def target(self) -> str:
+        """E.g. "at least 95 %"."""
+        if self.asked is None:
+            return ""
+        low, high = self.asked
+        if high == 1.0:
+            return f"at least {100 * low:g} %"
+        return f"at most {100 * high:g} %" if low == 0.0 else f"{100 * low:g} to {100 * high:g} %"
 
     @property
     def value(self) -> float:
@@ -24,12 +34,13 @@ class Rate:
 
     def in_words(self) -> str:
         """E.g. "named, force 5 times the noise floor: 30 of 31 (97 %), asked: at least 95 %"."""
-        asked = f", asked: {self.target}" if self.target else ""
+        asked = f", asked: {self.target}" if self.asked else ""
         share = f" ({100 * self.value:.0f} %)" if self.trials else ""
         return f"{self.what}: {self.count} of {self.trials}{share}{asked}"
 
 
-ASKED = {5.0: "at least 95 %", 2.0: "at least 80 %"}
+ASKED = {5.0: (0.95, 1.0), 2.0: (0.80, 1.0)}  # by force over the noise floor
+ALARMS, PAIRS, OUTSIDE, COVERED = (0.0, 0.01), (0.85, 1.0), (0.80, 1.0), (0.85, 0.95)
 
 
 def rates(outcomes: Sequence[Outcome]) -> list[Rate]:
@@ -39,29 +50,32 @@ def rates(outcomes: Sequence[Outcome]) -> list[Rate]:
     out = [
         _rate(
             f"named or in a declared ambiguity, force {s:g} times the noise floor",
-            [o for o in one if o.case.strength == s], _right, ASKED.get(s, ""),
+            [o for o in one if o.case.strength == s], _right, ASKED.get(s),
         )
         for s in sorted({o.case.strength for o in one})
     ]  # fmt: skip
     empty = [o for o in shown if not o.case.effects]
     two = [o for o in shown if len(o.case.effects) == 2]
-    out.append(_rate("false alarms, nothing planted", empty, _alarm, "at most 1 in 100"))
+    out.append(_rate("false alarms, nothing planted", empty, _alarm, ALARMS))
     out.append(_rate("wrong names given with confidence, one planted", one, _wrong))
-    out.append(_rate("both of two named", two, _right, "at least 85 %"))
+    out.append(_rate("both of two named", two, _right, PAIRS))
     left_out = [o for o in shown if not o.case.known]
     out.append(
         _rate("effect outside the catalogue: floor reached or the right coordinate", left_out,
-              lambda o: o.honest, "at least 80 %")
+              lambda o: o.honest, OUTSIDE)
     )  # fmt: skip
     covered = [c for o in empty for _, c in o.covered]
-    out.append(Rate("90 % intervals that hold the truth", sum(covered), len(covered), "85 to 95 %"))
+    out.append(Rate("90 % intervals that hold the truth", sum(covered), len(covered), COVERED))
     return [r for r in out if r.trials]
 
 
 def _rate(
-    what: str, trials: Sequence[Outcome], good: Callable[[Outcome], bool], target: str = ""
+    what: str,
+    trials: Sequence[Outcome],
+    good: Callable[[Outcome], bool],
+    asked: tuple[float, float] | None = None,
 ) -> Rate:
-    return Rate(what, sum(map(good, trials)), len(trials), target)
+    return Rate(what, sum(map(good, trials)), len(trials), asked)
 
 
 def _right(o: Outcome) -> bool:
@@ -82,7 +96,7 @@ def coverage(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
     for o in outcomes:
         for label, inside in o.covered:
             found.setdefault(label, []).append(inside)
-    return {k: Rate(k, sum(v), len(v), "85 to 95 %") for k, v in found.items()}
+    return {k: Rate(k, sum(v), len(v), COVERED) for k, v in found.items()}
 
 
 def confusion(outcomes: Sequence[Outcome]) -> dict[str, dict[str, float]]:
