@@ -13,7 +13,7 @@ from identify.diagnose import Step
 from identify.explanations import STRENGTH
 from identify.plan import Plan
 from identify.remarks import remarks
-from identify.uncertainty import Estimate
+from identify.uncertainty import Estimate, refusal
 from identify.workflow import Addition, Comparison, Diagnosis, FitResult
 from twin.effect import Effect
 from twin.effects import load_catalogue
@@ -37,8 +37,11 @@ def fit_text(result: FitResult) -> str:
         if shifted := shift_in_words(result.studies[axis]):
             lines.append(f"  {shifted}")
         hidden = described_labels(fit.axis)
+        common = refusal(fit)
+        if common is not None:
+            lines.append(f"  {common}")
         lines += [
-            f"  {e.label:34s} {_with_interval(e)}"
+            f"  {e.label:34s} {_with_interval(e, common)}"
             for e in result.estimates[axis]
             if e.label not in hidden
         ]
@@ -46,12 +49,13 @@ def fit_text(result: FitResult) -> str:
     return "\n".join(lines)
 
 
-def _with_interval(e: Estimate) -> str:
+def _with_interval(e: Estimate, common: str | None) -> str:
+    """A value with its interval, or why it has none unless that was said for all."""
     text = f"{e.value:12.6g} {e.unit:10s}"
     if not e.free:
         return text + " fixed"
     if e.low is None:
-        return text + f" {e.reason}"
+        return text if e.reason == common else f"{text} {e.reason}"
     return text + f" 90 % in [{e.low:.6g}, {e.high:.6g}]"
 
 
