@@ -29,6 +29,8 @@ Progress = Callable[[int, int], None]
 MOST_STEPS = 5  # effects added to one axis at most
 SETTLED = 0.999  # part of the error to which another start of the base must bring it
 NEARLY_ALL = 0.95  # part of the squared error above the floor that speaks for itself
+FLOOR_SURE = (0.85, 1.15)  # error over noise floor where both agree, and nothing more is sought
+BEYOND_DOUBT = 100.0  # evidence asked of an effect where the error is at its floor already
 PARTIAL_BIC = 50.0  # evidence asked of an effect that leaves other structure behind
 LEAST_PART = 0.4  # part that must be explained where a dependence is gone
 TIE = 2.0  # |t| of the held-out difference below which two explanations cannot be told apart
@@ -113,12 +115,12 @@ def diagnose_axis(
     base, ranking = rank(base, study, catalogue, progress, workers)
     steps: list[Step] = []
     final, found = base, ranking
-    while not final.at_floor and found and found[0].supported and len(steps) < MOST_STEPS:
+    while found and _asked_for(found[0], final) and len(steps) < MOST_STEPS:
         best = found[0]
         tied = tuple(c.effect.name for c in found[1:] if c.supported and _tie(study, best, c))
         final, dropped = _looked_back(base, best.fit, study, [s.candidate for s in _kept(steps)])
         steps.append(Step(best, tied, dropped))
-        if final.at_floor:
+        if final.at_floor and FLOOR_SURE[0] < final.ratio < FLOOR_SURE[1]:
             break
         if ahead := misalignment(final, study):  # seen only now that more is explained
             moved = realigned(study, study.shift + ahead)
@@ -126,6 +128,14 @@ def diagnose_axis(
             return diagnose_axis(again, moved, catalogue, progress, workers)
         final, found = rank(final, study, catalogue, progress, workers)
     return _decided(base, study, ranking, tuple(steps), final)
+
+
+def _asked_for(best: Candidate, base: Fit) -> bool:
+    """Whether the best candidate is to be added; at the noise floor only by much evidence.
+
+    The floor is an estimate, so an error at it may still hold an effect that shows beyond doubt.
+    """
+    return best.supported and (not base.at_floor or best.delta_bic > BEYOND_DOUBT)
 
 
 def rank(

@@ -24,12 +24,13 @@ from twin.effects import load_catalogue
 SLOW = pytest.mark.slow
 
 
+@SLOW  # tests/test_hidden_effects.py hides one
 @pytest.mark.parametrize(
     "case",
     [
         Case(("cogging",), 5.0, 1),
-        pytest.param(Case(("thermal_drift",), 2.0, 2), marks=SLOW),
-        pytest.param(Case(("asymmetric_friction", "axis_coupling"), 5.0, 3), marks=SLOW),
+        Case(("thermal_drift",), 2.0, 2),
+        Case(("asymmetric_friction", "axis_coupling"), 5.0, 3),
     ],
     ids=lambda c: "+".join(c.effects),
 )
