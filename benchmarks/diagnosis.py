@@ -43,7 +43,8 @@ def measure() -> list[Figure]:
         for axis, base in fitted.fits.items():
             rank(base, fitted.studies[axis], catalogue, workers=workers)
 
-    one, two = np.median(interleaved([partial(ranked, 1), partial(ranked, 2)], 1), axis=0)
+    runs = interleaved([partial(ranked, 1), partial(ranked, 2)], 1)
+    one, two = (float(t) for t in np.median(runs, axis=0))
     begun = perf_counter()
     workflow.diagnose(model, logs, catalogue=catalogue)
     diagnosis = perf_counter() - begun

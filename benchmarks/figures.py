@@ -30,7 +30,7 @@ class Target:
 
     def met(self, value: float) -> bool:
         """Whether the value lies in the interval."""
-        return self.low <= value <= self.high
+        return bool(self.low <= value <= self.high)
 
     def __str__(self) -> str:
         lower = f"at least {self.low:g}" if self.low > -inf else ""
@@ -102,7 +102,7 @@ def _table(figures: Sequence[Mapping[str, Any]]) -> str:
 def _as_json(figure: Figure) -> dict[str, Any]:
     return {
         "figure": figure.what,
-        "value": figure.value,
+        "value": None if figure.value is None else float(figure.value),
         "unit": figure.unit,
         "target": str(figure.target) if figure.target else None,
         "passed": figure.passed,

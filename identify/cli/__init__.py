@@ -14,6 +14,8 @@ __all__ = ["loop", "machine", "main", "plan", "selftest"]
 
 def main() -> None:
     """Entry point of `twin`: errors are one line, exit code 2."""
+    # Candidates go side by side, one a core; the matrices of each are too small to share out.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         code = app(standalone_mode=False)
     except InputError as error:
