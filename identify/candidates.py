@@ -19,7 +19,7 @@ from identify.evidence import (
     held_out_gain,
     left_out,
 )
-from identify.fit import Fit, Outcome, finished, fit_axis, rms, sticks
+from identify.fit import Fit, Outcome, finished, fit_axis, sticks
 from identify.residual import moving, residual
 from identify.search import Start, fit_thoroughly, starts, stepped
 from identify.study import Study
@@ -110,11 +110,12 @@ def _promising(base: Fit, start: Start) -> bool:
 
 def _glance(base: Fit, study: Study, fitted: Fitted) -> Fit:
     """The linear step as a fit, or the effect without strength where the step does harm."""
-    axis = stepped(base, fitted, study.fit)
-    if rms(residual(axis, study.fit)[base.kept]) > base.error:
-        free = (p.name for p in fitted.effect.strengths if p.name not in fitted.fixed)
-        absent = dict.fromkeys(free, 0.0)
-        axis = base.axis.with_effect(replace(fitted, values={**fitted.values, **absent}))
+    fit = finished(stepped(base, fitted, study.fit), base.begun, study.fit, Outcome.NOT_CONVERGED)
+    if fit.error <= base.error:
+        return fit
+    free = (p.name for p in fitted.effect.strengths if p.name not in fitted.fixed)
+    absent = dict.fromkeys(free, 0.0)
+    axis = base.axis.with_effect(replace(fitted, values={**fitted.values, **absent}))
     return finished(axis, base.begun, study.fit, Outcome.NOT_CONVERGED)
 
 

@@ -9,11 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from identify import workflow
-from identify.fit import Fit, fit_axis, rms
-from identify.planting import draw_effect, other_machine
+from identify.fit import Fit, fit_axis
+from identify.planting import draw_effect, hidden_part, other_machine
 from identify.report import write_report
-from identify.residual import residual
-from identify.search import orthonormal
 from identify.study import Study, studies
 from identify.workflow import Addition, Diagnosis
 from twin.effect import Effect, Kind
@@ -153,6 +151,4 @@ def _can_hide(effect: Effect, machine: StageModel) -> bool:
 
 def shows(hidden: Fitted, base: Fit, study: Study) -> bool:
     """Whether the parameters of the base can not take over the hidden effect's force."""
-    force = residual(base.axis.with_effect(hidden), study.fit)[base.kept] - base.residual
-    basis = orthonormal(base.jacobian)
-    return rms(force - basis @ (basis.T @ force)) > VISIBLE * rms(force)
+    return hidden_part(hidden, base, study) < 1.0 - VISIBLE

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from identify.candidates import Candidate
 from identify.evidence import BLOCKS, Evidence, effective_samples, held_out_gain
-from identify.fit import Fit, finished, fit_axis, sticks
+from identify.fit import Fit, fit_axis, sticks
 from identify.motion import excitation
 from identify.residual import jacobian, moving, residual
+from identify.search import fit_without
 from identify.smoothing import part_rows, smoothing
 from identify.study import Study
 from twin.effect import Effect, Part
@@ -157,7 +158,7 @@ def describe(base: Fit, study: Study, effect: Effect) -> Candidate:
     best = _attempt(base, base, study, empty)
     for _ in range(ROUNDS):
         # What is missing bent the physics of the base: choose anew beside what it is now.
-        again = _attempt(base, _beside(best.fit, study, effect.name), study, empty)
+        again = _attempt(base, fit_without(best.fit, study, effect.name), study, empty)
         if not again.fit.error < BETTER * best.fit.error:
             break
         best = again
@@ -213,11 +214,6 @@ def physics_alone(model: StageModel) -> StageModel:
         kept = tuple(f for f in axis.effects if not f.effect.is_description)
         model = model.with_axis(name, replace(axis, effects=kept))
     return model
-
-
-def _beside(fit: Fit, study: Study, effect: str) -> Fit:
-    """The fit with the description taken out and its physics as it is."""
-    return finished(fit.axis.without(effect), fit.begun, study.fit, fit.outcome)
 
 
 def _filled(

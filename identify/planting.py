@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from identify.fit import Fit, rms
 from identify.residual import Windowed, residual
 from identify.search import orthonormal
+from identify.study import Study
 from twin.effect import Effect, Excitation, Parameter
 from twin.model import AxisModel, Fitted, coordinates, read, write
 
@@ -122,3 +123,20 @@ def _root(error: Callable[[float], float]) -> float:
         middle = np.sqrt(low * high)
         low, high = (middle, high) if error(middle) < 0 else (low, middle)
     return float(low)
+
+
+def visible_force(fitted: Fitted, base: Fit, study: Study) -> float:
+    """RMS force (N) of an effect that the parameters of a fit cannot take over."""
+    force = _force(fitted, base, study)
+    basis = orthonormal(base.jacobian)
+    return rms(force - basis @ (basis.T @ force))
+
+
+def hidden_part(fitted: Fitted, base: Fit, study: Study) -> float:
+    """Part of an effect's RMS force that the parameters of a fit take over; of no force, all."""
+    force = rms(_force(fitted, base, study))
+    return 1.0 - visible_force(fitted, base, study) / force if force > 0.0 else 1.0
+
+
+def _force(fitted: Fitted, base: Fit, study: Study) -> Array:
+    return residual(base.axis.with_effect(fitted), study.fit)[base.kept] - base.residual

@@ -100,7 +100,7 @@ def fit_thoroughly(axis: AxisModel, study: Study) -> Fit:
         effect = axis[name].effect
         if best.at_floor or not any(p.scan for p in effect.parameters):
             continue
-        rest = _fit_without(best, study, name)
+        rest = fit_without(best, study, name)
         first = starts(rest, study, effect)[0].fitted
         held = {n: best.axis[name].values[n] for n in best.axis[name].fixed}
         again = replace(first, values={**first.values, **held}, fixed=best.axis[name].fixed)
@@ -110,7 +110,7 @@ def fit_thoroughly(axis: AxisModel, study: Study) -> Fit:
     return best
 
 
-def _fit_without(fit: Fit, study: Study, name: str) -> Fit:
+def fit_without(fit: Fit, study: Study, name: str) -> Fit:
     """The fit with one effect taken out, its other parameters left where they are."""
     return finished(fit.axis.without(name), fit.begun, study.fit, fit.outcome)
 

@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.fit import Fit, fit_axis, rms
+from identify.fit import fit_axis
 from identify.noise import noise_floor
-from identify.planting import draw_effect, other_machine
-from identify.residual import residual
-from identify.search import orthonormal
-from identify.study import Study, studies
+from identify.planting import draw_effect, hidden_part, other_machine, visible_force
+from identify.study import studies
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
 from twin.experiments import simulate
@@ -121,7 +119,7 @@ def _with_friction(
     for _ in range(ROUNDS):
         machine = true.with_axis(AXIS, true.axes[AXIS].with_effect(fitted))
         trial = simulate(machine, RUNS[0], seed=seed, duration=DURATION, stage=ReducedStage)
-        study = studies(replace(model, axes={AXIS: model.axes[AXIS]}), {"trial": trial}, {})[AXIS]
+        study = studies(model, {"trial": trial}, {})[AXIS]
         base = fit_axis(model.axes[AXIS], study.fit)
         floor = noise_floor(machine.axes[AXIS], [(w.motion, w.window) for w in study.fit])
         left = np.sqrt(max(base.error**2 - floor**2, 1e-4 * floor**2)) / floor
@@ -149,20 +147,3 @@ def _with_planted(
         raise NotShown(effect.name)
     axis = replace(true.axes[AXIS], mass_fixed=base.axis.mass_fixed)
     return true.with_axis(AXIS, axis.with_effect(fitted)), fitted
-
-
-def visible_force(fitted: Fitted, base: Fit, study: Study) -> float:
-    """RMS force (N) of an effect that the parameters of a fit cannot take over."""
-    force = _force(fitted, base, study)
-    basis = orthonormal(base.jacobian)
-    return rms(force - basis @ (basis.T @ force))
-
-
-def hidden_part(fitted: Fitted, base: Fit, study: Study) -> float:
-    """Part of an effect's RMS force that the parameters of a fit take over."""
-    force = rms(_force(fitted, base, study))
-    return 1.0 - visible_force(fitted, base, study) / force if force > 0.0 else 0.0
-
-
-def _force(fitted: Fitted, base: Fit, study: Study) -> np.ndarray:
-    return residual(base.axis.with_effect(fitted), study.fit)[base.kept] - base.residual
