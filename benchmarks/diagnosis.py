@@ -11,7 +11,7 @@ from benchmarks.figures import Figure, Target
 from benchmarks.timing import interleaved
 from identify import workflow
 from identify.candidates import absent_effects
-from identify.diagnose import rank
+from identify.ranking import rank
 from twin.effects import load_catalogue
 from twin.experiments import simulate
 from twin.model_file import load_model

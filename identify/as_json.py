@@ -162,7 +162,12 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
 
 
 def _step(s: Step) -> dict[str, Any]:
-    return {**_candidate(s.candidate), "ambiguous_with": list(s.tied), "dropped": list(s.dropped)}
+    return {
+        **_candidate(s.candidate),
+        "ambiguous_with": list(s.tied),
+        "dropped": list(s.dropped),
+        "beside": s.beside,
+    }
 
 
 def _candidate(c: Candidate) -> dict[str, Any]:

@@ -107,8 +107,9 @@ def diagnose_text(result: Diagnosis) -> str:
 def _step_line(number: int, step: Step) -> str:
     gain = step.candidate.gain
     dropped = f"; needless then: {', '.join(step.dropped)}" if step.dropped else ""
+    beside = f" beside {step.beside}" if step.beside else ""
     return (
-        f"  step {number}: with {step.candidate.effect.name} the held-out error falls from "
+        f"  step {number}: with {step.candidate.effect.name}{beside} the held-out error falls from "
         f"{gain.before:.4g} to {gain.after:.4g} N{dropped}"
     )
 

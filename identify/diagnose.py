@@ -2,38 +2,27 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property, partial
 
-import numpy as np
-from numpy.typing import NDArray
-
 from identify.alignment import misalignment, realigned
-from identify.candidates import Candidate, absent_effects, levelled, score, try_effect
-from identify.evidence import held_out_gain
-from identify.fit import AT_FLOOR, Fit, error_on, fit_axis, rms, sticks
+from identify.candidates import Candidate, score
+from identify.fit import Fit, fit_axis
+from identify.lookahead import held_at_floor, look_ahead
+from identify.ranking import Progress, less, rank, tie
 from identify.repeats import Repeat, not_general
-from identify.residual import moving, residual
 from identify.structure import Structure, explains, find_structure
 from identify.study import Study
-from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 
-Array = NDArray[np.float64]
-Progress = Callable[[int, int], None]
-
 MOST_STEPS = 5  # effects added to one axis at most
-SETTLED = 0.999  # part of the error to which another start of the base must bring it
 NEARLY_ALL = 0.95  # part of the squared error above the floor that speaks for itself
 FLOOR_SURE = (0.85, 1.15)  # error over noise floor where both agree, and nothing more is sought
 BEYOND_DOUBT = 100.0  # evidence asked of an effect where the error is at its floor already
 PARTIAL_BIC = 50.0  # evidence asked of an effect that leaves other structure behind
 LEAST_PART = 0.4  # part that must be explained where a dependence is gone
-TIE = 2.0  # |t| of the held-out difference below which two explanations cannot be told apart
 
 
 class Verdict(Enum):
@@ -49,11 +38,15 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One effect that was added in turn, and the earlier ones it made needless."""
+    """One effect that was added in turn, and the earlier ones it made needless.
+
+    tied: effects that explain as well. beside: the effect without which it has no evidence.
+    """
 
     candidate: Candidate
     tied: tuple[str, ...]
     dropped: tuple[str, ...] = ()
+    beside: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,22 +105,48 @@ def diagnose_axis(
 
     workers: threads; one a core where None.
     """
-    base, ranking = rank(base, study, catalogue, progress, workers)
+    ranked = partial(rank, study=study, catalogue=catalogue, progress=progress, workers=workers)
+    base, ranking = ranked(base)
     steps: list[Step] = []
     final, found = base, ranking
-    while found and _asked_for(found[0], final) and len(steps) < MOST_STEPS:
-        best = found[0]
-        tied = tuple(c.effect.name for c in found[1:] if c.supported and _tie(study, best, c))
-        final, dropped = _looked_back(base, best.fit, study, [s.candidate for s in _kept(steps)])
-        steps.append(Step(best, tied, dropped))
+    while len(steps) < MOST_STEPS and (more := _next(final, study, found, ranked)):
+        earlier = [s.candidate for s in _kept(steps)]
+        final, dropped = _looked_back(base, more[-1].candidate.fit, study, earlier)
+        steps += [*more[:-1], replace(more[-1], dropped=dropped)]
         if final.at_floor and FLOOR_SURE[0] < final.ratio < FLOOR_SURE[1]:
             break
         if ahead := misalignment(final, study):  # seen only now that more is explained
             moved = realigned(study, study.shift + ahead)
             again = fit_axis(base.axis, moved.fit)
             return diagnose_axis(again, moved, catalogue, progress, workers)
-        final, found = rank(final, study, catalogue, progress, workers)
+        final, found = ranked(final)
     return _decided(base, study, ranking, tuple(steps), final)
+
+
+def _next(
+    base: Fit,
+    study: Study,
+    ranking: Sequence[Candidate],
+    ranked: Callable[[Fit], tuple[Fit, tuple[Candidate, ...]]],
+) -> list[Step]:
+    """What is to be added: the best effect, two that need each other, or nothing."""
+    if ranking and _asked_for(ranking[0], base):
+        best = ranking[0]
+        tied = (c.effect.name for c in ranking[1:] if c.supported and tie(study, best, c))
+        return [Step(best, tuple(tied))]
+    if base.at_floor or held_at_floor(base, study):
+        return []
+    pairs = look_ahead(base, study, ranking, ranked)
+    if not pairs:
+        return []
+    pair = pairs[0]
+    level = [p for p in pairs[1:] if tie(study, pair.together, p.together)]
+    alike = sorted({name for p in level for name in p.names} - pair.names)
+    first, second = pair.first, pair.second
+    return [
+        Step(first, tuple(alike), beside=second.effect.name),
+        Step(second, (), beside=first.effect.name),
+    ]
 
 
 def _asked_for(best: Candidate, base: Fit) -> bool:
@@ -138,73 +157,17 @@ def _asked_for(best: Candidate, base: Fit) -> bool:
     return best.supported and (not base.at_floor or best.delta_bic > BEYOND_DOUBT)
 
 
-def rank(
-    base: Fit,
-    study: Study,
-    catalogue: Catalogue,
-    progress: Progress | None = None,
-    workers: int | None = None,
-) -> tuple[Fit, tuple[Candidate, ...]]:
-    """Every absent effect tried beside a fitted axis: the base and candidates by falling merit.
-
-    The base comes back refitted where a candidate's values, without its effect, suit it better: a
-    base short of its optimum would make evidence for every candidate.
-    """
-    effects = absent_effects(base.axis, catalogue)
-    candidates = []
-    # The laws run outside Python's lock, so candidates go side by side.
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
-        for candidate in pool.map(partial(try_effect, base, study), effects):
-            candidates.append(candidate)
-            if progress:
-                progress(len(candidates), len(effects))
-    supported = [c for c in candidates if c.supported]
-    if supported:
-        best = max(supported, key=lambda c: c.delta_bic)
-        again = _less(best.effect, best.fit, base, study)
-        if again.error < SETTLED * base.error:
-            base = again
-            candidates = [score(base, c.fit, study, c.effect) for c in candidates]
-    return base, _ranked(levelled(candidates))
-
-
-def _less(effect: Effect, fit: Fit, base: Fit, study: Study) -> Fit:
-    """The fit refitted without an effect, the friction that it replaced put back."""
-    if effect.kind is Kind.FRICTION:
-        own = next((f for f in base.axis.effects if f.effect.kind is Kind.FRICTION), None)
-        axis = fit.axis.with_effect(own) if own else fit.axis.without(effect.name)
-    else:
-        axis = fit.axis.without(effect.name)
-    return fit_axis(axis, study.fit)
-
-
 def _looked_back(
     base: Fit, fit: Fit, study: Study, earlier: Sequence[Candidate]
 ) -> tuple[Fit, tuple[str, ...]]:
     """The fit less the earlier effects that it does not need any more, and their names."""
     dropped = []
     for candidate in earlier:
-        without = _less(candidate.effect, fit, base, study)
+        without = less(candidate.effect, fit, base, study)
         if not score(without, fit, study, candidate.effect).supported:
             fit = without
             dropped.append(candidate.effect.name)
     return fit, tuple(dropped)
-
-
-def _ranked(candidates: list[Candidate]) -> tuple[Candidate, ...]:
-    """By falling merit; those within no evidence of the best come in the catalogue's order."""
-    ranking = sorted(candidates, key=_merit)
-    if not ranking or not ranking[0].supported:
-        return tuple(ranking)
-    best = ranking[0].evidence
-    level = [c for c in ranking if c.supported and best.over(c.evidence) < NO_EVIDENCE]
-    rest = [c for c in ranking if c not in level]
-    return (*sorted(level, key=lambda c: c.effect.name), *rest)
-
-
-def _merit(c: Candidate) -> tuple[bool, float]:
-    """Supported first, then by evidence."""
-    return (not c.supported, -c.delta_bic)
 
 
 def _decided(
@@ -217,7 +180,7 @@ def _decided(
     that dependence behind.
     """
     structure = None
-    if final.at_floor or (steps and _held_at_floor(final, study)):
+    if final.at_floor or (steps and held_at_floor(final, study)):
         tied = bool(steps) and _kept(steps)[0].tied
         verdict = Verdict.AMBIGUOUS if tied else Verdict.MISSING_EFFECT
         if not steps:
@@ -231,11 +194,6 @@ def _decided(
     return AxisDiagnosis(study, base, ranking, steps, final, verdict, structure)
 
 
-def _held_at_floor(final: Fit, study: Study) -> bool:
-    """Whether the logs that the fit did not see are explained down to noise."""
-    return bool(study.holdout) and rms(error_on(final.axis, study.holdout)) < AT_FLOOR * final.floor
-
-
 def _part(base: Fit, final: Fit) -> float:
     """Part of the squared error above the floor that is explained."""
     was, left = base.error**2 - base.floor**2, final.error**2 - final.floor**2
@@ -246,18 +204,3 @@ def _gone(base: Fit, final: Fit, steps: Sequence[Step], study: Study) -> bool:
     """Whether effects with much evidence took away what the residual depended on most."""
     proven = all(s.candidate.delta_bic > PARTIAL_BIC for s in steps[:1])
     return proven and _part(base, final) > LEAST_PART and explains(base, final, study)
-
-
-def _tie(study: Study, best: Candidate, other: Candidate) -> bool:
-    """Whether the evidence and the held-out error both fail to separate two candidates."""
-    if best.evidence.over(other.evidence) > LEAST_SEPARATION:
-        return False
-    logs = study.holdout or study.fit
-    either = sticks(best.fit.axis) or sticks(other.fit.axis)
-    kept = moving(logs, either)
-    pair = [residual(c.fit.axis, logs)[kept] for c in (other, best)]
-    return abs(held_out_gain(pair[0], pair[1], best.fit.floor).t) < TIE
-
-
-NO_EVIDENCE = 2.0  # difference of BIC "not worth more than a bare mention" (Kass, Raftery 1995)
-LEAST_SEPARATION = 10.0  # difference of BIC that separates two explanations

@@ -9,7 +9,7 @@ from identify.alignment import fit_aligned
 from identify.candidates import Candidate
 from identify.contest import Arena, Explanation, Trial, contest, favoured, refitted
 from identify.coverage import Gap, gap
-from identify.diagnose import LEAST_SEPARATION, AxisDiagnosis, Verdict, diagnose_axis
+from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
 from identify.explanations import (
     Rival,
     differing_axis,
@@ -18,6 +18,7 @@ from identify.explanations import (
     trial_study,
 )
 from identify.proposals import proposals
+from identify.ranking import LEAST_SEPARATION
 from identify.study import Study, studies
 from twin.effect import Effect
 from twin.effects import Catalogue

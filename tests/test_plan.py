@@ -13,8 +13,9 @@ from identify import diagnose, plan
 from identify.as_json import diagnose_json
 from identify.as_text import diagnose_text, plan_text
 from identify.contest import Arena, Explanation, contest, within_limits
-from identify.diagnose import LEAST_SEPARATION, Verdict
+from identify.diagnose import Verdict
 from identify.proposals import TOLERANCE, proposals
+from identify.ranking import LEAST_SEPARATION
 from identify.report import sections
 from identify.report.drawing import drawing_style
 from identify.report.subject import Subject
