@@ -10,20 +10,27 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import savgol_filter
 
 from identify.motion import Motion
-from twin.effect import Kind
+from twin.effect import Effect, Kind
 from twin.model import AxisModel, axis_table
 from twin.native import walk, walk_sensing
 
 Array = NDArray[np.float64]
 
+SMOOTHED = 11  # samples
 PASSES = 3  # from the reading to the position it was taken at
 
 
 def parts_of(axis: AxisModel, *kinds: Kind) -> AxisModel:
     """The axis with its effects of these kinds alone."""
     return replace(axis, effects=tuple(f for f in axis.effects if f.effect.kind in kinds))
+
+
+def is_noise(effect: Effect) -> bool:
+    """Whether an effect shows in the readings as noise alone: nothing of it can be fitted."""
+    return effect.kind is Kind.SENSING and all(p.fixed for p in effect.parameters)
 
 
 def actual_force(axis: AxisModel, motion: Motion) -> Array:
@@ -46,28 +53,40 @@ def actual_force(axis: AxisModel, motion: Motion) -> Array:
 def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
     """The motion that the readings come from, and the rate of their error, (n,) m/s.
 
-    A reading is the true position and an error that depends on it, so the error is taken at the
-    reading, then where that says the axis was, and so on. The rate is at the log's own rate.
+    The rate is at the log's own rate.
     """
-    part = parts_of(axis, Kind.SENSING)
+    sensing = parts_of(axis, Kind.SENSING)
+    part = replace(sensing, effects=tuple(f for f in sensing.effects if not is_noise(f.effect)))
     if not part.effects:
         return motion, np.zeros(motion.raw.shape[1])
-    table = axis_table({motion.axis: part})
+    error, rate = reading_error(part, motion)
+    blocks = motion.signals.copy()
+    blocks[:2] -= np.stack([error, rate]).reshape(2, blocks.shape[1], -1).mean(axis=2)
+    raw = np.stack([motion.raw[0] - rate, motion.raw[1]])
+    return replace(motion, signals=blocks, raw=raw), rate
+
+
+def reading_error(sensing: AxisModel, motion: Motion) -> tuple[Array, Array]:
+    """What these sensing effects add to the readings, (n,) m, and its rate, m/s.
+
+    A reading is the true position and an error that depends on it, so the error is taken at the
+    reading, then where that says the axis was, and so on. The readings are smoothed for that: a
+    delay undone on their noise would make more of it.
+    """
+    table = axis_table({motion.axis: sensing})
     _, _, _, first, last = table.axes[0]
-    read = _signals(motion, 0.0)
-    true, seen = read.copy(), np.empty_like(read[0])
+    true = _signals(motion, 0.0)
+    path = savgol_filter(true[0], SMOOTHED, 2)
+    seen = np.empty_like(path)
+    true[0] = path
     for _ in range(PASSES):
         walk_sensing(
             table.entries, first, last, table.parameters, np.zeros(table.n_states), true,
             motion.sample_period, seen,
         )  # fmt: skip
         error = seen - true[0]
-        true[0] = read[0] - error
-    rate = np.diff(error, append=error[-1]) / motion.sample_period
-    blocks = motion.signals.copy()
-    blocks[:2] -= np.stack([error, rate]).reshape(2, blocks.shape[1], -1).mean(axis=2)
-    raw = np.stack([motion.raw[0] - rate, motion.raw[1]])
-    return replace(motion, signals=blocks, raw=raw), rate
+        true[0] = path - error
+    return error, np.diff(error, append=error[-1]) / motion.sample_period
 
 
 def _signals(motion: Motion, instant: float) -> Array:

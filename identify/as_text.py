@@ -106,6 +106,8 @@ def diagnose_text(result: Diagnosis) -> str:
 
 def _step_line(number: int, step: Step) -> str:
     gain = step.candidate.gain
+    if step.candidate.is_noise:
+        return f"  step {number}: {step.candidate.effect.name} makes the rest of the error noise"
     dropped = f"; needless then: {', '.join(step.dropped)}" if step.dropped else ""
     beside = f" beside {step.beside}" if step.beside else ""
     return (

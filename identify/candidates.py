@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.actuation import is_noise
 from identify.evidence import (
     LEAST_BIC,
     LEAST_T,
@@ -18,8 +19,10 @@ from identify.evidence import (
     evidence,
     held_out_gain,
     left_out,
+    noise_gain,
 )
-from identify.fit import Fit, Outcome, finished, fit_axis, sticks
+from identify.fit import AT_FLOOR, Fit, Outcome, error_on, finished, fit_axis, rms, sticks
+from identify.noise import noise_floor
 from identify.residual import moving, residual
 from identify.search import Start, fit_thoroughly, starts, stepped
 from identify.study import Study
@@ -55,8 +58,13 @@ class Candidate:
         """Whether both the evidence and the held-out logs ask for the effect."""
         return (
             self.delta_bic > LEAST_BIC and self.gain.t > LEAST_T
-            and self.gain.after < self.gain.before
+            and (self.is_noise or self.gain.after < self.gain.before)
         )  # fmt: skip
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether the effect lowers no error and says how large it must be."""
+        return is_noise(self.effect)
 
 
 def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
@@ -78,6 +86,9 @@ def try_effect(base: Fit, study: Study, effect: Effect) -> Candidate:
     is far from any evidence, that is scored and no refit made.
     """
     best, *others = starts(base, study, effect)
+    if is_noise(effect):
+        axis = base.axis.with_effect(best.fitted)
+        return score(base, finished(axis, base.begun, study.fit, base.outcome), study, effect)
     if effect.kind is Kind.FRICTION:
         looked = _audition(base, study, best.fitted)
         if looked is not None:
@@ -152,6 +163,8 @@ def simplified(fit: Fit, study: Study, effect: Effect) -> Fit:
 
 def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
     """Evidence for a fitted larger model over the base, on the windows that both can use."""
+    if is_noise(effect):
+        return _score_noise(base, fit, study, effect)
     shared = base.kept & fit.kept
     before, after = (f.residual[shared[f.kept]] for f in (base, fit))
     added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
@@ -169,6 +182,23 @@ def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
         fit=fit,
         evidence=proof,
         gain=held_out_gain(pair[0], pair[1], base.floor),
+    )
+
+
+def _score_noise(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
+    """Evidence for a noise that the effect makes, where with it the error is noise."""
+    logs = study.holdout or study.fit
+    seen = error_on(fit.axis, logs)
+    floors = [noise_floor(f.axis, [(w.motion, w.window) for w in logs]) for f in (base, fit)]
+    told = fit.at_floor and not base.at_floor and rms(seen) < AT_FLOOR * floors[1]
+    gain = noise_gain(fit.residual, base.floor, fit.floor) if told else 0.0
+    unseen = effective_samples(seen) * noise_gain(seen, *floors) if told else 0.0
+    return Candidate(
+        effect=effect,
+        axis=study.axis,
+        fit=fit,
+        evidence=Evidence(gain, 1, effective_samples(fit.residual)),
+        gain=Gain(rms(seen), rms(seen), float(np.sqrt(max(unseen, 0.0)))),
     )
 
 

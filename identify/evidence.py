@@ -97,6 +97,15 @@ def held_out_gain(before: Array, after: Array, floor: float) -> Gain:
     return Gain(float(np.sqrt(np.mean(before**2))), float(np.sqrt(np.mean(after**2))), float(t))
 
 
+def noise_gain(residual: Array, before: float, after: float) -> float:
+    """Twice the gain in log likelihood per sample where noise of another size (N RMS) is expected.
+
+    residual (n,) N.
+    """
+    power = np.mean(residual**2)
+    return float(power / before**2 - power / after**2 - 2.0 * np.log(after / before))
+
+
 def left_out(residual: Array, jacobian: Array, scale: Array, blocks: int = BLOCKS) -> Array:
     """Residual (n,) each of some blocks would have if the fit had not seen it.
 

@@ -23,7 +23,8 @@ SHORTEST_BLOCK = 1e-3  # s
 LONGEST_BLOCK = 1e-2  # s
 SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
 SHORTEST_LOG = 1.0  # s
-GAP = 20.0  # ratio of differences between readings that only a resolution leaves empty
+GAP = 8.0  # ratio of differences between readings that only a resolution leaves empty
+WHOLE = 0.15  # of a step, RMS, by which such differences may miss whole steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +86,19 @@ class Motion:
     def command(self) -> Array:
         """(n,) N."""
         return self.signals[2]
+
+    def rounding(self) -> Array:
+        """What rounding to the readings' step made of the position, (n + 1,) m, about.
+
+        Where a reading changes, the position was half way; between such times it goes straight.
+        """
+        readings = np.concatenate([[0.0], np.cumsum(self.raw[0] * self.sample_period)])
+        step = resolution(self)
+        if step == 0.0:
+            return np.zeros(len(readings))
+        at = np.flatnonzero(np.abs(np.diff(readings)) > 0.5 * step)
+        middle = 0.5 * (readings[at] + readings[at + 1])
+        return readings - np.interp(np.arange(len(readings)), at + 0.5, middle)
 
 
 def white_noise(signal: Array) -> float:
@@ -182,17 +196,27 @@ def excitation(motions: list[Motion], travel: tuple[float, float] | None) -> Exc
 def resolution(motion: Motion) -> float:
     """Step between the readings, m; 0 where their noise, or the lack of one, hides it.
 
-    Differences of readings are then near 0 or near whole steps, with a wide gap between.
+    Differences of readings are then near 0 or near whole steps, with a wide gap between. Of two
+    steps, a fine one of the log's numbers and a coarse one of the encoder, the coarse one counts.
     """
     apart = np.sort(np.abs(motion.raw[0])) * motion.sample_period
-    few = len(apart) // 100
-    held = np.maximum(apart[few:], np.finfo(float).tiny)
-    widest = int(np.argmax(held[1:] / held[:-1]))
-    step = held[widest + 1]
-    if step < GAP * held[widest] or len(held) - widest < few:
+    apart = apart[len(apart) // 100 :]
+    for held in (apart[apart > 0.0], np.maximum(apart, np.finfo(float).tiny)):
+        if step := _step(held, fewest=len(apart) // 100):
+            return step
+    return 0.0
+
+
+def _step(apart: Array, fewest: int) -> float:
+    """Step of which rising distances (n,) m are near whole multiples, or 0."""
+    if len(apart) < 2 or fewest < 1:
+        return 0.0
+    widest = int(np.argmax(apart[1:] / apart[:-1]))
+    step = apart[widest + 1]
+    if step < GAP * apart[widest] or not fewest <= len(apart) - widest:
         return 0.0
     for reach in (1.5, 4.5, 16.5):
-        near = held[widest + 1 :][held[widest + 1 :] < reach * step]
+        near = apart[widest + 1 :][apart[widest + 1 :] < reach * step]
         counts = np.rint(near / step)
         step = float(near @ counts / (counts @ counts))
-    return step
+    return step if np.std(near / step - counts) < WHOLE else 0.0

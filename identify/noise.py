@@ -14,9 +14,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
+from scipy.signal import welch
 from scipy.signal.windows import hann
 
-from identify.actuation import actual_force
+from identify.actuation import actual_force, is_noise
 from identify.motion import Motion
 from identify.residual import on_blocks, total_force
 from identify.weak import Window
@@ -39,8 +40,27 @@ def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, Window]]) -> float
 
 def _variance(axis: AxisModel, motion: Motion, window: Window) -> float:
     frequency, passed, segment = noise_spectrum(axis, motion)
+    if any(is_noise(f.effect) for f in axis.effects):
+        passed = passed + _rounding(axis, motion, segment)
     response = window.response(motion.sample_period, segment)
     return float(np.trapezoid(passed * response, frequency))
+
+
+def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
+    """One-sided power (segment // 2 + 1,) N^2/Hz of what the readings' rounding pretends.
+
+    White at speed, where the spectrum's median holds it already; its slow steps are added.
+    """
+    frequency, power = welch(
+        motion.rounding(), 1.0 / motion.sample_period, nperseg=segment, detrend="linear"
+    )
+    return np.asarray(_bend(axis, motion, frequency) * power)
+
+
+def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
+    """Power gain (k,) from a position m to the force N that it pretends."""
+    dt = motion.sample_period
+    return ((2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * dt)) * axis.mass / dt**2) ** 2
 
 
 def noise_spectrum(axis: AxisModel, motion: Motion) -> tuple[Array, Array, int]:
@@ -49,19 +69,18 @@ def noise_spectrum(axis: AxisModel, motion: Motion) -> tuple[Array, Array, int]:
     One-sided, before any window; and the samples that the frequencies belong to.
     """
     dt = motion.sample_period
-    mass = axis.mass
     velocity = motion.raw[0]
     # The loop's own noise is in the command and moves the axis; a delay left out would tear the two
     # apart and pass for measurement noise.
     command = actual_force(axis, motion)
-    raw = 0.5 * (command[1:] + command[:-1]) - mass * np.diff(velocity) / dt
+    raw = 0.5 * (command[1:] + command[:-1]) - axis.mass * np.diff(velocity) / dt
     # What the model explains, a bump passed at speed say, is not noise either.
     raw += _between_samples(total_force(on_blocks(axis), motion), motion)
     # The median over segments passes by those with spikes and reversals.
     segment = min(max(round(SEGMENT / dt), 256), len(raw))
     frequency, power = _median_spectrum(raw, segment, dt)
     half = np.cos(np.pi * frequency * dt) ** 2
-    bend = ((2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * dt)) * mass / dt**2) ** 2
+    bend = _bend(axis, motion, frequency)
     band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < BAND[2] / dt)
     levels = _fit_levels(np.stack([half, bend], axis=1)[band], power[band])
     return frequency, levels[0] + levels[1] * bend, segment

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.actuation import is_noise, reading_error
 from identify.fit import Fit, rms
 from identify.residual import Windowed, residual
 from identify.search import orthonormal
@@ -63,7 +65,7 @@ def draw_effect(
     kept = beside.kept if beside else np.ones(len(base), dtype=bool)
 
     def added(fitted: Fitted) -> Array:
-        force = (residual(axis.with_effect(fitted), logs) - base)[kept]
+        force = _force(fitted, axis, logs, base)[kept]
         return np.asarray(force - basis @ (basis.T @ force))
 
     return strength_for(effect, added, force, values, rng)
@@ -127,16 +129,25 @@ def _root(error: Callable[[float], float]) -> float:
 
 def visible_force(fitted: Fitted, base: Fit, study: Study) -> float:
     """RMS force (N) of an effect that the parameters of a fit cannot take over."""
-    force = _force(fitted, base, study)
+    force = _beside(fitted, base, study)
     basis = orthonormal(base.jacobian)
     return rms(force - basis @ (basis.T @ force))
 
 
 def hidden_part(fitted: Fitted, base: Fit, study: Study) -> float:
     """Part of an effect's RMS force that the parameters of a fit take over; of no force, all."""
-    force = rms(_force(fitted, base, study))
+    force = rms(_beside(fitted, base, study))
     return 1.0 - visible_force(fitted, base, study) / force if force > 0.0 else 1.0
 
 
-def _force(fitted: Fitted, base: Fit, study: Study) -> Array:
-    return residual(base.axis.with_effect(fitted), study.fit)[base.kept] - base.residual
+def _beside(fitted: Fitted, base: Fit, study: Study) -> Array:
+    return _force(fitted, base.axis, study.fit, residual(base.axis, study.fit))[base.kept]
+
+
+def _force(fitted: Fitted, axis: AxisModel, logs: Sequence[Windowed], without: Array) -> Array:
+    """What the effect adds (n,) N to the residual of an axis, or pretends in its readings."""
+    if not is_noise(fitted.effect):
+        return residual(axis.with_effect(fitted), logs) - without
+    alone = replace(axis, effects=(fitted,))
+    rates = [log.fine.acceleration(reading_error(alone, log.motion)[1]) for log in logs]
+    return np.asarray(axis.mass * np.concatenate(rates))

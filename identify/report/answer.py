@@ -49,12 +49,11 @@ def _diagnosed(axis: AxisComparison, found: AxisDiagnosis, following: Plan | Non
 
 
 def _headline(found: AxisDiagnosis) -> str:
-    best = spaced(found.best.effect.name) if found.best else ""
+    first, *more = [spaced(name) for name in found.named] or [""]
+    either = " or ".join([first, *map(spaced, found.ambiguous_with)])
     match found.verdict:
-        case Verdict.MISSING_EFFECT:
-            return f"{best} is missing"
-        case Verdict.AMBIGUOUS:
-            return f"{' or '.join([best, *map(spaced, found.ambiguous_with)])} is missing"
+        case Verdict.MISSING_EFFECT | Verdict.AMBIGUOUS:
+            return f"{' and '.join([either, *more])} {'are' if more else 'is'} missing"
         case Verdict.UNEXPLAINED:
             return "something outside the catalogue is missing"
         case Verdict.NOTHING_MISSING:

@@ -59,7 +59,8 @@ def machine(
     seeds = [int(s) for s in rng.integers(1 << 31, size=len(RUNS) + 1)]
     model = replace(stage, axes={AXIS: stage.axes[AXIS]})
     planted: list[Fitted] = []
-    for effect in effects:
+    # A friction first: its level is found beside a model that lacks nothing else.
+    for effect in sorted(effects, key=lambda e: e.kind is not Kind.FRICTION):
         if effect.kind is Kind.FRICTION:
             model = model.with_axis(
                 AXIS, model.axes[AXIS].with_effect(plain_friction(stage, effect))

@@ -7,10 +7,13 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
+from identify.selftest.cases import AXIS
 from identify.selftest.trial import STAGE, Case, Outcome, run
+from twin.effect import Kind
 from twin.effects import Catalogue, load_catalogue
 from twin.model_file import load_model
 
@@ -22,7 +25,7 @@ class Design:
     """How much is tried: strengths (times the noise floor), and how many machines of each sort.
 
     each: of every effect and strength. empty: with nothing planted. pairs: with two effects.
-    left_out: of every effect, at ``pair strength``, with the effect taken out of the catalogue.
+    left_out: of every effect, at PAIR_STRENGTH, with the effect taken out of the catalogue.
     """
 
     strengths: tuple[float, ...] = (5.0,)
@@ -39,9 +42,13 @@ class Design:
         out = [Case((), 0.0, seed + i) for i in range(self.empty)]
         for i in range(self.each):
             out += [Case((n,), s, seed + i) for s in self.strengths for n in hidden]
-        for i in range(self.pairs):
-            first, second = rng.choice(hidden, 2, replace=False)
-            out.append(Case((str(first), str(second)), PAIR_STRENGTH, seed + i))
+        together = [
+            pair
+            for pair in combinations(hidden, 2)
+            if any(catalogue[name].kind is not Kind.FRICTION for name in pair)
+        ]
+        for i in range(self.pairs if together else 0):
+            out.append(Case(together[rng.integers(len(together))], PAIR_STRENGTH, seed + i))
         for i in range(self.left_out):
             out += [Case((n,), PAIR_STRENGTH, seed + 1000 + i, known=False) for n in hidden]
         return out
@@ -53,7 +60,7 @@ FULL = Design(strengths=(2.0, 5.0, 20.0), each=3, empty=200, pairs=60, left_out=
 
 def plantable(catalogue: Catalogue) -> list[str]:
     """Physical effects that the stage of the self-test lacks."""
-    own = load_model(STAGE, catalogue).axes["x"].names
+    own = load_model(STAGE, catalogue).axes[AXIS].names
     return [e.name for e in catalogue.values() if e.name not in own and not e.is_description]
 
 

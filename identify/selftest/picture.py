@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from identify.selftest.tally import AMBIGUOUS, NOTHING, UNEXPLAINED, confusion
 from identify.selftest.trial import Outcome
 from twin.errors import InputError
+from twin.model_file import write_atomically
 
 FORMATS = (".png", ".svg", ".pdf")
 
@@ -44,7 +46,9 @@ def draw(outcomes: Sequence[Outcome], path: Path) -> None:
     axes.set_yticks(np.arange(len(rows)) - 0.5, minor=True)
     axes.grid(which="minor", color="0.9", linewidth=0.5)
     figure.tight_layout()
-    figure.savefig(path)
+    content = BytesIO()
+    figure.savefig(content, format=path.suffix[1:])
+    write_atomically(path, content.getvalue())
 
 
 def _shares(

@@ -127,7 +127,10 @@ def _right_coordinates(built: Machine, base: Fit, study: Study) -> tuple[str, ..
     """Coordinates that the planted force depends on about as much as on the best of them."""
     if not built.planted:
         return ()
-    shares = dependences(_planted_force(built.planted, base, study), base, study)
+    force = _planted_force(built.planted, base, study)
+    if not force.any():  # noise alone
+        return ()
+    shares = dependences(force, base, study)
     return tuple(name for name, s in shares.items() if s >= NEARLY * max(shares.values()))
 
 

@@ -1,0 +1,104 @@
+"""Every effect that the model lacks tried beside a fit, ordered by evidence."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.candidates import Candidate, absent_effects, levelled, score, try_effect
+from identify.evidence import held_out_gain
+from identify.fit import Fit, fit_axis, sticks
+from identify.residual import moving, residual
+from identify.study import Study
+from twin.effect import Effect, Kind
+from twin.effects import Catalogue
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+SETTLED = 0.999  # part of the error to which another start of the base must bring it
+TIE = 2.0  # |t| of the held-out difference below which two explanations cannot be told apart
+NO_EVIDENCE = 2.0  # difference of BIC "not worth more than a bare mention" (Kass, Raftery 1995)
+LEAST_SEPARATION = 10.0  # difference of BIC that separates two explanations
+
+
+def rank(
+    base: Fit,
+    study: Study,
+    catalogue: Catalogue,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> tuple[Fit, tuple[Candidate, ...]]:
+    """Every absent effect tried beside a fitted axis: the base and candidates by falling merit.
+
+    The base comes back refitted where a candidate's values, without its effect, suit it better: a
+    base short of its optimum would make evidence for every candidate.
+    """
+    effects = absent_effects(base.axis, catalogue)
+    candidates = []
+    # The laws run outside Python's lock, so candidates go side by side.
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        for candidate in pool.map(partial(try_effect, base, study), effects):
+            candidates.append(candidate)
+            if progress:
+                progress(len(candidates), len(effects))
+    supported = [c for c in candidates if c.supported]
+    if supported:
+        best = max(supported, key=lambda c: c.delta_bic)
+        again = less(best.effect, best.fit, base, study)
+        if again.error < SETTLED * base.error:
+            base = again
+            candidates = [score(base, c.fit, study, c.effect) for c in candidates]
+    return base, _ranked(candidates)
+
+
+def less(effect: Effect, fit: Fit, base: Fit, study: Study) -> Fit:
+    """The fit refitted without an effect, the friction that it replaced put back."""
+    if effect.kind is Kind.FRICTION:
+        own = next((f for f in base.axis.effects if f.effect.kind is Kind.FRICTION), None)
+        axis = fit.axis.with_effect(own) if own else fit.axis.without(effect.name)
+    else:
+        axis = fit.axis.without(effect.name)
+    return fit_axis(axis, study.fit)
+
+
+def _ranked(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Supported first, and of these what lowers the error before what makes it noise."""
+    lowers = _ordered(levelled([c for c in candidates if not c.is_noise]))
+    supported = [c for c in lowers if c.supported]
+    noise = sorted((c for c in candidates if c.is_noise), key=_merit)
+    return (*supported, *noise, *lowers[len(supported) :])
+
+
+def _ordered(candidates: list[Candidate]) -> list[Candidate]:
+    """By falling merit; those within no evidence of the best come in the catalogue's order."""
+    ranking = sorted(candidates, key=_merit)
+    if not ranking or not ranking[0].supported:
+        return ranking
+    best = ranking[0].evidence
+    level = [c for c in ranking if c.supported and best.over(c.evidence) < NO_EVIDENCE]
+    rest = [c for c in ranking if c not in level]
+    return [*sorted(level, key=lambda c: c.effect.name), *rest]
+
+
+def _merit(c: Candidate) -> tuple[bool, float]:
+    """Supported first, then by evidence."""
+    return (not c.supported, -c.delta_bic)
+
+
+def tie(study: Study, best: Candidate, other: Candidate) -> bool:
+    """Whether the evidence and the held-out error both fail to separate two candidates."""
+    if best.is_noise or other.is_noise:
+        return False
+    if best.evidence.over(other.evidence) > LEAST_SEPARATION:
+        return False
+    logs = study.holdout or study.fit
+    either = sticks(best.fit.axis) or sticks(other.fit.axis)
+    kept = moving(logs, either)
+    pair = [residual(c.fit.axis, logs)[kept] for c in (other, best)]
+    return abs(held_out_gain(pair[0], pair[1], best.fit.floor).t) < TIE
