@@ -70,9 +70,8 @@ def less(effect: Effect, fit: Fit, base: Fit, study: Study) -> Fit:
 def _ranked(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """Supported first, and of these what lowers the error before what makes it noise."""
     lowers = _ordered(levelled([c for c in candidates if not c.is_noise]))
-    supported = [c for c in lowers if c.supported]
-    noise = sorted((c for c in candidates if c.is_noise), key=_merit)
-    return (*supported, *noise, *lowers[len(supported) :])
+    noise = _ordered([c for c in candidates if c.is_noise])
+    return tuple(sorted([*lowers, *noise], key=lambda c: not c.supported))
 
 
 def _ordered(candidates: list[Candidate]) -> list[Candidate]:
