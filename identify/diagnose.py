@@ -74,9 +74,14 @@ class AxisDiagnosis:
     @property
     def named(self) -> tuple[str, ...]:
         """Names of the effects that are missing, in the order they were found."""
+        return tuple(answer[0] for answer in self.answers)
+
+    @property
+    def answers(self) -> tuple[tuple[str, ...], ...]:
+        """Each effect that is missing, and after it those that explain as well."""
         if self.verdict not in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS):
             return ()
-        return tuple(s.candidate.effect.name for s in _kept(self.steps))
+        return tuple((s.candidate.effect.name, *s.tied) for s in _kept(self.steps))
 
     @property
     def best(self) -> Candidate | None:

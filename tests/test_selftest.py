@@ -64,11 +64,11 @@ def test_a_design_plants_every_physical_effect_the_stage_lacks():
 
 # --- the tally, on invented outcomes --------------------------------------------------------
 
-NAMED = Outcome(Case(("a",), 5.0, 1), "MISSING_EFFECT", ("a",), ratio=5.0, left=1.0)
-TIED = replace(NAMED, verdict="AMBIGUOUS", named=("b",), tied=("a",))
-WRONG = replace(NAMED, named=("b",))
-MISSED = replace(NAMED, verdict="UNEXPLAINED", named=())
-ALARM = Outcome(Case((), 0.0, 1), "MISSING_EFFECT", ("b",), covered=(("mass", False),))
+NAMED = Outcome(Case(("a",), 5.0, 1), "MISSING_EFFECT", (("a",),), ratio=5.0, left=1.0)
+TIED = replace(NAMED, verdict="AMBIGUOUS", answers=(("b", "a"),))
+WRONG = replace(NAMED, answers=(("b",),))
+MISSED = replace(NAMED, verdict="UNEXPLAINED", answers=())
+ALARM = Outcome(Case((), 0.0, 1), "MISSING_EFFECT", (("b",),), covered=(("mass", False),))
 QUIET = Outcome(Case((), 0.0, 2), "NOTHING_MISSING", covered=(("mass", True),))
 LOST = Outcome(
     Case(("a",), 5.0, 1, known=False), "UNEXPLAINED", left=5.0, depends_on="time",
@@ -95,15 +95,16 @@ def test_false_alarms_and_coverage_are_counted():
 def test_an_unexplained_effect_needs_its_own_coordinate_or_the_floor():
     assert not LOST.honest
     assert replace(LOST, depends_on="position").honest
-    assert not replace(LOST, verdict="MISSING_EFFECT", named=("b",), left=1.5).honest
-    assert replace(LOST, verdict="MISSING_EFFECT", named=("b",), left=1.1).honest
+    assert not replace(LOST, verdict="MISSING_EFFECT", answers=(("b",),), left=1.5).honest
+    assert replace(LOST, verdict="MISSING_EFFECT", answers=(("b",),), left=1.1).honest
 
 
 def test_one_of_two_named_is_not_enough():
     both = replace(NAMED, case=Case(("a", "b"), 5.0, 1))
     assert not both.right
-    assert replace(both, named=("b", "a")).right
-    assert not replace(both, named=("a", "b", "c")).right
+    assert replace(both, answers=(("b",), ("c", "a"))).right
+    assert not replace(both, answers=(("a", "b"), ("c",))).right
+    assert not replace(both, answers=(("a",), ("b",), ("c",))).right
 
 
 def test_the_picture_shows_every_answer(tmp_path):

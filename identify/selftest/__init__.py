@@ -26,7 +26,7 @@ def selftest_json(outcomes: Sequence[Outcome]) -> dict[str, Any]:
             {
                 "planted": list(o.case.effects), "strength": o.case.strength, "seed": o.case.seed,
                 "in_catalogue": o.case.known, "shown": o.shown, "verdict": o.verdict.lower(),
-                "named": list(o.named), "ambiguous_with": list(o.tied), "ratio_before": o.ratio,
+                "answers": [list(a) for a in o.answers], "ratio_before": o.ratio,
                 "ratio_after": o.left, "depends_on": o.depends_on,
             }
             for o in outcomes

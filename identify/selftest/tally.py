@@ -125,4 +125,4 @@ def _answer(o: Outcome) -> str:
     planted = o.case.effects[0] if o.case.effects else ""
     if planted in o.named:
         return planted
-    return AMBIGUOUS if planted in o.tied else o.named[0]
+    return AMBIGUOUS if any(planted in answer for answer in o.answers) else o.named[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
+from itertools import permutations
 from time import perf_counter
 
 import numpy as np
@@ -42,16 +43,16 @@ class Case:
 class Outcome:
     """What a trial found.
 
-    named: effects, in order; tied: those declared as ambiguous with them. ratio, left: error over
-    noise floor before and after. depends_on: of an unexplained residual. coordinates: those that
-    are right, from the planted force itself. covered: for each parameter of an honest machine with
-    an interval, whether it holds the truth. shown: whether the effect could show at all.
+    answers: for each effect that was named, in order, its name and those declared as ambiguous
+    with it. ratio, left: error over noise floor before and after. depends_on: of an unexplained
+    residual. coordinates: those that are right, from the planted force itself. covered: for each
+    parameter of an honest machine with an interval, whether it holds the truth. shown: whether the
+    effect could show at all.
     """
 
     case: Case
     verdict: str = ""
-    named: tuple[str, ...] = ()
-    tied: tuple[str, ...] = ()
+    answers: tuple[tuple[str, ...], ...] = ()
     ranking: tuple[tuple[str, float], ...] = ()
     ratio: float = np.nan
     left: float = np.nan
@@ -62,11 +63,17 @@ class Outcome:
     shown: bool = True
 
     @property
+    def named(self) -> tuple[str, ...]:
+        """The effect named first in each answer."""
+        return tuple(answer[0] for answer in self.answers)
+
+    @property
     def right(self) -> bool:
-        """Whether all planted effects, and no others, are named or in a declared ambiguity."""
-        told = {*self.named, *self.tied}
-        wrong = set(self.named) - set(self.case.effects)
-        return set(self.case.effects) <= told and len(wrong) <= len(self.tied)
+        """Whether each planted effect is in an answer of its own, and there are no others."""
+        return len(self.answers) == len(self.case.effects) and any(
+            all(name in answer for name, answer in zip(order, self.answers, strict=True))
+            for order in permutations(self.case.effects)
+        )
 
     def in_words(self) -> str:
         """One line: what was planted, and what the diagnosis said."""
@@ -74,14 +81,15 @@ class Outcome:
         if not self.shown:
             return f"{planted} cannot show on this stage's motion at {self.case.strength:g} floors"
         known = "" if self.case.known else ", left out of the catalogue"
-        answer = " and ".join(self.named) or self.verdict.lower()
-        tied = f", ambiguous with {', '.join(self.tied)}" if self.tied else ""
-        return f"{planted} at {self.case.strength:g} floors{known}: {answer}{tied}"
+        answer = " and ".join(" or ".join(answer) for answer in self.answers)
+        return (
+            f"{planted} at {self.case.strength:g} floors{known}: {answer or self.verdict.lower()}"
+        )
 
     @property
     def quiet(self) -> bool:
         """Whether no name was given."""
-        return not self.named
+        return not self.answers
 
     @property
     def honest(self) -> bool:
@@ -111,8 +119,7 @@ def run(case: Case) -> Outcome:
     return Outcome(
         case=case,
         verdict=found.verdict.name,
-        named=found.named,
-        tied=tuple(t for s in found.steps for t in s.tied) if found.named else (),
+        answers=found.answers,
         ranking=tuple((c.effect.name, c.delta_bic) for c in found.ranking[:4]),
         ratio=base.ratio,
         left=found.final.ratio,

@@ -1,0 +1,45 @@
+"""Two effects of which neither has evidence without the other."""
+
+import sys
+import zlib
+
+import numpy as np
+import pytest
+
+from identify.diagnose import Verdict, diagnose_axis
+from identify.fit import fit_axis
+from identify.selftest.cases import AXIS, machine
+from identify.study import studies
+from twin.effects import Catalogue, load_catalogue
+from twin.model_file import load_model
+
+CATALOGUE = load_catalogue()
+PLANTED = ("position_dependent_friction", "cogging")
+FEW = Catalogue(CATALOGUE[name] for name in (*PLANTED, "wear", "actuator_deadband"))
+
+
+@pytest.fixture(scope="module")
+def case():
+    """A fit and its study of a machine with both."""
+    rng = np.random.default_rng([4, *(zlib.crc32(name.encode()) for name in PLANTED)])
+    built = machine(load_model("proton_xy", CATALOGUE), [CATALOGUE[e] for e in PLANTED], 5.0, rng)
+    study = studies(built.model, built.logs, built.holdout)[AXIS]
+    return fit_axis(built.model.axes[AXIS], study.fit), study
+
+
+def test_both_are_named(case):
+    found = diagnose_axis(*case, FEW)
+    assert found.verdict is Verdict.MISSING_EFFECT
+    assert set(found.named) == set(PLANTED)
+    assert {s.beside for s in found.steps} == set(PLANTED)
+    assert found.final.ratio < 1.2 < 3.0 < found.base.ratio
+
+
+def test_without_a_look_ahead_neither_is(case, monkeypatch):
+    monkeypatch.setattr(sys.modules[diagnose_axis.__module__], "look_ahead", lambda *_: [])
+    assert diagnose_axis(*case, FEW).verdict is Verdict.UNEXPLAINED
+
+
+def test_with_one_of_them_unknown_neither_is_named(case):
+    alone = Catalogue(e for e in FEW.values() if e.name != "cogging")
+    assert diagnose_axis(*case, alone).verdict is Verdict.UNEXPLAINED
