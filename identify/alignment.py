@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.evidence import LEAST_BIC, evidence
-from identify.fit import Fit
+from identify.fit import Fit, fit_axis
 from identify.residual import Windowed
 from identify.search import fit_thoroughly, orthonormal
 from identify.study import Study
@@ -62,6 +62,20 @@ def misalignment(fit: Fit, study: Study) -> float:
     fall = 1.0 - float(after @ after) / max(float(left @ left), 1e-300)
     told = fall > LEAST_FALL and evidence(left, after, 1).delta_bic > LEAST_BIC
     return shift if told and LEAST_SHIFT * sample < shift < MOST_SHIFT * sample else 0.0
+
+
+def moved_by(fit: Fit, study: Study) -> Study | None:
+    """The study with its force channel where a larger model says that it acted, if elsewhere.
+
+    What the smaller model lacked can have passed for a shift, or hidden one.
+    """
+    if ahead := misalignment(fit, study):
+        return realigned(study, study.shift + ahead)
+    if study.shift == 0.0:
+        return None
+    back = realigned(study, 0.0)
+    better = np.sqrt(1.0 - LEAST_FALL) * fit.error
+    return back if fit_axis(fit.axis, back.fit).error < better else None
 
 
 def realigned(study: Study, shift: float) -> Study:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property, partial
 
-from identify.alignment import misalignment, realigned
+from identify.alignment import moved_by
 from identify.candidates import Candidate, score
 from identify.fit import Fit, fit_axis
 from identify.lookahead import held_at_floor, look_ahead
@@ -17,6 +17,7 @@ from identify.structure import Structure, explains, find_structure
 from identify.study import Study
 from twin.effects import Catalogue
 
+MOST_SHIFTS = 2  # of the force channel, after which a diagnosis begins anew
 MOST_STEPS = 5  # effects added to one axis at most
 NEARLY_ALL = 0.95  # part of the squared error above the floor that speaks for itself
 FLOOR_SURE = (0.85, 1.15)  # error over noise floor where both agree, and nothing more is sought
@@ -105,10 +106,12 @@ def diagnose_axis(
     catalogue: Catalogue,
     progress: Progress | None = None,
     workers: int | None = None,
+    shifts: int = MOST_SHIFTS,
 ) -> AxisDiagnosis:
     """Add effects to one fitted axis for as long as evidence asks for them, and decide.
 
-    workers: threads; one a core where None.
+    workers: threads; one a core where None. shifts: how often the force channel may still be moved
+    and all begun anew, where an effect that was found shows when the force acted.
     """
     ranked = partial(rank, study=study, catalogue=catalogue, progress=progress, workers=workers)
     base, ranking = ranked(base)
@@ -120,10 +123,9 @@ def diagnose_axis(
         steps += [*more[:-1], replace(more[-1], dropped=dropped)]
         if final.at_floor and FLOOR_SURE[0] < final.ratio < FLOOR_SURE[1]:
             break
-        if ahead := misalignment(final, study):  # seen only now that more is explained
-            moved = realigned(study, study.shift + ahead)
+        if shifts and (moved := moved_by(final, study)):
             again = fit_axis(base.axis, moved.fit)
-            return diagnose_axis(again, moved, catalogue, progress, workers)
+            return diagnose_axis(again, moved, catalogue, progress, workers, shifts - 1)
         final, found = ranked(final)
     return _decided(base, study, ranking, tuple(steps), final)
 
