@@ -15,8 +15,9 @@ from twin.native import walk
 from twin.simulator import MujocoStage, ReducedStage, run
 from twin.trajectory import Setpoint
 
-# Values common in simulations of LuGre friction, attributed to C. Canudas de Wit et al., IEEE TAC
-# 40 (1995), but not checked against that paper. For every model that has the parameter.
+# Table I of C. Canudas de Wit et al., IEEE TAC 40 (1995), as A. Manurung's reconstruction of that
+# paper's simulations gives it (github.com/auralius/LuGre, demo2.m); the paper itself could not be
+# opened. For every model that has the parameter.
 PAPER = {
     "Fc": 1.0, "Fs": 1.5, "v0": 1e-3, "sigma0": 1e5, "sigma1": 1e5**0.5, "sigma2": 0.4
 }  # fmt: skip

@@ -1,5 +1,7 @@
 """What each effect does, in number, against closed forms worked out here."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from effect_runs import CATALOGUE, Array, Motion, trace
@@ -144,3 +146,34 @@ def test_wear_grows_with_the_distance_travelled() -> None:
     factor = after("wear", DRY, moves, rate=0.5)
     assert factor[len(SWEEP) - 1] == pytest.approx(1.0 + 0.5 * 0.2, rel=1e-3)
     assert factor[-1] == pytest.approx(1.0 + 0.5 * 0.4, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        test_a_step_through_the_lag_is_an_exponential,
+        lambda: test_a_dead_zone_takes_its_width(1.5, 1.0),
+        lambda: test_saturation_loses_its_part_above_the_limit(5.0, 2.75),
+        test_force_constant_ripple_is_in_proportion_to_the_command,
+        lambda: test_a_delayed_reading_of_a_ramp_is_late_by_the_distance(3.5),
+        test_readings_are_the_nearest_whole_steps,
+        test_encoder_ripple_has_its_amplitude_and_period,
+        test_a_disturbance_has_its_frequency_and_mean_over_a_sample,
+        test_an_end_stop_pushes_with_its_stiffness_beyond_the_travel_alone,
+        test_the_loop_of_the_cable_has_the_area_of_its_slipping_layers,
+        lambda: test_breakaway_grows_with_the_time_at_rest(0.2),
+        test_wear_grows_with_the_distance_travelled,
+    ],
+)
+def test_a_planted_fault_is_seen(
+    check: Callable[[], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of these fails where the laws use values a twentieth too large."""
+    right = after
+
+    def wrong(name: str, slot: int, moves: Motion, **values: float) -> Array:
+        return right(name, slot, moves, **{k: 1.05 * v for k, v in values.items()})
+
+    monkeypatch.setitem(globals(), "after", wrong)
+    with pytest.raises(AssertionError):
+        check()

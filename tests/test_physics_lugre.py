@@ -18,13 +18,14 @@ from twin.trajectory import Setpoint
 LUGRE = CATALOGUE["lugre"]
 Lugre = dict[str, float]
 
-# The stage of the thesis; a stiff one, attributed to Canudas de Wit et al. (1995), not checked
-# there; a soft one with exponent 1.
+# The stage of the thesis; the stiff one of table I of Canudas de Wit et al., IEEE TAC 40 (1995), as
+# A. Manurung's reconstruction of that paper's simulations gives it (github.com/auralius/LuGre,
+# demo2.m; the paper itself could not be opened); a soft one with exponent 1.
 STAGE = {
     "Fc": 0.285, "Fs": 0.335, "v0": 0.01, "sigma2": 0.018, "sigma0": 260.0, "sigma1": 0.6, "n": 2.0
 }  # fmt: skip
 STIFF = {
-    "Fc": 1.0, "Fs": 1.5, "v0": 1e-3, "sigma2": 0.4, "sigma0": 1e5, "sigma1": 316.0, "n": 2.0
+    "Fc": 1.0, "Fs": 1.5, "v0": 1e-3, "sigma2": 0.4, "sigma0": 1e5, "sigma1": 1e5**0.5, "n": 2.0
 }  # fmt: skip
 SOFT = {
     "Fc": 0.2, "Fs": 0.5, "v0": 5e-3, "sigma2": 0.1, "sigma0": 2e3, "sigma1": 5.0, "n": 1.0
@@ -34,8 +35,9 @@ SETS = pytest.mark.parametrize("p", [STAGE, STIFF, SOFT], ids=["stage", "stiff",
 PULLS = pytest.mark.parametrize(
     ("p", "mass", "spring", "speed", "duration", "slips"),
     [(STAGE, 1.0, 5.0, 0.005, 4.0, 0), (STIFF, 1.0, 30.0, 0.05, 4.0, 3),
+     (STIFF, 1.0, 2.0, 0.1, 16.0, 2),  # stick-slip of the 1995 paper, by the same reconstruction
      (SOFT, 0.5, 50.0, 0.02, 3.0, 4)],
-    ids=["stage", "stiff", "soft"],
+    ids=["stage", "stiff", "paper", "soft"],
 )  # fmt: skip
 
 

@@ -54,6 +54,19 @@ def test_on_the_other_axis_it_does_the_same(effect: Effect, stage: Stepper) -> N
     assert np.abs(one[:, 0] - without[:, 0]).max() > 1e-9, "it does nothing"
 
 
+@EVERY
+def test_a_planted_difference_between_the_axes_is_seen(effect: Effect) -> None:
+    """The comparison above fails where one axis has a thousandth more of the effect."""
+    fitted = drawn(effect, 1)
+    more = {p.name: min(1.001 * fitted.values[p.name], p.upper) for p in effect.strengths}
+    other = Fitted.at_start(effect, {**fitted.values, **more})
+    plain = replace(PLAIN, mass=7.0)
+    one = signals(PLAIN.with_effect(fitted), plain, False, ReducedStage)
+    two = signals(plain, PLAIN.with_effect(other), True, ReducedStage)[:, ::-1]
+    size = np.abs(one).max(axis=(0, 1))
+    assert not np.all(np.abs(one - two).max(axis=(0, 1)) <= 1e-8 * size)
+
+
 def with_values(name: str, **values: float) -> AxisModel:
     return PLAIN.with_effect(Fitted.at_start(CATALOGUE[name], values))
 
