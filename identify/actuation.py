@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from identify.motion import Motion
 from twin.effect import Effect, Kind
@@ -19,7 +18,6 @@ from twin.native import walk, walk_sensing
 
 Array = NDArray[np.float64]
 
-SMOOTHED = 11  # samples
 PASSES = 3  # from the reading to the position it was taken at
 
 
@@ -39,7 +37,7 @@ def actual_force(axis: AxisModel, motion: Motion) -> Array:
     part = parts_of(axis, Kind.ACTUATION)
     if not part.effects:
         return command
-    signals = _signals(motion, 0.5)
+    signals = motion.at_samples(0.5)
     table = axis_table({motion.axis: part})
     rows = np.zeros((len(table.entries), len(command)))
     first, last, state, _, _ = table.axes[0]
@@ -75,10 +73,8 @@ def reading_error(sensing: AxisModel, motion: Motion) -> tuple[Array, Array]:
     """
     table = axis_table({motion.axis: sensing})
     _, _, _, first, last = table.axes[0]
-    true = _signals(motion, 0.0)
-    path = savgol_filter(true[0], SMOOTHED, 2)
-    seen = np.empty_like(path)
-    true[0] = path
+    true = motion.smoothed.copy()
+    path, seen = motion.smoothed[0], np.empty(true.shape[1])
     for _ in range(PASSES):
         walk_sensing(
             table.entries, first, last, table.parameters, np.zeros(table.n_states), true,
@@ -87,15 +83,3 @@ def reading_error(sensing: AxisModel, motion: Motion) -> tuple[Array, Array]:
         error = seen - true[0]
         true[0] = path - error
     return error, np.diff(error, append=error[-1]) / motion.sample_period
-
-
-def _signals(motion: Motion, instant: float) -> Array:
-    """Position m, velocity m/s and command N at the log's own rate, (3, n).
-
-    instant: where in the sample the position is taken, 0 its start, 1/2 its middle.
-    """
-    velocity, command = motion.raw
-    travelled = velocity * motion.sample_period
-    middle = np.cumsum(travelled) - 0.5 * travelled
-    middle += motion.position[0] - middle[: len(middle) // len(motion.position)].mean()
-    return np.stack([middle + (instant - 0.5) * travelled, velocity, command])

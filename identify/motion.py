@@ -8,9 +8,11 @@ samples keep these relations exact.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import savgol_filter
 
 from identify.lines import lines, ripples
 from twin.effect import Excitation
@@ -23,6 +25,7 @@ SHORTEST_BLOCK = 1e-3  # s
 LONGEST_BLOCK = 1e-2  # s
 SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
 SHORTEST_LOG = 1.0  # s
+SMOOTHED = 11  # samples over which readings are smoothed to undo their errors
 GAP = 8.0  # ratio of differences between readings that only a resolution leaves empty
 WHOLE = 0.15  # of a step, RMS, by which such differences may miss whole steps
 
@@ -87,6 +90,25 @@ class Motion:
         """(n,) N."""
         return self.signals[2]
 
+    def at_samples(self, instant: float) -> Array:
+        """Position m, velocity m/s and command N at the log's own rate, (3, n).
+
+        instant: where in the sample the position is taken, 0 its start, 1/2 its middle.
+        """
+        velocity, command = self.raw
+        travelled = velocity * self.sample_period
+        middle = np.cumsum(travelled) - 0.5 * travelled
+        middle += self.position[0] - middle[: len(middle) // len(self.position)].mean()
+        return np.stack([middle + (instant - 0.5) * travelled, velocity, command])
+
+    @cached_property
+    def smoothed(self) -> Array:
+        """Position m at the start of each sample, smoothed; velocity m/s and command N, (3, n)."""
+        signals = self.at_samples(0.0)
+        signals[0] = savgol_filter(signals[0], SMOOTHED, 2)
+        return signals
+
+    @cached_property
     def rounding(self) -> Array:
         """What rounding to the readings' step made of the position, (n + 1,) m, about.
 

@@ -52,7 +52,7 @@ def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
     White at speed, where the spectrum's median holds it already; its slow steps are added.
     """
     frequency, power = welch(
-        motion.rounding(), 1.0 / motion.sample_period, nperseg=segment, detrend="linear"
+        motion.rounding, 1.0 / motion.sample_period, nperseg=segment, detrend="linear"
     )
     return np.asarray(_bend(axis, motion, frequency) * power)
 

@@ -51,7 +51,7 @@ def test_the_step_is_read_off_the_readings(noise):
 def test_noise_without_rounding_has_no_step():
     noise = 1e-8 * np.random.default_rng(1).standard_normal(40_001)
     assert resolution(moved(path() + noise)) == 0.0
-    assert not moved(path() + noise).rounding().any()
+    assert not moved(path() + noise).rounding.any()
 
 
 def test_what_rounding_did_is_taken_back_between_slow_steps():
@@ -59,7 +59,7 @@ def test_what_rounding_did_is_taken_back_between_slow_steps():
     readings = rounded(3e-5 * np.sin(turn), STEP)
     true = readings - 3e-5 * np.sin(turn)
     away = np.abs(np.cos(turn)) > 0.3  # at a reversal nothing tells how far it went
-    left = (moved(readings).rounding() - true)[away]
+    left = (moved(readings).rounding - true)[away]
     assert np.std(left) < 0.15 * np.std(true)
 
 
