@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from identify.evidence import LEAST_BIC, evidence
 from identify.fit import Fit, fit_axis
 from identify.residual import Windowed
-from identify.search import fit_thoroughly, orthonormal
+from identify.search import fit_thoroughly
 from identify.study import Study
+from identify.subspace import orthonormal, unabsorbed
 from twin.model import AxisModel
 
 Array = NDArray[np.float64]
@@ -51,8 +52,7 @@ def misalignment(fit: Fit, study: Study) -> float:
     """
     rate = np.concatenate([w.fine.acceleration(w.motion.raw[1]) for w in study.fit])[fit.kept]
     basis = orthonormal(fit.jacobian)
-    left = fit.residual - basis @ (basis.T @ fit.residual)
-    own = rate - basis @ (basis.T @ rate)
+    left, own = unabsorbed(fit.residual, basis), unabsorbed(rate, basis)
     power = float(own @ own)
     if power <= 1e-12 * float(rate @ rate):
         return 0.0

@@ -22,8 +22,8 @@ from identify.evidence import effective_samples, evidence
 from identify.fit import fit_axis, rms, sticks
 from identify.motion import Motion, motion_of
 from identify.residual import Windowed, jacobian, moving, residual
-from identify.search import orthonormal
 from identify.study import choose_window
+from identify.subspace import orthonormal, unabsorbed
 from identify.weak import LEAST_BLOCKS
 from twin.errors import InputError
 from twin.experiment import Experiment
@@ -218,11 +218,6 @@ def refit_basis(axis: AxisModel, logs: Sequence[Windowed], kept: NDArray[np.bool
     if not where:
         return np.zeros((int(kept.sum()), 0))
     return orthonormal(jacobian(axis, logs, where)[kept])
-
-
-def unabsorbed(force: Array, basis: Array) -> Array:
-    """The part of a force (n,) N that lies outside the span of the basis (n, r)."""
-    return force - basis @ (basis.T @ force)
 
 
 def refitted(arena: Arena, trial: Trial) -> Trial:

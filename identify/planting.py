@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from identify.actuation import is_noise, reading_error
 from identify.fit import Fit, rms
 from identify.residual import Windowed, residual
-from identify.search import orthonormal
 from identify.study import Study
+from identify.subspace import orthonormal, unabsorbed
 from twin.effect import Effect, Excitation, Parameter
 from twin.model import AxisModel, Fitted, coordinates, read, write
 
@@ -66,7 +66,7 @@ def draw_effect(
 
     def added(fitted: Fitted) -> Array:
         force = _force(fitted, axis, logs, base)[kept]
-        return np.asarray(force - basis @ (basis.T @ force))
+        return unabsorbed(force, basis)
 
     return strength_for(effect, added, force, values, rng)
 
@@ -130,8 +130,7 @@ def _root(error: Callable[[float], float]) -> float:
 def visible_force(fitted: Fitted, base: Fit, study: Study) -> float:
     """RMS force (N) of an effect that the parameters of a fit cannot take over."""
     force = _beside(fitted, base, study)
-    basis = orthonormal(base.jacobian)
-    return rms(force - basis @ (basis.T @ force))
+    return rms(unabsorbed(force, orthonormal(base.jacobian)))
 
 
 def hidden_part(fitted: Fitted, base: Fit, study: Study) -> float:

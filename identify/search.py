@@ -16,6 +16,7 @@ from identify.fit import Fit, finished, fit_axis
 from identify.lines import lines_of
 from identify.residual import Windowed, jacobian, residual
 from identify.study import Study
+from identify.subspace import orthonormal, unabsorbed
 from twin.effect import Effect, Excitation, Kind, Parameter
 from twin.model import AxisModel, Coordinate, Fitted, read, write
 
@@ -195,21 +196,11 @@ def _without_friction(axis: AxisModel) -> AxisModel:
     )
 
 
-def orthonormal(columns: Array) -> Array:
-    """Orthonormal basis (n, r) of the columns' span."""
-    norms = np.linalg.norm(columns, axis=0)
-    scaled = columns[:, norms > 0] / norms[norms > 0]
-    power, directions = np.linalg.eigh(scaled.T @ scaled)
-    seen = power > 1e-12 * power.max(initial=1.0)
-    return scaled @ (directions[:, seen] / np.sqrt(power[seen]))
-
-
 def _bounded_step(
     basis: Array, force: Array, columns: Array, where: list[Coordinate], first: Fitted
 ) -> tuple[Array, float]:
     """Strengths within their bounds that minimise the force left beside the base's columns."""
-    left = force - basis @ (basis.T @ force)
-    own = columns - basis @ (basis.T @ columns)
+    left, own = unabsorbed(force, basis), unabsorbed(columns, basis)
     norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     start = np.array([first.values[c.parameter.name] for c in where])
     low = np.array([c.parameter.lower for c in where]) - start

@@ -6,6 +6,7 @@ Kinds of experiment are in twin.experiment_kinds, named ones in twin.experiments
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar
@@ -32,7 +33,7 @@ def counted(meaning: str) -> Any:
 
 
 @dataclass(frozen=True)
-class Experiment:
+class Experiment(ABC):
     """One experiment. Its fields are its parameters; their units are in the fields' metadata.
 
     closed_loop: whether the position loop is closed while it runs. Raises InputError for a
@@ -49,9 +50,9 @@ class Experiment:
             elif f.metadata.get("unit") == "":
                 require_count(f.name, getattr(self, f.name))
 
+    @abstractmethod
     def setpoint(self, model: StageModel, rng: np.random.Generator) -> Setpoint:
         """The setpoint for this stage; InputError where it goes beyond the stage's limits."""
-        raise NotImplementedError
 
 
 def _require(name: str, value: Any, unit: str, zero: bool) -> None:
@@ -112,11 +113,11 @@ class OneAxis(Experiment):
             return alone
         return _with_other(alone, model, self.axis, place, self.other)
 
+    @abstractmethod
     def on(
         self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: StageModel
     ) -> Setpoint:
         """The setpoint with the other axis at rest. axis: index; place: m, one per axis."""
-        raise NotImplementedError
 
 
 def gentle(limit: Limits, effort: float) -> Limits:

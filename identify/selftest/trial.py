@@ -13,10 +13,10 @@ from identify.alignment import fit_aligned
 from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
 from identify.fit import Fit
 from identify.residual import residual
-from identify.search import orthonormal
 from identify.selftest.cases import AXIS, Machine, NotShown, machine
 from identify.structure import dependences
 from identify.study import Study, studies
+from identify.subspace import orthonormal, unabsorbed
 from identify.uncertainty import estimates
 from twin.effects import Catalogue, load_catalogue
 from twin.model import Fitted, read
@@ -146,8 +146,7 @@ def _planted_force(planted: tuple[Fitted, ...], base: Fit, study: Study) -> np.n
     for fitted in planted:
         axis = axis.with_effect(fitted)
     force = base.residual - residual(axis, study.fit)[base.kept]
-    basis = orthonormal(base.jacobian)
-    return np.asarray(force - basis @ (basis.T @ force))
+    return unabsorbed(force, orthonormal(base.jacobian))
 
 
 def _covered(built: Machine, found: AxisDiagnosis) -> tuple[tuple[str, bool], ...]:
