@@ -44,6 +44,7 @@ def actual_force(axis: AxisModel, motion: Motion) -> Array:
     walk(
         table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
         signals, np.zeros_like(signals), motion.sample_period, 0, rows, axis.mass,
+        motion.clock,
     )  # fmt: skip
     return command + rows.sum(axis=0)
 

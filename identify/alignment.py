@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.clocks import reads_clock, synchronised, with_clocks
 from identify.evidence import LEAST_BIC, evidence
 from identify.fit import Fit, fit_axis
 from identify.residual import Windowed
@@ -31,7 +32,10 @@ ROUNDS = 3
 
 
 def fit_aligned(axis: AxisModel, study: Study) -> tuple[Study, Fit]:
-    """The fit of an axis, and the study with its force channel moved to where it acted."""
+    """The fit of an axis, and the study with its force channel moved to where it acted.
+
+    The study's clocks are set by what repeats in time.
+    """
     fit = fit_thoroughly(axis, study)
     for _ in range(ROUNDS):
         shift = misalignment(fit, study)
@@ -42,7 +46,10 @@ def fit_aligned(axis: AxisModel, study: Study) -> tuple[Study, Fit]:
         if again.error > np.sqrt(1.0 - LEAST_FALL) * fit.error:
             break
         study, fit = moved, replace(again, begun=fit.begun)
-    return study, fit
+    if not reads_clock(fit.axis, study):
+        return synchronised(fit, study)
+    study = with_clocks(fit.axis, study)
+    return study, replace(fit_thoroughly(fit.axis, study), begun=fit.begun)
 
 
 def misalignment(fit: Fit, study: Study) -> float:

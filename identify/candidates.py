@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.actuation import is_noise
+from identify.clocks import phases_found
 from identify.evidence import (
     LEAST_BIC,
     LEAST_T,
@@ -168,6 +169,7 @@ def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
     shared = base.kept & fit.kept
     before, after = (f.residual[shared[f.kept]] for f in (base, fit))
     added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
+    added += phases_found(fit.axis, effect.name, study)
     proof = evidence(before, after, added)
     if study.holdout:
         held = moving(study.holdout, sticks(base.axis) or sticks(fit.axis))

@@ -9,6 +9,7 @@ from functools import cached_property, partial
 
 from identify.alignment import moved_by
 from identify.candidates import Candidate, score
+from identify.clocks import synchronised
 from identify.fit import Fit, fit_axis
 from identify.lookahead import held_at_floor, look_ahead
 from identify.ranking import Progress, less, rank, tie
@@ -113,8 +114,8 @@ def diagnose_axis(
     workers: threads; one a core where None. shifts: how often the force channel may still be moved
     and all begun anew, where an effect that was found shows when the force acted.
     """
-    ranked = partial(rank, study=study, catalogue=catalogue, progress=progress, workers=workers)
-    base, ranking = ranked(base)
+    ranked = partial(rank, catalogue=catalogue, progress=progress, workers=workers)
+    base, ranking = ranked(base, study)
     steps: list[Step] = []
     final, found = base, ranking
     while len(steps) < MOST_STEPS and (more := _next(final, study, found, ranked)):
@@ -126,7 +127,8 @@ def diagnose_axis(
         if shifts and (moved := moved_by(final, study)):
             again = fit_axis(base.axis, moved.fit)
             return diagnose_axis(again, moved, catalogue, progress, workers, shifts - 1)
-        final, found = ranked(final)
+        study, final = synchronised(final, study)
+        final, found = ranked(final, study)
     return _decided(base, study, ranking, tuple(steps), final)
 
 
@@ -134,7 +136,7 @@ def _next(
     base: Fit,
     study: Study,
     ranking: Sequence[Candidate],
-    ranked: Callable[[Fit], tuple[Fit, tuple[Candidate, ...]]],
+    ranked: Callable[[Fit, Study], tuple[Fit, tuple[Candidate, ...]]],
 ) -> list[Step]:
     """What is to be added: the best effect, two that need each other, or nothing."""
     if ranking and _asked_for(ranking[0], base):

@@ -41,7 +41,7 @@ def look_ahead(
     base: Fit,
     study: Study,
     ranking: Sequence[Candidate],
-    ranked: Callable[[Fit], tuple[Fit, tuple[Candidate, ...]]],
+    ranked: Callable[[Fit, Study], tuple[Fit, tuple[Candidate, ...]]],
 ) -> list[Pair]:
     """Pairs that bring the error to the noise floor, best first.
 
@@ -52,7 +52,7 @@ def look_ahead(
     for first in sorted(ranking, key=lambda c: -c.evidence.log_gain)[:FIRSTS]:
         if 1.0 - (first.fit.error / base.error) ** 2 < LEAST_PART:
             break
-        beside, seconds = ranked(first.fit)
+        beside, seconds = ranked(first.fit, study)
         if not (seconds and seconds[0].supported):
             continue
         pair = _pair(base, study, replace(first, fit=beside), seconds[0])

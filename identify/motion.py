@@ -37,7 +37,8 @@ class Motion:
     name: of the log. signals (3, n): position m, velocity m/s, command N. others (3, n): position,
     velocity, acceleration of the other axis (zero where there is none). period: s, of a block.
     start: s, middle of the first block. sample_period: s, of the log. position_noise: m rms.
-    raw (2, n * samples a block): velocity m/s and command N at the log's own rate.
+    raw (2, n * samples a block): velocity m/s and command N at the log's own rate. clock: s, when
+    the log began, by the phase of what repeats in time.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Motion:
     sample_period: float
     position_noise: float
     raw: Array
+    clock: float = 0.0
 
     def head(self, duration: float) -> Motion:
         """Its first ``duration`` seconds."""

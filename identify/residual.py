@@ -61,6 +61,7 @@ def total_force(table: Table, motion: Motion) -> Array:
     walk(
         table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
         motion.signals, motion.others, motion.period, 0, rows, table.masses[0],
+        motion.clock,
     )  # fmt: skip
     return np.asarray(rows.sum(axis=0))
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from identify.alignment import fit_aligned
 from identify.candidates import Candidate, score, try_effect
+from identify.clocks import with_clocks
 from identify.compare import AxisComparison, compare_axis, position_errors
 from identify.describe import describe, in_words, physics_alone
 from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
@@ -134,7 +135,7 @@ def compare(
     model: StageModel, logs: Logs, *, window: float | None = None, progress: Progress = silent
 ) -> Comparison:
     """Error numbers of a model as it stands, and where it fails. Raises InputError."""
-    found = studies(model, logs, {}, window)
+    found = {a: with_clocks(model.axes[a], s) for a, s in studies(model, logs, {}, window).items()}
     errors = position_errors(_only(model, found), logs, partial(progress, "comparing"))
     axes = {a: compare_axis(model, study, logs, errors[a]) for a, study in found.items()}
     return Comparison(model, axes)

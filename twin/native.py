@@ -108,12 +108,27 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def walk(entries, first, last, parameters, states, at, motion, others, dt, begin, rows, mass=1.0):
+def walk(
+    entries,
+    first,
+    last,
+    parameters,
+    states,
+    at,
+    motion,
+    others,
+    dt,
+    begin,
+    rows,
+    mass=1.0,
+    clock=0.0,
+):
     """Forces along a measured motion: the laws stepped over every sample from ``begin`` on.
 
     motion (3, n): position m, velocity m/s, command N; others (3, n): position, velocity,
-    acceleration of the other axis; mass: moved mass, kg. Friction slides wherever v != 0, by an
-    infinite mass: what holds a measured axis at rest cannot be told. rows (n_entries, n): N.
+    acceleration of the other axis; mass: moved mass, kg; clock: s, when sample 0 was. Friction
+    slides wherever v != 0, by an infinite mass: what holds a measured axis at rest cannot be told.
+    rows (n_entries, n): N.
     """
     entries, parameters, states = borrow((entries, parameters, states))
     io = np.zeros(IO_SIZE)
@@ -128,7 +143,7 @@ def walk(entries, first, last, parameters, states, at, motion, others, dt, begin
     p, s = parameters.ctypes.data, states.ctypes.data
     for k in range(motion.shape[1]):
         io[INDEX] = begin + k
-        io[TIME] = (begin + k) * dt
+        io[TIME] = clock + (begin + k) * dt
         io[X] = motion[0, k]
         io[V] = motion[1, k]
         io[U] = motion[2, k]
