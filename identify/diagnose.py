@@ -52,6 +52,14 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
+class Stage:
+    """All steps up to some moment, and the fit that they led to."""
+
+    steps: tuple[Step, ...]
+    fit: Fit
+
+
+@dataclass(frozen=True, eq=False)
 class AxisDiagnosis:
     """Diagnosis of one axis.
 
@@ -117,11 +125,13 @@ def diagnose_axis(
     ranked = partial(rank, catalogue=catalogue, progress=progress, workers=workers)
     base, ranking = ranked(base, study)
     steps: list[Step] = []
+    stages = [Stage((), base)]
     final, found = base, ranking
     while len(steps) < MOST_STEPS and (more := _next(final, study, found, ranked)):
         earlier = [s.candidate for s in _kept(steps)]
         final, dropped = _looked_back(base, more[-1].candidate.fit, study, earlier)
         steps += [*more[:-1], replace(more[-1], dropped=dropped)]
+        stages.append(Stage(tuple(steps), final))
         if final.at_floor and FLOOR_SURE[0] < final.ratio < FLOOR_SURE[1]:
             break
         if shifts and (moved := moved_by(final, study)):
@@ -129,7 +139,8 @@ def diagnose_axis(
             return diagnose_axis(again, moved, catalogue, progress, workers, shifts - 1)
         study, final = synchronised(final, study)
         final, found = ranked(final, study)
-    return _decided(base, study, ranking, tuple(steps), final)
+        stages[-1] = replace(stages[-1], fit=final)
+    return _decided(study, ranking, stages)
 
 
 def _next(
@@ -180,27 +191,38 @@ def _looked_back(
 
 
 def _decided(
-    base: Fit, study: Study, ranking: tuple[Candidate, ...], steps: tuple[Step, ...], final: Fit
+    study: Study, ranking: tuple[Candidate, ...], stages: Sequence[Stage]
 ) -> AxisDiagnosis:
-    """The verdict on what was added.
-
-    A name is given where the effects bring the error to the floor, explain nearly all above it, or
-    leave nothing of what the residual depended on most. What stands in for another effect leaves
-    that dependence behind.
-    """
-    structure = None
-    if final.at_floor or (steps and held_at_floor(final, study)):
-        tied = bool(steps) and _kept(steps)[0].tied
-        verdict = Verdict.AMBIGUOUS if tied else Verdict.MISSING_EFFECT
-        if not steps:
-            verdict = Verdict.NOTHING_MISSING
-    elif steps and (_part(base, final) > NEARLY_ALL or _gone(base, final, steps, study)):
+    """The verdict on what was added, as far as each stage explained what was left before it."""
+    base = stages[0].fit
+    told = list(stages)
+    while len(told) > 1 and not _convincing(told[-2], told[-1], study):
+        told.pop()
+    steps, final = told[-1].steps, told[-1].fit
+    if len(told) > 1 and _convincing(stages[0], told[-1], study):
         verdict = Verdict.AMBIGUOUS if _kept(steps)[0].tied else Verdict.MISSING_EFFECT
-        structure = find_structure(final, study)
+        done = final.at_floor or held_at_floor(final, study)
+        structure = None if done else find_structure(final, study)
+    elif len(stages) == 1 and base.at_floor:
+        verdict, structure = Verdict.NOTHING_MISSING, None
     else:
-        verdict = Verdict.UNEXPLAINED
-        structure = find_structure(base, study)
+        steps, final = stages[-1].steps, stages[-1].fit
+        verdict, structure = Verdict.UNEXPLAINED, find_structure(base, study)
     return AxisDiagnosis(study, base, ranking, steps, final, verdict, structure)
+
+
+def _convincing(before: Stage, after: Stage, study: Study) -> bool:
+    """Whether effects bring the error to the floor, or explain nearly all or the foremost of it.
+
+    What stands in for another effect leaves behind what the residual depended on most.
+    """
+    added = after.steps[len(before.steps) :]
+    return (
+        after.fit.at_floor
+        or held_at_floor(after.fit, study)
+        or _part(before.fit, after.fit) > NEARLY_ALL
+        or _gone(before.fit, after.fit, added, study)
+    )
 
 
 def _part(base: Fit, final: Fit) -> float:
