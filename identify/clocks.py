@@ -82,10 +82,10 @@ def phases_found(axis: AxisModel, effect: str, study: Study) -> int:
 
 
 def without_clock(axis: AxisModel, log: Windowed) -> AxisModel:
-    """The axis less the forces that read the clock."""
+    """The axis less the physical forces that read the clock."""
     later = _set(log, log.motion.clock + LATER)
     for fitted in axis.effects:
-        if fitted.effect.kind is Kind.FORCE:
+        if fitted.effect.kind is Kind.FORCE and not fitted.effect.is_description:
             alone = replace(axis, effects=(fitted,))
             now, then = (windowed_force(alone, [w]) for w in (log, later))
             axis = axis if np.array_equal(now, then) else axis.without(fitted.effect.name)
