@@ -22,9 +22,9 @@ from identify.evidence import (
     left_out,
     noise_gain,
 )
-from identify.fit import AT_FLOOR, Fit, Outcome, error_on, finished, fit_axis, rms, sticks
+from identify.fit import AT_FLOOR, Fit, Outcome, error_on, finished, fit_axis, rms
 from identify.noise import noise_floor
-from identify.residual import moving, residual
+from identify.residual import moving, residual, sticks
 from identify.search import Start, fit_thoroughly, starts, stepped
 from identify.study import Study
 from twin.effect import Effect, Kind

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from identify.evidence import LEAST_BIC, effective_samples
 from identify.fit import Fit
 from identify.lines import lines_of
-from identify.residual import Windowed, moving, residual, windowed_force
+from identify.residual import Windowed, moving, residual, sticks, windowed_force
 from identify.study import Study
 from twin.effect import Kind
 from twin.model import AxisModel
@@ -98,8 +98,7 @@ def _set(log: Windowed, clock: float) -> Windowed:
 
 def _left(axis: AxisModel, log: Windowed) -> Array:
     """Residual (n,) N of one log, zero where the axis may stick."""
-    sticks = any(f.effect.sticks for f in axis.effects)
-    return np.asarray(residual(axis, [log]) * moving([log], sticks))
+    return np.asarray(residual(axis, [log]) * moving([log], sticks(axis)))
 
 
 def _own_line(axis: AxisModel, rest: AxisModel, log: Windowed) -> tuple[float, float] | None:

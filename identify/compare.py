@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.fit import rms, sticks
+from identify.fit import rms
 from identify.freerun import free_run, rms_error
 from identify.noise import noise_floor
-from identify.residual import Windowed, moving, residual
+from identify.residual import Windowed, moving, residual, sticks
 from identify.spectrum import bands
 from identify.structure import UNITS, gathered
 from identify.study import Study

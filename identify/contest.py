@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.evidence import effective_samples, evidence
-from identify.fit import fit_axis, rms, sticks
+from identify.fit import fit_axis, rms
 from identify.motion import Motion, motion_of
-from identify.residual import Windowed, jacobian, moving, residual
+from identify.residual import Windowed, jacobian, moving, residual, sticks
 from identify.study import choose_window
 from identify.subspace import orthonormal, unabsorbed
 from identify.weak import LEAST_BLOCKS

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from identify.candidates import Candidate
 from identify.evidence import BLOCKS, Evidence, effective_samples, held_out_gain
-from identify.fit import Fit, fit_axis, sticks
+from identify.fit import Fit, fit_axis
 from identify.motion import excitation
-from identify.residual import jacobian, moving, residual
+from identify.residual import jacobian, moving, residual, sticks
 from identify.search import fit_without
 from identify.smoothing import part_rows, smoothing
 from identify.study import Study

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from identify.evidence import effective_samples
 from identify.levenberg_marquardt import minimise
 from identify.noise import noise_floor
-from identify.residual import Windowed, jacobian, moving, residual
+from identify.residual import Windowed, jacobian, moving, residual, sticks
 from identify.scaling import Scaling
 from identify.smoothing import described, smoothing
 from twin.effect import Kind
@@ -82,11 +82,6 @@ class Fit:
     def ratio(self) -> float:
         """Error over noise floor."""
         return self.error / self.floor
-
-
-def sticks(axis: AxisModel) -> bool:
-    """Whether the axis' friction is a static one, whose force at rest can be anything."""
-    return any(f.effect.sticks for f in axis.effects)
 
 
 def _is_added(axis: AxisModel, c: Coordinate) -> bool:

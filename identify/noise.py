@@ -19,13 +19,14 @@ from scipy.signal.windows import hann
 
 from identify.actuation import actual_force, is_noise
 from identify.motion import Motion
-from identify.residual import on_blocks, total_force
+from identify.residual import REST_SPEED, on_blocks, sticks, total_force
 from identify.weak import Window
 from twin.model import AxisModel
 
 Array = NDArray[np.float64]
 
 SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
+LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
 ROUNDS = 12
 TOLERATED = 0.5  # logarithm of the power over the fit from which a frequency weighs half
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
@@ -78,7 +79,7 @@ def noise_spectrum(axis: AxisModel, motion: Motion) -> tuple[Array, Array, int]:
     raw += _between_samples(total_force(on_blocks(axis), motion), motion)
     # The median over segments passes by those with spikes and reversals.
     segment = min(max(round(SEGMENT / dt), 256), len(raw))
-    frequency, power = _median_spectrum(raw, segment, dt)
+    frequency, power = _median_spectrum(raw, segment, dt, _at_rest(axis, motion))
     half = np.cos(np.pi * frequency * dt) ** 2
     bend = _bend(axis, motion, frequency)
     band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < BAND[2] / dt)
@@ -92,14 +93,30 @@ def _between_samples(force: Array, motion: Motion) -> Array:
     return np.asarray(np.interp(samples, motion.time, force))
 
 
-def _median_spectrum(signal: Array, segment: int, dt: float) -> tuple[Array, Array]:
+def _at_rest(axis: AxisModel, motion: Motion) -> NDArray[np.bool_]:
+    """Where the axis may stick, (n,) over the log's inner samples.
+
+    Static friction then takes up the command and its noise, however large.
+    """
+    speed = np.abs(motion.velocity)
+    still = speed < REST_SPEED * speed.max()
+    samples = motion.raw.shape[1] // len(still)
+    return np.asarray(np.repeat(still & sticks(axis), samples)[1:])
+
+
+def _median_spectrum(
+    signal: Array, segment: int, dt: float, left_out: NDArray[np.bool_]
+) -> tuple[Array, Array]:
     """Welch's one-sided density with medians: frequency Hz, power unit^2/Hz, (segment // 2 + 1,).
 
+    Of the segments with the least of what is left out, at least a quarter.
     As scipy.signal.welch with average="median" and linear detrending, whose segment by segment
     detrending took a third of a fit. P. D. Welch (1967); bias of the median: B. Allen et al.,
     Phys. Rev. D 85, 122006 (2012).
     """
-    pieces = sliding_window_view(signal, segment)[:: max(segment - segment // 2, 1)]
+    step = max(segment - segment // 2, 1)
+    out = sliding_window_view(left_out, segment)[::step].mean(axis=1)
+    pieces = sliding_window_view(signal, segment)[::step][out <= np.quantile(out, LEAST_KEPT)]
     ramp = np.linspace(-1.0, 1.0, segment)
     slope = (pieces @ ramp) / (ramp @ ramp)
     level = pieces.mean(axis=1, keepdims=True) + slope[:, None] * ramp

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from identify.candidates import Candidate, absent_effects, levelled, score, try_effect
 from identify.evidence import held_out_gain
-from identify.fit import Fit, fit_axis, sticks
-from identify.residual import moving, residual
+from identify.fit import Fit, fit_axis
+from identify.residual import moving, residual, sticks
 from identify.study import Study
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue

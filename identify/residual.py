@@ -149,6 +149,11 @@ def difference_step(c: Coordinate, value: float) -> float:
     return size if value + size <= p.upper else -size
 
 
+def sticks(axis: AxisModel) -> bool:
+    """Whether the axis' friction is a static one, whose force at rest can be anything."""
+    return any(f.effect.sticks for f in axis.effects)
+
+
 def moving(logs: Sequence[Windowed], sticks: bool) -> NDArray[np.bool_]:
     """Which windows carry information: for a friction that sticks, those without standstill."""
     masks = []

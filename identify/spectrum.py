@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from identify.fit import sticks
 from identify.noise import noise_spectrum
-from identify.residual import Windowed, moving, residual
+from identify.residual import Windowed, moving, residual, sticks
 from twin.model import AxisModel
 
 Array = NDArray[np.float64]
