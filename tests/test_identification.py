@@ -149,3 +149,14 @@ def test_levenberg_marquardt_solves_rosenbrock_within_bounds():
     np.testing.assert_allclose(held.x, [0.5, 0.25], rtol=1e-5)
     assert free.converged
     assert held.converged
+
+
+def test_the_noise_floor_passes_by_rest_where_the_friction_sticks():
+    """Held by static friction, the loop's own noise moves nothing and would pass for more noise."""
+    friction = Fitted.at_start(
+        CATALOGUE["coulomb_viscous"], {"Fc": 30.0, "Fs": 30.0, "sigma2": 1.0}
+    )
+    axis = AXIS.with_effect(friction)
+    logs = {"log": simulate(STAGE.with_axis("x", axis), "moves", seed=3, duration=10.0)}
+    found = fit_axis(axis, studies(STAGE, logs, {})["x"].fit)
+    assert 0.85 < found.ratio < 1.15
