@@ -19,6 +19,7 @@ from identify.study import Study
 from twin.effects import Catalogue
 
 MOST_SHIFTS = 2  # of the force channel, after which a diagnosis begins anew
+NEAR = 0.8  # part of the best's gain in log likelihood that makes a rival
 MOST_STEPS = 5  # effects added to one axis at most
 NEARLY_ALL = 0.95  # part of the squared error above the floor that speaks for itself
 FLOOR_SURE = (0.85, 1.15)  # error over noise floor where both agree, and nothing more is sought
@@ -43,12 +44,14 @@ class Step:
     """One effect that was added in turn, and the earlier ones it made needless.
 
     tied: effects that explain as well. beside: the effect without which it has no evidence.
+    rivals: candidates that explained about as much when it was added.
     """
 
     candidate: Candidate
     tied: tuple[str, ...]
     dropped: tuple[str, ...] = ()
     beside: str | None = None
+    rivals: tuple[Candidate, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,8 +155,9 @@ def _next(
     """What is to be added: the best effect, two that need each other, or nothing."""
     if ranking and _asked_for(ranking[0], base):
         best = ranking[0]
-        tied = (c.effect.name for c in ranking[1:] if c.supported and tie(study, best, c))
-        return [Step(best, tuple(tied))]
+        near = tuple(c for c in ranking[1:] if c.supported and _near(best, c))
+        tied = tuple(c.effect.name for c in near if tie(study, best, c))
+        return [Step(best, tied, rivals=near)]
     if base.at_floor or held_at_floor(base, study):
         return []
     pairs = look_ahead(base, study, ranking, ranked)
@@ -177,6 +181,35 @@ def _asked_for(best: Candidate, base: Fit) -> bool:
     return best.supported and (not base.at_floor or best.delta_bic > BEYOND_DOUBT)
 
 
+def _near(best: Candidate, other: Candidate) -> bool:
+    """Whether a candidate explains about as much as the best."""
+    return other.evidence.log_gain > NEAR * best.evidence.log_gain and not other.is_noise
+
+
+def _compared_again(stages: Sequence[Stage], study: Study) -> tuple[Step, ...]:
+    """The steps with those tied that explain as well beside all the effects that were added.
+
+    When a first effect was compared, what the others explain was still in the way.
+    """
+    base, (steps, final) = stages[0].fit, (stages[-1].steps, stages[-1].fit)
+    kept = _kept(steps)
+    if len(kept) < 2:
+        return steps
+    named = {s.candidate.effect.name for s in kept}
+
+    def level(step: Step, rival: Candidate) -> bool:
+        axis = final.axis.without(step.candidate.effect.name)
+        fit = fit_axis(axis.with_effect(rival.fit.axis[rival.effect.name]), study.fit)
+        own = score(base, final, study, step.candidate.effect)
+        return tie(study, own, score(base, fit, study, rival.effect))
+
+    def told(step: Step) -> Step:
+        rivals = [r for r in step.rivals if r.effect.name not in named]
+        return replace(step, tied=tuple(r.effect.name for r in rivals if level(step, r)))
+
+    return tuple(told(s) if s in kept and s.beside is None else s for s in steps)
+
+
 def _looked_back(
     base: Fit, fit: Fit, study: Study, earlier: Sequence[Candidate]
 ) -> tuple[Fit, tuple[str, ...]]:
@@ -198,7 +231,7 @@ def _decided(
     told = list(stages)
     while len(told) > 1 and not _convincing(told[-2], told[-1], study):
         told.pop()
-    steps, final = told[-1].steps, told[-1].fit
+    steps, final = _compared_again(told, study), told[-1].fit
     if len(told) > 1 and _convincing(stages[0], told[-1], study):
         verdict = Verdict.AMBIGUOUS if _kept(steps)[0].tied else Verdict.MISSING_EFFECT
         done = final.at_floor or held_at_floor(final, study)
