@@ -65,7 +65,7 @@ def draw_effect(
     kept = beside.kept if beside else np.ones(len(base), dtype=bool)
 
     def added(fitted: Fitted) -> Array:
-        force = _force(fitted, axis, logs, base)[kept]
+        force = added_force(fitted, axis, logs, base)[kept]
         return unabsorbed(force, basis)
 
     return strength_for(effect, added, force, values, rng)
@@ -140,10 +140,10 @@ def hidden_part(fitted: Fitted, base: Fit, study: Study) -> float:
 
 
 def _beside(fitted: Fitted, base: Fit, study: Study) -> Array:
-    return _force(fitted, base.axis, study.fit, residual(base.axis, study.fit))[base.kept]
+    return added_force(fitted, base.axis, study.fit, residual(base.axis, study.fit))[base.kept]
 
 
-def _force(fitted: Fitted, axis: AxisModel, logs: Sequence[Windowed], without: Array) -> Array:
+def added_force(fitted: Fitted, axis: AxisModel, logs: Sequence[Windowed], without: Array) -> Array:
     """What the effect adds (n,) N to the residual of an axis, or pretends in its readings."""
     if not is_noise(fitted.effect):
         return residual(axis.with_effect(fitted), logs) - without

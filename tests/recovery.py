@@ -10,7 +10,7 @@ from effect_runs import CATALOGUE
 
 from identify.candidates import Candidate, try_effect
 from identify.fit import Fit, fit_axis, rms
-from identify.planting import draw_effect
+from identify.planting import added_force, draw_effect
 from identify.residual import residual
 from identify.study import Study, studies
 from identify.uncertainty import Estimate, estimates
@@ -109,7 +109,7 @@ def planted(effect: Effect, axis: AxisModel, study: Study, seed: int) -> Fitted 
         axis = bare(axis)
     for _ in range(DRAWS):
         drawn = draw_effect(effect, axis, study.fit, study.excitation, size, rng)
-        acts = residual(axis.with_effect(drawn), study.fit) - residual(axis, study.fit)
+        acts = added_force(drawn, axis, study.fit, residual(axis, study.fit))
         if rms(acts) > 0.5 * size:
             return drawn
     return None

@@ -90,6 +90,7 @@ def test_a_phase_counts_as_a_parameter(study):
 WITH_PUMP = replace(STAGE, axes={"x": STAGE.axes["x"].with_effect(PUMP)})
 
 
+@pytest.mark.slow
 def test_a_model_with_the_pump_meets_each_log_at_its_phase(logs):
     assert fit(WITH_PUMP, {str(i): log for i, log in enumerate(logs)}).fits["x"].ratio < 1.2
     alone = fit(WITH_PUMP, {"b": logs[1]})

@@ -35,6 +35,7 @@ def test_both_are_named(case):
     assert found.final.ratio < 1.2 < 3.0 < found.base.ratio
 
 
+@pytest.mark.slow
 def test_without_a_look_ahead_neither_is(case, monkeypatch):
     monkeypatch.setattr(sys.modules[diagnose_axis.__module__], "look_ahead", lambda *_: [])
     assert diagnose_axis(*case, FEW).verdict is Verdict.UNEXPLAINED
