@@ -14,6 +14,7 @@ from identify.fit import Fit, fit_axis
 from identify.lookahead import held_at_floor, look_ahead
 from identify.ranking import Progress, less, rank, tie
 from identify.repeats import Repeat, not_general
+from identify.search import fit_thoroughly
 from identify.structure import Structure, explains, find_structure
 from identify.study import Study
 from twin.effects import Catalogue
@@ -217,6 +218,9 @@ def _looked_back(
     dropped = []
     for candidate in earlier:
         without = less(candidate.effect, fit, base, study)
+        if score(without, fit, study, candidate.effect).supported:
+            # The later effects' shapes were found beside it, and may have to be found anew.
+            without = fit_thoroughly(without.axis, study)
         if not score(without, fit, study, candidate.effect).supported:
             fit = without
             dropped.append(candidate.effect.name)

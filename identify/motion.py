@@ -111,13 +111,18 @@ class Motion:
         return signals
 
     @cached_property
+    def resolution(self) -> float:
+        """Step between the readings, m; 0 where none shows."""
+        return resolution(self)
+
+    @cached_property
     def rounding(self) -> Array:
         """What rounding to the readings' step made of the position, (n + 1,) m, about.
 
         Where a reading changes, the position was half way; between such times it goes straight.
         """
         readings = np.concatenate([[0.0], np.cumsum(self.raw[0] * self.sample_period)])
-        step = resolution(self)
+        step = self.resolution
         if step == 0.0:
             return np.zeros(len(readings))
         at = np.flatnonzero(np.abs(np.diff(readings)) > 0.5 * step)
@@ -213,7 +218,7 @@ def excitation(motions: list[Motion], travel: tuple[float, float] | None) -> Exc
         force_max=float(np.abs(command).max()),
         lines=lines(motions),
         ripples=ripples(motions),
-        resolution=max(resolution(m) for m in motions),
+        resolution=max(m.resolution for m in motions),
     )
 
 

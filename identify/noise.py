@@ -8,6 +8,7 @@ are fitted to its spectrum above the band of the effects, and give what passes t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -32,19 +33,47 @@ TOLERATED = 0.5  # logarithm of the power over the fit from which a frequency we
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 
 
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Measurement noise of one log, before any window.
+
+    frequency (k,): Hz. force: N^2/Hz, one-sided and white. reading: m^2/Hz, one-sided and white.
+    bend (k,): power gain from a reading to the force that it pretends, N^2/m^2. segment: samples
+    that the frequencies belong to.
+    """
+
+    frequency: Array
+    force: float
+    reading: float
+    bend: Array
+    segment: int
+
+    @property
+    def power(self) -> Array:
+        """What is left in a force residual, (k,) N^2/Hz."""
+        return np.asarray(self.force + self.reading * self.bend)
+
+
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, Window]]) -> float:
     """RMS in N of what measurement noise leaves in the windowed residual of these logs."""
-    parts = [_variance(axis, motion, window) for motion, window in logs]
+    noises = [noise_of(axis, motion) for motion, _ in logs]
+    # The rounding of a coarse encoder at constant speed is a tone, which can pass for force noise;
+    # that is the drive's, and alike in all logs.
+    least = min(noise.force for noise in noises)
+    parts = []
+    for (motion, window), noise in zip(logs, noises, strict=True):
+        own = replace(noise, force=least) if motion.resolution else noise
+        parts.append(_variance(axis, motion, window, own))
     weights = [motion.signals.shape[1] for motion, _ in logs]
     return float(np.sqrt(np.average(parts, weights=weights)))
 
 
-def _variance(axis: AxisModel, motion: Motion, window: Window) -> float:
-    frequency, passed, segment = noise_spectrum(axis, motion)
+def _variance(axis: AxisModel, motion: Motion, window: Window, noise: Noise) -> float:
+    passed = noise.power
     if any(is_noise(f.effect) for f in axis.effects):
-        passed = passed + _rounding(axis, motion, segment)
-    response = window.response(motion.sample_period, segment)
-    return float(np.trapezoid(passed * response, frequency))
+        passed = passed + _rounding(axis, motion, noise.segment)
+    response = window.response(motion.sample_period, noise.segment)
+    return float(np.trapezoid(passed * response, noise.frequency))
 
 
 def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
@@ -64,11 +93,8 @@ def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
     return ((2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * dt)) * axis.mass / dt**2) ** 2
 
 
-def noise_spectrum(axis: AxisModel, motion: Motion) -> tuple[Array, Array, int]:
-    """What measurement noise leaves in a force residual: frequencies (k,) Hz, power (k,) N^2/Hz.
-
-    One-sided, before any window; and the samples that the frequencies belong to.
-    """
+def noise_of(axis: AxisModel, motion: Motion) -> Noise:
+    """The measurement noise of one log, from its raw residual."""
     dt = motion.sample_period
     velocity = motion.raw[0]
     # The loop's own noise is in the command and moves the axis; a delay left out would tear the two
@@ -84,7 +110,7 @@ def noise_spectrum(axis: AxisModel, motion: Motion) -> tuple[Array, Array, int]:
     bend = _bend(axis, motion, frequency)
     band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < BAND[2] / dt)
     levels = _fit_levels(np.stack([half, bend], axis=1)[band], power[band])
-    return frequency, levels[0] + levels[1] * bend, segment
+    return Noise(frequency, float(levels[0]), float(levels[1]), bend, segment)
 
 
 def _between_samples(force: Array, motion: Motion) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.candidates import Candidate, absent_effects, levelled, score, try_effect
-from identify.evidence import held_out_gain
+from identify.evidence import evidence, held_out_gain
 from identify.fit import Fit, fit_axis
 from identify.residual import moving, residual, sticks
 from identify.study import Study
@@ -100,4 +100,7 @@ def tie(study: Study, best: Candidate, other: Candidate) -> bool:
     either = sticks(best.fit.axis) or sticks(other.fit.axis)
     kept = moving(logs, either)
     pair = [residual(c.fit.axis, logs)[kept] for c in (other, best)]
-    return abs(held_out_gain(pair[0], pair[1], best.fit.floor).t) < TIE
+    if abs(held_out_gain(pair[0], pair[1], best.fit.floor).t) < TIE:
+        return True
+    # What is significant may still be next to nothing: two delays differ by a part in a thousand.
+    return abs(evidence(pair[0], pair[1], 0).delta_bic) < NO_EVIDENCE

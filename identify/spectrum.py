@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from identify.noise import noise_spectrum
+from identify.noise import noise_of
 from identify.residual import Windowed, moving, residual, sticks
 from twin.model import AxisModel
 
@@ -69,10 +69,10 @@ def _spectrum(axis: AxisModel, log: Windowed) -> tuple[Array, Array, Array, Arra
     ratio = round(period / motion.sample_period)
     passed = short.window.response(motion.sample_period, segment * ratio)[: len(frequency)]
     seen = (passed > SEEN) & (frequency > 0.0)
-    at, noise, _ = noise_spectrum(axis, motion)
+    noise = noise_of(axis, motion)
     frequency = frequency[seen]
     error, explain = power[:, seen] / passed[seen]
-    return frequency, error, np.interp(frequency, at, noise), explain
+    return frequency, error, np.interp(frequency, noise.frequency, noise.power), explain
 
 
 def _edges(frequency: Array) -> Array:

@@ -74,6 +74,12 @@ def test_the_constant_force_is_said_to_have_collapsed(added):
     assert abs(added.model.axes["x"]["constant_force"].values["F0"]) < 0.4
 
 
+def test_it_adds_nothing_more(found):
+    assert found.leading.named == ("asymmetric_friction",)
+    assert found.leading.unexplained is not None
+
+
+@pytest.mark.slow
 def test_then_it_stops_adding(added, emps):
     again = diagnose(added.model, *emps, catalogue=CATALOGUE, window=WINDOW)
     assert again.effect is None

@@ -9,6 +9,7 @@ from machines import one_axis
 from identify.diagnose import Verdict, diagnose_axis
 from identify.fit import finished, fit_axis
 from identify.motion import Motion, resolution
+from identify.noise import noise_floor, noise_of
 from identify.residual import Windowed
 from identify.study import Study, studies
 from twin.effects import Catalogue, load_catalogue
@@ -87,6 +88,22 @@ def test_a_floor_with_the_resolution_is_the_error_it_makes(coarse):
     assert told.error == pytest.approx(base.error)  # what is read once cannot be read finer
     assert base.ratio > 1.4
     assert 0.8 < told.ratio < 1.2
+
+
+@pytest.mark.parametrize("step", [STEP, 0.0], ids=["coarse", "fine"])
+def test_a_tone_of_rounding_in_one_log_is_not_force_noise(step, monkeypatch):
+    """The force noise of a drive with a coarse encoder is that of its quietest log."""
+    logs = [(log.motion, log.window) for log in study_of(step).fit]
+    axis = STAGE.axes["x"]
+    before = noise_floor(axis, logs)
+
+    def with_a_tone(axis, motion):
+        own = noise_of(axis, motion)
+        return replace(own, force=own.force + 1e-5) if motion is logs[1][0] else own
+
+    monkeypatch.setattr("identify.noise.noise_of", with_a_tone)
+    raised = noise_floor(axis, logs) / before
+    assert raised < 1.01 if step else raised > 1.5
 
 
 FEW = Catalogue(

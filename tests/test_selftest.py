@@ -31,6 +31,12 @@ SLOW = pytest.mark.slow
         Case(("cogging",), 5.0, 1),
         Case(("thermal_drift",), 2.0, 2),
         Case(("asymmetric_friction", "axis_coupling"), 5.0, 3),
+        # Delays that tie but for the last digits; a play whose basin is narrow; end stops that a
+        # cogging stands in for until the rest is known; rounding that is a tone at constant speed.
+        Case(("actuator_lag", "asymmetric_friction"), 5.0, 34),
+        Case(("axis_coupling", "backlash"), 5.0, 10),
+        Case(("asymmetric_friction", "end_stop"), 5.0, 44),
+        Case(("encoder_quantization", "end_stop"), 5.0, 42),
     ],
     ids=lambda c: "+".join(c.effects),
 )

@@ -1,0 +1,34 @@
+"""Two explanations are a tie unless the evidence, or a held-out gain worth having, parts them."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from identify import ranking
+from identify.evidence import Evidence
+
+
+def candidate(scale: float, gain: float):
+    """A candidate with this log gain, whose held-out residual is a noise times ``scale``."""
+    fit = SimpleNamespace(axis=scale, floor=1e-3)
+    return SimpleNamespace(is_noise=False, fit=fit, evidence=Evidence(gain, 1, 1000.0))
+
+
+@pytest.mark.parametrize(
+    ("scale", "gain", "tied"),
+    [
+        (1.0002, 1.0, True),  # lower in every block, and next to nothing
+        (1.2, 1.0, False),
+        (1.0, 0.98, False),
+        (1.0, 0.995, True),
+    ],
+    ids=["a trace held out", "much held out", "evidence", "little evidence"],
+)
+def test_tie(scale, gain, tied, monkeypatch):
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(3000)
+    monkeypatch.setattr(ranking, "residual", lambda axis, logs: axis * noise)
+    monkeypatch.setattr(ranking, "moving", lambda logs, either: slice(None))
+    monkeypatch.setattr(ranking, "sticks", lambda axis: False)
+    study = SimpleNamespace(holdout=("held out",), fit=())
+    assert ranking.tie(study, candidate(1.0, 1.0), candidate(scale, gain)) is tied
