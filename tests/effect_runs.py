@@ -111,7 +111,7 @@ def moderate(effect: Effect, rng: np.random.Generator, wanted: float = 0.3) -> d
     low, high = -15.0, 0.0  # decades of the factor on the strengths
     if action(effect, values(1.0)) < wanted:
         return values(1.0)
-    for _ in range(30):
+    for _ in range(12):  # to a hundredth
         middle = 0.5 * (low + high)
         if action(effect, values(10.0**middle)) < wanted:
             low = middle

@@ -48,6 +48,18 @@ def test_stribeck_slides_down_its_curve_and_sticks_again() -> None:
     assert np.ptp(x[stopped:]) < 1e-15
 
 
+def test_stribeck_is_the_curve_of_modelicas_friction_example() -> None:
+    """Modelica Standard Library, MassWithStopAndFriction, with the values of Examples.Friction.
+
+    F_prop v + F_Coulomb + F_Stribeck exp(-fexp v) with 1 N s/m, 5 N, 10 N and 2 s/m.
+    """
+    fitted = friction("stribeck", Fc=5.0, Fs=15.0, v0=0.5, sigma2=1.0, n=1.0)
+    v = np.array([1e-6, 0.1, 0.5, 1.0, 3.0])
+    expected = 1.0 * v + 5.0 + 10.0 * np.exp(-2.0 * v)
+    np.testing.assert_allclose(along(fitted, v, 1e-4), expected, rtol=1e-12)
+    np.testing.assert_allclose(along(fitted, -v, 1e-4), -expected, rtol=1e-12)
+
+
 @pytest.mark.parametrize("name", STATIC)
 def test_friction_stops_the_mass_with_all_it_has(name: str) -> None:
     """Level and viscosity together: what stops the axis within the sample is exactly what acts."""

@@ -53,10 +53,17 @@ def test_nothing_planted_nothing_named(seed):
     assert found.covered
 
 
-def test_an_effect_taken_out_of_the_catalogue_is_unexplained_by_its_coordinate():
-    found = run(Case(("quadratic_drag",), 5.0, 1, known=False))
+@pytest.mark.parametrize(
+    ("effect", "seed", "coordinate"),
+    [
+        ("cogging", 1002, "position"),
+        pytest.param("quadratic_drag", 1, "velocity", marks=SLOW),
+    ],
+)
+def test_an_effect_taken_out_of_the_catalogue_is_unexplained(effect, seed, coordinate):
+    found = run(Case((effect,), 5.0, seed, known=False))
     assert found.verdict == "UNEXPLAINED"
-    assert found.depends_on == "velocity"
+    assert found.depends_on == coordinate
     assert found.honest
 
 

@@ -1,11 +1,12 @@
 """Hysteresis of the cable slab: layers that stick to each other and slip one after another.
 
 F = -sum_{i=1..4} f_i e_i/d_i,  e_i = stop_{d_i}(x): e_i follows x and stays within +-d_i,
-d_i = reach (1/8, 1/4, 1/2, 1). f_i (N) is the force at which layer i slips, reach (m) the travel
-after a reversal until all slip. Maxwell-slip elements: W. D. Iwan, "A distributed-element model for
-hysteresis and its steady-state dynamic response", J. Appl. Mech. 33 (1966); F. Al-Bender et al.,
-IEEE TAC 50 (2005), less its velocity dependence. Rate-independent, keeps the memory of
-inner loops, linear in the forces, and exact for motion in one direction within a sample.
+d_i = reach (1, 1/2, 1/4, 1/8). f_i (N) is the force at which layer i slips, reach (m) the travel
+until all slip of a cable that lay without force; after a reversal it is twice that (Masing's rule).
+Maxwell-slip elements: W. D. Iwan, "A distributed-element model for hysteresis and its steady-state
+dynamic response", J. Appl. Mech. 33 (1966), 893-900; F. Al-Bender et al., IEEE TAC 50 (2005), less
+its velocity dependence. Rate-independent, keeps the memory of inner loops, linear in the forces,
+and exact for motion in one direction within a sample.
 """
 
 from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V
@@ -30,7 +31,7 @@ EFFECT = Effect(
     source="Iwan 1966, distributed elements; Al-Bender, Lampaert, Swevers 2005, Maxwell-slip",
     parameters=(
         Parameter(
-            "reach", "m", 5e-3, 1e-6, 1.0, "travel after which every layer slips",
+            "reach", "m", 5e-3, 1e-6, 1.0, "travel from no force until every layer slips",
             scan=lambda e: tuple(min(r, e.travel) for r in (1e-3, 3e-3, 1e-2, 3e-2)),
         ),
         *(

@@ -1,6 +1,6 @@
 """Cogging of the linear motor: a force periodic in position, independent of current.
 
-F = sum_{k=1..3} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p), p the magnet pitch.
+F = sum_{k=1..3} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p), p the pole pitch, or the slot pitch.
 J. F. Gieras, Z. J. Piech, B. Tomczuk, "Linear Synchronous Motors", 2nd ed. (2011): the cogging
 force is a Fourier series in position with period set by pole pitch and slot pitch.
 """

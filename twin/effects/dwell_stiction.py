@@ -5,8 +5,8 @@ The growth is the rising static friction of B. Armstrong-Helouvry, P. Dupont, C.
 "A survey of models, analysis tools and compensation methods for the control of machines with
 friction", Automatica 30 (1994), with Fs the level of fresh contacts. There the time at rest counts;
 here the age does, which is the same at rest and is forgotten over a sliding distance ``slip``
-(aging law, J. H. Dieterich 1979, A. Ruina 1983), so that no threshold of speed is needed. The age
-is exact over a sample of constant speed.
+(aging law: J. H. Dieterich, J. Geophys. Res. 84 (1979); as a state, A. Ruina 1983), so that no
+threshold of speed is needed. The age is exact over a sample of constant speed.
 """
 
 from math import exp, expm1

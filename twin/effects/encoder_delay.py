@@ -1,7 +1,8 @@
 """Reading older than its stamp.
 
 reading(t) = x(t - tau), a straight line between the samples.
-K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd ed., section 2.3 (sampling a delay).
+A dead time, as the actuator's (K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd ed.,
+section 2.3, where the input is held instead); the straight line is a choice.
 """
 
 from twin.effect import DT, INDEX, READING, Effect, Kind, Parameter

@@ -3,7 +3,8 @@
 reading = x + sum_{k=1,2} a_k sin(2 pi k x/period) + b_k cos(2 pi k x/period). Offsets of the two
 quadrature signals give the first harmonic, unequal amplitudes and a phase error the second:
 P. L. M. Heydemann, "Determination and correction of quadrature fringe measurement errors in
-interferometers", Applied Optics 20 (1981), to first order in the errors.
+interferometers", Applied Optics 20 (1981), 3382-3384, to first order in the errors; the constant
+of a phase error is left out, a shift of zero.
 """
 
 from math import cos, pi, sin

@@ -1,9 +1,10 @@
 """End stops: a spring and damper beyond each travel limit that can push, not pull.
 
 F = -stiffness (d + relaxation v) where that pushes back, d = x - high or x - low, the depth.
-Kelvin-Voigt contact without adhesion; K. L. Johnson, Contact Mechanics, section 6.5. Within the
-step the depth is the one that this force leads to (implicit Euler with the axis' mass), so that any
-stiffness is stable; along a measured motion, which no force changes, the law is as printed.
+Kelvin-Voigt contact without adhesion, as in the Modelica Standard Library's ElastoBacklash2 (its
+ElastoGap bounds the damper another way). Within the step the depth is the one that this force leads
+to (implicit Euler with the axis' mass), so that any stiffness is stable; along a measured motion,
+which no force changes, the law is as printed.
 """
 
 from twin.effect import DT, MASS, OUT, Effect, Kind, Parameter, V, X
@@ -27,7 +28,7 @@ EFFECT = Effect(
     kind=Kind.FORCE,
     summary="spring and damper at the travel limits",
     equation="F = -stiffness (d + relaxation v) where it pushes back;  d = x - high, x - low",
-    source="Kelvin-Voigt contact; Johnson, Contact Mechanics, section 6.5",
+    source="Kelvin-Voigt contact that does not pull; Modelica Standard Library, ElastoBacklash2",
     parameters=(
         Parameter(
             "low", "m", 0.0, -1e3, 1e3, "lower stop",

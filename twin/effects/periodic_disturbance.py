@@ -2,8 +2,8 @@
 
 F = a sin(2 pi f t) + b cos(2 pi f t), t from the start of the log. What acts is its mean over the
 sample: the value in the middle times sinc(f dt), so that steps of any length carry the same
-impulse. Fourier series of a periodic force, e.g. C. W. de Silva, Vibration: Fundamentals and
-Practice, section 3.4.
+impulse. One term of the Fourier series of a periodic force; D. J. Inman, Engineering Vibration,
+section 3.3 (response to an arbitrary periodic input).
 """
 
 from math import cos, pi, sin
@@ -27,7 +27,7 @@ EFFECT = Effect(
     kind=Kind.FORCE,
     summary="sinusoidal force in time: floor vibration, pump, mains",
     equation="F = a sin(2 pi f t) + b cos(2 pi f t)",
-    source="Fourier series of a periodic force; de Silva, Vibration, section 3.4",
+    source="Fourier series of a periodic force; Inman, Engineering Vibration, section 3.3",
     parameters=(
         Parameter("f", "Hz", 10.0, 1e-2, 5e3, "frequency", scan=frequencies),
         Parameter("a", "N", 0.0, -1e4, 1e4, "sine term", strength=True),

@@ -3,7 +3,8 @@
 F = g(v) sgn(v) + sigma2 v,  g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n); at rest any force up to
 g(0) = Fs is held. A. Tustin, "The effects of backlash and of speed-dependent friction on the
 stability of closed-cycle control systems", J. IEE 94 (1947), has n = 1; the form with n is that of
-B. Armstrong-Helouvry et al., Automatica 30 (1994); thesis eq. 2.4-2.5. Stepped as an impulse
+L. C. Bo, D. Pavelescu, Wear 82 (1982), as surveyed by B. Armstrong-Helouvry et al., Automatica 30
+(1994); thesis eq. 2.4-2.5. Stepped as an impulse
 (Moreau 1988): HOLD is the friction that would stop the axis within this sample; if the level
 allows it, exactly that force acts, so the axis is at rest to rounding and never creeps.
 """
@@ -32,7 +33,7 @@ EFFECT = Effect(
     summary="Stribeck curve: friction falls with speed before viscosity takes over; sticks at rest",
     equation="F = g(v) sgn(v) + sigma2 v;  g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n);  "
     "|F| <= Fs at rest",
-    source="Tustin 1947 (n = 1); Armstrong-Helouvry et al. 1994; L. Jia 2023, eq. 2.4-2.5",
+    source="Tustin 1947 (n = 1); Bo, Pavelescu 1982 (n); L. Jia 2023, eq. 2.4-2.5",
     parameters=(
         Parameter(
             "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True,
