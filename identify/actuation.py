@@ -6,6 +6,7 @@ so these effects are stepped sample by sample, not over blocks.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from twin.native import walk, walk_sensing
 
 Array = NDArray[np.float64]
 
+LESSENED = 0.5  # of the commanded force, below which the motor gives another one altogether
 PASSES = 3  # from the reading to the position it was taken at
 
 
@@ -47,6 +49,19 @@ def actual_force(axis: AxisModel, motion: Motion) -> Array:
         motion.clock,
     )  # fmt: skip
     return command + rows.sum(axis=0)
+
+
+def forces_lessened(axis: AxisModel, motions: Sequence[Motion]) -> float:
+    """RMS force of the motor over that commanded, where it is less than half; else 1."""
+    if not parts_of(axis, Kind.ACTUATION).effects:
+        return 1.0
+    given, asked = (
+        sum(float(np.sum(force**2)) for force in forces)
+        for forces in ([actual_force(axis, m) for m in motions], [m.raw[1] for m in motions])
+    )
+    if given >= LESSENED**2 * asked:
+        return 1.0
+    return float(np.sqrt(max(given / asked, np.finfo(float).tiny)))
 
 
 def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.actuation import is_noise
+from identify.actuation import forces_lessened, is_noise
 from identify.clocks import phases_found
 from identify.evidence import (
     LEAST_BIC,
@@ -167,15 +167,21 @@ def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
     if is_noise(effect):
         return _score_noise(base, fit, study, effect)
     shared = base.kept & fit.kept
-    before, after = (f.residual[shared[f.kept]] for f in (base, fit))
+    # What makes the motor weak makes all forces small, and the error with them.
+    scales = [forces_lessened(f.axis, study.motions) for f in (base, fit)]
+
+    def both(left: Callable[[Fit], Array]) -> list[Array]:
+        return [left(f) / k for f, k in zip((base, fit), scales, strict=True)]
+
+    before, after = both(lambda f: f.residual[shared[f.kept]])
     added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
     added += phases_found(fit.axis, effect.name, study)
     proof = evidence(before, after, added)
     if study.holdout:
         held = moving(study.holdout, sticks(base.axis) or sticks(fit.axis))
-        pair = [residual(f.axis, study.holdout)[held] for f in (base, fit)]
+        pair = both(lambda f: residual(f.axis, study.holdout)[held])
     elif proof.delta_bic > LEAST_BIC:
-        pair = [_cross_validated(f, shared[f.kept]) for f in (base, fit)]
+        pair = both(lambda f: _cross_validated(f, shared[f.kept]))
     else:  # not supported, whatever blocks left out would say
         pair = [before, after]
     return Candidate(

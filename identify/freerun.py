@@ -66,8 +66,9 @@ def free_run(
 
 
 def rms_error(run: FreeRun, axis: str) -> float:
-    """RMS of the free-running position error of one axis, in m."""
-    return float(np.sqrt(np.nanmean(run.error[axis] ** 2)))
+    """RMS of the free-running position error of one axis, in m; infinite where the run diverges."""
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.nanmean(run.error[axis] ** 2)))
 
 
 def _as_logged(model: StageModel, log: Log) -> StageModel:

@@ -1,11 +1,12 @@
 """An effect that the analysis is not told of is named; nothing is named where nothing is hidden."""
 
 import pytest
+from check_cases import with_axis
 from machines import machine, one_axis
 
 from identify.diagnose import Verdict
 from identify.workflow import add, diagnose
-from twin.effects import load_catalogue
+from twin.effects import Catalogue, load_catalogue
 from twin.model_file import load_model
 
 CATALOGUE = load_catalogue()
@@ -57,3 +58,18 @@ def test_nothing_is_named_where_nothing_is_hidden(seed):
     found = diagnose(STAGE, honest.logs, honest.holdout, catalogue=CATALOGUE)
     assert found.leading.verdict is Verdict.NOTHING_MISSING
     assert found.effect is None
+
+
+def test_a_force_channel_of_another_machine_is_not_a_weak_motor():
+    """With a motor that gives nothing all forces are zero, and so is the error."""
+    honest = machine(STAGE, CATALOGUE, None, 0.0, 14)
+    mixed = {name: _backwards(log) for name, log in honest.logs.items()}
+    held = {name: _backwards(log) for name, log in honest.holdout.items()}
+    few = Catalogue([CATALOGUE[n] for n in ("actuator_deadband", "actuator_saturation")])
+    found = diagnose(STAGE, mixed, held, catalogue=few)
+    assert found.leading.verdict is Verdict.UNEXPLAINED
+
+
+def _backwards(log):
+    """The log with its force in reverse order."""
+    return with_axis(log, "x", lambda c: {**c, "force": c["force"][::-1].copy()})
