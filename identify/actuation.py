@@ -52,7 +52,10 @@ def actual_force(axis: AxisModel, motion: Motion) -> Array:
 
 
 def forces_lessened(axis: AxisModel, motions: Sequence[Motion]) -> float:
-    """RMS force of the motor over that commanded, where it is less than half; else 1."""
+    """RMS force of the motor over that commanded, where it is less than half; else 1.
+
+    A millionth at least, which keeps what is divided by it finite.
+    """
     if not parts_of(axis, Kind.ACTUATION).effects:
         return 1.0
     given, asked = (
@@ -61,7 +64,7 @@ def forces_lessened(axis: AxisModel, motions: Sequence[Motion]) -> float:
     )
     if given >= LESSENED**2 * asked:
         return 1.0
-    return float(np.sqrt(max(given / asked, np.finfo(float).tiny)))
+    return float(np.sqrt(max(given / asked, 1e-12)))
 
 
 def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
