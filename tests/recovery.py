@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from effect_runs import CATALOGUE
 
+from identify.actuation import is_noise, parts_of, reading_error
 from identify.candidates import Candidate, try_effect
 from identify.fit import Fit, fit_axis, rms
 from identify.planting import added_force, draw_effect
@@ -24,7 +25,8 @@ HARDWARE = Hardware(
     acceleration=2.0, jerk=100.0,
 )  # fmt: skip
 SEEN = 0.1  # N RMS that is planted
-DRAWS = 3
+DRAWS = 8
+STEEPEST = 0.3  # slope of a reading's error over position, RMS
 # Half width of a 99.9 % interval over that of a 90 % one, for the 29 degrees of freedom of blocks.
 WIDER = 3.66 / 1.70
 # An attached mass is stepped 0.2 ms along a block of 1 ms and 0.1 ms by the stage, both implicit in
@@ -110,9 +112,19 @@ def planted(effect: Effect, axis: AxisModel, study: Study, seed: int) -> Fitted 
     for _ in range(DRAWS):
         drawn = draw_effect(effect, axis, study.fit, study.excitation, size, rng)
         acts = added_force(drawn, axis, study.fit, residual(axis, study.fit))
-        if rms(acts) > 0.5 * size:
+        if rms(acts) > 0.5 * size and _rises(drawn, axis, study):
             return drawn
     return None
+
+
+def _rises(drawn: Fitted, axis: AxisModel, study: Study) -> bool:
+    """Whether an encoder with that effect reads more the farther the axis is, as any does."""
+    part = parts_of(axis.with_effect(drawn), Kind.SENSING)
+    motion = study.fit[0].motion
+    if not part.effects or is_noise(drawn.effect):
+        return True
+    _, rate = reading_error(part, motion)
+    return rms(rate) < STEEPEST * rms(motion.raw[0])
 
 
 def bare(axis: AxisModel) -> AxisModel:
