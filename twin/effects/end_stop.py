@@ -9,7 +9,8 @@ which no force changes, the law is as printed.
 
 from twin.effect import DT, MASS, OUT, Effect, Kind, Parameter, V, X
 
-STOPS = (0.005, 0.02, 0.06, 0.15, 0.3)  # places tried, parts of the travel from its ends
+# Places tried, parts of the travel from its ends; soft stops a tenth off pass for a cable.
+STOPS = (0.005, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4)
 
 
 def law(p, s, io):
