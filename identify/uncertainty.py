@@ -17,7 +17,8 @@ from scipy.stats import t as student
 
 from identify.evidence import left_out
 from identify.fit import Fit
-from twin.model import read
+from identify.residual import residual
+from twin.model import Coordinate, read, write
 
 Array = NDArray[np.float64]
 
@@ -25,6 +26,8 @@ BLOCKS = 30
 RIDGE = 1e-6  # keeps a fit without one block finite
 INSEPARABLE = 0.9999  # correlation of two estimates from which they are one number
 CONFIDENCE = 0.90
+FAR = 4.0  # half widths to either side at which the error must have risen
+LEAST_RISE = 0.1  # of the rise that the slopes foresee
 LARGEST_RATIO = 3.0  # of error to noise floor; above it the model is wrong and no interval holds
 
 
@@ -57,10 +60,31 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
             why = "no interval: this motion does not show the parameter"
         if why is None and c.label in twins:
             why = f"no interval: this data cannot tell it from {twins[c.label]}"
+        if why is None and (side := open_side(fit, c, width)):
+            why = f"no interval: a {side} value fits as well, these logs do not reach it"
         if why is None:
             low, high = max(value - width, p.lower), min(value + width, p.upper)
         free.append(Estimate(c.label, float(value), p.unit, low, high, True, why))
     return (*free, *_held(fit))
+
+
+def open_side(fit: Fit, c: Coordinate, half: float) -> str | None:
+    """The side, "smaller" or "larger", to which the error hardly rises; None where it does.
+
+    An end stop out of reach is the example: where it just touches the motion the fit has a slope.
+    """
+    column = fit.jacobian[:, fit.scaling.where.index(c)]
+    value = read(fit.axis, [c])[0]
+    for side, step in (("smaller", -FAR * half), ("larger", FAR * half)):
+        moved = write(fit.axis, [c], [np.clip(value + step, c.parameter.lower, c.parameter.upper)])
+        step = read(moved, [c])[0] - value
+        foreseen = 2.0 * step * float(fit.residual @ column) + step**2 * float(column @ column)
+        if abs(step) < 0.5 * FAR * half or foreseen <= 0.0:  # a bound is in the way
+            continue
+        there = residual(moved, fit.logs)[fit.kept]
+        if float(there @ there - fit.residual @ fit.residual) < LEAST_RISE * foreseen:
+            return side
+    return None
 
 
 def inseparable(fit: Fit) -> dict[str, str]:

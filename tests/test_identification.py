@@ -8,7 +8,7 @@ import pytest
 from machines import machine, one_axis
 
 from identify.candidates import try_effect
-from identify.fit import fit_axis
+from identify.fit import Outcome, finished, fit_axis
 from identify.levenberg_marquardt import minimise
 from identify.study import studies
 from identify.uncertainty import estimates, refusal
@@ -63,6 +63,23 @@ def test_intervals_are_refused_on_a_wrong_model(study):
     wrong = fit_axis(AXIS.without("cable_slab"), study.fit)
     assert refusal(wrong) is not None
     assert all(e.low is None for e in estimates(wrong))
+
+
+def test_a_value_that_fits_as_well_farther_off_has_no_interval():
+    """An end stop that the motion does not reach could be anywhere beyond."""
+    lowest, highest = -0.3, 0.0  # m; the motion goes from about -0.163 m to 0.033 m
+    stops = {"low": lowest, "high": highest, "stiffness": 2.0}
+    effect = CATALOGUE["end_stop"]
+    there = STAGE.with_axis("x", AXIS.with_effect(Fitted.at_start(effect, stops)))
+    log = simulate(there, "tracking", seed=3, duration=10.0)
+    study = studies(STAGE, {"log": log}, {})["x"]
+    touching = float(study.fit[0].motion.position.min()) + 1e-4
+    begun = AXIS.with_effect(Fitted.at_start(effect, {**stops, "low": touching}))
+    fit = finished(begun, begun, study.fit, Outcome.CONVERGED)
+    found = {e.label: e for e in estimates(fit)}
+    assert found["end_stop.low"].low is None
+    assert "a smaller value fits as well" in found["end_stop.low"].reason
+    assert found["end_stop.high"].low <= highest <= found["end_stop.high"].high
 
 
 def test_the_twin_has_no_delay(fitted, study):
