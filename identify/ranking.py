@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 SETTLED = 0.999  # part of the error to which another start of the base must bring it
-TIE = 2.0  # |t| of the held-out difference below which two explanations cannot be told apart
+TIE = 2.0  # t of the held-out difference from which one explanation is the better
 NO_EVIDENCE = 2.0  # difference of BIC "not worth more than a bare mention" (Kass, Raftery 1995)
 LEAST_SEPARATION = 10.0  # difference of BIC that separates two explanations
 
@@ -91,7 +91,7 @@ def _merit(c: Candidate) -> tuple[bool, float]:
 
 
 def tie(study: Study, best: Candidate, other: Candidate) -> bool:
-    """Whether the evidence and the held-out error both fail to separate two candidates."""
+    """Whether neither the evidence nor the held-out error favours the best of two candidates."""
     if best.is_noise or other.is_noise:
         return False
     if best.evidence.over(other.evidence) > LEAST_SEPARATION:
@@ -100,7 +100,7 @@ def tie(study: Study, best: Candidate, other: Candidate) -> bool:
     either = sticks(best.fit.axis) or sticks(other.fit.axis)
     kept = moving(logs, either)
     pair = [residual(c.fit.axis, logs)[kept] for c in (other, best)]
-    if abs(held_out_gain(pair[0], pair[1], best.fit.floor).t) < TIE:
+    if held_out_gain(pair[0], pair[1], best.fit.floor).t < TIE:
         return True
     # What is significant may still be next to nothing: two delays differ by a part in a thousand.
-    return abs(evidence(pair[0], pair[1], 0).delta_bic) < NO_EVIDENCE
+    return evidence(pair[0], pair[1], 0).delta_bic < NO_EVIDENCE

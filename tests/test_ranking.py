@@ -20,10 +20,11 @@ def candidate(scale: float, gain: float):
     [
         (1.0002, 1.0, True),  # lower in every block, and next to nothing
         (1.2, 1.0, False),
+        (0.8, 1.0, True),
         (1.0, 0.98, False),
         (1.0, 0.995, True),
     ],
-    ids=["a trace held out", "much held out", "evidence", "little evidence"],
+    ids=["a trace held out", "much held out", "the other is better held out", "evidence", "little evidence"],
 )
 def test_tie(scale, gain, tied, monkeypatch):
     noise = 1e-3 * np.random.default_rng(1).standard_normal(3000)
