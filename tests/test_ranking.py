@@ -24,7 +24,7 @@ def candidate(scale: float, gain: float):
         (1.0, 0.98, False),
         (1.0, 0.995, True),
     ],
-    ids=["a trace held out", "much held out", "the other is better held out", "evidence", "little evidence"],
+    ids=["a trace held out", "much held out", "worse held out", "evidence", "little evidence"],
 )
 def test_tie(scale, gain, tied, monkeypatch):
     noise = 1e-3 * np.random.default_rng(1).standard_normal(3000)
