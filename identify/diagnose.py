@@ -217,6 +217,9 @@ def _looked_back(
     """The fit less the earlier effects that it does not need any more, and their names."""
     dropped = []
     for candidate in earlier:
+        if candidate.effect.name not in fit.axis.names:  # a friction that another one replaced
+            dropped.append(candidate.effect.name)
+            continue
         without = less(candidate.effect, fit, base, study)
         if score(without, fit, study, candidate.effect).supported:
             # The later effects' shapes were found beside it, and may have to be found anew.
