@@ -15,6 +15,7 @@ from identify.selftest import (
     coverage,
     draw,
     rates,
+    run_all,
     selftest_json,
 )
 from identify.selftest.design import plantable
@@ -127,6 +128,11 @@ def test_the_picture_shows_every_answer(tmp_path):
     draw([NAMED, TIED, WRONG, MISSED, ALARM, QUIET], tmp_path / "matrix.svg")
     text = (tmp_path / "matrix.svg").read_text(encoding="utf-8")
     assert "<svg" in text
+
+
+def test_a_failing_machine_is_named():
+    with pytest.raises(RuntimeError, match="no such effect"):
+        run_all([Case(("no such effect",), 5.0, 1)], workers=1)
 
 
 def test_bad_input_is_one_line(tmp_path, capsys, monkeypatch):

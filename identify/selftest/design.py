@@ -69,11 +69,18 @@ def run_all(
     workers: int | None = None,
     progress: Callable[[Outcome, int, int], None] | None = None,
 ) -> list[Outcome]:
-    """Run cases in as many processes as there are cores; in the order given."""
+    """Run cases in as many processes as there are cores; in the order given.
+
+    Raises RuntimeError, with the machine named, where a diagnosis fails; no other is begun then.
+    """
     found: dict[Case, Outcome] = {}
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers or os.cpu_count(), mp_context=context) as pool:
-        for done in as_completed([pool.submit(run, case) for case in cases]):
+        jobs = {pool.submit(run, case): case for case in cases}
+        for done in as_completed(jobs):
+            if error := done.exception():
+                pool.shutdown(cancel_futures=True)
+                raise RuntimeError(f"{jobs[done]}: {error!r}") from error
             outcome = done.result()
             found[outcome.case] = outcome
             if progress:
