@@ -56,15 +56,9 @@ def forces_lessened(axis: AxisModel, motions: Sequence[Motion]) -> float:
 
     A millionth at least, which keeps what is divided by it finite.
     """
-    if not parts_of(axis, Kind.ACTUATION).effects:
-        return 1.0
-    given, asked = (
-        sum(float(np.sum(force**2)) for force in forces)
-        for forces in ([actual_force(axis, m) for m in motions], [m.raw[1] for m in motions])
-    )
-    if given >= LESSENED**2 * asked:
-        return 1.0
-    return float(np.sqrt(max(given / asked, 1e-12)))
+    given = np.linalg.norm(np.concatenate([actual_force(axis, m) for m in motions]))
+    asked = np.linalg.norm(np.concatenate([m.raw[1] for m in motions]))
+    return 1.0 if given >= LESSENED * asked else max(float(given / asked), 1e-6)
 
 
 def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:

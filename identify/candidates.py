@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.actuation import forces_lessened, is_noise
+from identify.actuation import is_noise
 from identify.clocks import phases_found
 from identify.evidence import (
     LEAST_BIC,
@@ -167,11 +167,10 @@ def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
     if is_noise(effect):
         return _score_noise(base, fit, study, effect)
     shared = base.kept & fit.kept
-    # What makes the motor weak makes all forces small, and the error with them.
-    scales = [forces_lessened(f.axis, study.motions) for f in (base, fit)]
 
     def both(left: Callable[[Fit], Array]) -> list[Array]:
-        return [left(f) / k for f, k in zip((base, fit), scales, strict=True)]
+        # What makes the motor weak makes all forces small, and the error with them.
+        return [left(f) / f.lessened for f in (base, fit)]
 
     before, after = both(lambda f: f.residual[shared[f.kept]])
     added = max(len(fit.scaling.where) - len(base.scaling.where), 1)

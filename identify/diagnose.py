@@ -198,15 +198,17 @@ def _compared_again(stages: Sequence[Stage], study: Study) -> tuple[Step, ...]:
         return steps
     named = {s.candidate.effect.name for s in kept}
 
-    def level(step: Step, rival: Candidate) -> bool:
-        axis = final.axis.without(step.candidate.effect.name)
+    def level(own: Candidate, rival: Candidate) -> bool:
+        axis = final.axis.without(own.effect.name)
         fit = fit_axis(axis.with_effect(rival.fit.axis[rival.effect.name]), study.fit)
-        own = score(base, final, study, step.candidate.effect)
         return tie(study, own, score(base, fit, study, rival.effect))
 
     def told(step: Step) -> Step:
         rivals = [r for r in step.rivals if r.effect.name not in named]
-        return replace(step, tied=tuple(r.effect.name for r in rivals if level(step, r)))
+        if not rivals:
+            return replace(step, tied=())
+        own = score(base, final, study, step.candidate.effect)
+        return replace(step, tied=tuple(r.effect.name for r in rivals if level(own, r)))
 
     return tuple(told(s) if s in kept and s.beside is None else s for s in steps)
 
@@ -221,10 +223,12 @@ def _looked_back(
             dropped.append(candidate.effect.name)
             continue
         without = less(candidate.effect, fit, base, study)
-        if score(without, fit, study, candidate.effect).supported:
+        needed = score(without, fit, study, candidate.effect).supported
+        if needed:
             # The later effects' shapes were found beside it, and may have to be found anew.
             without = fit_thoroughly(without.axis, study)
-        if not score(without, fit, study, candidate.effect).supported:
+            needed = score(without, fit, study, candidate.effect).supported
+        if not needed:
             fit = without
             dropped.append(candidate.effect.name)
     return fit, tuple(dropped)

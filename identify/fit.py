@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.actuation import forces_lessened
 from identify.evidence import effective_samples
 from identify.levenberg_marquardt import minimise
 from identify.noise import noise_floor
@@ -67,6 +68,11 @@ class Fit:
     def floor(self) -> float:
         """RMS noise floor in N."""
         return noise_floor(self.axis, [(log.motion, log.window) for log in self.logs])
+
+    @cached_property
+    def lessened(self) -> float:
+        """RMS force of the motor over that commanded, where it is less than half; else 1."""
+        return forces_lessened(self.axis, [log.motion for log in self.logs])
 
     @cached_property
     def jacobian(self) -> Array:

@@ -112,8 +112,17 @@ class Motion:
 
     @cached_property
     def resolution(self) -> float:
-        """Step between the readings, m; 0 where none shows."""
-        return resolution(self)
+        """Step between the readings, m; 0 where their noise, or the lack of one, hides it.
+
+        Differences of readings are then near 0 or near whole steps, with a wide gap between. Of two
+        steps, a fine one of the log's numbers and a coarse one of the encoder, the coarse counts.
+        """
+        apart = np.sort(np.abs(self.raw[0])) * self.sample_period
+        apart = apart[len(apart) // 100 :]
+        for held in (apart[apart > 0.0], np.maximum(apart, np.finfo(float).tiny)):
+            if step := _step(held, fewest=len(apart) // 100):
+                return step
+        return 0.0
 
     @cached_property
     def rounding(self) -> Array:
@@ -220,20 +229,6 @@ def excitation(motions: list[Motion], travel: tuple[float, float] | None) -> Exc
         ripples=ripples(motions),
         resolution=max(m.resolution for m in motions),
     )
-
-
-def resolution(motion: Motion) -> float:
-    """Step between the readings, m; 0 where their noise, or the lack of one, hides it.
-
-    Differences of readings are then near 0 or near whole steps, with a wide gap between. Of two
-    steps, a fine one of the log's numbers and a coarse one of the encoder, the coarse one counts.
-    """
-    apart = np.sort(np.abs(motion.raw[0])) * motion.sample_period
-    apart = apart[len(apart) // 100 :]
-    for held in (apart[apart > 0.0], np.maximum(apart, np.finfo(float).tiny)):
-        if step := _step(held, fewest=len(apart) // 100):
-            return step
-    return 0.0
 
 
 def _step(apart: Array, fewest: int) -> float:

@@ -52,11 +52,6 @@ class Study:
         return np.concatenate([np.arange(len(w)) < len(h) for h, w in pairs])
 
     @property
-    def motions(self) -> tuple[Motion, ...]:
-        """The motions to fit on."""
-        return tuple(w.motion for w in self.fit)
-
-    @property
     def window(self) -> float:
         """Window length in s."""
         return self.fit[0].window.length

@@ -8,7 +8,7 @@ from machines import one_axis
 
 from identify.diagnose import Verdict, diagnose_axis
 from identify.fit import finished, fit_axis
-from identify.motion import Motion, resolution
+from identify.motion import Motion
 from identify.noise import noise_floor, noise_of
 from identify.residual import Windowed
 from identify.study import Study, studies
@@ -46,12 +46,12 @@ def test_the_step_is_read_off_the_readings(noise):
     drawn = np.random.default_rng(1).standard_normal(40_001)
     before = rounded(path() + (noise if noise > 1e-8 else 0.0) * drawn, STEP)
     after = rounded(before + (noise if noise < 1e-8 else 0.0) * drawn, 1e-9)
-    assert resolution(moved(after)) == pytest.approx(STEP, rel=1e-3)
+    assert moved(after).resolution == pytest.approx(STEP, rel=1e-3)
 
 
 def test_noise_without_rounding_has_no_step():
     noise = 1e-8 * np.random.default_rng(1).standard_normal(40_001)
-    assert resolution(moved(path() + noise)) == 0.0
+    assert moved(path() + noise).resolution == 0.0
     assert not moved(path() + noise).rounding.any()
 
 

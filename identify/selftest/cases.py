@@ -117,21 +117,24 @@ def _with_friction(
         if p.name not in shared and p.lower < p.upper
     }
     fitted = Fitted.at_start(effect, {**effect.starts(), **drawn, **shared})
-    for corrected in range(ROUNDS + 1):
-        machine = true.with_axis(AXIS, true.axes[AXIS].with_effect(fitted))
+
+    def left(machine: StageModel) -> float:
+        """Error of the model on that machine above the noise floor, in floors."""
         trial = simulate(machine, RUNS[0], seed=seed, duration=DURATION, stage=ReducedStage)
         study = studies(model, {"trial": trial}, {})[AXIS]
         base = fit_axis(model.axes[AXIS], study.fit)
         floor = noise_floor(machine.axes[AXIS], [(w.motion, w.window) for w in study.fit])
-        left = np.sqrt(max(base.error**2 - floor**2, 1e-4 * floor**2)) / floor
-        if corrected == ROUNDS:
-            break
-        scale = float(np.clip(strength / left, 0.1, 10.0))
+        return float(np.sqrt(max(base.error**2 - floor**2, 1e-4 * floor**2)) / floor)
+
+    machine = true.with_axis(AXIS, true.axes[AXIS].with_effect(fitted))
+    for _ in range(ROUNDS):
+        scale = float(np.clip(strength / left(machine), 0.1, 10.0))
         scaled = {p.name: scale * fitted.values[p.name] for p in effect.strengths}
         fitted = Fitted.at_start(effect, {**fitted.values, **scaled})
-    if left < REACHED * strength:
+        machine = true.with_axis(AXIS, true.axes[AXIS].with_effect(fitted))
+    if left(machine) < REACHED * strength:
         raise NotShown(effect.name)
-    return true.with_axis(AXIS, true.axes[AXIS].with_effect(fitted)), fitted
+    return machine, fitted
 
 
 def _with_planted(
