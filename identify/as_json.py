@@ -10,6 +10,7 @@ from identify.candidates import Candidate
 from identify.compare import AxisComparison
 from identify.contest import Trial
 from identify.diagnose import Step
+from identify.given import Refit
 from identify.plan import Plan
 from identify.remarks import remarks
 from identify.uncertainty import Estimate
@@ -46,6 +47,7 @@ def fit_json(result: FitResult) -> dict[str, Any]:
                 "force_shift": result.studies[axis].shift,
                 "force_shift_unit": "s",
                 "parameters": {e.label: _estimate(e) for e in result.estimates[axis]},
+                "refit": _refit(result.refits[axis]),
             }
             for axis, fit in result.fits.items()
         }
@@ -57,6 +59,23 @@ def _estimate(e: Estimate) -> dict[str, Any]:
     return {
         "value": e.value, "unit": e.unit, "interval_90": interval, "free": e.free,
         "interval_refused": e.reason,
+    }  # fmt: skip
+
+
+def _refit(changed: Refit | None) -> dict[str, Any] | None:
+    if changed is None:
+        return None
+    return {
+        "force_error_as_given": changed.given,
+        "force_error": changed.refitted,
+        "force_unit": "N",
+        "changed": [
+            {
+                "parameter": c.label, "before": c.before, "after": c.after, "unit": c.unit,
+                "force": c.force, "force_unit": "N", "same_force_as": list(c.alike),
+            }
+            for c in changed.changes
+        ],
     }  # fmt: skip
 
 
@@ -156,7 +175,8 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
             "phase": dict(d.repeat.phase),
             "phase_unit": "rad",
         },
-        "notes": list(remarks(d)),
+        "refit": _refit(result.refits.get(axis)),
+        "notes": list(remarks(d, result.refits.get(axis))),
         "next_experiment": following and plan_json(following),
     }
 

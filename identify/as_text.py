@@ -36,6 +36,8 @@ def fit_text(result: FitResult) -> str:
         lines.append(f"  {fit.outcome.value}")
         if shifted := shift_in_words(result.studies[axis]):
             lines.append(f"  {shifted}")
+        if changed := result.refits[axis].in_words():
+            lines.append(f"  {changed}")
         hidden = described_labels(fit.axis)
         common = refusal(fit)
         if common is not None:
@@ -100,7 +102,7 @@ def diagnose_text(result: Diagnosis) -> str:
             lines.append(f"  {advice()}")
         lines += [_ranking_line(c) for c in d.ranking[:4]]
         lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
-        lines += [f"  note: {remark}" for remark in remarks(d)]
+        lines += [f"  note: {remark}" for remark in remarks(d, result.refits.get(axis))]
     return "\n".join(lines)
 
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 from identify.alignment import shift_in_words
 from identify.diagnose import AxisDiagnosis
 from identify.fit import Outcome
+from identify.given import Refit
 from identify.workflow import moved_parameters
 
 
-def remarks(found: AxisDiagnosis) -> tuple[str, ...]:
+def remarks(found: AxisDiagnosis, refit: Refit | None) -> tuple[str, ...]:
     """Shifted channels, fits that did not end well, parameters that moved, what is weak."""
     out = []
+    if refit and (changed := refit.in_words()):
+        out.append(changed)
     if shifted := shift_in_words(found.study):
         out.append(shifted)
     if found.base.outcome is not Outcome.CONVERGED:

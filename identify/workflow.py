@@ -16,6 +16,7 @@ from identify.describe import describe, in_words, physics_alone
 from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
 from identify.fit import Fit, error_on, rms
 from identify.freerun import free_run, rms_error
+from identify.given import Refit, refit
 from identify.plan import Plan, next_experiment, plan
 from identify.study import Study, studies
 from identify.uncertainty import Estimate, estimates, half_widths
@@ -36,13 +37,17 @@ def silent(what: str, done: int, total: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class FitResult:
-    """A fitted stage: fits and estimates by axis, held-out force errors (N RMS) where given."""
+    """A fitted stage: fits and estimates by axis, held-out force errors (N RMS) where given.
+
+    refits: what the fit changed of the model given, by axis.
+    """
 
     model: StageModel
     studies: Mapping[str, Study]
     fits: Mapping[str, Fit]
     estimates: Mapping[str, tuple[Estimate, ...]]
     holdout_error: Mapping[str, float | None]
+    refits: Mapping[str, Refit]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +63,14 @@ class Diagnosis:
     """Diagnoses by axis; the answer is that of the axis with the strongest evidence.
 
     next_experiments: for an axis whose diagnosis is ambiguous, the experiment that decides.
+    refits: what fitting the model as given changed, by axis.
     """
 
     model: StageModel
     axes: Mapping[str, AxisDiagnosis]
     comparison: Comparison
     next_experiments: Mapping[str, Plan] = field(default_factory=dict)
+    refits: Mapping[str, Refit] = field(default_factory=dict)
 
     @property
     def leading(self) -> AxisDiagnosis:
@@ -107,15 +114,17 @@ def fit(
     logs: Logs,
     holdout: Logs | None = None,
     *,
+    catalogue: Catalogue | None = None,
     window: float | None = None,
     progress: Progress = silent,
 ) -> FitResult:
     """Identify the free parameters of a model's effects.
 
-    logs, holdout: by name. window: of the weak form in s; from the noise where None. Raises
-    InputError for logs that do not fit the model.
+    logs, holdout: by name. catalogue: its absent effects are told where a parameter stands in for
+    them. window: of the weak form in s; from the noise where None. Raises InputError for logs that
+    do not fit the model.
     """
-    found = studies(model, logs, holdout or {}, window)
+    found, given = studies(model, logs, holdout or {}, window), model
     fits: dict[str, Fit] = {}
     for i, (axis, study) in enumerate(list(found.items())):
         found[axis], fits[axis] = fit_aligned(model.axes[axis], study)
@@ -123,7 +132,9 @@ def fit(
     for axis, result in fits.items():
         model = model.with_axis(axis, result.axis)
     held = {a: holdout_error(f, found[a]) for a, f in fits.items()}
-    return FitResult(model, found, fits, {a: estimates(f) for a, f in fits.items()}, held)
+    known = Catalogue([]) if catalogue is None else catalogue
+    changed = {a: refit(given.axes[a], f, known) for a, f in fits.items()}
+    return FitResult(model, found, fits, {a: estimates(f) for a, f in fits.items()}, held, changed)
 
 
 def holdout_error(fitted: Fit, study: Study) -> float | None:
@@ -159,7 +170,9 @@ def diagnose(
 
     Descriptions that the model holds are set aside: what they describe is to be explained.
     """
-    result = fit(physics_alone(model), logs, holdout, window=window, progress=progress)
+    result = fit(
+        physics_alone(model), logs, holdout, catalogue=catalogue, window=window, progress=progress
+    )
     axes = {
         axis: diagnose_axis(
             fitted,
@@ -175,6 +188,7 @@ def diagnose(
         axes,
         compare(result.model, logs, window=window, progress=progress),
         {axis: found for axis, found in plans.items() if found is not None},
+        result.refits,
     )
 
 

@@ -96,4 +96,4 @@ def test_the_term_of_a_screw_turn_is_present_in_each_run_but_not_general(found):
     assert repeat is not None
     assert repeat.period == pytest.approx(2.5e-3, rel=0.005)
     assert all(0.5 < a < 1.5 for a in repeat.amplitude.values())
-    assert any("not general" in note for note in remarks(found.leading))
+    assert any("not general" in note for note in remarks(found.leading, None))

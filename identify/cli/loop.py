@@ -42,10 +42,18 @@ def fit(
 
     if out:
         require_folder(out)
-    stage = stage_model(model, catalogue_with(effects))
+    catalogue = catalogue_with(effects)
+    stage = stage_model(model, catalogue)
     recorded = read_logs(logs)
     with bars_on_stderr() as bars:
-        result = workflow.fit(stage, recorded, read_logs(holdout), window=window, progress=bars)
+        result = workflow.fit(
+            stage,
+            recorded,
+            read_logs(holdout),
+            catalogue=catalogue,
+            window=window,
+            progress=bars,
+        )
     if out:
         save_model(result.model, out)
     say(as_text.fit_text(result), as_json.fit_json(result), as_json_, checked(recorded))

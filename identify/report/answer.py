@@ -7,6 +7,7 @@ from identify.candidates import Candidate
 from identify.compare import AxisComparison
 from identify.diagnose import AxisDiagnosis, Verdict
 from identify.fit import AT_FLOOR
+from identify.given import Refit
 from identify.plan import Plan
 from identify.report.blocks import Answer, Section, Tile, Tone
 from identify.report.subject import Subject
@@ -23,11 +24,16 @@ def section(subject: Subject) -> Section:
     for axis in subject.axes:
         found = subject.diagnosed(axis.axis)
         following = subject.next_experiment(axis.axis)
-        cards.append(_compared(axis) if found is None else _diagnosed(axis, found, following))
+        if found is None:
+            cards.append(_compared(axis))
+        else:
+            cards.append(_diagnosed(axis, found, following, subject.refit(axis.axis)))
     return Section("answer", "Answer", cards)
 
 
-def _diagnosed(axis: AxisComparison, found: AxisDiagnosis, following: Plan | None) -> Answer:
+def _diagnosed(
+    axis: AxisComparison, found: AxisDiagnosis, following: Plan | None, refit: Refit | None
+) -> Answer:
     remarks = []
     sentence = found.verdict.value
     if found.unexplained is not None:
@@ -39,6 +45,8 @@ def _diagnosed(axis: AxisComparison, found: AxisDiagnosis, following: Plan | Non
         remarks.append(f"{advice()}.")
     if following is not None:
         remarks.append(_next_step(following))
+    if found.verdict is Verdict.NOTHING_MISSING and refit and (changed := refit.in_words()):
+        remarks.append(f"{changed[0].upper()}{changed[1:]}.")
     return Answer(
         headline=f"Axis {axis.axis}: {_headline(found)}",
         sentence=sentence,

@@ -14,7 +14,10 @@ def section(subject: Subject) -> Section | None:
     for axis in subject.axes:
         found = subject.diagnosed(axis.axis)
         if found is not None:
-            notes.extend(f"Axis {axis.axis}: {_sentence(note)}" for note in remarks(found))
+            notes.extend(
+                f"Axis {axis.axis}: {_sentence(note)}"
+                for note in remarks(found, subject.refit(axis.axis))
+            )
     for step in (*subject.steps, *(a.step for a in subject.additions)):
         what = f"Axis {step.axis}, {spaced(step.effect)} added"
         notes.extend(f"{what}: {_sentence(note)}" for note in step.notes)

@@ -12,6 +12,7 @@ from identify.candidates import Candidate
 from identify.compare import AxisComparison
 from identify.diagnose import AxisDiagnosis, Verdict
 from identify.fit import sticks
+from identify.given import Refit
 from identify.plan import Plan
 from identify.residual import Windowed, moving, residual
 from identify.workflow import Addition, Comparison, Diagnosis
@@ -48,6 +49,10 @@ class Subject:
     def next_experiment(self, axis: str) -> Plan | None:
         """The experiment that decides what the diagnosis of one axis could not."""
         return self.diagnosis.next_experiments.get(axis) if self.diagnosis else None
+
+    def refit(self, axis: str) -> Refit | None:
+        """What fitting the model as given changed on one axis."""
+        return self.diagnosis.refits.get(axis) if self.diagnosis else None
 
     def named(self, axis: str) -> Candidate | None:
         """The effect that the diagnosis names on this axis."""
