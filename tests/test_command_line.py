@@ -163,6 +163,18 @@ def test_a_setpoint_outside_the_travel_is_refused(folder):
     assert "travel" in refusal("simulate", "tracking", "--model", "narrow.toml", folder=folder)
 
 
+def test_a_drive_too_weak_for_its_motion_is_told_of(tmp_path):
+    weak = load_text().replace("force_limit = 200.0", "force_limit = 8.0", 1)
+    (tmp_path / "weak.toml").write_text(weak)
+    command = ("simulate", "moves", "--seed", 1)
+    ran = twin(*command, "--model", "weak.toml", folder=tmp_path)
+    assert ran.returncode == 0
+    (line,) = ran.stderr.splitlines()
+    assert "axis x" in line
+    assert "outside its travel" in line
+    assert twin(*command, folder=tmp_path).stderr == ""
+
+
 def test_an_output_folder_that_is_missing_is_refused_before_the_work(folder):
     assert "no/where" in refusal(
         "fit", "proton_xy", "log.mcap", "-o", "no/where/f.toml", folder=folder

@@ -145,6 +145,24 @@ def simulate(
     return replace(log, attachments={**log.attachments, **attached})
 
 
+def outside_travel(model: StageModel, log: Log) -> tuple[str, ...]:
+    """A sentence for each axis of the model that left its travel in a log of the twin."""
+    told = []
+    for name, axis in model.axes.items():
+        if axis.hardware.travel is None:
+            continue
+        low, high = axis.hardware.travel
+        position = log.truth[name]["position"]
+        farthest = position[np.argmax(np.maximum(low - position, position - high))]
+        if not low <= farthest <= high:
+            told.append(
+                f"axis {name} went to {farthest:.4g} m, outside its travel of {low:g} to {high:g} "
+                f"m: the drive does not hold it; move more gently, or check force_limit "
+                f"({axis.hardware.force_limit:g} N), bandwidth and the effects"
+            )
+    return tuple(told)
+
+
 def _log(
     model: StageModel,
     experiment: str,

@@ -40,6 +40,7 @@ def simulate(
     from functools import partial
 
     from twin.experiment_file import SUFFIX, load_experiment
+    from twin.experiments import outside_travel
     from twin.experiments import simulate as run
     from twin.log import write_log
 
@@ -53,7 +54,8 @@ def simulate(
         )  # fmt: skip
         write_log(log, out, progress=partial(bars, "writing"))
     result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
-    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_)
+    text = f"{out}: {len(log)} samples at {log.sample_rate:g} Hz"
+    say(text, result, as_json_, outside_travel(stage, log))
 
 
 @app.command("import")
