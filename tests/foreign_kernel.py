@@ -16,6 +16,11 @@ HALF_SPAN, PLACES = 0.25, 50001  # m, and number, of the position tables
 TOP_SPEED, SPEEDS = 1.0, 20001  # m/s, and number, of the drag table
 SMOOTH_SIGN = 5e-4  # m/s, over which direction changes
 HISTORY = 4096  # true positions kept for the delayed reading
+STATES = 14  # what has a memory, beside the slip elements:
+LAGGED, LAST, REMANENCE = range(3)  # drive: N, N of the actual force, 1
+BRISTLE, HEAT, REST, DWELT, DISTANCE = range(3, 8)  # friction: m or N, J, s, 1, m
+LOOP, SIDE = range(8, 10)  # cable's loop and side of a bump, 1
+X2, V2, XF, VF = range(10, 14)  # second mass and frame, m and m/s
 
 
 class Plant(NamedTuple):
@@ -123,6 +128,104 @@ def friction_force(p, z, elements, v, g, h):
 
 
 @njit(cache=True)
+def command_of(gains, s, reading, target, rate):
+    """Command (N) of the cascade; s holds the last reading, filtered speed and integral."""
+    s[1] += gains.filter * ((reading - s[0]) * rate - s[1])
+    s[0] = reading
+    wanted = target[1] + gains.position * (target[0] - reading)
+    s[2] += gains.integral * (wanted - s[1]) / rate
+    command = gains.speed * (wanted - s[1]) + s[2] + gains.mass * target[2]
+    command += gains.friction * np.tanh(target[1] / 2e-3)
+    return min(max(command, -gains.limit), gains.limit)
+
+
+@njit(cache=True)
+def drive_force(p, s, u, h):
+    """Force (N) for a command: dead zone, rate, lag, limit, then the motor's own faults."""
+    u = np.sign(u) * max(abs(u) - p.deadband, 0.0)
+    u = s[LAGGED] + min(max(u - s[LAGGED], -p.rate_limit * h), p.rate_limit * h)
+    if p.lag > 0.0:
+        s[LAGGED] += (1.0 - np.exp(-h / p.lag)) * (u - s[LAGGED])
+    else:
+        s[LAGGED] = u
+    actual = min(max(s[LAGGED], -p.saturation), p.saturation)
+    change, s[LAST] = actual - s[LAST], actual
+    grown = min(abs(change) / p.remanence_width, 1.0)
+    s[REMANENCE] += (np.sign(change) - s[REMANENCE]) * grown
+    return actual + p.remanence * s[REMANENCE] - p.current_drop * actual * abs(actual)
+
+
+@njit(cache=True)
+def dwelt(p, s, v, h):
+    """Part of the dwell force that rest has built up and motion has not yet worn off."""
+    if p.dwell_force == 0.0:
+        return 0.0
+    if abs(v) < 2e-4:
+        s[REST] += h
+        s[DWELT] = max(s[DWELT], 1.0 - np.exp(-s[REST] / p.dwell_time))
+    else:
+        s[REST] = 0.0
+        s[DWELT] *= np.exp(-abs(v) * h / 5e-4)
+    return s[DWELT]
+
+
+@njit(cache=True)
+def friction(p, s, elements, tables, x, v, a, other_a, h):
+    """Friction with its memory and the viscous part, both N, opposing motion."""
+    sign = np.tanh(v / SMOOTH_SIGN)
+    level = look_up(tables[FRICTION], HALF_SPAN, x) * (1.0 + p.asymmetry * sign)
+    level *= 1.0 + p.load_gain * abs(other_a) + p.wear_rate * s[DISTANCE]
+    level *= 1.0 + p.accel_gain * abs(a)
+    cold = np.exp(-p.warm_gain * s[HEAT])
+    v0 = p.v0 * look_up(tables[STRIBECK], HALF_SPAN, x)
+    curve = p.Fc + (p.Fs - p.Fc) * np.exp(-((abs(v) / v0) ** p.n))
+    g = (curve * cold + p.dwell_force * dwelt(p, s, v, h)) * level
+    s[BRISTLE], held = friction_force(p, s[BRISTLE], elements, v, g, h)
+    viscous = p.s2 * cold * (1.0 + p.viscous_asymmetry * sign) * v
+    s[HEAT] += h * ((held + viscous) * v - s[HEAT] / p.warm_time)
+    s[DISTANCE] += abs(v) * h
+    return held, viscous
+
+
+@njit(cache=True)
+def track_force(p, s, tables, drag, x, v, h):
+    """Force (N) of cable, track, air, bumps and stops."""
+    rub = 1.0 - abs(s[LOOP]) * (0.5 + 0.5 * np.sign(v * s[LOOP]))
+    s[LOOP] += v * h / p.loop_length * rub
+    force = look_up(tables[FORCE], HALF_SPAN, x) - look_up(drag, TOP_SPEED, v)
+    force -= p.loop_force * s[LOOP]
+    if p.turn > 0.0:
+        s[SIDE] = min(max(s[SIDE] + 2.0 * v * h / p.turn, -1.0), 1.0)
+    else:
+        s[SIDE] = np.tanh(v / SMOOTH_SIGN)
+    force -= s[SIDE] * look_up(tables[AHEAD if s[SIDE] > 0.0 else BEHIND], HALF_SPAN, x)
+    if x > p.stop_high:
+        force -= p.stop_k * (x - p.stop_high) + p.stop_c * v
+    elif x < p.stop_low:
+        force -= p.stop_k * (x - p.stop_low) + p.stop_c * v
+    return force
+
+
+@njit(cache=True)
+def acceleration(p, s, x, v, force, mass, h):
+    """Acceleration (m/s^2) over the frame, which with the second mass goes one step on."""
+    link, shake = 0.0, 0.0
+    if p.mass2 > 0.0:
+        apart = s[X2] - x
+        squeeze = np.sign(apart) * max(abs(apart) - p.gap, 0.0)
+        if squeeze != 0.0 or p.gap == 0.0:
+            link = p.k2 * squeeze + p.c2 * (s[V2] - v)
+    if p.frame_mass > 0.0:
+        shake = (-force - p.frame_k * s[XF] - p.frame_c * s[VF]) / p.frame_mass
+        s[VF] += h * shake
+        s[XF] += h * s[VF]
+    if p.mass2 > 0.0:
+        s[V2] += h * (-link / p.mass2 - shake)
+        s[X2] += h * s[V2]
+    return (force + link) / mass - shake
+
+
+@njit(cache=True)
 def simulate(p, gains, setpoint, other, tables, drag, disturbance, noise, rate):
     """Run under control; (n, 4): reading m, command N, true position m, true speed m/s.
 
@@ -130,16 +233,12 @@ def simulate(p, gains, setpoint, other, tables, drag, disturbance, noise, rate):
     noise (n,) m are sampled at the control's rate (Hz).
     """
     n, h = len(setpoint), STEP
-    inner = round(1.0 / (rate * h))
+    inner, late = round(1.0 / (rate * h)), round(p.reading_delay / h)
     out = np.zeros((n, 4))
     history, elements = np.full(HISTORY, setpoint[0, 0]), np.zeros(4)
-    x, v, a, z = setpoint[0, 0], 0.0, 0.0, 0.0
-    x2, v2, xf, vf = x, 0.0, 0.0, 0.0
-    motor, loop, remanence, old_motor = 0.0, 0.0, 0.0, 0.0
-    heat, rest, extra, distance = 0.0, 0.0, 0.0, 0.0
-    previous, speed, integral = x, 0.0, 0.0
-    late = round(p.reading_delay / h)
-    fine, side = 0, 0.0
+    x, v, a, fine = setpoint[0, 0], 0.0, 0.0, 0
+    s, loop = np.zeros(STATES), np.array([x, 0.0, 0.0])
+    s[X2] = x
     for k in range(n):
         history[fine % HISTORY] = x
         seen = history[(fine - late) % HISTORY] if fine >= late else history[0]
@@ -147,86 +246,24 @@ def simulate(p, gains, setpoint, other, tables, drag, disturbance, noise, rate):
         if p.resolution > 0.0:
             reading = np.floor(reading / p.resolution + 0.5) * p.resolution
         if k == 0:
-            previous = reading
-        speed += gains.filter * ((reading - previous) * rate - speed)
-        previous = reading
-        wanted = setpoint[k, 1] + gains.position * (setpoint[k, 0] - reading)
-        integral += gains.integral * (wanted - speed) / rate
-        command = gains.speed * (wanted - speed) + integral + gains.mass * setpoint[k, 2]
-        command += gains.friction * np.tanh(setpoint[k, 1] / 2e-3)
-        command = min(max(command, -gains.limit), gains.limit)
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = reading, command, x, v
+            loop[0] = reading
+        out[k] = reading, command_of(gains, loop, reading, setpoint[k], rate), x, v
+        k1 = min(k + 1, n - 1)
         for i in range(inner):
             history[fine % HISTORY] = x
             fine += 1
             since = (i + 0.5) * h * rate
-            # Drive: the command of a while ago, dead zone, rate, lag, limit, then the motor.
             j = k + int(np.floor(since - p.delay * rate))
-            u = 0.0 if j < 0 else out[j, 1]
-            u = np.sign(u) * max(abs(u) - p.deadband, 0.0)
-            u = motor + min(max(u - motor, -p.rate_limit * h), p.rate_limit * h)
-            if p.lag > 0.0:
-                motor += (1.0 - np.exp(-h / p.lag)) * (u - motor)
-            else:
-                motor = u
-            actual = min(max(motor, -p.saturation), p.saturation)
-            change, old_motor = actual - old_motor, actual
-            remanence += (np.sign(change) - remanence) * min(abs(change) / p.remanence_width, 1.0)
-            actual += p.remanence * remanence - p.current_drop * actual * abs(actual)
-            actual *= look_up(tables[MOTOR], HALF_SPAN, x)
-            # Friction.
-            k1 = min(k + 1, n - 1)
             other_v = other[k, 0] + since * (other[k1, 0] - other[k, 0])
             other_a = other[k, 1] + since * (other[k1, 1] - other[k, 1])
-            sign = np.tanh(v / SMOOTH_SIGN)
-            level = look_up(tables[FRICTION], HALF_SPAN, x) * (1.0 + p.asymmetry * sign)
-            level *= 1.0 + p.load_gain * abs(other_a) + p.wear_rate * distance
-            level *= 1.0 + p.accel_gain * abs(a)
-            cold = np.exp(-p.warm_gain * heat)
-            if p.dwell_force != 0.0:
-                if abs(v) < 2e-4:
-                    rest += h
-                    extra = max(extra, 1.0 - np.exp(-rest / p.dwell_time))
-                else:
-                    rest = 0.0
-                    extra *= np.exp(-abs(v) * h / 5e-4)
-            v0 = p.v0 * look_up(tables[STRIBECK], HALF_SPAN, x)
-            curve = p.Fc + (p.Fs - p.Fc) * np.exp(-((abs(v) / v0) ** p.n))
-            g = (curve * cold + p.dwell_force * extra) * level
-            z, held = friction_force(p, z, elements, v, g, h)
-            viscous = p.s2 * cold * (1.0 + p.viscous_asymmetry * sign) * v
-            heat += h * ((held + viscous) * v - heat / p.warm_time)
-            distance += abs(v) * h
-            # Everything else that acts on the carriage.
-            loop += v * h / p.loop_length * (1.0 - abs(loop) * (0.5 + 0.5 * np.sign(v * loop)))
-            force = actual - held - viscous - p.loop_force * loop
-            force += look_up(tables[FORCE], HALF_SPAN, x) - look_up(drag, TOP_SPEED, v)
-            side = min(max(side + 2.0 * v * h / p.turn, -1.0), 1.0) if p.turn > 0.0 else sign
-            force -= side * look_up(tables[AHEAD if side > 0.0 else BEHIND], HALF_SPAN, x)
+            force = drive_force(p, s, 0.0 if j < 0 else out[j, 1], h)
+            force *= look_up(tables[MOTOR], HALF_SPAN, x)
+            held, viscous = friction(p, s, elements, tables, x, v, a, other_a, h)
+            force += track_force(p, s, tables, drag, x, v, h) - held - viscous
             force += disturbance[k] + since * (disturbance[k1] - disturbance[k])
             force -= p.couple_inertia * other_a + p.couple_viscous * other_v
-            if x > p.stop_high:
-                force -= p.stop_k * (x - p.stop_high) + p.stop_c * v
-            elif x < p.stop_low:
-                force -= p.stop_k * (x - p.stop_low) + p.stop_c * v
             mass = p.mass - p.mass2 + p.mass_rate * (k + since) / rate
-            on_frame = -force
-            if p.mass2 > 0.0:
-                apart = x2 - x
-                squeeze = np.sign(apart) * max(abs(apart) - p.gap, 0.0)
-                link = 0.0
-                if squeeze != 0.0 or p.gap == 0.0:
-                    link = p.k2 * squeeze + p.c2 * (v2 - v)
-                force += link
-            shake = 0.0
-            if p.frame_mass > 0.0:
-                shake = (on_frame - p.frame_k * xf - p.frame_c * vf) / p.frame_mass
-                vf += h * shake
-                xf += h * vf
-            if p.mass2 > 0.0:
-                v2 += h * (-link / p.mass2 - shake)
-                x2 += h * v2
-            a = force / mass - shake
+            a = acceleration(p, s, x, v, force, mass, h)
             x += h * (v + 0.5 * h * a)
             v += h * a
     return out
