@@ -23,7 +23,7 @@ from identify.evidence import (
     noise_gain,
 )
 from identify.fit import AT_FLOOR, Fit, Outcome, error_on, finished, fit_axis, rms
-from identify.noise import noise_floor
+from identify.noise import floor_of
 from identify.residual import moving, residual, sticks
 from identify.search import Start, fit_thoroughly, starts, stepped
 from identify.study import Study
@@ -196,7 +196,7 @@ def _score_noise(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate
     """Evidence for a noise that the effect makes, where with it the error is noise."""
     logs = study.holdout or study.fit
     seen = error_on(fit.axis, logs)
-    floors = [noise_floor(f.axis, [(w.motion, w.window) for w in logs]) for f in (base, fit)]
+    floors = [floor_of(f.axis, logs) for f in (base, fit)]
     told = fit.at_floor and not base.at_floor and rms(seen) < AT_FLOOR * floors[1]
     gain = noise_gain(fit.residual, base.floor, fit.floor) if told else 0.0
     unseen = effective_samples(seen) * noise_gain(seen, *floors) if told else 0.0

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from identify.fit import rms
 from identify.freerun import free_run, rms_error
-from identify.noise import noise_floor
+from identify.noise import floor_of
 from identify.residual import Windowed, moving, residual, sticks
 from identify.spectrum import bands
 from identify.structure import UNITS, gathered
@@ -111,7 +111,7 @@ def compare_axis(
     axis = model.axes[study.axis]
     kept = moving(study.fit, sticks(axis))
     every = residual(axis, study.fit)
-    floor = noise_floor(axis, [(w.motion, w.window) for w in study.fit])
+    floor = floor_of(axis, study.fit)
     where = gathered(study.fit)
     where["roller_phase"] = np.mod(where["position"], roller_pitch(axis))
     force, where = every[kept], {k: v[kept] for k, v in where.items()}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from identify.candidates import try_effect
 from identify.contest import Explanation
 from identify.fit import fit_axis
-from identify.noise import noise_floor
+from identify.noise import floor_of
 from identify.planting import strength_for
 from identify.residual import residual
 from identify.search import fit_thoroughly
@@ -75,7 +75,7 @@ def _supposed(effect: Effect, axis: AxisModel, study: Study) -> AxisModel:
         return fit_axis(
             axis.with_effect(start_values(base, study, effect)[0].fitted), study.fit
         ).axis
-    floor = noise_floor(axis, [(log.motion, log.window) for log in study.fit])
+    floor = floor_of(axis, study.fit)
     without = residual(axis, study.fit)
 
     def added(fitted: Fitted) -> Array:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from identify.actuation import forces_lessened
 from identify.evidence import effective_samples
 from identify.levenberg_marquardt import minimise
-from identify.noise import noise_floor
+from identify.noise import floor_of
 from identify.residual import Windowed, jacobian, moving, residual, sticks
 from identify.scaling import Scaling
 from identify.smoothing import described, smoothing
@@ -67,7 +67,7 @@ class Fit:
     @cached_property
     def floor(self) -> float:
         """RMS noise floor in N."""
-        return noise_floor(self.axis, [(log.motion, log.window) for log in self.logs])
+        return floor_of(self.axis, self.logs)
 
     @cached_property
     def lessened(self) -> float:

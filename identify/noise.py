@@ -20,7 +20,7 @@ from scipy.signal.windows import hann
 
 from identify.actuation import actual_force, is_noise
 from identify.motion import Motion
-from identify.residual import REST_SPEED, on_blocks, sticks, total_force
+from identify.residual import REST_SPEED, Windowed, on_blocks, sticks, total_force
 from identify.weak import Window
 from twin.model import AxisModel
 
@@ -52,6 +52,11 @@ class Noise:
     def power(self) -> Array:
         """What is left in a force residual, (k,) N^2/Hz."""
         return np.asarray(self.force + self.reading * self.bend)
+
+
+def floor_of(axis: AxisModel, logs: Sequence[Windowed]) -> float:
+    """RMS noise floor in N of the windowed residual of these logs."""
+    return noise_floor(axis, [(log.motion, log.window) for log in logs])
 
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, Window]]) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.fit import fit_axis
-from identify.noise import noise_floor
+from identify.noise import floor_of
 from identify.planting import draw_effect, hidden_part, other_machine, visible_force
 from identify.study import studies
 from twin.effect import Effect, Kind
@@ -123,7 +123,7 @@ def _with_friction(
         trial = simulate(machine, RUNS[0], seed=seed, duration=DURATION, stage=ReducedStage)
         study = studies(model, {"trial": trial}, {})[AXIS]
         base = fit_axis(model.axes[AXIS], study.fit)
-        floor = noise_floor(machine.axes[AXIS], [(w.motion, w.window) for w in study.fit])
+        floor = floor_of(machine.axes[AXIS], study.fit)
         return float(np.sqrt(max(base.error**2 - floor**2, 1e-4 * floor**2)) / floor)
 
     machine = true.with_axis(AXIS, true.axes[AXIS].with_effect(fitted))
