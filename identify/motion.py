@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
@@ -25,6 +26,7 @@ SHORTEST_BLOCK = 1e-3  # s
 LONGEST_BLOCK = 1e-2  # s
 SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
 SHORTEST_LOG = 1.0  # s
+READ_BACK = 32  # readings that a controller is supposed to use
 SMOOTHED = 11  # samples over which readings are smoothed to undo their errors
 GAP = 8.0  # ratio of differences between readings that only a resolution leaves empty
 WHOLE = 0.15  # of a step, RMS, by which such differences may miss whole steps
@@ -109,6 +111,22 @@ class Motion:
         signals = self.at_samples(0.0)
         signals[0] = savgol_filter(signals[0], SMOOTHED, 2)
         return signals
+
+    @cached_property
+    def command_noise(self) -> float:
+        """White noise in the command that its controller did not make of the readings, N^2/Hz.
+
+        One-sided. Second differences leave little of a setpoint; what a linear controller makes of
+        its last readings is taken off, and the median passes by what is not linear.
+        """
+        command, bend = np.diff(self.raw[1], 2), np.diff(self.raw[0])
+        lags = min(READ_BACK, len(command) // 8)
+        past = sliding_window_view(bend[: len(command)], lags)
+        scale = np.sqrt(np.mean(past**2)) or 1.0
+        rows, wanted = past / scale, command[lags - 1 :]
+        gains = np.linalg.lstsq(rows.T @ rows, rows.T @ wanted, rcond=1e-12)[0]
+        left = np.median(np.abs(wanted - rows @ gains)) / 0.6745
+        return float(2.0 * self.sample_period * left**2 / 6.0)
 
     @cached_property
     def resolution(self) -> float:

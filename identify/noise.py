@@ -2,13 +2,15 @@
 
 The raw residual, with a from second differences, is all noise at high frequency: white
 noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 cos(w dt))/dt^2)^2. A and B
-are fitted to its spectrum above the band of the effects, and give what passes the windows.
+are fitted to its spectrum above the band of the effects, and give what passes the windows. Where
+the encoder's noise hides that of the force in all of that band, the force's is what the controller
+did not make of its readings.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -31,6 +33,7 @@ LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
 ROUNDS = 12
 TOLERATED = 0.5  # logarithm of the power over the fit from which a frequency weighs half
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
+PLAIN = 3.0  # of the reading's noise where the band begins, from which the force's is seen in it
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,19 +64,13 @@ def floor_of(axis: AxisModel, logs: Sequence[Windowed]) -> float:
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, Window]]) -> float:
     """RMS in N of what measurement noise leaves in the windowed residual of these logs."""
-    noises = [noise_of(axis, motion) for motion, _ in logs]
-    # The rounding of a coarse encoder at constant speed is a tone, which can pass for force noise;
-    # that is the drive's, and alike in all logs.
-    least = min(noise.force for noise in noises)
-    parts = []
-    for (motion, window), noise in zip(logs, noises, strict=True):
-        own = replace(noise, force=least) if motion.resolution else noise
-        parts.append(_variance(axis, motion, window, own))
+    parts = [_variance(axis, *log) for log in logs]
     weights = [motion.signals.shape[1] for motion, _ in logs]
     return float(np.sqrt(np.average(parts, weights=weights)))
 
 
-def _variance(axis: AxisModel, motion: Motion, window: Window, noise: Noise) -> float:
+def _variance(axis: AxisModel, motion: Motion, window: Window) -> float:
+    noise = noise_of(axis, motion)
     passed = noise.power
     if any(is_noise(f.effect) for f in axis.effects):
         passed = passed + _rounding(axis, motion, noise.segment)
@@ -114,8 +111,10 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     half = np.cos(np.pi * frequency * dt) ** 2
     bend = _bend(axis, motion, frequency)
     band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < BAND[2] / dt)
-    levels = _fit_levels(np.stack([half, bend], axis=1)[band], power[band])
-    return Noise(frequency, float(levels[0]), float(levels[1]), bend, segment)
+    force, reading = map(float, _fit_levels(np.stack([half, bend], axis=1)[band], power[band]))
+    if force < PLAIN * reading * bend[band][0]:
+        force = motion.command_noise
+    return Noise(frequency, force, reading, bend, segment)
 
 
 def _between_samples(force: Array, motion: Motion) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -74,7 +74,7 @@ def studies(
         if not fit:
             continue
         held = _moving(holdout, name)
-        length = window or choose_window(fit)
+        length = window or choose_window(fit, held)
         out[name] = Study(
             axis=name,
             fit=tuple(Windowed.of(m, length) for m in fit),
@@ -110,11 +110,13 @@ def _one_way(position: Array) -> bool:
     return bool(np.abs(steps.sum()) > 0.5 * np.abs(steps).sum() > 0)
 
 
-def choose_window(motions: Iterable[Motion]) -> float:
-    """The shortest window (s) whose noise floor is small against what is to be explained."""
-    motions = list(motions)
+def choose_window(motions: Sequence[Motion], others: Sequence[Motion] = ()) -> float:
+    """The shortest window (s) whose noise floor is small against what is to be explained.
+
+    others: motions that it must suit as well, by the length of their blocks.
+    """
     mass = inertia(motions)
-    longest_block = max(m.period for m in motions)
+    longest_block = max(m.period for m in (*motions, *others))
     for length in WINDOWS:
         if length < LEAST_BLOCKS * longest_block:
             continue
