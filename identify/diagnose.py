@@ -12,11 +12,12 @@ from identify.candidates import Candidate, score
 from identify.clocks import synchronised
 from identify.fit import Fit, fit_axis
 from identify.lookahead import held_at_floor, look_ahead
-from identify.ranking import Progress, less, rank, tie
+from identify.ranking import Progress, less, rank, tie, took_friction
 from identify.repeats import Repeat, not_general
 from identify.search import fit_thoroughly
 from identify.structure import Structure, explains, find_structure
 from identify.study import Study
+from twin.effect import Kind
 from twin.effects import Catalogue
 
 MOST_SHIFTS = 2  # of the force channel, after which a diagnosis begins anew
@@ -158,7 +159,7 @@ def _next(
         best = ranking[0]
         near = tuple(c for c in ranking[1:] if c.supported and _near(best, c))
         tied = tuple(c.effect.name for c in near if tie(study, best, c))
-        return [Step(best, tied, rivals=near)]
+        return [Step(best, tied or _friction_instead(base, best, ranking), rivals=near)]
     if base.at_floor or held_at_floor(base, study):
         return []
     pairs = look_ahead(base, study, ranking, ranked)
@@ -180,6 +181,17 @@ def _asked_for(best: Candidate, base: Fit) -> bool:
     The floor is an estimate, so an error at it may still hold an effect that shows beyond doubt.
     """
     return best.supported and (not base.at_floor or best.delta_bic > BEYOND_DOUBT)
+
+
+def _friction_instead(base: Fit, best: Candidate, ranking: Sequence[Candidate]) -> tuple[str, ...]:
+    """A friction that explains nearly all as well, where the best took over the dry friction.
+
+    No machine is without; a hysteresis that leaves none may as well be friction with a memory.
+    """
+    if not took_friction(base.axis, best.fit.axis):
+        return ()
+    frictions = (c for c in ranking if c.effect.kind is Kind.FRICTION and c.supported)
+    return tuple(c.effect.name for c in frictions if _part(base, c.fit) > NEARLY_ALL)[:1]
 
 
 def _near(best: Candidate, other: Candidate) -> bool:

@@ -17,6 +17,7 @@ from identify.residual import moving, residual, sticks
 from identify.study import Study
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
+from twin.model import AxisModel
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -25,6 +26,7 @@ SETTLED = 0.999  # part of the error to which another start of the base must bri
 TIE = 2.0  # t of the held-out difference from which one explanation is the better
 NO_EVIDENCE = 2.0  # difference of BIC "not worth more than a bare mention" (Kass, Raftery 1995)
 LEAST_SEPARATION = 10.0  # difference of BIC that separates two explanations
+LEAST_DRY = 0.3  # part of the dry friction below which another effect took it over
 
 
 def rank(
@@ -104,3 +106,14 @@ def tie(study: Study, best: Candidate, other: Candidate) -> bool:
         return True
     # What is significant may still be next to nothing: two delays differ by a part in a thousand.
     return evidence(pair[0], pair[1], 0).delta_bic < NO_EVIDENCE
+
+
+def took_friction(before: AxisModel, after: AxisModel) -> bool:
+    """Whether a friction is still there, but hardly any of its dry part (N) is left."""
+    for old in before.effects:
+        if old.effect.kind is not Kind.FRICTION or old.effect.name not in after.names:
+            continue
+        new = after[old.effect.name].values
+        dry = [p.name for p in old.effect.strengths if p.unit == "N" and p.name not in old.fixed]
+        return any(new[name] < LEAST_DRY * old.values[name] for name in dry)
+    return False

@@ -1,12 +1,16 @@
 """Logs of a second simulator, which shares no law with the product: the right name, or none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from foreign_effects import INSIDE, OUTSIDE
-from foreign_machine import drawn, gaussian
+from foreign_kernel import SLIP_ELEMENTS
+from foreign_machine import AHEAD, BEHIND, FORCE, drawn, gaussian
 from foreign_study import CATALOGUE, STAGE, diagnosed, model_for
 
 from identify.diagnose import Verdict
+from twin.model import Fitted
 
 SEED = 5
 RATE = 4e3  # Hz
@@ -73,3 +77,16 @@ def test_nothing_is_named_where_nothing_is_planted(seed, rate, terms):
 def test_bumps_of_another_form_are_no_reason_to_name_another_effect(seed):
     machine = drawn(np.random.default_rng(seed), bump=gaussian)
     assert diagnosed(STAGE, machine, seed).best is None
+
+
+def test_a_hysteresis_that_leaves_no_dry_friction_may_be_one():
+    """Slip elements of the friction are to the motion what those of a cable would be."""
+    machine = drawn(np.random.default_rng(1), 2e3)
+    machine.tables[[FORCE, AHEAD, BEHIND]] = 0.0
+    machine = machine.having(kind=SLIP_ELEMENTS, Fc=1.1, Fs=1.1, s2=1.1)
+    axis = STAGE.axes["x"]
+    friction = Fitted.at_start(CATALOGUE["coulomb_viscous"])
+    model = STAGE.with_axis("x", replace(axis, effects=(friction,)))
+    tried = RIVALS | {name: CATALOGUE[name] for name in ("gms", "stribeck")}
+    answer = diagnosed(model, machine, 1, 8.0, tried)
+    assert "gms" in answer.answers[0]
