@@ -27,6 +27,7 @@ LONGEST_BLOCK = 1e-2  # s
 SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
 SHORTEST_LOG = 1.0  # s
 READ_BACK = 32  # readings that a controller is supposed to use
+ENOUGH = 200_000  # samples that tell the noise of a command
 SMOOTHED = 11  # samples over which readings are smoothed to undo their errors
 GAP = 8.0  # ratio of differences between readings that only a resolution leaves empty
 WHOLE = 0.15  # of a step, RMS, by which such differences may miss whole steps
@@ -119,7 +120,8 @@ class Motion:
         One-sided. Second differences leave little of a setpoint; what a linear controller makes of
         its last readings is taken off, and the median passes by what is not linear.
         """
-        command, bend = np.diff(self.raw[1], 2), np.diff(self.raw[0])
+        velocity, command = self.raw[:, :ENOUGH]
+        command, bend = np.diff(command, 2), np.diff(velocity)
         lags = min(READ_BACK, len(command) // 8)
         past = sliding_window_view(bend[: len(command)], lags)
         scale = np.sqrt(np.mean(past**2)) or 1.0
