@@ -23,7 +23,7 @@ DRIVES = {
 
 
 @pytest.mark.parametrize("drive", DRIVES)
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_the_force_noise_that_was_put_in_is_found(drive, seed):
     rate, resolution, encoder, current = DRIVES[drive]
     rng = np.random.default_rng(seed)
