@@ -57,7 +57,8 @@ def test_descriptions_are_marked_and_never_a_diagnosis() -> None:
 @pytest.mark.parametrize(
     ("force", "height", "name", "fall"),
     [("chirp", 0.05, MAP, 20.0), pytest.param("hill", 0.1, MAP, 20.0, marks=SLOW),
-     pytest.param("sawtooth", 0.05, MAP, 3.5, marks=SLOW), ("bend", 0.05, LEARNED, 4.0)],
+     pytest.param("sawtooth", 0.05, MAP, 3.5, marks=SLOW),
+     pytest.param("bend", 0.05, LEARNED, 4.0, marks=SLOW)],
 )  # fmt: skip
 def test_a_force_of_no_known_effect_is_described(
     force: str, height: float, name: str, fall: float, tmp_path: Path

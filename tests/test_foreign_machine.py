@@ -79,6 +79,7 @@ def test_bumps_of_another_form_are_no_reason_to_name_another_effect(seed):
     assert diagnosed(STAGE, machine, seed).best is None
 
 
+@pytest.mark.slow
 def test_a_hysteresis_that_leaves_no_dry_friction_may_be_one():
     """Slip elements of the friction are to the motion what those of a cable would be."""
     machine = drawn(np.random.default_rng(1), 2e3)
