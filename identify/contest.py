@@ -27,7 +27,7 @@ from identify.subspace import orthonormal, unabsorbed
 from identify.weak import LEAST_BLOCKS
 from twin.errors import InputError
 from twin.experiment import Experiment
-from twin.experiments import simulate
+from twin.experiments import outside_travel, simulate
 from twin.log import Log
 from twin.model import AxisModel, StageModel, coordinates, read
 from twin.simulator import ReducedStage
@@ -108,14 +108,11 @@ class Arena:
 
 def within_limits(stage: StageModel, log: Log) -> bool:
     """Whether a simulated log keeps to the travel and the force limit of every axis."""
-    for name, axis in stage.axes.items():
-        h = axis.hardware
-        position = log.truth[name]["position"]
-        if np.abs(log.axes[name].force).max() >= h.force_limit:
-            return False
-        if h.travel and not h.travel[0] <= position.min() <= position.max() <= h.travel[1]:
-            return False
-    return True
+    strained = any(
+        np.abs(log.axes[name].force).max() >= axis.hardware.force_limit
+        for name, axis in stage.axes.items()
+    )
+    return not strained and not outside_travel(stage, log)
 
 
 def favoured(arena: Arena) -> tuple[str, float]:

@@ -6,7 +6,7 @@ and the cable's constant, a payload and the mass) never shows as missing. It sho
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,26 +74,21 @@ def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
     if not error > AT_FLOOR * max(fit.floor, fit.error):
         return Refit(error, fit.error, ())
     where = fit.scaling.where
-    before, after = read(given, where), read(fit.axis, where)
-    forces = {}
-    for c, old, moved in zip(where, before, abs(after - before) > half_widths(fit), strict=True):
-        back = residual(write(fit.axis, [c], [old]), fit.logs)[fit.kept] - fit.residual
-        if moved and rms(back) > LEAST_FORCE * error:
-            forces[c] = back
-    most = sorted(forces, key=lambda c: -rms(forces[c]))[:MOST_TOLD]
-    bases = _bases(fit, catalogue) if most else {}
-    changes = [
-        Change(
-            c.label,
-            float(before[where.index(c)]),
-            float(after[where.index(c)]),
-            c.parameter.unit,
-            rms(forces[c]),
-            tuple(name for name, basis in bases.items() if _within(forces[c], basis)),
-        )
-        for c in most
-    ]
-    return Refit(error, fit.error, tuple(changes))
+    values = zip(where, read(given, where), read(fit.axis, where), half_widths(fit), strict=True)
+    told: list[tuple[Change, Array]] = []
+    for c, before, after, half in values:
+        if abs(after - before) > half:
+            back = residual(write(fit.axis, [c], [before]), fit.logs)[fit.kept] - fit.residual
+            unit = c.parameter.unit
+            told.append((Change(c.label, float(before), float(after), unit, rms(back)), back))
+    told = [t for t in told if t[0].force > LEAST_FORCE * error]
+    told = sorted(told, key=lambda t: -t[0].force)[:MOST_TOLD]
+    bases = _bases(fit, catalogue) if told else {}
+    changes = tuple(
+        replace(change, alike=tuple(name for name, basis in bases.items() if _within(back, basis)))
+        for change, back in told
+    )
+    return Refit(error, fit.error, changes)
 
 
 def _bases(fit: Fit, catalogue: Catalogue) -> dict[str, Array]:

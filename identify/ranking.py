@@ -26,7 +26,7 @@ SETTLED = 0.999  # part of the error to which another start of the base must bri
 TIE = 2.0  # t of the held-out difference from which one explanation is the better
 NO_EVIDENCE = 2.0  # difference of BIC "not worth more than a bare mention" (Kass, Raftery 1995)
 LEAST_SEPARATION = 10.0  # difference of BIC that separates two explanations
-LEAST_DRY = 0.3  # part of the dry friction below which another effect took it over
+COLLAPSE = 0.3  # part that a strength keeps at most where an effect added later took it over
 
 
 def rank(
@@ -115,5 +115,5 @@ def took_friction(before: AxisModel, after: AxisModel) -> bool:
             continue
         new = after[old.effect.name].values
         dry = [p.name for p in old.effect.strengths if p.unit == "N" and p.name not in old.fixed]
-        return any(new[name] < LEAST_DRY * old.values[name] for name in dry)
+        return any(new[name] < COLLAPSE * old.values[name] for name in dry)
     return False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from identify.fit import Fit, error_on, rms
 from identify.freerun import free_run, rms_error
 from identify.given import Refit, refit
 from identify.plan import Plan, next_experiment, plan
+from identify.ranking import COLLAPSE
 from identify.study import Study, studies
 from identify.uncertainty import Estimate, estimates, half_widths
 from twin.effect import Effect
@@ -39,7 +40,7 @@ def silent(what: str, done: int, total: int) -> None:
 class FitResult:
     """A fitted stage: fits and estimates by axis, held-out force errors (N RMS) where given.
 
-    refits: what the fit changed of the model given, by axis.
+    given: the stage before the fit. catalogue: whose absent effects a parameter may stand in for.
     """
 
     model: StageModel
@@ -47,7 +48,13 @@ class FitResult:
     fits: Mapping[str, Fit]
     estimates: Mapping[str, tuple[Estimate, ...]]
     holdout_error: Mapping[str, float | None]
-    refits: Mapping[str, Refit]
+    given: StageModel
+    catalogue: Catalogue
+
+    @cached_property
+    def refits(self) -> Mapping[str, Refit]:
+        """What the fit changed of the model given, by axis."""
+        return {a: refit(self.given.axes[a], f, self.catalogue) for a, f in self.fits.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +140,8 @@ def fit(
         model = model.with_axis(axis, result.axis)
     held = {a: holdout_error(f, found[a]) for a, f in fits.items()}
     known = Catalogue([]) if catalogue is None else catalogue
-    changed = {a: refit(given.axes[a], f, known) for a, f in fits.items()}
-    return FitResult(model, found, fits, {a: estimates(f) for a, f in fits.items()}, held, changed)
+    intervals = {a: estimates(f) for a, f in fits.items()}
+    return FitResult(model, found, fits, intervals, held, given, known)
 
 
 def holdout_error(fitted: Fit, study: Study) -> float | None:
@@ -284,8 +291,6 @@ def moved_parameters(before: Fit, after: Fit) -> tuple[str, ...]:
         out.append(f"{c.label} {verb} from {a:.4g} to {b:.4g} {p.unit}: {tail}")
     return tuple(out)
 
-
-COLLAPSE = 0.3  # part of its value that a parameter keeps at most when it is said to collapse
 
 __all__ = [
     "Addition",

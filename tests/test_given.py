@@ -12,7 +12,8 @@ from identify.given import Refit
 from identify.workflow import FitResult
 from twin.effects import load_catalogue
 from twin.experiments import simulate
-from twin.model import StageModel
+from twin.log import Log
+from twin.model import StageModel, coordinates, write
 from twin.model_file import load_model
 
 CATALOGUE = load_catalogue()
@@ -24,22 +25,21 @@ def nominal() -> StageModel:
     return load_model("proton_xy", CATALOGUE)
 
 
-@cache
 def machine(label: str, value: float) -> StageModel:
     """The stage with one number other than the model has it."""
     axis = nominal().axes["x"]
-    if label == "mass":
-        return nominal().with_axis("x", replace(axis, mass=value))
-    effect, parameter = label.split(".")
-    own = axis[effect]
-    changed = replace(own, values={**own.values, parameter: value})
-    return nominal().with_axis("x", axis.with_effect(changed))
+    (where,) = (c for c in coordinates(axis) if c.label == label)
+    return nominal().with_axis("x", write(axis, [where], [value]))
+
+
+@cache
+def logged(label: str, value: float) -> Log:
+    return simulate(machine(label, value), "moves", seed=1, duration=6.0)
 
 
 @cache
 def fitted(label: str, value: float) -> FitResult:
-    log = simulate(machine(label, value), "moves", seed=1, duration=6.0)
-    return workflow.fit(nominal(), {"fit": log}, catalogue=CATALOGUE)
+    return workflow.fit(nominal(), {"fit": logged(label, value)}, catalogue=CATALOGUE)
 
 
 def refit(label: str, value: float) -> Refit:
@@ -71,8 +71,7 @@ def test_what_is_said_to_be_the_same_force_is() -> None:
     """With the mass held, that effect takes the error to where refitting the mass did."""
     found = refit("mass", 15.6)
     held = replace(nominal().axes["x"], mass_fixed=True)
-    log = simulate(machine("mass", 15.6), "moves", seed=1, duration=6.0)
     model = nominal().with_axis("x", held)
     effect = CATALOGUE[found.changes[0].alike[0]]
-    added = workflow.add(effect, model, {"fit": log}, axis="x")
+    added = workflow.add(effect, model, {"fit": logged("mass", 15.6)}, axis="x")
     assert added.step.fit_error_after == pytest.approx(found.refitted, rel=0.01)

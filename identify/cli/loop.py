@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +24,7 @@ from identify.cli.shared import (
     require_folder,
     say,
     stage_model,
+    with_holdout,
 )
 
 
@@ -43,17 +45,10 @@ def fit(
     if out:
         require_folder(out)
     catalogue = catalogue_with(effects)
-    stage = stage_model(model, catalogue)
-    recorded = read_logs(logs)
-    with bars_on_stderr() as bars:
-        result = workflow.fit(
-            stage,
-            recorded,
-            read_logs(holdout),
-            catalogue=catalogue,
-            window=window,
-            progress=bars,
-        )
+    result, recorded = with_holdout(
+        partial(workflow.fit, catalogue=catalogue, window=window),
+        stage_model(model, catalogue), logs, holdout,
+    )  # fmt: skip
     if out:
         save_model(result.model, out)
     say(as_text.fit_text(result), as_json.fit_json(result), as_json_, checked(recorded))
@@ -104,16 +99,9 @@ def diagnose(
         require_folder(out)
     catalogue = catalogue_with(effects)
     stage = stage_model(model, catalogue)
-    recorded = read_logs(logs)
-    with bars_on_stderr() as bars:
-        result = workflow.diagnose(
-            stage,
-            recorded,
-            read_logs(holdout),
-            catalogue=catalogue,
-            window=window,
-            progress=bars,
-        )
+    result, recorded = with_holdout(
+        partial(workflow.diagnose, catalogue=catalogue, window=window), stage, logs, holdout
+    )
     if out:
         from identify.report import write_report
 
@@ -145,18 +133,10 @@ def add(
     require_folder(out)
     catalogue = catalogue_with(effects)
     chosen = catalogue[effect]
-    stage = stage_model(model, catalogue)
-    recorded = read_logs(logs)
-    with bars_on_stderr() as bars:
-        result = workflow.add(
-            chosen,
-            stage,
-            recorded,
-            read_logs(holdout),
-            axis=axis,
-            window=window,
-            progress=bars,
-        )
+    result, recorded = with_holdout(
+        partial(workflow.add, chosen, axis=axis, window=window),
+        stage_model(model, catalogue), logs, holdout,
+    )  # fmt: skip
     save_model(result.model, out)
     say(as_text.add_text(result), as_json.add_json(result), as_json_, checked(recorded))
     if not result.kept:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from twin.effects import Catalogue
     from twin.log import Log
     from twin.model import StageModel
+
+Result = TypeVar("Result")
 
 app = typer.Typer(
     help="Find out why the model and the machine disagree.",
@@ -82,6 +84,15 @@ def stage_model(name: str, catalogue: Catalogue) -> StageModel:
     from twin.model_file import load_model
 
     return load_model(name, catalogue)
+
+
+def with_holdout(
+    job: Callable[..., Result], stage: StageModel, logs: list[Path], holdout: list[Path] | None
+) -> tuple[Result, dict[str, Log]]:
+    """What a job makes of a stage, logs and held-out logs; and the logs."""
+    recorded = read_logs(logs)
+    with bars_on_stderr() as bars:
+        return job(stage, recorded, read_logs(holdout), progress=bars), recorded
 
 
 def read_logs(paths: list[Path] | None) -> dict[str, Log]:
