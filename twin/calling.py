@@ -10,6 +10,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from twin.compiled import callback
 from twin.effect import Effect, Law
 from twin.errors import InputError
 
@@ -38,7 +39,7 @@ def law_address(effect: Effect) -> int:
 
 @cache  # the native code must live as long as its address
 def _compile(law: Law) -> Any:
-    return numba.cfunc(LAW_SIGNATURE, cache=True, error_model="numpy")(law)
+    return callback(law, LAW_SIGNATURE)
 
 
 @intrinsic

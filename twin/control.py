@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.compiled import compiled
 from twin.model import AxisModel
 
 # Columns of the gain table, one row an axis.
@@ -60,7 +60,7 @@ def gain_table(
     return np.array(rows)
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def measure(position, noise, resolution):
     """Encoder reading: noise added, then rounded to the resolution."""
     if resolution > 0.0:
@@ -68,7 +68,7 @@ def measure(position, noise, resolution):
     return position + noise
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def command(gains, state, setpoint, reading, dt, first):
     """Force command in N. setpoint: position m, velocity m/s, acceleration m/s^2, force N."""
     if first:

@@ -8,10 +8,10 @@ shows no delay that the machine would not have.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from twin.calling import borrow, doubles_at
+from twin.compiled import compiled
 from twin.control import RESOLUTION, command, measure
 from twin.effect import (
     A_OTHER,
@@ -36,7 +36,7 @@ READING_COLUMN, COMMAND_COLUMN, POSITION_COLUMN, VELOCITY_COLUMN = range(4)
 N_SIGNALS = 4
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def control_axis(a, x, v, lead, table, sensing_states, gains, states, setpoint, noise, io, out):
     """Read the encoder, compute the command, log both with the true motion; returns the command.
 
@@ -59,7 +59,7 @@ def control_axis(a, x, v, lead, table, sensing_states, gains, states, setpoint, 
     return force
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True)
 def run_mujoco(
     step, model, data, off, where, user_at, first_sample, dt, table, sensing_states, gains,
     controller_states, setpoints, noise, watched, signals, forces, states,
@@ -99,7 +99,7 @@ def run_mujoco(
             states[k, i] = user[after + watched[i]]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True)
 def run_reduced(
     motion, effect_states, masses, substeps, first_sample, dt, table, sensing_states, gains,
     controller_states, setpoints, noise, watched, signals, forces, states,

@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import mujoco
-import numba
 import numpy as np
 from numba import carray, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
 from twin.calling import doubles_at
+from twin.compiled import callback, compiled
 from twin.effect import (
     A_OTHER,
     DT,
@@ -157,13 +157,13 @@ def call_step(typingctx, step, model, data):
     return types.void(types.int64, types.int64, types.int64), codegen
 
 
-@numba.njit(cache=True, inline="always")
+@compiled(inline=True)
 def view(address, shape):
     """Array of the doubles at an address, which MuJoCo owns."""
     return carray(doubles_at(address), shape)
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def begin_sample(time, committed, start, after):
     """Make ``start`` the states at the start of this sample, and ``after`` a copy of them.
 
@@ -181,7 +181,7 @@ def begin_sample(time, committed, start, after):
         after[i] = start[i]
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def passive_forces(block, data, off):
     """Add the effects' forces of every axis to qfrc_passive (see the module's docstring).
 
@@ -236,7 +236,6 @@ def _callback(off: Offsets) -> Any:
     # MuJoCo version compiles anew instead of reading the wrong fields.
     model_offsets, data_offsets = tuple(off[:2]), tuple(off[2:])
 
-    @numba.cfunc(types.void(types.int64, types.int64), cache=True, error_model="numpy")
     def passive(model, data):
         size = word_at(model + model_offsets[0])
         if size < HEADER + AXIS_COLUMNS:
@@ -248,7 +247,7 @@ def _callback(off: Offsets) -> Any:
         block = word_at(model + model_offsets[1]) + 8 * (size - length)
         passive_forces(block, data, data_offsets)
 
-    return passive
+    return callback(passive, types.void(types.int64, types.int64))
 
 
 def attach(spec: mujoco.MjSpec, table: Table, period: float, axes: tuple[str, ...]) -> int:

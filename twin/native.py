@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.calling import ADDRESS, KIND, P_AT, S_AT, borrow, call_law, law_address
+from twin.compiled import compiled
 from twin.effect import (
     A_OTHER,
     DRY,
@@ -50,7 +50,7 @@ _FRICTION = Kind.FRICTION.value
 _STRUCTURE = Kind.STRUCTURE.value
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def axis_force(entries, first, last, parameters, states, at, io, rows, k):
     """Forces on one axis, N: (of actuator and effects, of its structure); states advance a sample.
 
@@ -107,7 +107,7 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
     return net, added
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled(nogil=True)
 def walk(
     entries,
     first,
@@ -158,7 +158,7 @@ def walk(
             rows[i, k] = row[0, i]
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def sense(entries, first, last, parameters, states, io, position):
     """Encoder reading of a true position: the sensing effects in order."""
     io[READING] = position
@@ -172,7 +172,7 @@ def sense(entries, first, last, parameters, states, io, position):
     return io[READING]
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled(nogil=True)
 def walk_sensing(entries, first, last, parameters, states, motion, dt, readings):
     """Encoder readings (n,) m along a motion (3, n): position m, velocity m/s, command N."""
     io = np.zeros(IO_SIZE)

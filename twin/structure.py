@@ -8,16 +8,16 @@ the same one for the bodies that the effects build there.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from twin.calling import ADDRESS, P_AT, S_AT, call_law
+from twin.compiled import compiled
 from twin.effect import ACC, DT, MOVED, NET, OUT, WHEN
 
 LONGEST_STEP = 2e-4  # s, of attached masses along a measured motion
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def answer(entry, p, s, io, net, acceleration):
     """OUT (N) of a structure effect under these NET and ACC (m/s^2)."""
     io[OUT], io[NET], io[ACC] = 0.0, net, acceleration
@@ -26,7 +26,7 @@ def answer(entry, p, s, io, net, acceleration):
     return io[OUT]
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def answers(entries, first, last, p, s, io):
     """How the structure effects would answer in this sample: (pushed, riding, moved, yielding).
 
@@ -49,7 +49,7 @@ def answers(entries, first, last, p, s, io):
     return pushed, riding, moved, yielding
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def settle(entries, first, last, p, s, io, net, answered, rows, k):
     """Force (N) that the structure effects add under a net force; their states advance.
 
@@ -66,7 +66,7 @@ def settle(entries, first, last, p, s, io, net, answered, rows, k):
     return total
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled()
 def along(entries, first, last, p, s, io, velocity, k, rows):
     """Force (N) of structure effects along block k of a measured motion; their states advance.
 
@@ -97,7 +97,7 @@ def along(entries, first, last, p, s, io, velocity, k, rows):
     io[DT] = block
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def shared(answered, mass, measured):
     """NET and ACC (m/s^2) behind an acceleration of the axis over what it stands on."""
     pushed, riding, moved, yielding = answered
@@ -106,7 +106,7 @@ def shared(answered, mass, measured):
     return net / mass, (net + pushed) / free
 
 
-@numba.njit(cache=True, inline="always", error_model="numpy")
+@compiled(inline=True)
 def slope(values, k, dt):
     """Derivative of equally spaced means in the middle of number k, of fourth order inside."""
     last = values.shape[0] - 1
