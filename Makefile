@@ -1,4 +1,5 @@
 # Two commands do all the set-up: `make demo` and `make test`. Nothing is installed outside .venv.
+# `make check`, for daily work: lint, types, and the tests of what changed, for 15 s.
 PYTHON ?= python3
 VENV := .venv
 ifeq ($(OS),Windows_NT)
@@ -7,7 +8,7 @@ else
 BIN := $(VENV)/bin
 endif
 
-.PHONY: demo test bench clean
+.PHONY: demo check test bench clean
 
 demo: $(VENV)/runtime
 	$(BIN)/twin demo --out demo
@@ -17,6 +18,12 @@ test: $(VENV)/tests
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 -m "not slow"
+
+check: $(VENV)/tests
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -m "not slow" --changed --seconds 15
 
 bench: $(VENV)/benchmarks
 	$(BIN)/python -m benchmarks

@@ -21,9 +21,11 @@ from benchmarks import (
     simulation,
 )
 from benchmarks.figures import Figure, write_results
+from benchmarks.mutation import noticed
 
 ALL = (
     simulation, second_start, peer_fits, diagnosis, mcap_logs, effect_cost, import_time, selftest,
+    noticed,
 )  # fmt: skip
 
 

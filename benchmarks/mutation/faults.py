@@ -1,0 +1,224 @@
+"""Small faults: a line drawn at random, and one operator of cosmic-ray applied to it.
+
+To its operators come two that it lacks: arguments swapped, and a term dropped.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.mutating import MutationVisitor
+from cosmic_ray.operators.operator import Example, Operator
+from cosmic_ray.plugins import get_operator
+
+PACKAGES = ("twin", "identify")
+# A comparison is turned round, not moved by its boundary: between doubles that is the same.
+KINDS = (
+    *(f"ReplaceBinaryOperator_{k}" for k in (
+        "Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "FloorDiv_Div", "Mod_Add",
+        "BitAnd_BitOr", "BitOr_BitAnd",
+    )),
+    *(f"ReplaceComparisonOperator_{k}" for k in (
+        "Lt_GtE", "LtE_Gt", "Gt_LtE", "GtE_Lt", "Eq_NotEq", "NotEq_Eq", "Is_IsNot", "IsNot_Is",
+    )),
+    "ReplaceUnaryOperator_USub_UAdd", "ReplaceUnaryOperator_Delete_Not", "AddNot",
+    "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd",
+    "ReplaceBreakWithContinue", "NumberReplacer", "ZeroIterationForLoop",
+)  # fmt: skip
+
+
+class SwapArguments(Operator):
+    """f(a, b) -> f(b, a), for each neighbouring pair of positional arguments."""
+
+    def mutation_positions(self, node):
+        pairs = self._pairs(node)  # all at once: the node changes while its mutant is made
+        return [(node.children[i].start_pos, node.children[i + 2].end_pos) for i in pairs]
+
+    def mutate(self, node, index):
+        i = self._pairs(node)[index]
+        first, second = node.children[i].get_code(False), node.children[i + 2].get_code(False)
+        swapped = f"{second}, {first}"
+        module = get_ast(f"f({swapped})")
+        fresh = next(n for n in ast_nodes(module) if n.type == "arglist").children
+        prefix = node.children[i].get_first_leaf().prefix
+        fresh[0].get_first_leaf().prefix = prefix
+        node.children[i : i + 3] = fresh
+        return node
+
+    @staticmethod
+    def _pairs(node) -> list[int]:
+        """Where two positional arguments that differ stand side by side."""
+        if node.type != "arglist" or getattr(node.parent, "type", "") == "classdef":
+            return []
+        found = []
+        for i in range(0, len(node.children) - 2, 2):
+            one, other = node.children[i], node.children[i + 2]
+            plain = all(c.type != "argument" for c in (one, other))
+            if plain and one.get_code(False) != other.get_code(False):
+                found.append(i)
+        return found
+
+    @classmethod
+    def examples(cls):
+        return (Example("f(a, b)", "f(b, a)"),)
+
+
+class DropTerm(Operator):
+    """a + b -> a, for each term of a sum after its first."""
+
+    def mutation_positions(self, node):
+        return [
+            (node.children[i].start_pos, node.children[i + 1].end_pos) for i in self._terms(node)
+        ]
+
+    def mutate(self, node, index):
+        i = self._terms(node)[index]
+        del node.children[i : i + 2]
+        return node
+
+    @staticmethod
+    def _terms(node) -> list[int]:
+        if node.type != "arith_expr":
+            return []
+        return list(range(1, len(node.children), 2))
+
+    @classmethod
+    def examples(cls):
+        return (Example("x = a + b", "x = a"),)
+
+
+@cache
+def operators() -> dict[str, Operator]:
+    """Every kind of fault by name."""
+    known: dict[str, Operator] = {k: get_operator(f"core/{k}")() for k in KINDS}
+    return {**known, "SwapArguments": SwapArguments(), "DropTerm": DropTerm()}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One altered line: path from the project's root, line number, kind, which of that kind."""
+
+    path: str
+    line: int
+    kind: str
+    occurrence: int
+
+    @property
+    def folder(self) -> str:
+        """The folder that it is counted to."""
+        return str(Path(self.path).parent)
+
+    def applied(self, source: str) -> str:
+        """The source with the fault in it."""
+        altered = MutationVisitor.mutate_code(source, operators()[self.kind], self.occurrence)
+        return source if altered is None else altered
+
+    def shown(self, source: str) -> str:
+        """The lines before and after, e.g. "a + b  ->  a - b"."""
+        before, after = source.splitlines(), self.applied(source).splitlines()
+        changed = [i for i, (a, b) in enumerate(zip(before, after, strict=False)) if a != b]
+        if not changed:
+            return f"{before[self.line - 1].strip()}  ->  (a line less)"
+        i = changed[0]
+        return f"{before[i].strip()}  ->  {after[i].strip()}"
+
+
+def faults_on(path: str, source: str, line: int) -> list[Fault]:
+    """Every fault that can be put into one line."""
+    if line in _idle_lines(source) or "| None" in source.splitlines()[line - 1]:
+        return []
+    found = []
+    tree = get_ast(source)
+    nodes = list(ast_nodes(tree))
+    for kind, operator in operators().items():
+        occurrence = 0
+        for node in nodes:
+            for begin, _ in operator.mutation_positions(node):
+                if begin[0] == line:
+                    found.append(Fault(path, line, kind, occurrence))
+                occurrence += 1
+    return [f for f in found if _compiles(f.applied(source), source)]
+
+
+def _compiles(altered: str, source: str) -> bool:
+    if altered == source:
+        return False
+    try:
+        compile(altered, "altered", "exec")
+    except SyntaxError:
+        return False
+    return True
+
+
+@cache
+def _idle_lines(source: str) -> frozenset[int]:
+    """Lines whose change shows in no result: annotations, imports, decorators and texts."""
+    idle: set[int] = set()
+
+    def add(node: ast.AST) -> None:
+        idle.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))  # type: ignore[attr-defined]
+
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, (ast.Import, ast.ImportFrom, ast.AnnAssign)) and not getattr(
+            node, "value", None
+        ):
+            add(node)
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            for decorator in node.decorator_list:
+                add(decorator)
+        if isinstance(node, ast.FunctionDef):
+            body = node.body[0].lineno
+            idle.update(range(node.lineno, body))
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            add(node)
+    return frozenset(idle)
+
+
+def files(root: Path) -> list[str]:
+    """The product's Python files, by their path from the root."""
+    found = [p for package in PACKAGES for p in sorted((root / package).rglob("*.py"))]
+    return [str(p.relative_to(root)) for p in found]
+
+
+def draw(root: Path, count: int, seed: int, least: int = 3) -> list[Fault]:
+    """Faults in lines drawn at random: of each folder its part by lines, and ``least`` at least."""
+    rng = np.random.default_rng(seed)
+    sources = {path: (root / path).read_text() for path in files(root)}
+    folders: dict[str, list[tuple[str, int]]] = {}
+    for path, source in sources.items():
+        lines = [(path, i + 1) for i, text in enumerate(source.splitlines()) if text.strip()]
+        folders.setdefault(str(Path(path).parent), []).extend(lines)
+    drawn: list[Fault] = []
+    for folder, wanted in _shares({f: len(v) for f, v in folders.items()}, count, least).items():
+        drawn += list(_drawn(folders[folder], sources, wanted, rng))
+    return drawn
+
+
+def _drawn(
+    lines: Sequence[tuple[str, int]], sources: dict[str, str], wanted: int, rng: np.random.Generator
+) -> Iterator[Fault]:
+    for i in rng.permutation(len(lines)):
+        if wanted == 0:
+            return
+        path, line = lines[i]
+        if choice := faults_on(path, sources[path], line):
+            yield choice[int(rng.integers(len(choice)))]
+            wanted -= 1
+
+
+def _shares(sizes: dict[str, int], count: int, least: int) -> dict[str, int]:
+    """How many of each folder: by size, largest remainders, each ``least`` at least."""
+    total = sum(sizes.values())
+    exact = {f: max(count * n / total, float(min(least, n))) for f, n in sizes.items()}
+    scale = count / sum(exact.values())
+    out = {f: int(e * scale) for f, e in exact.items()}
+    rest = sorted(exact, key=lambda f: out[f] - exact[f] * scale)
+    for f in rest[: count - sum(out.values())]:
+        out[f] += 1
+    return out

@@ -1,0 +1,90 @@
+"""Which tests run a line, and how long each takes: from one run of the suite under coverage."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+from coverage import CoverageData
+
+from benchmarks.mutation.faults import PACKAGES, Fault
+
+
+def environment(root: Path) -> dict[str, str]:
+    """Variables under which that copy of the project is tested, and no other."""
+    return {
+        **os.environ,
+        "PYTHONPATH": str(root),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "OMP_NUM_THREADS": "1",
+    }
+
+
+@dataclass(frozen=True)
+class Reach:
+    """seconds: of each test by its id. contexts: path -> line -> the tests that run it."""
+
+    seconds: Mapping[str, float]
+    contexts: Mapping[str, Mapping[int, frozenset[str]]]
+
+    def tests_for(self, fault: Fault, budget: float) -> list[str]:
+        """Tests that can notice a fault, quickest first, of ``budget`` seconds together.
+
+        Native code and what runs at import leave no trace of their line: there any test may notice.
+        """
+        by_line = self.contexts.get(fault.path, {})
+        chosen = by_line.get(fault.line) or frozenset().union(*by_line.values())
+        chosen &= self.seconds.keys()
+        if not chosen:
+            chosen = frozenset(self.seconds)
+        out, spent = [], 0.0
+        for test in sorted(chosen, key=lambda t: (self.seconds[t], t)):
+            spent += self.seconds[test]
+            if out and spent > budget:
+                break
+            out.append(test)
+        return out
+
+
+@cache
+def reach(root: Path, scratch: Path) -> Reach:
+    """Run the quick suite of a copy of the project under coverage.
+
+    Raises RuntimeError where a test fails: a fault could not be told from that.
+    """
+    report, data = scratch / "tests.xml", scratch / "coverage"
+    command = [sys.executable, "-m", "pytest", "-n", "2", "-m", "not slow", "-q"]
+    command += [f"--cov={p}" for p in PACKAGES]
+    command += ["--cov-context=test", "--cov-report=", f"--junitxml={report}"]
+    done = subprocess.run(
+        command, cwd=root, env={**environment(root), "COVERAGE_FILE": str(data)},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    if done.returncode:
+        raise RuntimeError(f"the suite fails without a fault:\n{done.stdout[-2000:]}")
+    return Reach(_seconds(report), _contexts(data, root))
+
+
+def _seconds(report: Path) -> dict[str, float]:
+    out = {}
+    for case in ElementTree.parse(report).iter("testcase"):
+        module = case.get("classname", "").replace(".", "/") + ".py"
+        out[f"{module}::{case.get('name')}"] = float(case.get("time", 0.0))
+    return out
+
+
+def _contexts(data: Path, root: Path) -> dict[str, dict[int, frozenset[str]]]:
+    measured = CoverageData(str(data))
+    measured.read()
+    out: dict[str, dict[int, frozenset[str]]] = {}
+    for file in measured.measured_files():
+        lines = measured.contexts_by_lineno(file).items()
+        tests = {line: frozenset(c.partition("|")[0] for c in names if c) for line, names in lines}
+        out[os.path.relpath(file, root)] = {line: t for line, t in tests.items() if t}
+    return out
