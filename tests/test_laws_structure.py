@@ -68,6 +68,32 @@ def test_a_payload_is_mass_also_where_friction_holds(
     np.testing.assert_allclose(found.rows[name], wanted.rows[name], rtol=0, atol=size)
 
 
+@EACH
+@pytest.mark.parametrize("ratio", [-0.45, 0.8])
+def test_a_payload_is_mass_at_an_end_stop(ratio: float, stage: Stepper) -> None:
+    stop = effect("end_stop", low=-1.1e-3, high=2e-3, stiffness=1e6, relaxation=1e-4)
+    force = shoves(600, 20.0)
+    found = pushed(MASS, (stop, effect("payload_mass", ratio=ratio)), force, stage)
+    wanted = pushed(MASS * (1.0 + ratio), (stop,), force, stage)
+    assert np.abs(wanted.rows["end_stop"]).max() > 20.0
+    np.testing.assert_allclose(found.x, wanted.x, rtol=0, atol=1e-9 * np.ptp(wanted.x))
+
+
+@EACH
+@pytest.mark.parametrize("name", ["flexible_mode", "base_vibration"])
+@pytest.mark.parametrize("stiffness", [1e5, 1e9])
+def test_an_end_stop_of_any_stiffness_is_stable_whatever_is_attached(
+    name: str, stiffness: float, stage: Stepper
+) -> None:
+    """It stops what it stops: no deeper than a step of the fastest motion."""
+    share = {"flexible_mode": "load", "base_vibration": "recoil"}[name]
+    part = effect(name, frequency=20.0, **{share: 0.9})
+    stop = effect("end_stop", low=-1.1e-3, high=2e-3, stiffness=stiffness, relaxation=0.0)
+    run = pushed(MASS, (stop, part), shoves(600, 20.0), stage)
+    assert np.abs(run.v).max() < 1.5
+    assert run.x.max() < 2e-3 + 1.5 * H + 60.0 / 1e5
+
+
 # --- Newton's second law --------------------------------------------------------------------------
 
 
