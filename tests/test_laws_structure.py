@@ -216,7 +216,7 @@ def walked(effects: tuple[Fitted, ...], v: Array, u: Array, dt: float, mass: flo
 def test_the_way_back_gives_the_forces_of_the_way_there(names: tuple[str, ...]) -> None:
     """Blocks of eight samples of a smooth run: their mean speeds tell the mean forces."""
     t = np.arange(4000) * H
-    force = 9.0 * np.sin(2.0 * np.pi * 2.3 * t) * np.sin(2.0 * np.pi * 0.7 * t) ** 2
+    force = 9.0 * np.sin(2.0 * np.pi * 9.0 * t) * np.sin(2.0 * np.pi * 0.7 * t) ** 2
     parts = tuple(p for n, p in PARTS.items() if n in names and n != "backlash")
     run = pushed(MASS, parts, force)
     block = 8
@@ -225,7 +225,8 @@ def test_the_way_back_gives_the_forces_of_the_way_there(names: tuple[str, ...]) 
     for name in (p.effect.name for p in parts):
         wanted = run.rows[name][:3992].reshape(-1, block).mean(axis=1)
         error = np.abs(back[name] - wanted)[2:-2]
-        assert error.max() < 0.02 * np.abs(wanted).max()
+        # a base is stepped once a block: first order in its w h; what rides is of higher order
+        assert error.max() < (0.015 if "base_vibration" in names else 2e-4) * np.abs(wanted).max()
 
 
 @pytest.mark.parametrize("dt", [1e-4, 3e-4, 1e-3])
