@@ -152,6 +152,25 @@ def test_the_law_is_its_equation(name: str, when: float) -> None:
     require_reference(CATALOGUE[name], when, TOLERANCES.get(name, 1e-9))
 
 
+REMEMBERING = ("dahl", "lugre", "gms", "leuven", "modified_leuven")
+
+
+@pytest.mark.parametrize("name", REMEMBERING)
+def test_a_friction_without_a_level_is_viscous_and_forgets(name: str) -> None:
+    """After samples without dry friction it goes on as from the start."""
+    effect = CATALOGUE[name]
+    values, q = values_of(effect), columns(1.0, True)
+    gone, again = 30, 40
+    dry = q.dry.copy()
+    dry[gone:again] = 0.0
+    _, found = stepped(effect, values, replace(q, dry=dry))
+    wanted = values["sigma2"] * q.viscous * q.v
+    np.testing.assert_allclose(found[gone:again, OUT], wanted[gone:again], rtol=1e-12)
+    rest = {f.name: getattr(q, f.name)[again:] for f in fields(Columns) if f.name not in SINGLE}
+    _, fresh = stepped(effect, values, replace(q, **rest))
+    np.testing.assert_allclose(found[again:, OUT], fresh[:, OUT], rtol=1e-9, atol=1e-12)
+
+
 def quadratic_drag(p, s, io):
     io[OUT] = -p[0] * io[V] ** 3
 

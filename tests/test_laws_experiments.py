@@ -4,7 +4,7 @@ Times, speeds, spans and forces are read off the setpoint by counting samples.
 """
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -27,6 +27,7 @@ from twin.experiment_kinds import (
 from twin.experiments import EXPERIMENTS, MAP_SPEEDS, find_experiment
 from twin.model import AxisModel, Hardware, StageModel
 from twin.trajectory import Setpoint
+from twin.trajectory.limits import axis_name
 
 RATE = 2000.0
 X = Hardware(travel=(-0.11, 0.17), force_limit=30.0, velocity=0.3, acceleration=4.0, jerk=300.0)
@@ -185,6 +186,18 @@ def test_every_kind_has_one_name_and_one_summary() -> None:
         Tracking(0.0)
     with pytest.raises(InputError):
         Rests("x", 0.1, 0.05, ())
+
+
+UNITS = {"m", "s", "m/s", "N", "Hz", "1", ""}
+
+
+def test_every_number_of_an_experiment_has_its_unit_and_one_is_the_least_count() -> None:
+    for kind in KINDS.values():
+        for f in fields(kind):
+            assert f.name == "axis" or f.metadata["unit"] in UNITS
+            assert f.name == "axis" or f.metadata["meaning"] not in UNITS
+    assert Moves(count=1).count == 1
+    assert [axis_name(i) for i in range(5)] == ["x", "y", "z", "3", "4"]
 
 
 # --- named experiments ----------------------------------------------------------------------------
