@@ -32,9 +32,7 @@ DT = 2  # s, sample period
 X = 3  # m, true position
 V = 4  # m/s, true velocity
 U = 5  # N, actuator force; commanded on entry, actual after the actuation effects
-MASS = (
-    6  # kg, what a force moves in a sample, with what is attached; infinite along a measured motion
-)
+MASS = 6  # kg, what a force moves, with what is attached; infinite along a measured motion
 X_OTHER = 7  # m, position of the other axis
 V_OTHER = 8  # m/s
 A_OTHER = 9  # m/s^2
