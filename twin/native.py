@@ -59,7 +59,8 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
     rows[k, i] receives the force that entry i puts on the axis.
     """
     rate = 1.0 / io[DT]
-    stop = io[MASS] * io[V] * rate
+    mass = io[MASS]
+    stop = mass * io[V] * rate
     io[DRY] = 1.0
     io[STATIC] = 1.0
     io[VISCOUS] = 1.0
@@ -73,9 +74,11 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
     answered = (0.0, 0.0, 0.0, 0.0)
     if structure < last:
         answered = answers(entries, structure, last, p, s, io)
-        share = io[MASS] / (io[MASS] - answered[1])  # of a force, that moves the nominal mass
+        share = mass / (mass - answered[1])  # of a force, that moves the nominal mass
+        moving = share + answered[3] / io[MOVED]
         stop += share * answered[0] + answered[2]
-        stop /= share + answered[3] / io[MOVED]
+        stop /= moving
+        io[MASS] = mass / moving
     total = 0.0
     friction = 0.0
     for i in range(first, structure):
@@ -97,6 +100,7 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
             rows[k, i] = -friction
         else:
             rows[k, i] = io[U] - before
+    io[MASS] = mass
     net = total - friction + io[U]
     added = 0.0
     if structure < last:

@@ -1,0 +1,184 @@
+"""Every law is the plain NumPy reference written from its printed equation, slot by slot.
+
+The inputs are pairwise different, so that a swapped parameter, column or sign shows.
+"""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from effect_runs import CATALOGUE, Array, compiled
+from reference_kit import Columns, Values
+from references import REFERENCES
+
+from twin import effect as slots
+from twin.effect import IO_SIZE, OUT, Effect, Kind, V
+
+SINGLE = ("dt", "when", "mass", "moved")
+WHENS = pytest.mark.parametrize("when", [1.0, 0.5])
+EVERY = pytest.mark.parametrize("name", REFERENCES)
+
+# Where effects act on the motion below, and where the drawn values would be out of proportion.
+SPECIAL = {
+    "actuator_deadband": {"width": 0.7},
+    "actuator_saturation": {"limit": 1.3, "loss": 0.6},
+    "actuator_delay": {"tau": 3.3e-4},
+    "actuator_lag": {"tau": 4e-4},
+    "encoder_delay": {"tau": 2.7e-4},
+    "encoder_quantization": {"step": 3e-3},
+    "encoder_ripple": {"period": 0.013, "a1": 3e-5, "b1": -2e-5, "a2": 7e-6, "b2": 1.1e-5},
+    "cable_hysteresis": {"reach": 9e-5, "f0": 0.2, "f1": 0.3, "f2": 0.5, "f3": 0.7},
+    "asymmetric_friction": {"coulomb": 0.3, "viscous": -0.2},
+    "dwell_stiction": {"growth": 1.7, "time": 2e-3, "slip": 3e-4},
+    "load_dependent_friction": {"motor": 0.3, "corner": 0.05, "offset": -9.0},
+    "position_dependent_friction": {
+        "start": -0.11, "length": 0.23, "c1": 0.5, "c2": -0.3, "c3": 0.7, "c4": 0.2, "c5": -0.4,
+    },
+    "thermal_drift": {"dry": 70.0, "viscous": 40.0, "tau": 0.2},
+    "wear": {"rate": 300.0},
+    "end_stop": {"low": -0.05, "high": 0.07, "stiffness": 3e4, "relaxation": 3e-3},
+    "roller_spikes": {"pitch": 0.03, "width": 0.025, "phase": 0.004, "ahead": 0.7, "behind": 0.3},
+    "periodic_disturbance": {"f": 730.0, "a": 0.6, "b": -0.4},
+    "payload_mass": {"ratio": 0.37},
+    "force_constant_ripple": {"p": 0.031, "a1": 0.3, "b1": -0.2, "a2": 0.13, "b2": 0.07},
+    "backlash": {"load": 0.3, "play": 3e-6, "frequency": 410.0, "damping": 0.21},
+    "flexible_mode": {"load": 0.4, "frequency": 530.0, "damping": 0.13},
+    "base_vibration": {"recoil": 0.35, "frequency": 97.0, "damping": 0.17},
+}  # fmt: skip
+CURVE = {"Fc": 1.0, "Fs": 1.4, "v0": 0.03, "sigma2": 2.3, "sigma0": 8e4, "sigma1": 3.0}
+FRICTIONS = {
+    "coulomb_viscous": {},
+    "stribeck": {},
+    "dahl": {"n": 1.6},
+    "lugre": {},
+    "gms": {"C": 900.0, "spread": 12.0},
+    "leuven": {"m": 4.0, "b": 0.8},
+    "modified_leuven": {"m": 4.0, "spread": 12.0},
+}
+
+
+def values_of(effect: Effect, n: float = 1.3) -> dict[str, float]:
+    """Pairwise different values within the bounds; n: exponent of a Stribeck curve."""
+    rng = np.random.default_rng(61)
+    known = effect.starts()
+    for p in effect.parameters:
+        if p.strength:
+            known[p.name] = float(rng.uniform(0.1, 0.9)) * (
+                1 if p.lower == 0 else rng.choice([-1, 1])
+            )
+        elif p.name.startswith(("share_", "stiff_")):
+            known[p.name] = float(rng.uniform(0.5, 2.0))
+    own = SPECIAL.get(effect.name, {})
+    if effect.name in FRICTIONS:
+        own = {n: v for n, v in CURVE.items() if n in known} | FRICTIONS[effect.name]
+    return {**known, **own, **({"n": n} if "v0" in known else {})}
+
+
+def path(rng: np.random.Generator, n: int) -> Array:
+    """Speeds with inner loops of some micrometres that close, long slides, rests, and creeping."""
+    legs = [9, -6, 4, -2, 1, -4, 3, 12, -25, 14, -7, 3, -9, 40, 0, 8, -3, 30, -30]
+    speeds = np.concatenate([np.sign(leg) * np.linspace(0.02, 0.05, abs(leg) + 1) for leg in legs])
+    speeds = speeds[:n] * rng.uniform(0.8, 1.2, n)
+    speeds[-4:] = 0.0, 1e-12, -1e-12, 0.3
+    return speeds
+
+
+def columns(when: float, friction: bool) -> Columns:
+    """Unrelated inputs; the factors on a friction that remembers are held, as its level is."""
+    rng = np.random.default_rng(62)
+    n, dt = 180, 1e-4
+    v = path(rng, n)
+    own = {
+        "time": 0.37 + dt * np.arange(n),
+        "x": rng.uniform(-0.2, 0.2, n),
+        "v": v,
+        "u": rng.normal(0.0, 2.0, n),
+        "hold": np.where(np.arange(n) % 7 < 3, rng.uniform(-3.0, 3.0, n), 40.0 * v / 0.03),
+    }
+    factors = {"dry": 0.8, "static": 1.15, "viscous": 1.7}
+    for f in fields(Columns):
+        if f.name not in SINGLE and f.name not in own:
+            own[f.name] = rng.uniform(0.2, 1.8, n) * rng.choice([-1.0, 1.0], n)
+    for name, value in factors.items():
+        own[name] = np.full(n, value) if friction else rng.uniform(0.5, 1.5, n)
+    own["reading"] = 0.1 * own["reading"]
+    return Columns(dt=dt, when=when, mass=1.9, moved=3.1, **own)
+
+
+def stepped(effect: Effect, values: Values, q: Columns) -> tuple[Array, Array]:
+    """io before and after the law, (n, IO_SIZE) each, along the columns."""
+    law = compiled(effect)
+    p, s = np.array([values[p.name] for p in effect.parameters]), np.zeros(len(effect.states) + 1)
+    before = np.zeros((len(q), IO_SIZE))
+    for f in fields(Columns):
+        before[:, getattr(slots, f.name.upper())] = getattr(q, f.name)
+    before[:, slots.INDEX] = np.arange(len(q))
+    after = before.copy()
+    for io in after:
+        law(p, s, io)
+    return before, after
+
+
+def require_reference(effect: Effect, when: float, tolerance: float) -> None:
+    exponent = 2.0 if when == 1.0 else 1.3  # laws have a quicker way for the usual one
+    values, q = values_of(effect, exponent), columns(when, effect.kind is Kind.FRICTION)
+    before, after = stepped(effect, values, q)
+    results = REFERENCES[effect.name].results(values, q)
+    written = np.flatnonzero(np.any(before != after, axis=0))
+    assert set(written) <= set(results), "it writes a slot that its equation has no word about"
+    for slot, wanted in results.items():
+        assert np.ptp(wanted) > 0.0 or slot == OUT, "blind"
+        assert not np.allclose(wanted, before[:, slot]), "blind"
+        size = tolerance * np.abs(wanted - (before[:, slot] if slot != OUT else 0.0)).max()
+        np.testing.assert_allclose(after[:, slot], wanted, rtol=0, atol=size)
+
+
+def test_there_is_a_reference_for_every_effect_and_no_other() -> None:
+    assert set(REFERENCES) == set(CATALOGUE)
+
+
+@EVERY
+def test_the_reference_was_written_from_the_equation_that_is_printed(name: str) -> None:
+    assert REFERENCES[name].equation == CATALOGUE[name].equation
+
+
+# Small steps within a sample leave an error; all else agrees to rounding.
+TOLERANCES = {"dahl": 1e-5, "lugre": 1e-5, "gms": 5e-5, "leuven": 1e-2, "modified_leuven": 2e-2}
+
+
+@EVERY
+@WHENS
+def test_the_law_is_its_equation(name: str, when: float) -> None:
+    require_reference(CATALOGUE[name], when, TOLERANCES.get(name, 1e-9))
+
+
+REMEMBERING = ("dahl", "lugre", "gms", "leuven", "modified_leuven")
+
+
+@pytest.mark.parametrize("name", REMEMBERING)
+def test_a_friction_without_a_level_is_viscous_and_forgets(name: str) -> None:
+    """After samples without dry friction it goes on as from the start."""
+    effect = CATALOGUE[name]
+    values, q = values_of(effect), columns(1.0, True)
+    gone, again = 30, 40
+    dry = q.dry.copy()
+    dry[gone:again] = 0.0
+    _, found = stepped(effect, values, replace(q, dry=dry))
+    wanted = values["sigma2"] * q.viscous * q.v
+    np.testing.assert_allclose(found[gone:again, OUT], wanted[gone:again], rtol=1e-12)
+    rest = {f.name: getattr(q, f.name)[again:] for f in fields(Columns) if f.name not in SINGLE}
+    _, fresh = stepped(effect, values, replace(q, **rest))
+    np.testing.assert_allclose(found[again:, OUT], fresh[:, OUT], rtol=1e-9, atol=1e-12)
+
+
+def quadratic_drag(p, s, io):
+    io[OUT] = -p[0] * io[V] ** 3
+
+
+def test_a_law_that_is_not_its_printed_equation_is_seen() -> None:
+    """Printed -c v |v|, coded -c v^3."""
+    planted = replace(CATALOGUE["quadratic_drag"], law=quadratic_drag)
+    planted.__dict__["name"] = "quadratic_drag"  # not that of this file
+    require_reference(CATALOGUE["quadratic_drag"], 1.0, 1e-9)
+    with pytest.raises(AssertionError):
+        require_reference(planted, 1.0, 1e-9)

@@ -1,0 +1,278 @@
+"""Start rules and scans are formulas in the units of the log.
+
+With lengths in other units of length, times in other units of time and forces in other units of
+force, a rule gives the same values in those units. Ladders of fixed values keep their own laws.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effect_runs import CATALOGUE
+
+from twin.effect import IO_SIZE, OUT, Effect, Excitation, Parameter, X
+
+LOG = Excitation(
+    position_low=-0.13, position_high=0.21, speed_max=0.37, dry_level=0.83, duration=47.0,
+    period=2.5e-4, force_max=11.0, lines=(53.0, 17.0), ripples=(3.1e-5, 1.7e-5), resolution=2.3e-7,
+)  # fmt: skip
+PARAMETERS = [(e, p) for e in CATALOGUE.values() for p in e.parameters]
+RULED = [(e, p) for e, p in PARAMETERS if p.start_rule]
+SCANNED = [(e, p) for e, p in PARAMETERS if p.scan]
+
+
+def ids(pairs: list[tuple[Effect, Parameter]]) -> list[str]:
+    return [f"{e.name}-{p.name}" for e, p in pairs]
+
+
+# --- units ----------------------------------------------------------------------------------------
+
+BASE = {"m": (1, 0, 0), "s": (0, 1, 0), "N": (0, 0, 1), "Hz": (0, -1, 0), "1": (0, 0, 0),
+        "J": (1, 0, 1), "kg": (-1, 2, 1)}  # fmt: skip
+
+
+def dimension(unit: str) -> np.ndarray:
+    """Exponents of metre, second and newton."""
+    above, _, below = unit.partition("/")
+    total = np.zeros(3)
+    for sign, part in ((1, above), (-1, below)):
+        for factor in part.replace("(", "").replace(")", "").split():
+            name, _, power = factor.partition("^")
+            total += sign * int(power or 1) * np.array(BASE[name])
+    return total
+
+
+def scaled(e: Excitation, length: float, time: float, force: float) -> Excitation:
+    """The same log in units that are smaller by these factors."""
+    return Excitation(
+        length * e.position_low, length * e.position_high, length / time * e.speed_max,
+        force * e.dry_level, time * e.duration, time * e.period, force * e.force_max,
+        tuple(f / time for f in e.lines), tuple(length * r for r in e.ripples),
+        length * e.resolution,
+    )  # fmt: skip
+
+
+UNITS = [(2.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 5.0), (0.7, 1.9, 0.3)]
+
+
+def follows_units(rule: Callable, unit: str) -> bool:
+    here = np.atleast_1d(rule(LOG))
+    for units in UNITS:
+        there = np.atleast_1d(rule(scaled(LOG, *units)))
+        factor = np.prod(np.array(units) ** dimension(unit))
+        if there.shape != here.shape or not np.allclose(there, factor * here, rtol=1e-12, atol=0):
+            return False
+    return True
+
+
+def test_units_are_read_as_they_are_written() -> None:
+    np.testing.assert_array_equal(dimension("N s^2/m^2"), [-2, 2, 1])
+    np.testing.assert_array_equal(dimension("1/J"), [-1, 0, -1])
+    assert follows_units(lambda e: e.dry_level / e.travel, "N/m")
+    assert not follows_units(lambda e: e.dry_level / e.travel, "N")
+    assert not follows_units(lambda e: e.dry_level + 1e-3, "N")
+
+
+# Rules of thumb: force levels over a deflection of a millimetre and over a time of 10 ms.
+THUMB = {"sigma0": 1.0 / 1e-3, "C": 1.0 / 1e-2}
+
+
+@pytest.mark.parametrize(("effect", "p"), RULED, ids=ids(RULED))
+def test_a_start_rule_follows_the_units_of_the_log(effect: Effect, p: Parameter) -> None:
+    if p.name in THUMB:
+        assert p.start_rule(LOG) == pytest.approx(THUMB[p.name] * LOG.dry_level)
+    else:
+        assert follows_units(p.start_rule, p.unit)
+
+
+# Scans that try fixed values: of scales and machines, not of the log.
+ABSOLUTE = {
+    "backlash-play", "backlash-frequency", "roller_spikes-width", "roller_spikes-phase",
+    "dwell_stiction-time", "dwell_stiction-slip", "base_vibration-damping", "flexible_mode-damping",
+}  # fmt: skip
+OWN = {"base_vibration-frequency", "flexible_mode-frequency", "encoder_ripple-period", "cogging-p",
+       "force_constant_ripple-p", "cable_hysteresis-reach"}  # fmt: skip
+DEFLECTIONS = {"sigma0"}  # stiffness from fixed deflections
+
+
+@pytest.mark.parametrize(("effect", "p"), SCANNED, ids=ids(SCANNED))
+def test_a_scan_is_sorted_within_bounds_and_in_the_units_of_the_log(
+    effect: Effect, p: Parameter
+) -> None:
+    name = f"{effect.name}-{p.name}"
+    tried = np.array(p.scan(LOG))
+    assert len(set(tried)) == len(tried) > 0
+    assert p.lower <= tried.min() <= tried.max() <= p.upper
+    if name not in OWN and name != "periodic_disturbance-f":  # strongest first
+        assert np.all(np.diff(tried) > 0.0) or np.all(np.diff(tried) < 0.0)
+    if name in OWN:
+        return
+    if name in ABSOLUTE:
+        for units in UNITS:
+            np.testing.assert_array_equal(p.scan(scaled(LOG, *units)), tried)
+    elif p.name in DEFLECTIONS:
+        decades = np.log10(LOG.dry_level / tried)
+        np.testing.assert_allclose(np.diff(decades), -1.0)
+        np.testing.assert_allclose(decades, np.rint(decades))
+    else:
+        assert follows_units(p.scan, p.unit)
+
+
+@pytest.mark.parametrize(("effect", "p"), SCANNED, ids=ids(SCANNED))
+def test_a_scan_has_its_start_within_reach(effect: Effect, p: Parameter) -> None:
+    """No tried value is farther from the next, or from the start, than the scan is fine."""
+    tried = np.array(p.scan(replace(LOG, lines=(), ripples=())))
+    start = p.start_from(LOG)
+    if start > 0.0 and tried.min() > 0.0:
+        assert tried.min() / 10.0 <= start <= 10.0 * tried.max()
+
+
+# --- starts that are known -----------------------------------------------------------------------
+
+MEANT = {
+    "Fc": LOG.dry_level,
+    "start": LOG.position_low,
+    "low": LOG.position_low,
+    "high": LOG.position_high,
+    "length": LOG.position_high - LOG.position_low,
+    "speed": LOG.speed_max,
+    "step": LOG.resolution,
+    "T": 1.0 / LOG.lines[0],
+}
+
+
+@pytest.mark.parametrize(("effect", "p"), RULED, ids=ids(RULED))
+def test_a_start_that_the_log_shows_is_that_of_the_log(effect: Effect, p: Parameter) -> None:
+    if p.name in MEANT:
+        assert p.start_from(LOG) == pytest.approx(MEANT[p.name], rel=1e-14)
+    if p.name == "Fs":  # at rest a little more holds than while it slides, where there is a curve
+        rise = p.start_rule(LOG) / LOG.dry_level
+        assert rise == 1.0 if p.fixed else 1.05 < rise < 1.3
+    if p.name == "v0":  # the curve falls within the slow part of the motion
+        assert 0.02 * LOG.speed_max <= p.start_rule(LOG) <= 0.1 * LOG.speed_max
+    if p.name == "tau":  # half of what is warming up shows in the log
+        assert p.start_rule(LOG) == 0.5 * LOG.duration
+    if p.name == "limit":  # below the largest command, above half of it
+        assert 0.5 * LOG.force_max < p.start_rule(LOG) < LOG.force_max
+    assert replace(p, start_rule=None).start_from(LOG) == p.start
+
+
+def test_memories_of_a_reversal_are_short_beside_the_travel() -> None:
+    """The short one of both descriptions is one, a thousandth; the long one is 50 times that."""
+    short, other = (
+        CATALOGUE[e].parameter(n).start_rule(LOG) / LOG.travel
+        for e, n in (("empirical_map", "turn"), ("learned_residual", "reach1"))
+    )
+    assert short == other == pytest.approx(1e-3)
+    long = CATALOGUE["learned_residual"].parameter("reach2").start_rule(LOG)
+    assert long == pytest.approx(0.05 * LOG.travel)
+
+
+def test_a_description_without_lines_repeats_once_a_second() -> None:
+    assert CATALOGUE["empirical_map"].parameter("T").start_rule(replace(LOG, lines=())) == 1.0
+
+
+# --- scans with laws of their own -----------------------------------------------------------------
+
+
+def scan(effect: str, name: str, e: Excitation = LOG) -> np.ndarray:
+    return np.array(CATALOGUE[effect].parameter(name).scan(e))
+
+
+@pytest.mark.parametrize(("effect", "most"), [("cogging", 120), ("force_constant_ripple", 70)])
+@pytest.mark.parametrize("travel", [0.02, 0.1, 0.4])
+def test_pitches_are_half_a_cycle_apart_from_three_cycles_on(
+    effect: str, most: int, travel: float
+) -> None:
+    """Down to 2 mm, or to as many cycles as the data can tell apart."""
+    tried = scan(effect, "p", replace(LOG, position_low=0.03, position_high=0.03 + travel))
+    halves = 2.0 * travel / tried
+    np.testing.assert_allclose(halves, np.arange(6, 6 + len(tried)), rtol=1e-12)
+    assert halves[-1] / 2.0 == pytest.approx(min(np.floor(travel / 2e-3 + 1e-9), most), abs=0.01)
+
+
+@pytest.mark.parametrize("period", [1e-4, 2e-3, 0.05])
+def test_frequencies_of_a_mode_are_eighths_up_to_a_quarter_of_the_rate(period: float) -> None:
+    tried = scan("flexible_mode", "frequency", replace(LOG, period=period))
+    np.testing.assert_allclose(tried[1:] / tried[:-1], 1.125)
+    highest = np.clip(0.25 / period, 20.0, 400.0)
+    assert tried[0] == 10.0
+    assert tried[-1] <= highest < 1.125 * tried[-1]
+
+
+@pytest.mark.parametrize("duration", [0.05, 0.5, 4.0, 100.0])
+def test_frequencies_of_a_base_are_fifths_from_what_the_log_resolves(duration: float) -> None:
+    tried = scan("base_vibration", "frequency", replace(LOG, duration=duration))
+    assert tried[0] == max(2.0 / duration, 0.3)
+    np.testing.assert_allclose(tried[1:] / tried[:-1], 1.2)
+    if len(tried) > 1:
+        assert tried[-1] <= 20.0 / 1.2 * (1.0 + 1e-12) < 1.2 * tried[-1]
+    else:
+        assert tried[0] >= 20.0 / 1.2**2
+
+
+def test_periods_of_an_encoder_are_those_of_scales_and_those_seen() -> None:
+    scales = set(scan("encoder_ripple", "period", replace(LOG, ripples=())))
+    assert set(scan("encoder_ripple", "period")) == scales | set(LOG.ripples)
+    assert scan("encoder_ripple", "period")[-2:].tolist() == list(LOG.ripples)
+    digits = {f"{s:.1e}"[:3] for s in scales}
+    assert digits <= {"1.0", "1.6", "2.0", "4.0", "5.0", "8.0"}, "not periods of common scales"
+
+
+def test_reaches_of_a_cable_end_at_the_travel() -> None:
+    wide, narrow = (
+        scan("cable_hysteresis", "reach", replace(LOG, position_high=-0.13 + t))
+        for t in (1.0, 0.015)
+    )
+    np.testing.assert_allclose(narrow, np.minimum(wide, 0.015))
+    np.testing.assert_allclose(np.diff(np.log10(wide)), 0.5, atol=0.03)
+
+
+def test_stops_are_tried_from_both_ends_alike_and_not_beyond_the_middle() -> None:
+    low, high = scan("end_stop", "low"), scan("end_stop", "high")
+    np.testing.assert_allclose(low - LOG.position_low, LOG.position_high - high)
+    assert np.all((low > LOG.position_low) & (low < LOG.position_low + 0.5 * LOG.travel))
+    ratios = np.diff(low) / LOG.travel
+    assert ratios.max() <= 0.1 + 1e-9, "a gap wider than a tenth of the travel"
+
+
+def test_lines_of_the_log_are_tried_and_a_ladder_where_there_are_none() -> None:
+    assert tuple(scan("periodic_disturbance", "f")) == LOG.lines
+    ladder = scan("periodic_disturbance", "f", replace(LOG, lines=()))
+    np.testing.assert_allclose(ladder[1:] / ladder[:-1], 1.1)
+    assert ladder[0] == 0.5
+    assert ladder[-1] > 50.0
+
+
+def test_rollers_are_tried_all_round_one_pitch() -> None:
+    effect = CATALOGUE["roller_spikes"]
+    phases = scan("roller_spikes", "phase")
+    pitch = effect.parameter("pitch").start
+    np.testing.assert_allclose(phases, np.arange(len(phases)) * pitch / len(phases))
+    assert np.diff(phases).max() < scan("roller_spikes", "width").min(), "a bump between two tries"
+
+
+@pytest.mark.parametrize("k", [1, 2, 3])
+@pytest.mark.parametrize("others", [0.0, 0.09, 0.11])
+def test_the_simplest_pitch_has_the_same_force(k: int, others: float) -> None:
+    """A harmonic alone is a fundamental of a part of the pitch; less than a tenth is left out."""
+    effect = CATALOGUE["cogging"]
+    values = {"p": 0.03, **{f"{c}{j}": 0.0 for c in "ab" for j in (1, 2, 3)}}
+    values[f"a{k}"], values[f"b{k}"] = 0.6, -0.8
+    for j in {1, 2, 3} - {k}:
+        values[f"b{j}"] = 0.5 * others
+    simple = effect.simplest(values)
+    assert set(simple) == set(values)
+    changed = k > 1 and others < 0.1
+    assert (simple == values) == (not changed)
+    assert simple["p"] == pytest.approx(values["p"] / (k if changed else 1))
+
+    def force(of: dict[str, float], x: float) -> float:
+        io = [0.0] * IO_SIZE
+        io[X] = x
+        effect.law([of[p.name] for p in effect.parameters], [], io)
+        return io[OUT]
+
+    for x in np.linspace(-0.02, 0.03, 7):
+        assert force(simple, x) == pytest.approx(force(values, x), abs=others + 1e-12)
