@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from constructed import LAG, PAYLOAD, RIPPLE, SENSING, SHORT, STICKY, effect
+from constructed import LAG, PAYLOAD, RIPPLE, SENSING, SHORT, STICKY, effect, windowed
 
 from identify.actuation import actual_force, forces_lessened, is_noise, parts_of, true_motion
+from identify.residual import windowed_force
 from twin.effect import Kind
 from twin.model import AxisModel
 
@@ -14,14 +15,27 @@ from twin.model import AxisModel
 def test_a_lag_follows_its_equation_at_the_logs_own_rate():
     """tau u' + u = command, held over a sample: a decay by exp(-dt/tau) towards it."""
     command, dt, tau = SHORT.raw[1], SHORT.sample_period, 1.7e-3
-    u, wanted = 0.0, []
+    u, wanted = command[0], []
     decay = np.exp(-dt / tau)
     for c in command:
         begin, u = u, c + (u - c) * decay
         wanted.append(c + (begin - c) * (1.0 - decay) * tau / dt)  # the mean over the sample
     found = actual_force(AxisModel(1.0, effects=(LAG,)), SHORT)
-    assert np.abs(found - wanted)[20:].max() < 0.02 * np.std(command)
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
     np.testing.assert_array_equal(actual_force(AxisModel(1.0, effects=(STICKY,)), SHORT), command)
+
+
+def test_an_actuation_adds_the_mean_of_what_it_makes_of_the_command_to_the_residual():
+    log = windowed(SHORT)
+    for chain in (LAG, RIPPLE):
+        axis = AxisModel(1.0, effects=(chain,))
+        added = log.fine.mean(actual_force(axis, SHORT) - SHORT.raw[1])
+        found = windowed_force(axis, [log])
+        np.testing.assert_allclose(found, added, atol=5e-3 * np.std(added))
+    pushed = AxisModel(1.0, effects=(LAG, effect("constant_force", {"F0": 0.4})))
+    np.testing.assert_allclose(
+        windowed_force(pushed, [log]), 0.4 + windowed_force(AxisModel(1.0, effects=(LAG,)), [log])
+    )
 
 
 def test_a_force_ripple_acts_at_the_middle_of_the_sample():
@@ -60,6 +74,7 @@ def test_a_late_reading_is_undone():
     np.testing.assert_allclose(true.raw[0][inner], ahead[inner], atol=2e-3 * np.ptp(ahead))
     np.testing.assert_allclose(true.raw[0] + rate, SHORT.raw[0], atol=1e-12)
     np.testing.assert_array_equal(true.raw[1], SHORT.raw[1])
+    assert rate[-1] == 0.0  # nothing is known of what follows
     means = rate.reshape(len(SHORT.time), -1).mean(axis=1)
     np.testing.assert_allclose(SHORT.velocity - true.velocity, means, atol=1e-12)
     seen = SHORT.at_samples(0.0)[0]
