@@ -248,6 +248,24 @@ def test_a_side_is_open_where_the_error_hardly_rises(monkeypatch, rises, wanted)
     assert open_side(fit, lower, 0.5) == "smaller"
 
 
+def test_the_rise_foreseen_counts_what_a_bound_or_prior_left_of_the_slope(monkeypatch):
+    """With a slope of 0.8 at the end, a step d is foreseen to raise the square by 0.8 d + d^2."""
+    c = Coordinate("constant_force", Parameter("a", "N", 0.0, -9.0, 9.0, ""))
+    axis = AxisModel(1.0, effects=(replace(effect("constant_force"), values={"a": 2.0}),))
+    fit = SimpleNamespace(
+        axis=axis, logs=None, scaling=Scaling((c,)), kept=np.array([True, True]),
+        residual=np.array([3.0, 0.4]), jacobian=np.array([[0.0], [1.0]]),
+    )  # fmt: skip
+    for rises, wanted in (((0.13, 0.11), None), ((0.13, 0.09), "larger"), ((0.09, 0.5), "smaller")):
+
+        def left(axis, logs, rises=rises):
+            d = axis["constant_force"].values["a"] - 2.0
+            return np.array([3.0, np.sqrt(0.16 + rises[int(d > 0)] * (0.8 * d + d * d))])
+
+        monkeypatch.setattr(uncertainty, "residual", left)
+        assert open_side(fit, c, 0.5) == wanted
+
+
 def test_estimates_are_the_values_with_their_intervals_within_the_bounds():
     friction = effect("coulomb_viscous", {"Fc": 0.41, "Fs": 0.41, "sigma2": 0.01})
     cable = effect("cable_slab", {"offset": -0.3, "k1": 4.0})

@@ -104,8 +104,9 @@ def test_a_wrong_slope_lets_no_step_raise_the_cost_and_ends_by_damping():
     np.testing.assert_array_equal(found.x, start)
 
 
-def test_a_variable_that_does_nothing_and_one_pushed_outwards_stay():
-    a = np.array([[1.0, 0.0, 2.0], [2.0, 0.0, -1.0], [1.5, 0.0, 0.3], [0.2, 0.0, 1.0]])
+@pytest.mark.parametrize("unit", [1.0, 1e-4])
+def test_a_variable_that_does_nothing_and_one_pushed_outwards_stay(unit):
+    a = unit * np.array([[1.0, 0.0, 2.0], [2.0, 0.0, -1.0], [1.5, 0.0, 0.3], [0.2, 0.0, 1.0]])
     b = a @ [3.0, 0.0, -4.0]
     bounds = np.array([-9.0, -9.0, -1.0]), np.array([1.0, 9.0, 9.0])
 
@@ -128,10 +129,11 @@ def test_a_variable_that_does_nothing_and_one_pushed_outwards_stay():
     np.testing.assert_array_equal(flat.x, np.zeros(3))
 
 
-def test_a_held_variable_does_not_slow_the_others():
+@pytest.mark.parametrize("unit", [1.0, 1e-4])
+def test_a_held_variable_does_not_slow_the_others(unit):
     """At a bound that it is pushed beyond it is left out: the rest is solved in few steps."""
-    a = np.array([[1.0, 0.99], [1.0, 1.01], [0.0, 0.1]])
-    b = np.array([5.0, 5.0, 3.0])
+    a = unit * np.array([[1.0, 0.99], [1.0, 1.01], [0.0, 0.1]])
+    b = unit * np.array([5.0, 5.0, 3.0])
     bounds = np.array([-50.0, -1.0]), np.array([50.0, 1.0])
     found = minimise(
         lambda x: a @ x - b, lambda x: a, np.array([0.0, 1.0]), bounds,
