@@ -9,7 +9,6 @@ from constructed import effect, fit_of, moved, windowed
 from identify.evidence import effective_samples
 from identify.fit import (
     AT_FLOOR,
-    PRIOR_FORCE,
     PRIOR_SPREAD,
     Outcome,
     _Problem,
@@ -57,21 +56,25 @@ def test_priors_are_rows_beside_the_residual():
     np.testing.assert_allclose(slopes[:, 1], differences, atol=1e-4 * np.abs(differences).max())
 
 
-def test_priors_weigh_by_the_noise_and_the_force_to_be_explained():
-    problem = _Problem(ODD, LOGS, 10)
+@pytest.mark.parametrize("quiet", [False, True])
+def test_priors_weigh_by_the_noise_and_the_force_to_be_explained(quiet):
+    """Where it is quiet a tenth of that force is expected of an effect, else the noise."""
+    noise = np.random.default_rng(7).normal(0.0, 1e-3, len(LOGS[0]))
+    log = replace(LOGS[0], command=LOGS[0].command - residual(ODD, LOGS[:1]) + noise)
+    logs = [log] if quiet else LOGS
+    problem = _Problem(ODD, logs, 10)
     problem.set_priors(problem.start)
-    left = residual(ODD, LOGS)[problem.kept]
-    noise = rms(left) * np.sqrt(len(left) / effective_samples(left))
-    logs = problem.scaling.is_logarithm()
-    np.testing.assert_allclose(problem.pull[logs], noise / PRIOR_SPREAD)
-    bare = AxisModel(ODD.mass)
-    expected = max(PRIOR_FORCE * rms(residual(bare, LOGS)), noise)
-    columns = problem.columns(problem.start)
-    size = np.sqrt(np.mean(columns**2, axis=0))
-    np.testing.assert_allclose(
-        problem.pull[problem.added], (noise * size / expected)[problem.added]
-    )
-    others = ~logs & ~problem.added
+    left = residual(ODD, logs)[problem.kept]
+    size = rms(left) * np.sqrt(len(left) / effective_samples(left))
+    is_log = problem.scaling.is_logarithm()
+    np.testing.assert_allclose(problem.pull[is_log & ~problem.added], size / PRIOR_SPREAD)
+    explained = rms(np.concatenate([log.command - 1.7 * log.acceleration for log in logs]))
+    expected = 0.1 * explained
+    assert (expected > size) == quiet
+    columns = np.sqrt(np.mean(problem.columns(problem.start) ** 2, axis=0))
+    wanted = (size * columns / max(expected, size))[problem.added]
+    np.testing.assert_allclose(problem.pull[problem.added], wanted)
+    others = ~is_log & ~problem.added
     assert others.any()
     assert not problem.pull[others].any()
 

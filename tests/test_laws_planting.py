@@ -45,7 +45,9 @@ from twin.effect import Parameter
 from twin.errors import InputError
 from twin.model import AxisModel, Hardware, StageModel, coordinates, read
 
-LOGS = [windowed(moved(np.random.default_rng(s), 1.5, 1000.0)) for s in (1, 2)]
+LOGS = [
+    windowed(moved(np.random.default_rng(s), 1.0, 1000.0).head(n)) for s, n in ((1, 0.5), (2, 0.3))
+]
 AXIS = AxisModel(
     1.7,
     effects=(
