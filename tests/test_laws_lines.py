@@ -93,6 +93,14 @@ def test_a_ripple_of_the_reading_is_found_at_its_period():
         )
         found = ripples([rippled, rippled])
         assert found[0] == pytest.approx(pitch, rel=3e-3)
+    # what is loud at low speed, such as friction, does not hide it
+    rng = np.random.default_rng(8)
+    pitch = 1.37e-3
+    loud = ridden(
+        lambda m: 9e-6 * (m.velocity / pitch) ** 2 * np.sin(2.0 * np.pi * m.position / pitch)
+        + 15.0 * rng.normal(size=len(m.time)) * (np.abs(m.velocity) < 0.03)
+    )  # fmt: skip
+    assert ripples([loud])[0] == pytest.approx(pitch, rel=3e-3)
     still = replace(SHORT, signals=SHORT.signals * [[0.0], [1.0], [1.0]])
     assert ripples([still]) == ()
 

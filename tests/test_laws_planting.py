@@ -43,7 +43,8 @@ from identify.planting import (
 from identify.residual import residual
 from twin.effect import Parameter
 from twin.errors import InputError
-from twin.model import AxisModel, Hardware, StageModel, coordinates, read
+from twin.model import AxisModel, Hardware, StageModel, axis_table, coordinates, read
+from twin.native import walk
 
 LOGS = [
     windowed(moved(np.random.default_rng(s), 1.0, 1000.0).head(n)) for s, n in ((1, 0.5), (2, 0.3))
@@ -244,3 +245,32 @@ def test_a_coupled_axis_follows_the_others_motion_before_a_restart():
     assert not states[:, second].any()
     swapped = _states_at(table, x[:, ::-1], 0.0 * x, 1.0 / RATE, np.array([900, 1900]))
     np.testing.assert_array_equal(swapped[:, second], states[:, first])
+
+
+def test_friction_before_a_restart_knows_the_place_and_the_other_axis():
+    """A dragged Dahl brush has the force that its modifiers leave there, to a thousandth."""
+    x = np.stack([0.1 * T, -0.05 + 0.2 * T], axis=1)
+    brush = effect("dahl", {"Fc": 0.4, "sigma0": 4e3})
+    place = effect("position_dependent_friction", {"c1": 0.3, "c2": 0.2})
+    load = effect("load_dependent_friction", {"motor": 0.0, "corner": 1.7, "offset": 0.9})
+    axis = AxisModel(1.0, effects=(brush, place, load))
+    table = StageModel("s", {"x": axis, "y": axis}).table()
+    starts = np.array([900, 2100, 3000])
+    states = _states_at(table, x, 0.0 * x, 1.0 / RATE, starts)
+    for a in (0, 1):
+        own = next(e for e, n in zip(table.entries, table.labels, strict=True)
+                   if n == ("xy"[a], "dahl"))  # fmt: skip
+        table_of_one = axis_table({"x": axis})
+        steady = []
+        for k in starts:
+            at = np.stack([np.full(200, 0.5 * (x[k, i] + x[k - 1, i])) for i in (a, 1 - a)])
+            motion = np.stack([at[0], np.full(200, (x[k, a] - x[k - 1, a]) * RATE), 0.0 * at[0]])
+            other = np.stack([at[1], 0.0 * at[1], 0.0 * at[1]])
+            memory = np.zeros(table_of_one.n_states)
+            first, last, begin, _, _ = table_of_one.axes[0]
+            rows = np.zeros((len(table_of_one.entries), 200))
+            walk(table_of_one.entries, first, last, table_of_one.parameters, memory, begin,
+                 motion, other, 1.0 / RATE, 0, rows)  # fmt: skip
+            steady.append(-rows.sum(axis=0)[-1])
+        np.testing.assert_allclose(states[:, int(own[3])], steady, rtol=5e-3)
+        assert np.ptp(steady) > 0.02
