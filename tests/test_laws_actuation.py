@@ -4,10 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from constructed import LAG, PAYLOAD, RIPPLE, SENSING, SHORT, STICKY, effect, windowed
+from constructed import (
+    LAG,
+    PAYLOAD,
+    RIPPLE,
+    SENSING,
+    SHORT,
+    STICKY,
+    effect,
+    log_of,
+    waves,
+    windowed,
+)
 
 from identify.actuation import actual_force, forces_lessened, is_noise, parts_of, true_motion
-from identify.residual import windowed_force
+from identify.motion import motion_of
+from identify.residual import residual, windowed_force
 from twin.effect import Kind
 from twin.model import AxisModel
 
@@ -81,6 +93,18 @@ def test_a_late_reading_is_undone():
     error = (seen - np.interp(at + tau / dt, at, seen)).reshape(len(means), -1).mean(axis=1)
     np.testing.assert_allclose((SHORT.position - true.position)[9:-9], error[9:-9], atol=2e-6)
     np.testing.assert_array_equal(true.command, SHORT.command)
+
+
+def test_the_residual_of_late_readings_is_none_with_the_delay_and_not_without():
+    """The force that a reading's error pretends, mass x its acceleration, is given back."""
+    rate, mass, tau = 2000.0, 1.7, 7.3e-4
+    x = waves((0.03, 1.3, 0.4), (0.006, 5.1, 1.0))
+    t = np.arange(3000) / rate
+    middle = t + 0.5 / rate
+    push = mass * (x(middle + 1e-4) - 2.0 * x(middle) + x(middle - 1e-4)) / 1e-8
+    log = windowed(motion_of(log_of(rate, x(t - tau), push), "x", ""))
+    bare, knowing = (residual(AxisModel(mass, effects=e), [log]) for e in ((), SENSING[:1]))
+    assert np.std(knowing) < 0.1 * np.std(bare)
 
 
 def test_a_ripple_of_the_encoder_is_undone():

@@ -200,6 +200,8 @@ def test_a_log_begun_later_has_its_clock_later_modulo_the_period(study):
     ahead = axis.with_effect(effect("periodic_disturbance", early))
     shifted = np.mod(wanted - 0.25 + 0.5, 1.0) - 0.5
     np.testing.assert_allclose(turns(with_clocks(ahead, study)), shifted, atol=0.01)
+    late = clocks(with_clocks(ahead, study_of(*study.fit, started(0.0211, 3)))) * 23.7
+    assert (np.abs(late) <= 0.5).all()  # the nearest of all turns alike
     near = study_of(started(0.0), started(0.015 / 23.7, 1))
     assert not clocks(with_clocks(axis, near)).any()  # within two hundredths of a turn
 

@@ -179,6 +179,8 @@ def test_the_exact_model_reproduces_the_motion_and_a_wrong_force_drifts_as_its_p
     known = np.isfinite(run.error["x"])
     assert not known[:side].any()
     assert known[side:-side].all()
+    short = log_of(RATE, x[: side + 2 * 1000 + 5], PUSH[: side + 2 * 1000 + 5])
+    assert np.isnan(free_run(model, short).error["x"][-5:]).all()  # no room for another start
     pushed = StageModel(
         "s", {"x": AxisModel(1.7, effects=(effect("constant_force", {"F0": 0.34}),))}
     )
