@@ -79,8 +79,7 @@ def windowed_force(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
     A sensing effect adds the force that the reading's error pretends, mass x its acceleration, and
     the other effects act along the motion behind the readings.
     """
-    # An actuation with memory needs the log's own rate.
-    fine = any(f.effect.kind is Kind.ACTUATION and f.effect.states for f in axis.effects)
+    fine = _on_samples(axis)
     apart = {Kind.SENSING, *((Kind.ACTUATION,) if fine else ())}
     table = axis_table({"": parts_of(axis, *(set(Kind) - apart))})
     parts = []
@@ -95,6 +94,11 @@ def windowed_force(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
     return np.concatenate(parts)
 
 
+def _on_samples(axis: AxisModel) -> bool:
+    """Whether the axis has an actuation with memory, which needs the log's own rate."""
+    return any(f.effect.kind is Kind.ACTUATION and f.effect.states for f in axis.effects)
+
+
 def residual(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
     """Unexplained force (n,) N: windowed command + effects - mass x acceleration, log after log."""
     inertia = np.concatenate([log.command - axis.mass * log.acceleration for log in logs])
@@ -104,13 +108,15 @@ def residual(axis: AxisModel, logs: Sequence[Windowed]) -> Array:
 def group_of(axis: AxisModel, effect: str) -> AxisModel:
     """The part of the axis whose force can change when a parameter of that effect does.
 
-    Friction and its modifiers act together, and so does what is in a chain; any other effect acts
-    by itself. All act along the motion that the sensing effects leave.
+    Friction and its modifiers act together, and so does what is in a chain; friction may depend on
+    the force that a chain without memory gives. Any other effect acts by itself. All act along the
+    motion that the sensing effects leave.
     """
     kind = axis[effect].effect.kind
     if kind is Kind.SENSING:
         return axis
-    for joint in ((Kind.FRICTION, Kind.MODIFIER), (Kind.ACTUATION,)):
+    friction, chain = (Kind.FRICTION, Kind.MODIFIER), (Kind.ACTUATION,)
+    for joint in (friction, chain) if _on_samples(axis) else ((*friction, *chain),):
         if kind in joint:
             return parts_of(axis, *joint, Kind.SENSING)
     return replace(axis, effects=(axis[effect], *parts_of(axis, Kind.SENSING).effects))

@@ -1,0 +1,90 @@
+"""Motions and logs built from closed forms, for tests that know the answer without the product."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from effect_runs import companion
+from numpy.typing import NDArray
+
+from identify.fit import Fit, finished
+from identify.fit import Outcome as Ended
+from identify.motion import Motion, motion_of
+from identify.residual import Windowed
+from identify.study import Study
+from twin.effect import Excitation
+from twin.effects import load_catalogue
+from twin.log import AxisLog, Log
+from twin.model import AxisModel, Fitted
+
+Array = NDArray[np.float64]
+CATALOGUE = load_catalogue()
+COVERED = Excitation(-0.031, 0.083, 0.7, 0.9, 3.0, 1e-3, force_max=4.0)
+
+
+def log_of(rate: float, x: Array, force: Array, other: Array | None = None, **more: Array) -> Log:
+    """A log of axis x, of axis y too where its positions are given, at that rate (Hz)."""
+    axes = {"x": AxisLog({"position": x, "force": force, **more})}
+    if other is not None:
+        axes["y"] = AxisLog({"position": other, "force": np.zeros_like(other)})
+    return Log(rate, axes)
+
+
+def waves(*terms: tuple[float, float, float]) -> Callable[[Array], Array]:
+    """Sum of amplitude x sin(2 pi frequency t + phase)."""
+    return lambda t: sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in terms)
+
+
+def held(force: Array, mass: float, dt: float, x: float = 0.0, v: float = 0.0) -> Array:
+    """Positions (n,) m of a free mass under forces (n,) N, each held over its sample: exact."""
+    out = np.empty(len(force))
+    for k, u in enumerate(force):
+        out[k] = x
+        x, v = x + dt * v + 0.5 * dt**2 * u / mass, v + dt * u / mass
+    return out
+
+
+def moved(
+    rng: np.random.Generator, duration: float = 1.0, rate: float = 2000.0, name: str = "log"
+) -> Motion:
+    """A smooth motion of two axes that turns often, with a command that is no function of it."""
+    t = np.arange(round(duration * rate) + 1) / rate
+    phase = rng.uniform(0.0, 6.0, 4)
+    x = 0.02 + waves((0.03, 2.3, phase[0]), (0.004, 9.1, phase[1]))(t)
+    force = waves((3.0, 3.7, phase[2]), (1.1, 17.0, phase[3]))(t)
+    other = 0.05 + waves((0.02, 3.1, phase[3]), (0.003, 7.9, phase[2]))(t)
+    return motion_of(log_of(rate, x, force, other), "x", name)
+
+
+def windowed(motion: Motion, length: float = 0.05) -> Windowed:
+    """The motion in windows of that length (s)."""
+    return Windowed.of(motion, length)
+
+
+def effect(name: str, values: Mapping[str, float] | None = None) -> Fitted:
+    """An effect of the catalogue at its start values, or those given."""
+    return Fitted.at_start(CATALOGUE[name], values)
+
+
+def fit_of(axis: AxisModel, *logs: Windowed) -> Fit:
+    """The fit that an axis is at its present values."""
+    return finished(axis, axis, logs, Ended.CONVERGED)
+
+
+def study_of(*fit: Windowed, holdout: tuple[Windowed, ...] = (), shift: float = 0.0) -> Study:
+    """A study of some logs of axis x."""
+    return Study("x", fit, holdout, COVERED, shift)
+
+
+SHORT = moved(np.random.default_rng(1), 1.0).head(0.4)
+SHORT = replace(SHORT, clock=0.137)
+SENSING = (
+    effect("encoder_delay", {"tau": 7.3e-4}),
+    effect("encoder_ripple", {"period": 3.1e-3, "a1": 2e-5, "b1": -1.3e-5, "a2": 7e-6, "b2": 3e-6}),
+)
+STICKY = companion(CATALOGUE["lugre"])
+LAG = effect("actuator_lag", {"tau": 1.7e-3})
+RIPPLE = effect("force_constant_ripple", {"p": 0.013, "a1": 0.05, "b1": 0.03})
+PAYLOAD = effect("payload_mass", {"ratio": 0.31})
