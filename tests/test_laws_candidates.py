@@ -1,0 +1,371 @@
+"""One effect as a candidate: which are tried, how far, and on which windows they are scored."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from built_fits import (
+    CATALOGUE,
+    NOISE,
+    PLAIN,
+    axis_of,
+    built,
+    built_fit,
+    built_study,
+    fitted,
+    study_stub,
+)
+
+from identify import candidates
+from identify.candidates import (
+    PROMISE,
+    RIDGE,
+    SAME_ERROR,
+    _audition,
+    _cross_validated,
+    _glance,
+    _promising,
+    absent_effects,
+    levelled,
+    score,
+    simplified,
+    try_effect,
+)
+from identify.evidence import LEAST_BIC, LEAST_T, Evidence, Gain, effective_samples, evidence
+from identify.fit import AT_FLOOR, Outcome
+from identify.search import Start
+from twin.effect import Kind
+
+RNG = np.random.default_rng(5)
+
+
+# --- which effects, and what supports them --------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("bic", "t", "after", "supported"),
+    [
+        (LEAST_BIC, 9.0, 2.0, False),
+        (LEAST_BIC + 0.1, 9.0, 2.0, True),
+        (90.0, LEAST_T, 2.0, False),
+        (90.0, LEAST_T + 0.1, 2.0, True),
+        (90.0, 9.0, 7.0, False),
+        (90.0, 9.0, 7.1, False),
+    ],
+)
+def test_evidence_and_held_out_logs_must_both_ask(bic, t, after, supported):
+    assert built(bic=bic, t=t, before=7.0, after=after).supported is supported
+
+
+def test_a_noise_need_not_lower_the_error_and_needs_its_evidence():
+    assert built(NOISE, bic=90.0, t=9.0, before=7.0, after=7.0).supported
+    assert not built(NOISE, bic=9.0, t=9.0, before=7.0, after=7.0).supported
+    assert not built(NOISE, bic=90.0, t=2.0, before=7.0, after=7.0).supported
+
+
+def test_absent_are_all_effects_but_those_there_and_descriptions():
+    names = {e.name for e in absent_effects(axis_of(fitted("cogging")), CATALOGUE)}
+    described = {"empirical_map", "learned_residual"}
+    assert names == set(CATALOGUE) - {"cogging", "coulomb_viscous"} - described
+    bare = replace(PLAIN, effects=())
+    modifiers = {e.name for e in CATALOGUE.values() if e.kind is Kind.MODIFIER}
+    assert modifiers
+    found = {e.name for e in absent_effects(bare, CATALOGUE)}
+    assert found == set(CATALOGUE) - modifiers - described
+
+
+def test_candidates_are_levelled_to_the_samples_of_what_explains_most():
+    made = [
+        replace(built(n), evidence=Evidence(gain, 1, samples))
+        for n, gain, samples in (("cogging", 1.0, 90.0), ("wear", 3.0, 50.0), ("gms", 2.0, 20.0))
+    ]
+    out = levelled(made)
+    assert [c.evidence for c in out] == [
+        Evidence(1.0, 1, 50.0), Evidence(3.0, 1, 50.0), Evidence(2.0, 1, 20.0),
+    ]  # fmt: skip
+    assert levelled([]) == []
+
+
+# --- the score ------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def quiet(monkeypatch):
+    """No effect reads a clock."""
+    monkeypatch.setattr(candidates, "phases_found", lambda axis, name, study: 0)
+
+
+def test_only_windows_that_both_fits_can_use_are_compared(quiet):
+    n = 400
+    a, b = RNG.standard_normal(n), 0.5 * RNG.standard_normal(n)
+    one, other = np.arange(n) % 3 != 0, np.arange(n) % 4 != 0
+    base = built_fit(0, residual=a[one], kept=one)
+    fit = built_fit(
+        0, axis=axis_of(fitted("constant_force")), residual=b[other], kept=other,
+        jacobian=np.ones((other.sum(), 1)),
+    )  # fmt: skip
+    base.__dict__["jacobian"] = np.ones((one.sum(), 1))
+    found = score(base, fit, study_stub(), CATALOGUE["constant_force"])
+    shared = one & other
+    assert found.evidence == evidence(a[shared], b[shared], 1)
+    assert (found.fit, found.axis, found.effect.name) == (fit, "x", "constant_force")
+
+
+@pytest.mark.parametrize("name", ["constant_force", "axis_coupling", "backlash"])
+def test_evidence_counts_the_parameters_that_the_fit_has_more(quiet, name):
+    axis = PLAIN.with_effect(fitted(name))
+    base, fit = built_fit(2.0), built_fit(1.9, axis=axis)
+    free = len(fit.scaling.where) - len(base.scaling.where)
+    effect = CATALOGUE[name]
+    assert score(base, fit, study_stub(), effect).evidence.parameters == free
+    assert score(fit, base, study_stub(), effect).evidence.parameters == 1
+
+
+def test_phases_found_count_as_parameters(monkeypatch):
+    monkeypatch.setattr(candidates, "phases_found", lambda axis, name, study: 3)
+    fit = built_fit(1.9, axis=axis_of(fitted("constant_force")))
+    found = score(built_fit(2.0), fit, study_stub(), CATALOGUE["constant_force"])
+    assert found.evidence.parameters == 4
+
+
+def test_a_motor_made_weak_is_no_smaller_error(quiet):
+    axis = axis_of(fitted("actuator_deadband"))
+    noise = RNG.standard_normal(300)
+    weak = built_fit(0, axis=axis, residual=0.25 * noise, lessened=0.25)
+    found = score(built_fit(0, residual=noise), weak, study_stub(), CATALOGUE["actuator_deadband"])
+    assert found.evidence.log_gain == pytest.approx(0.0, abs=1e-12)
+    assert found.gain == Gain(found.gain.before, found.gain.before, 0.0)
+
+
+def test_the_held_out_logs_judge_before_and_after_in_that_order(quiet):
+    study = built_study("fit", held=("held",))
+    base = built_fit(0.4, 0.02)
+    richer = axis_of(fitted("constant_force", F0=2.0))
+    fit = built_fit(0.1, 0.02, richer)
+    found = score(base, fit, study, CATALOGUE["constant_force"])
+    kept = candidates.moving(study.holdout, True)
+    before, after = (
+        np.sqrt(np.mean(candidates.residual(a, study.holdout)[kept] ** 2)) for a in (PLAIN, richer)
+    )
+    assert found.gain.before == pytest.approx(before)
+    assert found.gain.after == pytest.approx(after)
+    assert after > before
+    assert not found.supported
+
+
+def test_blocks_are_left_out_only_where_evidence_asks(quiet, monkeypatch):
+    noise = RNG.standard_normal(600)
+    fit = built_fit(0, axis=axis_of(fitted("constant_force")), residual=noise)
+    monkeypatch.setattr(candidates, "_cross_validated", lambda f, rows: 3.0 * f.residual[rows])
+    effect = CATALOGUE["constant_force"]
+    strong = score(built_fit(0, residual=2.0 * noise), fit, study_stub(), effect)
+    size = np.sqrt(np.mean(noise**2))
+    assert (strong.gain.before, strong.gain.after) == pytest.approx((6.0 * size, 3.0 * size))
+    weak = score(built_fit(0, residual=1.001 * noise), fit, study_stub(), effect)
+    assert weak.gain.after == pytest.approx(size)
+
+
+def test_a_cross_validated_residual_is_that_of_a_fit_without_the_block():
+    n, k = 240, 3
+    columns, rows = RNG.standard_normal((n, k)), np.ones(n, dtype=bool)
+    rows[::7] = False
+    force = RNG.standard_normal(n)
+    used, left = columns[rows], force[rows]
+    # A fit's residual has no part left along its columns, up to a ridge.
+    left = left - used @ np.linalg.lstsq(used, left, rcond=None)[0]
+    force[rows] = left
+    out = _cross_validated(built_fit(0, residual=force, jacobian=columns), rows)
+    edges = np.linspace(0, len(left), 25).astype(int)
+    ridge = np.diag((RIDGE * np.linalg.norm(used, axis=0)) ** 2)
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        others = np.r_[0:a, b : len(left)]
+        normal = used[others].T @ used[others] + ridge
+        move = np.linalg.solve(normal, -used[others].T @ left[others])
+        np.testing.assert_allclose(out[a:b], left[a:b] + used[a:b] @ move, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("base_error", "fit_error", "seen", "told"),
+    [
+        (1.6, 1.2, 2.0, True),
+        (1.2, 1.2, 2.0, False),
+        (1.6, 1.4, 2.0, False),
+        (1.6, 1.2, 2.0 * AT_FLOOR - 0.01, True),
+        (1.6, 1.2, 2.0 * AT_FLOOR + 0.01, False),
+    ],
+)
+def test_a_noise_is_told_where_it_alone_makes_the_error_noise(
+    monkeypatch, base_error, fit_error, seen, told
+):
+    noise = RNG.standard_normal(500)
+    noise /= np.sqrt(np.mean(noise**2))
+    base = built_fit(base_error, 1.0)
+    fit = built_fit(0, 1.0, axis_of(), residual=fit_error * noise)
+    asked = []
+
+    def floor(axis, logs):
+        asked.append((axis, logs))
+        return 1.0 if axis is base.axis else 2.0
+
+    monkeypatch.setattr(candidates, "error_on", lambda axis, logs: seen * noise)
+    monkeypatch.setattr(candidates, "floor_of", floor)
+    base.__dict__["floor"], fit.__dict__["floor"] = 1.0, 1.05
+    study = study_stub(holdout=("held",), fit=("fit",))
+    found = score(base, fit, study, NOISE)
+    assert {logs for _, logs in asked} == {study.holdout}
+    assert (found.evidence.log_gain != 0.0) is told
+    assert (found.gain.t != 0.0) is told
+    assert found.gain.before == found.gain.after == pytest.approx(seen)
+    assert found.evidence.samples == effective_samples(fit.residual)
+    if told:
+        power, before, after = fit_error**2, 1.0, 1.05
+        gain = power / before**2 - power / after**2 - 2.0 * np.log(after / before)
+        assert found.evidence.log_gain == pytest.approx(gain)
+        unseen = seen**2 - seen**2 / 4.0 - 2.0 * np.log(2.0)
+        t = np.sqrt(max(effective_samples(seen * noise) * unseen, 0.0))
+        assert found.gain.t == pytest.approx(t)
+
+
+# --- how far an effect is tried -------------------------------------------------------------
+
+
+def test_a_first_look_must_show_a_part_of_the_evidence_asked_for():
+    noise = RNG.standard_normal(500)
+    base = built_fit(0, residual=noise)
+    n, before = effective_samples(noise), float(np.sum(noise**2))
+    for effect, free in (("constant_force", 1), ("cogging", 7)):
+        wanted = PROMISE * (LEAST_BIC + free * np.log(n))
+        for gain, promising in ((0.99 * wanted, False), (1.01 * wanted, True)):
+            left = before * np.exp(-gain / n)
+            assert _promising(base, Start(left, {}, fitted(effect))) is promising
+    held = replace(fitted("cogging"), fixed=frozenset({"p", "a1", "b1", "a2", "b2", "a3"}))
+    one = PROMISE * (LEAST_BIC + np.log(n))
+    assert _promising(base, Start(before * np.exp(-1.01 * one / n), {}, held))
+    assert not _promising(built_fit(0.0), Start(0.0, {}, fitted("cogging")))
+
+
+@pytest.mark.parametrize(("error", "kept"), [(1.9, True), (2.0, True), (2.1, False)])
+def test_a_step_that_does_harm_leaves_the_effect_without_strength(monkeypatch, error, kept):
+    base, effect = built_fit(2.0), fitted("cogging", a1=0.7, b2=0.2, p=0.03)
+    moved = axis_of(fitted("constant_force"), effect)
+    monkeypatch.setattr(candidates, "stepped", lambda base, fitted, logs: moved)
+
+    def finished(axis, begun, logs, outcome):
+        assert (begun, logs, outcome) == (base.begun, ("log",), Outcome.NOT_CONVERGED)
+        return built_fit(error if axis is moved else 2.0, axis=axis, outcome=outcome)
+
+    monkeypatch.setattr(candidates, "finished", finished)
+    found = _glance(base, study_stub(fit=("log",)), effect)
+    values = found.axis["cogging"].values
+    assert (found.axis is moved) is kept
+    assert values["p"] == 0.03
+    assert (values["a1"], values["b2"]) == ((0.7, 0.2) if kept else (0.0, 0.0))
+
+
+@pytest.mark.parametrize(("error", "simpler"), [(0.99, True), (1.01, False)])
+def test_simpler_values_may_cost_a_hundredth(monkeypatch, error, simpler):
+    multiple = fitted("cogging", p=0.06, a2=0.5)
+    fit = built_fit(2.0, axis=axis_of(multiple))
+    again = {}
+
+    def refit(axis, logs):
+        again.update(axis["cogging"].values)
+        return built_fit(2.0 * (1.0 + (SAME_ERROR - 1.0) * error), axis=axis)
+
+    monkeypatch.setattr(candidates, "fit_axis", refit)
+    found = simplified(fit, study_stub(), CATALOGUE["cogging"])
+    assert (again["p"], again["a1"]) == (0.03, 0.5)
+    assert (found is not fit) is simpler
+    plain = built_fit(2.0, axis=axis_of(fitted("cogging", p=0.06, a1=0.5)))
+    assert simplified(plain, study_stub(), CATALOGUE["cogging"]) is plain
+    other = built_fit(2.0, axis=axis_of(fitted("wear")))
+    assert simplified(other, study_stub(), CATALOGUE["wear"]) is other
+
+
+def tried(monkeypatch, effect, *, promising=True, looked=None, errors=(0.5, 0.4, 0.3), bic=90.0):
+    """try_effect with every part given; the axis each fit began from, and what was scored."""
+    begun, left = [], list(errors)
+    starts = [Start(float(i), {}, fitted(effect)) for i in (1, 2)]
+    other = axis_of(mass=9.9)
+    base = built_fit(2.0, 0.1, begun=other)
+
+    def fit_axis(axis, logs):
+        begun.append((axis.mass, axis[effect] is starts[1].fitted))
+        return built_fit(left.pop(0), 0.1, axis)
+
+    monkeypatch.setattr(candidates, "starts", lambda *_: starts)
+    monkeypatch.setattr(candidates, "fit_axis", fit_axis)
+    monkeypatch.setattr(candidates, "fit_thoroughly", lambda axis, s: built_fit(0.2, 0.1, axis))
+    monkeypatch.setattr(candidates, "simplified", lambda fit, study, effect: fit)
+    monkeypatch.setattr(candidates, "_promising", lambda *_: promising)
+    monkeypatch.setattr(candidates, "_glance", lambda *_: built_fit(1.7, 0.1))
+    monkeypatch.setattr(candidates, "_audition", lambda *_: looked)
+    monkeypatch.setattr(
+        candidates, "score", lambda base, fit, study, effect: built(effect, bic=bic, fit=fit)
+    )
+    return try_effect(base, study_stub(), CATALOGUE[effect]).fit.error, begun
+
+
+def test_an_effect_is_tried_as_far_as_it_promises(monkeypatch):
+    assert tried(monkeypatch, "cogging", promising=False) == (pytest.approx(1.7), [])
+    looked = built_fit(1.5, 0.1)
+    assert tried(monkeypatch, "lugre", looked=looked) == (pytest.approx(1.5), [])
+    first = [(5.3, False)]
+    assert tried(monkeypatch, "cogging", errors=[0.12]) == (pytest.approx(0.12), first)
+    assert tried(monkeypatch, "cogging", bic=9.0) == (pytest.approx(0.5), first)
+    every = [(5.3, False), (9.9, False), (5.3, True)]
+    assert tried(monkeypatch, "cogging") == (pytest.approx(0.2), every)
+    assert tried(monkeypatch, "lugre", promising=False) == (pytest.approx(0.2), every)
+    floor = tried(monkeypatch, "cogging", errors=(0.5, 0.11, 0.3))
+    assert floor == (pytest.approx(0.11), every)
+
+
+def test_a_noise_is_scored_without_a_refit(monkeypatch):
+    monkeypatch.setattr(candidates, "finished", lambda axis, *_: built_fit(1.4, axis=axis))
+    assert tried(monkeypatch, NOISE.name) == (pytest.approx(1.4), [])
+
+
+def auditioned(monkeypatch, *, after, head=40, whole=100):
+    noise = RNG.standard_normal(400)
+    study = study_stub(fit=[range(whole)])
+    study.heads = [range(head)]
+    new_axis = axis_of(mass=7.7).with_effect(fitted("dahl"))
+
+    def fit_axis(axis, logs, most):
+        assert logs is study.heads
+        assert axis.names == ("dahl",)
+        return built_fit(1.0, axis=new_axis)
+
+    monkeypatch.setattr(candidates, "_on_heads", lambda base, study: built_fit(1.0))
+    monkeypatch.setattr(candidates, "fit_axis", fit_axis)
+    monkeypatch.setattr(candidates, "moving", lambda logs, either: np.full(400, either))
+    monkeypatch.setattr(
+        candidates, "residual",
+        lambda axis, logs: noise if axis is PLAIN else after(noise),
+    )  # fmt: skip
+    monkeypatch.setattr(candidates, "finished", lambda axis, *_: built_fit(0.5, axis=axis))
+    return _audition(built_fit(2.0), study, fitted("dahl")), noise, new_axis
+
+
+@pytest.mark.parametrize(("part", "passed"), [(0.9, False), (1.1, True)])
+def test_a_friction_passes_where_the_heads_show_it_better(monkeypatch, part, passed):
+    def after(noise):
+        gain = part * PROMISE * LEAST_BIC / effective_samples(noise)
+        return noise * np.exp(-0.5 * gain)
+
+    found, _, axis = auditioned(monkeypatch, after=after)
+    assert (found is None) is passed
+    assert passed or found.axis is axis
+    assert auditioned(monkeypatch, after=after, head=50)[0] is None or not passed
+    assert auditioned(monkeypatch, after=after, head=51)[0] is None
+
+
+def test_the_heads_are_fitted_once_for_all_frictions(monkeypatch):
+    fitted_on = []
+    monkeypatch.setattr(candidates, "fit_axis", lambda axis, logs: fitted_on.append((axis, logs)))
+    base, study = built_fit(1.0), built_study("fit")
+    for _ in range(2):
+        candidates._on_heads(base, study)
+    assert fitted_on == [(PLAIN, study.heads)]

@@ -1,0 +1,307 @@
+"""The order of candidates, ties between them, and pairs that need each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from built_fits import (
+    CATALOGUE,
+    NOISE,
+    PLAIN,
+    axis_of,
+    built,
+    built_fit,
+    fitted,
+    study_stub,
+)
+
+from identify import lookahead, ranking
+from identify.evidence import Evidence, held_out_gain
+from identify.fit import AT_FLOOR
+from identify.lookahead import FIRSTS, LEAST_PART, held_at_floor, look_ahead
+from identify.ranking import COLLAPSE, SETTLED, _ranked, less, rank, tie, took_friction
+from twin.effects import Catalogue
+from twin.model import Fitted
+
+STUDY = study_stub()
+NAMES = ("cogging", "end_stop", "gms", "quadratic_drag", "wear")
+
+
+def names(found) -> list[str]:
+    return [c.effect.name for c in found]
+
+
+# --- order ----------------------------------------------------------------------------------
+
+
+def test_candidates_come_by_falling_evidence_supported_first():
+    made = [built(n, bic=b, t=t) for n, b, t in zip(NAMES, (90, 300, 900, 40, 700),
+                                                    (9, 9, 1, 9, 1), strict=True)]  # fmt: skip
+    expected = ["end_stop", "cogging", "quadratic_drag", "gms", "wear"]
+    for seed in range(5):
+        order = np.random.default_rng(seed).permutation(len(made))
+        assert names(_ranked([made[i] for i in order])) == expected
+
+
+@pytest.mark.parametrize(("behind", "level"), [(1.9, True), (2.1, False)])
+def test_within_no_evidence_of_the_best_the_catalogue_decides(behind, level):
+    made = [built("wear", bic=90.0), built("cogging", bic=90.0 - behind), built("gms", bic=50.0)]
+    first = ["cogging", "wear"] if level else ["wear", "cogging"]
+    assert names(_ranked(made)) == [*first, "gms"]
+    unsupported = [replace(c, gain=replace(c.gain, t=0.0)) for c in made]
+    assert names(_ranked(unsupported)) == ["wear", "cogging", "gms"]
+    mixed = [made[0], unsupported[1], made[2]]
+    assert names(_ranked(mixed)) == ["wear", "gms", "cogging"]
+
+
+def test_a_noise_comes_after_what_lowers_the_error_if_both_are_supported():
+    noise, weak = built(NOISE, bic=900.0), built("wear", bic=20.0)
+    assert names(_ranked([noise, weak])) == ["wear", NOISE.name]
+    unsupported = built("wear", bic=20.0, t=1.0)
+    assert names(_ranked([unsupported, noise])) == [NOISE.name, "wear"]
+
+
+def ranked(monkeypatch, ratio, t=9.0):
+    """rank among two effects, where a refit of the base gives that ratio of its error."""
+    base, again = built_fit(4.0), built_fit(4.0 * ratio)
+    bics = {"cogging": 40.0, "wear": 90.0}
+    asked, bars = [], []
+
+    def less_of(effect, fit, base, study):
+        asked.append((effect.name, fit))
+        return again
+
+    def try_effect(base, study, effect):
+        return built(effect, bic=bics[effect.name], t=t)
+
+    monkeypatch.setattr(ranking, "try_effect", try_effect)
+    monkeypatch.setattr(ranking, "less", less_of)
+    monkeypatch.setattr(
+        ranking, "score", lambda b, fit, s, effect: built(effect, bic=1e3 * b.error, fit=fit)
+    )
+    catalogue = Catalogue([CATALOGUE[n] for n in bics])
+    found = rank(base, STUDY, catalogue, lambda *done: bars.append(done), workers=1)
+    assert bars == [(1, 2), (2, 2)]
+    return found, base, again, asked
+
+
+@pytest.mark.parametrize(("ratio", "settled"), [(SETTLED + 1e-4, True), (SETTLED - 1e-4, False)])
+def test_a_base_short_of_its_optimum_is_exchanged_and_all_scored_anew(monkeypatch, ratio, settled):
+    (base, found), old, again, asked = ranked(monkeypatch, ratio)
+    assert base is (old if settled else again)
+    assert [name for name, _ in asked] == ["wear"]
+    expected = [90.0, 40.0] if settled else [1e3 * again.error] * 2
+    assert [c.delta_bic for c in found] == pytest.approx(expected)
+
+
+def test_without_support_the_base_stays(monkeypatch):
+    (base, found), old, _, asked = ranked(monkeypatch, 0.5, t=1.0)
+    assert (base, asked) == (old, [])
+    assert names(found) == ["wear", "cogging"]
+
+
+def test_less_an_effect_the_friction_that_it_replaced_is_back(monkeypatch):
+    monkeypatch.setattr(ranking, "fit_axis", lambda axis, logs: (axis, logs))
+    study = study_stub(fit=("log",))
+    rich = axis_of(fitted("cogging")).with_effect(fitted("lugre"))
+    axis, logs = less(CATALOGUE["lugre"], built_fit(1.0, axis=rich), built_fit(1.0), study)
+    assert axis.names == ("cogging", "coulomb_viscous")
+    assert axis["coulomb_viscous"] is PLAIN["coulomb_viscous"]
+    assert logs == ("log",)
+    bare = built_fit(1.0, axis=replace(PLAIN, effects=()))
+    assert less(CATALOGUE["lugre"], built_fit(1.0, axis=rich), bare, study)[0].names == ("cogging",)
+    axis, _ = less(CATALOGUE["cogging"], built_fit(1.0, axis=rich), built_fit(1.0), study)
+    assert axis.names == ("lugre",)
+
+
+# --- ties -----------------------------------------------------------------------------------
+
+
+NOISY = 1e-3 * np.random.default_rng(7).standard_normal(3000)
+
+
+def tied(monkeypatch, best_scale, other_scale, gains=(1.0, 1.0), logs=("held out",), **parts):
+    best = built("cogging", fit=built_fit(1.0, 1e-3, axis_of(mass=1.0)))
+    other = built("wear", fit=built_fit(1.0, 1e-3, axis_of(mass=2.0)))
+    best, other = (
+        replace(c, evidence=Evidence(g, 1, 1000.0))
+        for c, g in zip((best, other), gains, strict=True)
+    )
+    scales, seen = {1.0: best_scale, 2.0: other_scale}, []
+
+    def residual(axis, given):
+        seen.append(given)
+        return scales[axis.mass] * NOISY
+
+    monkeypatch.setattr(ranking, "residual", residual)
+    monkeypatch.setattr(ranking, "moving", lambda given, either: np.ones(len(NOISY), dtype=bool))
+    study = study_stub(holdout=logs, fit=("fit",))
+    return tie(study, best, other), seen
+
+
+def test_a_tie_ends_where_the_best_gains_more_than_next_to_nothing(monkeypatch):
+    t = held_out_gain(1.003 * NOISY, NOISY, 1e-3).t
+    assert t > 10.0  # in every block
+    assert tied(monkeypatch, 1.0, 1.0003)[0] is True
+    assert tied(monkeypatch, 1.0, 1.003)[0] is False
+    assert tied(monkeypatch, 1.003, 1.0)[0] is True  # the other is better: no reason to part
+
+
+def test_the_evidence_parts_two_candidates_by_more_than_ten(monkeypatch):
+    assert tied(monkeypatch, 1.0, 1.0, (1.0101, 1.0))[0] is False
+    assert tied(monkeypatch, 1.0, 1.0, (1.0099, 1.0))[0] is True
+    assert tied(monkeypatch, 1.0, 1.0, (1.0, 1.5))[0] is True
+
+
+def test_a_tie_is_judged_on_the_held_out_logs_where_there_are_any(monkeypatch):
+    assert tied(monkeypatch, 1.0, 1.0)[1] == [("held out",)] * 2
+    assert tied(monkeypatch, 1.0, 1.0, logs=())[1] == [("fit",)] * 2
+
+
+def test_windows_at_rest_are_left_out_where_either_sticks(monkeypatch):
+    asked = []
+    monkeypatch.setattr(ranking, "residual", lambda axis, logs: NOISY)
+
+    def moving(logs, either):
+        asked.append(either)
+        return np.ones(len(NOISY), dtype=bool)
+
+    monkeypatch.setattr(ranking, "moving", moving)
+    sliding = axis_of().with_effect(fitted("lugre"))
+    pairs = [(PLAIN, sliding), (sliding, PLAIN), (sliding, sliding)]
+    for one, two in pairs:
+        made = [built("wear", fit=built_fit(1.0, axis=axis)) for axis in (one, two)]
+        tie(study_stub(holdout=(1,)), *made)
+    assert asked == [True, True, False]
+
+
+def test_what_only_makes_noise_ties_with_nothing(monkeypatch):
+    monkeypatch.setattr(ranking, "residual", lambda *_: pytest.fail("compared"))
+    assert not tie(STUDY, built(NOISE), built("wear"))
+    assert not tie(STUDY, built("wear"), built(NOISE))
+
+
+# --- friction -------------------------------------------------------------------------------
+
+
+def friction(**values: float) -> Fitted:
+    own = PLAIN.effects[0]
+    return replace(own, values={**own.values, **values})
+
+
+@pytest.mark.parametrize(
+    ("after", "taken"),
+    [
+        (friction(Fc=0.31 * COLLAPSE + 1e-4), False),
+        (friction(Fc=0.31 * COLLAPSE - 1e-4), True),
+        (friction(sigma2=0.001), False),
+        (friction(Fs=0.001), False),  # held by the fit
+    ],
+)
+def test_a_friction_is_taken_where_its_dry_part_collapses(after, taken):
+    assert took_friction(PLAIN, PLAIN.with_effect(after)) is taken
+
+
+def test_a_friction_that_was_replaced_was_not_taken_over():
+    assert not took_friction(PLAIN, PLAIN.with_effect(fitted("lugre")))
+    assert not took_friction(replace(PLAIN, effects=()), PLAIN)
+    other = fitted("constant_force", F0=2.0)
+    gone = fitted("constant_force", F0=1e-3)
+    assert not took_friction(axis_of(other), axis_of(gone))
+
+
+# --- two at once ----------------------------------------------------------------------------
+
+
+def test_held_out_logs_are_explained_where_their_error_is_at_the_floor(monkeypatch):
+    fit = built_fit(9.0, 2.0)
+    study = study_stub(holdout=("log",))
+    for error, held in ((2.0 * AT_FLOOR - 0.01, True), (2.0 * AT_FLOOR + 0.01, False)):
+        monkeypatch.setattr(
+            lookahead, "error_on", lambda axis, logs, e=error: e * np.array([1.0, -1.0])
+        )
+        assert held_at_floor(fit, study) is held
+        assert not held_at_floor(fit, study_stub())
+
+
+def ahead(monkeypatch, made, seconds, *, base=None, needed=True, together=True, held=False):
+    """look_ahead where beside each first the ranking holds those seconds."""
+    base = base or built_fit(4.0)
+    beside, calls = {}, []
+
+    def ranked(fit, study):
+        name = fit.axis.names[-1]
+        beside[name] = built_fit(3.9, axis=fit.axis)
+        return beside[name], tuple(seconds.get(name, ()))
+
+    def score(smaller, fit, study, effect):
+        calls.append((smaller is base, effect.name))
+        good = together if smaller is base else needed
+        return built(effect, bic=fit.error * 100, t=9.0 if good else 1.0, fit=fit)
+
+    def less_of(effect, fit, base_, study):
+        assert base_ is base
+        return built_fit(3.0, axis=fit.axis.without(effect.name))
+
+    monkeypatch.setattr(lookahead, "score", score)
+    monkeypatch.setattr(lookahead, "less", less_of)
+    monkeypatch.setattr(lookahead, "held_at_floor", lambda fit, study: held)
+    return look_ahead(base, STUDY, made, ranked), beside, calls
+
+
+def second(name, first, error=1.1, t=9.0):
+    axis = axis_of(fitted(first), fitted(name))
+    return built(name, t=t, fit=built_fit(error, axis=axis))
+
+
+def first(name, error=3.0, gain=1.0):
+    return built(name, gain=gain, t=1.0, fit=built_fit(error, axis=axis_of(fitted(name))))
+
+
+def test_a_pair_brings_the_error_to_the_floor_and_needs_both(monkeypatch):
+    made = [first("cogging")]
+    seconds = {"cogging": [second("wear", "cogging")]}
+    (pair,), beside, calls = ahead(monkeypatch, made, seconds)
+    assert pair.names == {"cogging", "wear"}
+    assert pair.first.effect.name == "cogging"
+    assert pair.first.fit is beside["cogging"]
+    assert pair.second is seconds["cogging"][0]
+    assert pair.together.fit is pair.second.fit
+    assert calls == [(True, "wear"), (False, "cogging")]
+    for refused in ({"needed": False}, {"together": False}):
+        assert ahead(monkeypatch, made, seconds, **refused)[0] == []
+    above = {"cogging": [second("wear", "cogging", error=1.4)]}
+    assert ahead(monkeypatch, made, above)[0] == []
+    assert len(ahead(monkeypatch, made, above, held=True)[0]) == 1
+    weak = {"cogging": [second("wear", "cogging", t=1.0)]}
+    assert ahead(monkeypatch, made, weak)[0] == []
+    assert ahead(monkeypatch, made, {})[0] == []
+
+
+def test_a_first_explains_a_part_alone(monkeypatch):
+    seconds = {"cogging": [second("wear", "cogging")]}
+    edge = 4.0 * np.sqrt(1.0 - LEAST_PART)
+    assert len(ahead(monkeypatch, [first("cogging", edge - 0.01)], seconds)[0]) == 1
+    assert ahead(monkeypatch, [first("cogging", edge + 0.01)], seconds)[0] == []
+
+
+def test_pairs_begin_with_the_candidates_that_explain_most_and_come_once(monkeypatch):
+    gains = {"cogging": 1.0, "end_stop": 4.0, "gms": 3.0, "quadratic_drag": 2.0}
+    others = {"cogging": "wear", "end_stop": "gms", "quadratic_drag": "wear"}
+    errors = {"end_stop": 1.1, "quadratic_drag": 1.2}
+    made = [first(n, gain=g) for n, g in gains.items() if n != "gms"]
+    friction_first = built("gms", gain=3.0, fit=built_fit(3.0, axis=axis_of(fitted("wear"))))
+    made.append(friction_first)
+    seconds = {
+        n: [second(o, n, errors.get(n, 1.0))] for n, o in others.items() if o != "gms"
+    }
+    both = axis_of(fitted("end_stop")).with_effect(fitted("gms"))
+    seconds["end_stop"] = [built("gms", fit=built_fit(1.1, axis=both))]
+    swapped = axis_of(fitted("end_stop")).with_effect(fitted("gms"))
+    seconds["wear"] = [built("end_stop", fit=built_fit(1.0, axis=swapped))]
+    pairs, beside, _ = ahead(monkeypatch, made, seconds)
+    assert len(beside) == FIRSTS
+    assert [p.names for p in pairs] == [{"quadratic_drag", "wear"}, {"end_stop", "gms"}]
+
