@@ -20,9 +20,7 @@ from built_fits import (
 
 from identify import candidates
 from identify.candidates import (
-    PROMISE,
     RIDGE,
-    SAME_ERROR,
     _audition,
     _cross_validated,
     _glance,
@@ -33,11 +31,13 @@ from identify.candidates import (
     simplified,
     try_effect,
 )
-from identify.evidence import LEAST_BIC, LEAST_T, Evidence, Gain, effective_samples, evidence
-from identify.fit import AT_FLOOR, Outcome
+from identify.evidence import Evidence, Gain, effective_samples, evidence
+from identify.fit import Outcome
 from identify.search import Start
 from twin.effect import Kind
 
+# The rules as they were decided.
+LEAST_BIC, LEAST_T, PROMISE, SAME_ERROR, AT_FLOOR = 10.0, 3.0, 0.3, 1.01, 1.3
 RNG = np.random.default_rng(5)
 
 
@@ -74,6 +74,9 @@ def test_absent_are_all_effects_but_those_there_and_descriptions():
     assert modifiers
     found = {e.name for e in absent_effects(bare, CATALOGUE)}
     assert found == set(CATALOGUE) - modifiers - described
+    sliding = replace(PLAIN, effects=(fitted("cogging"),))
+    assert {e.name for e in absent_effects(sliding, CATALOGUE)} == found - {"cogging"}
+    assert modifiers <= {e.name for e in absent_effects(PLAIN, CATALOGUE)}
 
 
 def test_candidates_are_levelled_to_the_samples_of_what_explains_most():
@@ -212,6 +215,9 @@ def test_a_noise_is_told_where_it_alone_makes_the_error_noise(
     monkeypatch.setattr(candidates, "error_on", lambda axis, logs: seen * noise)
     monkeypatch.setattr(candidates, "floor_of", floor)
     base.__dict__["floor"], fit.__dict__["floor"] = 1.0, 1.05
+    score(base, fit, study_stub(fit=("fit",)), NOISE)
+    assert {logs for _, logs in asked} == {("fit",)}
+    asked.clear()
     study = study_stub(holdout=("held",), fit=("fit",))
     found = score(base, fit, study, NOISE)
     assert {logs for _, logs in asked} == {study.holdout}
@@ -250,7 +256,12 @@ def test_a_first_look_must_show_a_part_of_the_evidence_asked_for():
 def test_a_step_that_does_harm_leaves_the_effect_without_strength(monkeypatch, error, kept):
     base, effect = built_fit(2.0), fitted("cogging", a1=0.7, b2=0.2, p=0.03)
     moved = axis_of(fitted("constant_force"), effect)
-    monkeypatch.setattr(candidates, "stepped", lambda base, fitted, logs: moved)
+
+    def stepped(*given):
+        assert given == (base, effect, ("log",))
+        return moved
+
+    monkeypatch.setattr(candidates, "stepped", stepped)
 
     def finished(axis, begun, logs, outcome):
         assert (begun, logs, outcome) == (base.begun, ("log",), Outcome.NOT_CONVERGED)
@@ -289,23 +300,43 @@ def tried(monkeypatch, effect, *, promising=True, looked=None, errors=(0.5, 0.4,
     begun, left = [], list(errors)
     starts = [Start(float(i), {}, fitted(effect)) for i in (1, 2)]
     other = axis_of(mass=9.9)
-    base = built_fit(2.0, 0.1, begun=other)
+    base, study = built_fit(2.0, 0.1, begun=other), study_stub()
+
+    def given(fit):
+        """A part that is asked about this base, study and start, in that order."""
+
+        def part(*asked):
+            wanted = (base, study, starts[0].fitted)
+            assert all(a is w for a, w in zip(asked, wanted, strict=True))
+            return fit
+
+        return part
+
+    def promises(asked, start):
+        assert (asked, start) == (base, starts[0])
+        return promising
+
+    def begin(*asked):
+        assert asked == (base, study, CATALOGUE[effect])
+        return starts
+
+    def scored(asked, fit, where, what):
+        assert (asked, where, what) == (base, study, CATALOGUE[effect])
+        return built(what, bic=bic, fit=fit)
 
     def fit_axis(axis, logs):
         begun.append((axis.mass, axis[effect] is starts[1].fitted))
         return built_fit(left.pop(0), 0.1, axis)
 
-    monkeypatch.setattr(candidates, "starts", lambda *_: starts)
+    monkeypatch.setattr(candidates, "starts", begin)
     monkeypatch.setattr(candidates, "fit_axis", fit_axis)
     monkeypatch.setattr(candidates, "fit_thoroughly", lambda axis, s: built_fit(0.2, 0.1, axis))
     monkeypatch.setattr(candidates, "simplified", lambda fit, study, effect: fit)
-    monkeypatch.setattr(candidates, "_promising", lambda *_: promising)
-    monkeypatch.setattr(candidates, "_glance", lambda *_: built_fit(1.7, 0.1))
-    monkeypatch.setattr(candidates, "_audition", lambda *_: looked)
-    monkeypatch.setattr(
-        candidates, "score", lambda base, fit, study, effect: built(effect, bic=bic, fit=fit)
-    )
-    return try_effect(base, study_stub(), CATALOGUE[effect]).fit.error, begun
+    monkeypatch.setattr(candidates, "_promising", promises)
+    monkeypatch.setattr(candidates, "_glance", given(built_fit(1.7, 0.1)))
+    monkeypatch.setattr(candidates, "_audition", given(looked))
+    monkeypatch.setattr(candidates, "score", scored)
+    return try_effect(base, study, CATALOGUE[effect]).fit.error, begun
 
 
 def test_an_effect_is_tried_as_far_as_it_promises(monkeypatch):

@@ -18,13 +18,14 @@ from built_fits import (
 )
 
 from identify import lookahead, ranking
-from identify.evidence import Evidence, held_out_gain
-from identify.fit import AT_FLOOR
-from identify.lookahead import FIRSTS, LEAST_PART, held_at_floor, look_ahead
-from identify.ranking import COLLAPSE, SETTLED, _ranked, less, rank, tie, took_friction
+from identify.evidence import Evidence, effective_samples, held_out_gain
+from identify.lookahead import held_at_floor, look_ahead
+from identify.ranking import _ranked, less, rank, tie, took_friction
 from twin.effects import Catalogue
 from twin.model import Fitted
 
+# The rules as they were decided.
+AT_FLOOR, COLLAPSE, SETTLED, FIRSTS, LEAST_PART = 1.3, 0.3, 0.999, 3, 0.1
 STUDY = study_stub()
 NAMES = ("cogging", "end_stop", "gms", "quadratic_drag", "wear")
 
@@ -59,6 +60,7 @@ def test_within_no_evidence_of_the_best_the_catalogue_decides(behind, level):
 def test_a_noise_comes_after_what_lowers_the_error_if_both_are_supported():
     noise, weak = built(NOISE, bic=900.0), built("wear", bic=20.0)
     assert names(_ranked([noise, weak])) == ["wear", NOISE.name]
+    assert names(_ranked([weak, noise])) == ["wear", NOISE.name]
     unsupported = built("wear", bic=20.0, t=1.0)
     assert names(_ranked([unsupported, noise])) == [NOISE.name, "wear"]
 
@@ -73,14 +75,18 @@ def ranked(monkeypatch, ratio, t=9.0):
         asked.append((effect.name, fit))
         return again
 
-    def try_effect(base, study, effect):
+    def try_effect(given, study, effect):
+        assert (given, study) == (base, STUDY)
         return built(effect, bic=bics[effect.name], t=t)
 
     monkeypatch.setattr(ranking, "try_effect", try_effect)
     monkeypatch.setattr(ranking, "less", less_of)
-    monkeypatch.setattr(
-        ranking, "score", lambda b, fit, s, effect: built(effect, bic=1e3 * b.error, fit=fit)
-    )
+
+    def score(given, fit, study, effect):
+        assert (study, fit.axis.names[-1]) == (STUDY, effect.name)
+        return built(effect, bic=1e3 * given.error, fit=fit)
+
+    monkeypatch.setattr(ranking, "score", score)
     catalogue = Catalogue([CATALOGUE[n] for n in bics])
     found = rank(base, STUDY, catalogue, lambda *done: bars.append(done), workers=1)
     assert bars == [(1, 2), (2, 2)]
@@ -122,6 +128,9 @@ def test_less_an_effect_the_friction_that_it_replaced_is_back(monkeypatch):
 NOISY = 1e-3 * np.random.default_rng(7).standard_normal(3000)
 
 
+SAMPLES = effective_samples(NOISY)
+
+
 def tied(monkeypatch, best_scale, other_scale, gains=(1.0, 1.0), logs=("held out",), **parts):
     best = built("cogging", fit=built_fit(1.0, 1e-3, axis_of(mass=1.0)))
     other = built("wear", fit=built_fit(1.0, 1e-3, axis_of(mass=2.0)))
@@ -143,6 +152,8 @@ def tied(monkeypatch, best_scale, other_scale, gains=(1.0, 1.0), logs=("held out
 
 def test_a_tie_ends_where_the_best_gains_more_than_next_to_nothing(monkeypatch):
     t = held_out_gain(1.003 * NOISY, NOISY, 1e-3).t
+    assert tied(monkeypatch, 1.0, np.exp(0.5 * 1.9 / SAMPLES))[0] is True
+    assert tied(monkeypatch, 1.0, np.exp(0.5 * 2.1 / SAMPLES))[0] is False
     assert t > 10.0  # in every block
     assert tied(monkeypatch, 1.0, 1.0003)[0] is True
     assert tied(monkeypatch, 1.0, 1.003)[0] is False
@@ -219,9 +230,12 @@ def test_held_out_logs_are_explained_where_their_error_is_at_the_floor(monkeypat
     fit = built_fit(9.0, 2.0)
     study = study_stub(holdout=("log",))
     for error, held in ((2.0 * AT_FLOOR - 0.01, True), (2.0 * AT_FLOOR + 0.01, False)):
-        monkeypatch.setattr(
-            lookahead, "error_on", lambda axis, logs, e=error: e * np.array([1.0, -1.0])
-        )
+
+        def error_on(axis, logs, e=error):
+            assert (axis, logs) == (fit.axis, ("log",))
+            return e * np.array([1.0, -1.0])
+
+        monkeypatch.setattr(lookahead, "error_on", error_on)
         assert held_at_floor(fit, study) is held
         assert not held_at_floor(fit, study_stub())
 
@@ -229,14 +243,18 @@ def test_held_out_logs_are_explained_where_their_error_is_at_the_floor(monkeypat
 def ahead(monkeypatch, made, seconds, *, base=None, needed=True, together=True, held=False):
     """look_ahead where beside each first the ranking holds those seconds."""
     base = base or built_fit(4.0)
-    beside, calls = {}, []
+    beside, calls, last = {}, [], None
 
     def ranked(fit, study):
+        nonlocal last
         name = fit.axis.names[-1]
+        last = next((c.fit.axis.names[-1] for c in seconds.get(name, ())), None)
         beside[name] = built_fit(3.9, axis=fit.axis)
         return beside[name], tuple(seconds.get(name, ()))
 
     def score(smaller, fit, study, effect):
+        assert smaller is base or smaller.axis == fit.axis.without(effect.name)
+        assert (study, fit.axis.names[-1]) == (STUDY, last)
         calls.append((smaller is base, effect.name))
         good = together if smaller is base else needed
         return built(effect, bic=fit.error * 100, t=9.0 if good else 1.0, fit=fit)

@@ -10,9 +10,6 @@ import pytest
 from built_fits import NOISE, PLAIN, axis_of, built, built_fit, fitted, stage, step, study_stub
 
 from identify.diagnose import (
-    BEYOND_DOUBT,
-    FLOOR_SURE,
-    MOST_STEPS,
     AxisDiagnosis,
     Stage,
     Verdict,
@@ -34,6 +31,8 @@ from identify.structure import Structure
 from twin.effects import Catalogue
 
 module = importlib.import_module("identify.diagnose")
+# The rules as they were decided.
+BEYOND_DOUBT, FLOOR_SURE, MOST_STEPS = 100.0, (0.85, 1.15), 5
 STUDY = study_stub()
 HIGH, LOW = built_fit(8.0), built_fit(1.1)  # over a floor of 1 N
 
