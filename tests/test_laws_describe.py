@@ -222,7 +222,7 @@ def test_an_attempt_is_judged_by_the_degrees_of_freedom_it_takes(monkeypatch, ab
     base, study, empty, found = about
     stiffness = {PARTS[0]: 0.1}
     study = built_study("run", held=("held",)) if held else study
-    after = axis_of(fitted("constant_force", F0=0.7))
+    after = axis_of(fitted("constant_force", F0=0.7)).with_effect(fitted("lugre"))
     fit = built_fit(0, 0.02, after, residual=0.5 * base.residual + 0.01)
     monkeypatch.setattr(module._Linear, "about", classmethod(lambda cls, *_: found))
     monkeypatch.setattr(module, "choose_stiffness", lambda linear: stiffness)

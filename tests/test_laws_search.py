@@ -98,24 +98,24 @@ def test_a_ridge_decides_where_the_base_explains_a_strength_already():
     assert abs(found[0]) < 1e-3
 
 
-@pytest.mark.parametrize("name", ["axis_coupling", "cogging"])
+@pytest.mark.parametrize("name", ["axis_coupling", "cogging", "coulomb_viscous"])
 def test_a_try_of_a_linear_effect_is_the_joint_least_squares(study, base, name):
     effect = CATALOGUE[name]
     shape = {"p": 0.021} if name == "cogging" else {}
     ground = _Ground.of(base, study, effect, SEEN, on_heads=False)
     found = _try(ground, shape, effect.strengths)
     at = Fitted.at_start(effect, {**effect.starts(SEEN), **shape})
-    where = [Coordinate(effect.name, p) for p in effect.strengths]
-    axis = base.axis.with_effect(at)
+    where = [Coordinate(effect.name, p) for p in effect.strengths if not p.fixed]
+    axis = base.axis.with_effect(at)  # a friction takes the place of the old one
     own = jacobian(axis, study.fit, where)[base.kept]
-    both = np.hstack([own, base.jacobian])
+    both = np.hstack([own, ground.basis])
     force = residual(axis, study.fit)[base.kept]
     step, *_ = np.linalg.lstsq(both / np.linalg.norm(both, axis=0), -force, rcond=None)
     step = step / np.linalg.norm(both, axis=0)
     left = force + both @ step
     assert found.squared_error == pytest.approx(float(left @ left), rel=1e-4)
-    values = [found.fitted.values[p.name] for p in effect.strengths]
-    start = [at.values[p.name] for p in effect.strengths]
+    values = [found.fitted.values[c.parameter.name] for c in where]
+    start = [at.values[c.parameter.name] for c in where]
     np.testing.assert_allclose(np.array(values) - start, step[: len(where)], rtol=0.02)
     assert found.shape == shape
     assert shape.items() <= found.fitted.values.items()
@@ -219,6 +219,7 @@ def test_many_shapes_are_sifted_on_the_heads_first(monkeypatch, effect, shapes, 
     effect = CATALOGUE[effect]
 
     def best(ground, tried, strengths, count):
+        assert all(isinstance(s.fitted, Fitted) and "i" in s.shape for s in tried)
         seen.append((ground, len(tried), len(strengths)))
         return list(tried)[:count]
 
@@ -226,9 +227,13 @@ def test_many_shapes_are_sifted_on_the_heads_first(monkeypatch, effect, shapes, 
     monkeypatch.setattr(search, "tried_shapes", lambda e, x: ({"i": i} for i in range(shapes)))
     monkeypatch.setattr(search, "_best", best)
     monkeypatch.setattr(search, "_worth_all", lambda *_: worth)
-    ground = SimpleNamespace(of=lambda *_, on_heads: "head" if on_heads else "whole")
-    monkeypatch.setattr(search, "_Ground", ground)
-    found = starts(None, None, effect)
+
+    def of(*given, on_heads):
+        assert given == ("base", "study", effect, SEEN)
+        return "head" if on_heads else "whole"
+
+    monkeypatch.setattr(search, "_Ground", SimpleNamespace(of=of))
+    found = starts("base", "study", effect)
     full = len(effect.strengths)
     assert seen == [(g, n, full if k is None else k) for g, n, k in rounds]
     assert len(found) == min(REFINED_STARTS, rounds[-1][1])
