@@ -60,6 +60,13 @@ def test_the_growth_runs_from_the_first_error_to_the_last():
     }  # fmt: skip
 
 
+def test_of_two_equal_errors_one_number_is_above_and_one_below():
+    alike = replace(made.STEPS[0], fit_error_before=3.0, holdout_error_before=3.0)
+    (axes,) = growth._figure([alike], None).axes
+    sides = [t.xyann[1] > 0 for t in axes.texts if t.get_text() == "3.00"]
+    assert sorted(sides) == [False, True]
+
+
 def test_without_held_out_errors_there_is_one_line():
     small = replace(made.STEPS[2], fit_error_before=0.0341, fit_error_after=0.0313)
     (axes,) = growth._figure([small], None).axes
@@ -91,6 +98,7 @@ def test_a_bar_for_each_candidate_ends_at_its_error():
         "cogging", "quadratic drag", "constant force",
     ]  # fmt: skip
     assert [t.get_text() for t in axes.texts] == ["2.17", "2.38", "bar cut, 20.0"]
+    assert [t.get_position() for t in axes.texts] == [(1.0, 0), (1.0, 1), (1.0, 2)]
     from matplotlib.colors import to_rgba
 
     assert [b.get_facecolor() for b in bars] == [to_rgba(c) for c in (ORANGE, BLUE, GREY)]

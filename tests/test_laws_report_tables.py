@@ -84,6 +84,28 @@ def test_the_ledger_shows_each_step_in_its_row_and_column():
     assert text.index("Axis x") < text.index("4.57 N") < text.index("Axis y") < text.index("3.13")
 
 
+def test_the_ledger_has_the_unit_of_its_largest_error():
+    steps = (replace(made.STEPS[0], fit_error_before=0.713, fit_error_after=0.0341),)
+    (row,) = growth._table(steps).rows
+    assert row.cells[1:3] == ("0.713 N", "0.0341 N")
+    table = growth._table(made.STEPS)
+    assert [c.numeric for c in table.columns] == [False, True, True, True, True]
+    assert [c.numeric for c in logs._table(made.comparison_of()).columns] == [False] + 4 * [True]
+
+
+def test_each_section_has_its_anchor_and_title():
+    subject = subject_of(made.diagnosed(), additions=(made.addition(),))
+    shown = [
+        part.section(subject)
+        for part in (answer, regions, ranking, growth, equations, parameters, logs, notes)
+    ]
+    assert {s.anchor: s.title for s in shown} == {
+        "answer": "Answer", "regions": "Where the error is", "ranking": "Candidates, ranked",
+        "growth": "The error, effect by effect", "equations": "The law of the named effect",
+        "parameters": "Parameters", "logs": "Errors log by log", "notes": "Notes",
+    }  # fmt: skip
+
+
 def test_the_ledger_of_positions():
     lost = replace(made.addition(False), step=made.STEPS[1], position_error=(2.9e-6, 2.1e-6))
     page = page_of(subject_of(history=(), additions=(made.addition(), lost)), growth)
@@ -146,6 +168,7 @@ def test_candidates_have_their_evidence_errors_and_values():
     ]  # fmt: skip
     values = rows["Cogging"]["Values"].replace("\u00a0", " ")
     assert values.startswith("p = 26.1 mm, a1 = 127 mN, b1 = 35.3 mN, a2 = 0 N")
+    assert rows["Cogging"]["Values"].startswith("p\u00a0=\u00a026.1\u00a0mm, a1")
     assert page.tones["ranking"][:4] == ["head", "strong", "plain", "muted"]
     assert "RMS force, held-out" in page.texts["ranking"]
     four = made.diagnosis_of(ranking=(made.BEST, made.RIVAL, made.WEAK, made.LATER))
