@@ -29,9 +29,7 @@ HARDWARE = Hardware(
     travel=(-0.11, 0.13), encoder_noise=1e-9, current_noise=1e-3, force_constant=10.0,
     velocity=0.2, acceleration=2.0, jerk=100.0,
 )  # fmt: skip
-FRICTION = Fitted.at_start(
-    CATALOGUE["coulomb_viscous"], {"Fc": 0.31, "Fs": 0.31, "sigma2": 0.53}
-)
+FRICTION = Fitted.at_start(CATALOGUE["coulomb_viscous"], {"Fc": 0.31, "Fs": 0.31, "sigma2": 0.53})
 
 
 def axis_of(*effects: Fitted, mass: float = 5.3) -> AxisModel:

@@ -76,9 +76,7 @@ def diagnosis_of(verdict: Verdict = Verdict.AMBIGUOUS, **changes: object) -> Axi
     )
     base = built_fit(8.37, 2.11, PLAIN)
     final = built_fit(3.19, 2.03, LATER.fit.axis)
-    found = AxisDiagnosis(
-        STUDY, base, (BEST, RIVAL, WEAK), steps, final, verdict, None, **{}
-    )
+    found = AxisDiagnosis(STUDY, base, (BEST, RIVAL, WEAK), steps, final, verdict, None, **{})
     found = replace(found, **changes)
     found.__dict__["repeat"] = None
     return found
@@ -108,7 +106,9 @@ def correlation(signal: str, o: float) -> Correlation:
 def tests_of(o: float = 0.0) -> ResidualTests:
     edges = np.linspace(-0.5, 0.5, 6) + o
     density = np.array([0.1, 0.9, 2.3, 1.1, 0.6]) + o
-    made = tuple(correlation(n, o + i / 1e3) for i, n in enumerate(("residual", "command", "speed")))
+    made = tuple(
+        correlation(n, o + i / 1e3) for i, n in enumerate(("residual", "command", "speed"))
+    )
     return ResidualTests(Loop.OPEN, 387, 0.0737 + o, edges, density, 0.883 - o, made)
 
 

@@ -312,9 +312,7 @@ def test_pairs_begin_with_the_candidates_that_explain_most_and_come_once(monkeyp
     made = [first(n, gain=g) for n, g in gains.items() if n != "gms"]
     friction_first = built("gms", gain=3.0, fit=built_fit(3.0, axis=axis_of(fitted("wear"))))
     made.append(friction_first)
-    seconds = {
-        n: [second(o, n, errors.get(n, 1.0))] for n, o in others.items() if o != "gms"
-    }
+    seconds = {n: [second(o, n, errors.get(n, 1.0))] for n, o in others.items() if o != "gms"}
     both = axis_of(fitted("end_stop")).with_effect(fitted("gms"))
     seconds["end_stop"] = [built("gms", fit=built_fit(1.1, axis=both))]
     swapped = axis_of(fitted("end_stop")).with_effect(fitted("gms"))
@@ -322,4 +320,3 @@ def test_pairs_begin_with_the_candidates_that_explain_most_and_come_once(monkeyp
     pairs, beside, _ = ahead(monkeypatch, made, seconds)
     assert len(beside) == FIRSTS
     assert [p.names for p in pairs] == [{"quadratic_drag", "wear"}, {"end_stop", "gms"}]
-

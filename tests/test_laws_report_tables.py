@@ -211,8 +211,9 @@ def test_fitted_values_stand_beside_those_without_the_effect():
         "Meaning": "static friction, held",
     }  # fmt: skip
     page = page_of(subject_of(made.diagnosed(x)), parameters)
-    assert "Without cogging: no intervals, because the force error of 8.37 N stands 3.97 times" in (
-        page.texts["parameters"]
+    assert (
+        "Without cogging: no intervals, because the force error of 8.37 N stands 3.97 times"
+        in (page.texts["parameters"])
     )
     assert page.tones["parameters"][:4] == ["head", "plain", "strong", "plain"]
 
@@ -365,8 +366,13 @@ def test_the_line_under_the_title_and_the_order_of_axes():
         "Model": "the stage", "Logs": "run 1, run 2", "Held out": "held 1", "Window": "40.0 ms",
     }  # fmt: skip
     assert "Held out" not in page_of(subject_of()).facts
-    y_first = replace(found, axes={"x": replace(found.axes["y"], study=made.STUDY),
-                                   "y": replace(found.axes["x"], study=found.axes["y"].study)})
+    y_first = replace(
+        found,
+        axes={
+            "x": replace(found.axes["y"], study=made.STUDY),
+            "y": replace(found.axes["x"], study=found.axes["y"].study),
+        },
+    )
     assert [a.axis for a in subject_of(y_first).axes] == ["y", "x"]
     assert [a.axis for a in subject_of(found).axes] == ["x", "y"]
     quiet = replace(found, axes={"y": found.axes["y"]})

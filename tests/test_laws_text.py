@@ -251,9 +251,7 @@ def test_the_catalogue_and_one_effect():
     text = effect_text(CATALOGUE["lugre"])
     for p in CATALOGUE["lugre"].parameters:
         row = next(line for line in text.splitlines() if line.split()[0] == p.name)
-        found = re.fullmatch(
-            r"\s+\S+\s+(\S+) (.+?)\s+\[(\S+), (\S+)\]  (.*)", row
-        )
+        found = re.fullmatch(r"\s+\S+\s+(\S+) (.+?)\s+\[(\S+), (\S+)\]  (.*)", row)
         start, unit, low, high, meaning = found.groups()
         assert (f"{p.start:.4g}", p.unit, f"{p.lower:g}", f"{p.upper:g}", p.meaning) == (
             start, unit, low, high, meaning,
