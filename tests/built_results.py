@@ -1,4 +1,4 @@
-"""One small result of every kind, whose numbers are all different: each must arrive in its place."""
+"""One small result of every kind, all of whose numbers are different."""
 
 from __future__ import annotations
 
@@ -103,7 +103,10 @@ def correlation(signal: str, o: float) -> Correlation:
     return Correlation(signal, lag, value, tested, 0.061 + o, 0.113 + o)
 
 
-def tests_of(o: float = 0.0) -> ResidualTests:
+SIGNALS = ("residual", "command", "speed")
+
+
+def whiteness_of(o: float = 0.0) -> ResidualTests:
     edges = np.linspace(-0.5, 0.5, 6) + o
     density = np.array([0.1, 0.9, 2.3, 1.1, 0.6]) + o
     made = tuple(
@@ -132,7 +135,7 @@ def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:
             Region("position", "m", 0.0123 + o, 0.0257 + o, 0.121 + o, 14.3 + o, 0.37 + o),
             Region("direction", "1", -1.5, 0.0, 0.087 + o, 7.7 + o, 0.53 + o),
         ],
-        tests=tests_of(o),
+        tests=whiteness_of(o),
     )  # fmt: skip
 
 

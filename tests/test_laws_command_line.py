@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import sys
-from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from stubbed_cli import stub, stubbed
 
 import identify.demo
 import identify.report
@@ -21,64 +20,14 @@ import twin.log.check
 import twin.log.importers
 import twin.model_file
 from identify import as_json, as_text, workflow
-from identify.cli import loop, machine, main
-from identify.cli import plan as plan_command
-from identify.cli.shared import checked, read_logs, require_folder, say
-from twin.errors import InputError
+from identify.cli.shared import checked
 from twin.log.check import CheckReport, Fault, Finding, Severity
-from twin.model import StageModel
-
-STAGE = StageModel("the stage", {})
-
-
-class Stub:
-    """Records how it was called, and answers what it was given."""
-
-    def __init__(self, answer: object = None) -> None:
-        self.answer, self.calls = answer, []
-
-    def __call__(self, *given: object, **named: object) -> object:
-        named.pop("progress", None)
-        self.calls.append((given, named))
-        return self.answer
-
-    @property
-    def only(self) -> tuple:
-        (call,) = self.calls
-        return call
 
 
 @pytest.fixture
 def cli(monkeypatch, capsys, tmp_path):
     """Runs `twin` with all input stubbed: exit code, standard output and standard error."""
-    monkeypatch.chdir(tmp_path)
-    for module in (loop, machine, plan_command):
-        for name, answer in (
-            ("stage_model", lambda name, catalogue: StageModel(f"{name} {catalogue['all']}", {})),
-            ("catalogue_with", lambda files: {"all": [str(f) for f in files or ()], "wear": "W"}),
-            ("read_logs", lambda paths: {str(p): f"log {p}" for p in paths or ()}),
-            ("checked", lambda logs: [f"warned of {n}" for n in logs]),
-            ("bars_on_stderr", lambda: nullcontext(Stub())),
-        ):
-            if hasattr(module, name):
-                monkeypatch.setattr(module, name, answer)
-    monkeypatch.setattr("identify.cli.shared.read_logs", loop.read_logs)
-    monkeypatch.setattr("identify.cli.shared.bars_on_stderr", lambda: nullcontext(Stub()))
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["twin", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return ended.value.code, out, err
-
-    return run
-
-
-def stub(monkeypatch, where: object, name: str, answer: object = None) -> Stub:
-    made = Stub(answer)
-    monkeypatch.setattr(where, name, made)
-    return made
+    return stubbed(monkeypatch, capsys, tmp_path)
 
 
 def printed(monkeypatch, name: str) -> None:
@@ -306,60 +255,3 @@ def test_selftest(monkeypatch, cli):
     cli("selftest")
     cli("selftest", "--full")
     assert picked == ["QUICK", "FULL"]
-
-
-# --- errors ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("error", "said"),
-    [
-        (InputError("two\nlines"), "twin: two lines"),
-        (KeyboardInterrupt(), "twin: interrupted"),
-        (PermissionError(13, "Permission denied", "f.x"), "twin: f.x: Permission denied; check"),
-        (ValueError("odd"), "twin: this is a fault of the program: ValueError: odd; please"),
-    ],
-)
-def test_every_failure_is_one_line_and_exit_code_two(monkeypatch, cli, error, said):
-    def fails(*_: object, **__: object) -> None:
-        raise error
-
-    monkeypatch.delenv("TWIN_TRACEBACK", raising=False)
-    monkeypatch.setattr(workflow, "compare", fails)
-    code, out, err = cli("compare", "m.toml", "a.mcap", "--json")
-    assert (code, out) == (2, "")
-    assert err.startswith(said)
-    assert err.count("\n") == 1
-
-
-def test_a_traceback_is_shown_where_it_is_asked_for(monkeypatch):
-    monkeypatch.setenv("TWIN_TRACEBACK", "1")
-    monkeypatch.setattr(sys, "argv", ["twin", "effects"])
-    monkeypatch.setattr(machine, "catalogue_with", lambda files: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        main()
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        ("fit", "m", "a"), ("compare", "m", "a"), ("diagnose", "m", "a"), ("add", "wear", "m", "a"),
-        ("simulate", "moves"), ("recover", "a"), ("plan", "m"), ("selftest",),
-    ],
-)  # fmt: skip
-def test_a_missing_folder_is_said_before_the_work(cli, command):
-    code, out, err = cli(*command, "-o", "no/where.toml")
-    assert (code, out) == (2, "")
-    assert "no/where.toml: its folder does not exist" in err
-
-
-def test_what_is_said_goes_to_its_own_stream(capsys, tmp_path):
-    say("text", {"a": 1.5, "b": float("inf")}, True, ["w1", "w2"])
-    out, err = capsys.readouterr()
-    assert (json.loads(out), err) == ({"a": 1.5, "b": None}, "twin: w1\ntwin: w2\n")
-    say("text", {"a": 1}, False)
-    assert capsys.readouterr() == ("text\n", "")
-    require_folder(tmp_path / "new.toml")
-    with pytest.raises(InputError):
-        require_folder(tmp_path / "no" / "new.toml")
-    assert read_logs(None) == {}

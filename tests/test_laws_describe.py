@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -85,7 +86,7 @@ def test_each_block_is_left_by_a_fit_of_the_others_alone(stiffness):
     n = len(found.force)
     edges = np.linspace(0, n, BLOCKS + 1).astype(int)
     expected = np.empty(n)
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         matrix, columns, force, used = dense(found, stiffness, np.r_[0:a, b:n])
         change = np.linalg.solve(matrix, -columns.T @ force)
         expected[a:b] = found.force[a:b] + found.columns[a:b][:, used] @ change

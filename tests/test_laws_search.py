@@ -23,8 +23,6 @@ from identify.search import (
     _try,
     _with_lines_left,
     _worth_all,
-    fit_thoroughly,
-    fit_without,
     starts,
     stepped,
     tried_shapes,
@@ -263,53 +261,3 @@ def test_a_tone_in_the_residual_is_among_the_first_lines_tried(study):
     assert abs(found.lines[0] - 7.3) < 0.5
     assert len(found.lines) <= RESIDUAL_LINES + 2
     assert replace(found, lines=()) == replace(known.excitation, lines=())
-
-
-# --- fitted thoroughly ----------------------------------------------------------------------
-
-
-def thorough(monkeypatch, again, first=4.0, floor=1.0):
-    """fit_thoroughly of an axis with two effects, one with a shape; the axes fitted."""
-    axes, errors = [], [first, first * again]
-    shape = fitted("cogging", p=0.02, a1=0.4)
-    held = replace(shape, fixed=frozenset({"b1"}), values={**shape.values, "b1": 0.77})
-    axis = axis_of(fitted("constant_force"), held)
-
-    def fit_axis(axis, logs):
-        axes.append(axis)
-        return built_fit(errors.pop(0), floor, axis=axis)
-
-    def started(rest, study, effect):
-        assert "cogging" not in rest.axis.names
-        return [Start(0.0, {}, fitted("cogging", p=0.03, a1=0.9, b1=0.5)), None]
-
-    monkeypatch.setattr(search, "fit_axis", fit_axis)
-    monkeypatch.setattr(search, "starts", started)
-    monkeypatch.setattr(
-        search, "fit_without", lambda fit, study, name: built_fit(9.0, axis=axis.without(name))
-    )
-    return fit_thoroughly(axis, SimpleNamespace(fit=())), axes, axis
-
-
-@pytest.mark.parametrize(("again", "taken"), [(BETTER - 0.001, True), (BETTER + 0.001, False)])
-def test_a_shape_found_anew_is_taken_where_it_is_better(monkeypatch, again, taken):
-    found, axes, axis = thorough(monkeypatch, again)
-    assert len(axes) == 2
-    values = axes[1]["cogging"].values
-    assert (values["p"], values["a1"], values["b1"]) == (0.03, 0.9, 0.77)
-    assert axes[1]["cogging"].fixed == {"b1"}
-    assert found.error == pytest.approx(4.0 * again if taken else 4.0)
-    assert found.begun is axis
-
-
-def test_at_the_floor_no_shape_is_sought_anew(monkeypatch):
-    assert len(thorough(monkeypatch, 0.1, first=1.2)[1]) == 1
-
-
-def test_without_an_effect_the_rest_stays_where_it_was(study, base):
-    found = fit_without(base, study, "constant_force")
-    assert found.axis == base.axis.without("constant_force")
-    assert (found.begun, found.outcome) == (base.begun, base.outcome)
-    np.testing.assert_allclose(
-        found.residual, residual(base.axis, study.fit)[found.kept] - 0.2, atol=1e-9
-    )

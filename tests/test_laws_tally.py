@@ -1,9 +1,9 @@
-"""The self-test counts: each outcome exactly once, in its own row; and the benchmark's figures."""
+"""The self-test counts: each outcome exactly once, in its own row."""
 
 from __future__ import annotations
 
-import json
 import math
+from concurrent.futures import Future
 from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
@@ -12,19 +12,16 @@ import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_study, fitted
 
-from benchmarks.figures import Figure, Target, write_results
 from identify.diagnose import AxisDiagnosis, Verdict
 from identify.fit import Outcome as FitOutcome
 from identify.fit import finished
 from identify.residual import residual
-from identify.selftest import cases, trial
+from identify.selftest import cases, design, trial
 from identify.selftest.design import FULL, PAIR_STRENGTH, QUICK, Design, plantable
-from identify.selftest.picture import _shares, draw
 from identify.selftest.tally import COVERED, Rate, confusion, coverage, rates
 from identify.selftest.trial import Case, Outcome, _covered, _right_coordinates
 from identify.uncertainty import Estimate
 from twin.effect import Kind
-from twin.errors import InputError
 
 
 def outcomes_of(counts: dict[Outcome, int]) -> list[Outcome]:
@@ -130,10 +127,10 @@ def test_an_outcome_in_words():
 
 
 def test_a_design_makes_the_same_cases_from_the_same_seed_only():
-    design = Design(strengths=(2.0, 7.0), each=3, empty=4, pairs=6, left_out=2)
-    made = design.cases(5)
-    assert made == design.cases(5)
-    assert made != design.cases(6)
+    drawn = Design(strengths=(2.0, 7.0), each=3, empty=4, pairs=6, left_out=2)
+    made = drawn.cases(5)
+    assert made == drawn.cases(5)
+    assert made != drawn.cases(6)
     names = plantable(CATALOGUE)
     assert "lugre" not in names
     assert not any(CATALOGUE[n].is_description for n in names)
@@ -152,6 +149,44 @@ def test_a_design_makes_the_same_cases_from_the_same_seed_only():
     assert [c.seed for c in pairs] == list(range(5, 11))
     assert all(c.strength == PAIR_STRENGTH and c.known for c in pairs)
     assert len(made) == len(empty) + len(single) + len(out) + len(pairs)
+
+
+def test_a_quick_design_and_the_full_one():
+    assert (QUICK.strengths, FULL.strengths) == ((5.0,), (2.0, 5.0, 20.0))
+    sizes = [(d.each, d.empty, d.pairs, d.left_out) for d in (QUICK, FULL)]
+    assert sizes == [(1, 10, 10, 1), (3, 200, 60, 2)]
+
+
+class Inline:
+    """A pool that runs each job at once, in this process."""
+
+    def __init__(self, workers, mp_context) -> None:
+        self.workers = workers
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_) -> None:
+        pass
+
+    def submit(self, function, case):
+        future = Future()
+        future.set_result(function(case))
+        return future
+
+
+def test_outcomes_come_in_the_order_of_the_cases_with_their_progress(monkeypatch):
+    monkeypatch.setattr(design, "ProcessPoolExecutor", Inline)
+    monkeypatch.setattr(design, "as_completed", lambda jobs: reversed(list(jobs)))
+    monkeypatch.setattr(design, "run", lambda case: Outcome(case, str(case.seed)))
+    wanted = [Case(("a",), 5.0, seed) for seed in (3, 1, 2)]
+    told = []
+    found = design.run_all(wanted, progress=lambda *given: told.append(given))
+    assert [o.case for o in found] == wanted
+    assert [(o.verdict, done, total) for o, done, total in told] == [
+        ("2", 1, 3), ("1", 2, 3), ("3", 3, 3),
+    ]  # fmt: skip
+    assert design.run_all(wanted) == found
 
 
 def test_two_frictions_are_never_planted_together():
@@ -258,71 +293,3 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, study, known):
 
     monkeypatch.setattr(trial, "machine", refused)
     assert trial.run(Case(("cogging",), 3.0, 7)) == Outcome(Case(("cogging",), 3.0, 7), shown=False)
-
-
-# --- picture and figures --------------------------------------------------------------------
-
-
-def test_the_picture_has_the_share_of_each_answer(tmp_path):
-    table = {"a": {"b": 0.25, "a": 0.75}, "nothing": {"nothing": 1.0}}
-    np.testing.assert_array_equal(
-        _shares(table, ["a", "nothing"], ["a", "b", "nothing"]), [[0.75, 0.25, 0], [0, 0, 1]]
-    )
-    draw(EVERY, tmp_path / "m.svg")
-    assert "<svg" in (tmp_path / "m.svg").read_text(encoding="utf-8")
-    with pytest.raises(InputError, match="ends in"):
-        draw(EVERY, tmp_path / "m.txt")
-
-
-@pytest.mark.parametrize(
-    ("target", "met", "missed", "words"),
-    [
-        (Target(low=2.0), (2.0, 9.0), (1.9,), "at least 2"),
-        (Target(high=3.0), (3.0, -1.0), (3.1,), "at most 3"),
-        (Target(2.0, 3.0), (2.0, 3.0), (1.9, 3.1), "at least 2 and at most 3"),
-        (Target(), (-1e300, 1e300), (math.nan,), ""),
-    ],
-)
-def test_a_target_is_an_interval_with_its_ends(target, met, missed, words):
-    assert all(Figure("w", v, target=target).passed is True for v in met)
-    assert all(Figure("w", v, target=target).passed is False for v in missed)
-    assert str(target) == words
-    assert [Figure("w", v, target=target).verdict for v in (met[0], missed[0])] == ["pass", "FAIL"]
-
-
-def test_figures_without_value_or_target_have_no_verdict():
-    assert (Figure("w", None, target=Target()).passed, Figure("w", 1.0).passed) == (None, None)
-    assert (Figure("w", None).verdict, Figure("w", 1.0).verdict) == ("skipped", "")
-
-
-def strict(path):
-    def refuse(constant):
-        raise AssertionError(f"{constant} is no JSON")
-
-    return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
-
-
-def test_results_are_kept_for_what_was_not_run(tmp_path):
-    old = [Figure("speed", 12.345, "ns", Target(high=20.0), "a note"), Figure("rate", None)]
-    write_results({"first": old, "second": [Figure("x", 1.0)]}, tmp_path)
-    write_results({"second": [Figure("y", np.float64(3.0), "s", Target(low=4.0))]}, tmp_path)
-    found = strict(tmp_path / "RESULTS.json")["benchmarks"]
-    assert found["first"] == [
-        {"figure": "speed", "value": 12.345, "unit": "ns", "target": "at most 20", "passed": True,
-         "note": "a note"},
-        {"figure": "rate", "value": None, "unit": "1", "target": None, "passed": None, "note": ""},
-    ]  # fmt: skip
-    assert [f["figure"] for f in found["second"]] == ["y"]
-    text = (tmp_path / "RESULTS.md").read_text(encoding="utf-8")
-    rows = [[c.strip() for c in line.split("|")[1:-1]] for line in text.splitlines() if "|" in line]
-    assert ["speed", "12.3", "ns", "at most 20", "pass", "a note"] in rows
-    assert ["rate", "", "1", "", "", ""] in rows
-    assert ["y", "3", "s", "at least 4", "FAIL", ""] in rows
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["RESULTS.json", "RESULTS.md"]
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_a_figure_that_is_no_number_is_null_in_the_file(tmp_path, value):
-    write_results({"first": [Figure("speed", value, target=Target(low=0.0))]}, tmp_path)
-    (row,) = strict(tmp_path / "RESULTS.json")["benchmarks"]["first"]
-    assert row["value"] is None

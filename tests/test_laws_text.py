@@ -101,7 +101,7 @@ def test_a_comparison():
     assert lines[3].strip().startswith("worst: moving backwards: 0.087 N RMS, 7.7 times")
     tested = [line for line in lines if line.startswith("  force residual against")]
     assert len(tested) == 6
-    assert lines[-1] == made.tests_of().reason
+    assert lines[-1] == made.whiteness_of().reason
     assert lines.count(lines[-1]) == 1
     quiet = made.Comparison(made.MODEL, {"x": replace(made.comparison_of(), worst=[])})
     assert "nowhere does the error stand above the noise" in compare_text(quiet)
