@@ -84,6 +84,8 @@ def test_measured_and_modelled_force_are_drawn_whole_and_in_part():
         np.testing.assert_allclose(lines["model"].get_ydata(), forces.model[part])
         np.testing.assert_allclose(lines["model with the effect"].get_ydata(), forces.named[part])
         np.testing.assert_allclose(lines["model"].get_xdata(), TIME[part])
+        wide = lines["measured (command less inertia)"].get_linewidth()
+        assert wide > lines["model"].get_linewidth()  # a model that hides it is seen to fit
     own, named = left.get_lines()
     assert (own.get_color(), named.get_color()) == (BLUE, ORANGE)
     scale = Scale.of("N", [0.115])

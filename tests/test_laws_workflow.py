@@ -90,6 +90,107 @@ def test_a_strength_collapsed_where_less_than_a_third_is_left(monkeypatch, f0, s
     assert moved(monkeypatch, {"F0": 0.039}, {"F0": 0.0}) == ()
 
 
+# --- fit, compare, diagnose -----------------------------------------------------------------
+
+
+def handed(monkeypatch):
+    """The loop's parts stubbed: each says what it was given."""
+    studies = {a: replace(made.STUDY, axis=a) for a in ("x", "y")}
+    seen = {}
+
+    def read(*asked):
+        seen["studies"] = asked
+        return dict(studies)
+
+    def aligned(axis, study):
+        aligned_study = replace(study, shift=axis.mass / 1e4)
+        return aligned_study, built_fit(axis.mass, axis=replace(axis, mass=2 * axis.mass))
+
+    monkeypatch.setattr(workflow, "studies", read)
+    monkeypatch.setattr(workflow, "fit_aligned", aligned)
+    monkeypatch.setattr(workflow, "estimates", lambda fit: ("estimates", fit))
+    monkeypatch.setattr(workflow, "error_on", lambda axis, logs: np.full(5, axis.mass * len(logs)))
+    monkeypatch.setattr(workflow, "refit", lambda *given: given)
+    return seen
+
+
+def test_a_fit_takes_over_the_values_and_the_shift_of_each_axis(monkeypatch):
+    seen, bars = handed(monkeypatch), []
+    found = workflow.fit(
+        made.MODEL, "logs", "held", catalogue="known", window=0.07,
+        progress=lambda *done: bars.append(done),
+    )  # fmt: skip
+    assert seen["studies"] == (made.MODEL, "logs", "held", 0.07)
+    assert bars == [("fitting", 1, 2), ("fitting", 2, 2)]
+    assert {a: m.mass for a, m in found.model.axes.items()} == {"x": 10.6, "y": 15.8}
+    assert {a: s.shift for a, s in found.studies.items()} == {"x": 5.3e-4, "y": 7.9e-4}
+    assert found.holdout_error == pytest.approx({"x": 10.6, "y": 15.8})
+    assert all(found.estimates[a] == ("estimates", found.fits[a]) for a in "xy")
+    assert found.refits == {a: (made.MODEL.axes[a], found.fits[a], "known") for a in "xy"}
+    bare = replace(made.STUDY, holdout=())
+    assert workflow.holdout_error(found.fits["x"], bare) is None
+    assert len(workflow.fit(made.MODEL, "logs").catalogue) == 0
+    assert seen["studies"][2] == {}
+
+
+def test_a_comparison_is_of_the_axes_that_move(monkeypatch):
+    moving = {"y": "study y"}
+    monkeypatch.setattr(workflow, "studies", lambda *given: moving if given[1:] == (
+        "logs", {}, 0.07) else None)  # fmt: skip
+    monkeypatch.setattr(workflow, "with_clocks", lambda axis, study: (axis.mass, study))
+    asked = []
+
+    def errors(model, logs, progress):
+        progress(3, 4)
+        asked.append((tuple(model.axes), logs))
+        return {"y": "errors of y"}
+
+    monkeypatch.setattr(workflow, "position_errors", errors)
+    monkeypatch.setattr(workflow, "compare_axis", lambda *given: given)
+    bars = []
+    found = workflow.compare(
+        made.MODEL, "logs", window=0.07, progress=lambda *done: bars.append(done)
+    )
+    assert found.axes == {"y": (made.MODEL, (7.9, "study y"), "logs", "errors of y")}
+    assert (asked, bars) == ([(("y",), "logs")], [("comparing", 3, 4)])
+    assert found.model is made.MODEL
+
+
+def test_a_diagnosis_hands_each_axis_its_own_fit_and_study(monkeypatch):
+    described = made.MODEL.with_axis("x", axis_of(fitted("empirical_map")))
+    result = made.fit_result()
+    asked, plans = {}, {"x": None, "y": "plan y"}
+
+    def fit(*given, **named):
+        asked.update(given=given, named=named)
+        return result
+
+    def diagnose_axis(fit, study, catalogue, progress):
+        progress(1, 2)
+        return SimpleNamespace(axis=study.axis, fit=fit, catalogue=catalogue)
+
+    bars = []
+    monkeypatch.setattr(workflow, "fit", fit)
+    monkeypatch.setattr(workflow, "diagnose_axis", diagnose_axis)
+    monkeypatch.setattr(
+        workflow, "next_experiment", lambda d, model, window: plans[d.axis] and (d, model, window)
+    )
+    monkeypatch.setattr(workflow, "compare", lambda *given, **named: (given, named))
+    progress = lambda *done: bars.append(done)  # noqa: E731
+    found = workflow.diagnose(
+        described, "logs", "held", catalogue="known", window=0.07, progress=progress
+    )
+    assert asked["given"] == (made.MODEL, "logs", "held")
+    assert asked["named"] == {"catalogue": "known", "window": 0.07, "progress": progress}
+    for axis in "xy":
+        d = found.axes[axis]
+        assert (d.axis, d.fit, d.catalogue) == (axis, result.fits[axis], "known")
+    assert bars == [(f"trying effects on {a}", 1, 2) for a in "xy"]
+    assert found.next_experiments == {"y": (found.axes["y"], result.model, 0.07)}
+    assert found.comparison == ((result.model, "logs"), {"window": 0.07, "progress": progress})
+    assert found.refits is result.refits
+
+
 # --- add ------------------------------------------------------------------------------------
 
 
@@ -114,7 +215,9 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
     assert [t[0] for t in tried] == list(both.fits.values())
     assert seen[0][0][1:] == ("logs", "held")
     assert seen[0][1]["window"] == 0.07
-    assert add(wear, made.MODEL, "logs", axis="x")[0].axis == "x"
+    bars = []
+    found = add(wear, made.MODEL, "logs", axis="x", progress=lambda *done: bars.append(done))
+    assert (found[0].axis, bars) == ("x", [("adding", 1, 1)])
     with pytest.raises(InputError, match="already"):
         add(CATALOGUE["coulomb_viscous"], made.MODEL, "logs")
     with pytest.raises(InputError, match="no axis"):
