@@ -155,7 +155,12 @@ def test_an_effect_is_tried_as_far_as_it_promises(monkeypatch):
 
 
 def test_a_noise_is_scored_without_a_refit(monkeypatch):
-    monkeypatch.setattr(candidates, "finished", lambda axis, *_: built_fit(1.4, axis=axis))
+
+    def finished(axis, begun, logs, outcome):
+        assert (begun.mass, logs, outcome) == (9.9, (), Outcome.CONVERGED)
+        return built_fit(1.4, axis=axis)
+
+    monkeypatch.setattr(candidates, "finished", finished)
     assert tried(monkeypatch, NOISE.name) == (pytest.approx(1.4), [])
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
 import pytest
 from stubbed_cli import stubbed
 
 from identify import workflow
 from identify.cli import machine, main
-from identify.cli.shared import read_logs, require_folder, say
+from identify.cli.shared import catalogue_with, read_logs, require_folder, say, stage_model
 from twin.errors import InputError
 
 
@@ -74,4 +75,14 @@ def test_what_is_said_goes_to_its_own_stream(capsys, tmp_path):
     require_folder(tmp_path / "new.toml")
     with pytest.raises(InputError):
         require_folder(tmp_path / "no" / "new.toml")
+
+
+def test_files_are_read_by_the_names_they_were_given(monkeypatch):
+    monkeypatch.setattr("twin.log.read_log", lambda path: f"log {path}")
+    monkeypatch.setattr("twin.effects.load_catalogue", lambda files: files)
+    monkeypatch.setattr("twin.model_file.load_model", lambda *given: given)
+    paths = [Path("b.mcap"), Path("a.mcap")]
+    assert list(read_logs(paths).items()) == [(str(p), f"log {p}") for p in paths]
     assert read_logs(None) == {}
+    assert (catalogue_with(paths), catalogue_with(None)) == (paths, ())
+    assert stage_model("name", "catalogue") == ("name", "catalogue")

@@ -1,27 +1,22 @@
-"""What a plan asks, chooses and proposes: both sides of each rule, within the stage's limits."""
+"""What a plan asks and how it chooses: both sides of each rule."""
 
 from __future__ import annotations
 
 import importlib
-import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import built_results as made
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, HARDWARE, PLAIN, axis_of, built, built_fit, built_motion, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_motion, fitted
 
 from identify.contest import (
     Arena,
     Explanation,
 )
 from identify.diagnose import Verdict
-from identify.proposals import _affordable, _fits, _move_time, _swept, neat, proposals
 from identify.residual import Windowed
 from twin.errors import InputError
-from twin.experiment import stage_limits
-from twin.experiment_kinds import Moves, Passes, Staircase, Steps, Sweep, Tracking
 from twin.model import StageModel
 
 plans = importlib.import_module("identify.plan")
@@ -207,68 +202,3 @@ def test_the_study_is_that_of_the_axis_in_question(monkeypatch):
     assert plans._study(STAGE, {"a": 1}, {}, [], None, None) == "study y"
     with pytest.raises(InputError, match="does not move"):
         plans._study(STAGE, {"a": 1}, {}, [], "x", None)
-
-
-# --- proposals ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "value", [0.1234567, 0.999999, 1.0, 4.0, 1234.9, 5e-7, 0.29999999999999999]
-)
-def test_a_neat_value_has_three_digits_and_is_no_larger(value):
-    found = neat(value)
-    assert found <= value * (1.0 + 1e-12)
-    assert found > value * (1.0 - 1e-2)
-    assert float(f"{found:.3g}") == found
-    assert neat(found) == found
-
-
-def test_a_weak_motor_is_asked_for_a_part_of_its_force():
-    for limit, effort in ((math.inf, 1.0), (0.4 * 5.3 * 2.0 / 0.16, 1.0), (5.3, 0.2)):
-        axis = replace(PLAIN, hardware=replace(HARDWARE, force_limit=limit))
-        assert _affordable(StageModel("s", {"x": axis}), "x") == pytest.approx(effort)
-
-
-def test_proposals_cover_the_sorts_and_last_about_as_long_as_asked():
-    found = proposals(STAGE, "x", 8.0)
-    kinds = {type(e) for e in found}
-    assert {Tracking, Moves, Passes, Staircase, Steps, Sweep} <= kinds
-    assert Tracking(8.0) in found
-    for e in found:
-        assert getattr(e, "axis", "x") == "x"
-        assert getattr(e, "span", 0.0) <= 0.9 * 0.24 + 1e-12
-    assert any(getattr(e, "other", 0.0) > 0.0 for e in found)
-    alone = proposals(StageModel("s", {"x": PLAIN}, 2000.0), "x", 8.0)
-    assert not any(getattr(e, "other", 0.0) for e in alone)
-    rounds = [Moves(count=8), Moves(count=4, dwell=1.0)]  # 8 s in moves of 0.9 s, of 1.8 s
-    assert all(m in found for m in rounds)
-
-
-def test_a_proposal_may_take_three_tenths_more_than_asked():
-    lasting = SimpleNamespace(setpoint=lambda model, rng: SimpleNamespace(duration=12.99))
-    assert _fits(lasting, STAGE, 10.0)
-    assert not _fits(lasting, STAGE, 9.99)
-
-    def refused(model, rng):
-        raise InputError("no")
-
-    assert not _fits(SimpleNamespace(setpoint=refused), STAGE, 1e9)
-
-
-def test_a_sweep_is_half_as_strong_as_the_limits_allow():
-    limits = dict(zip(STAGE.axes, stage_limits(STAGE), strict=True))
-    found = list(_swept(STAGE, limits, "x", 8.0))
-    assert [(round(s.span, 4), s.highest) for s in found] == [
-        (0.216, 60.0), (0.216, 120.0), (0.0216, 60.0), (0.0216, 120.0),
-    ]  # fmt: skip
-    for s in found:
-        assert s.amplitude == neat(0.5 * s.most_force(PLAIN))
-        assert (s.effort, s.lowest, s.repeats) == (0.5, 2.0, 1)
-        assert s.speed <= 2.4 * s.span / 8.0
-
-
-def test_the_time_of_a_move_follows_from_its_limits():
-    (limit, _) = stage_limits(STAGE)  # 0.2 m/s, 2 m/s^2, 100 m/s^3
-    assert _move_time(limit, 0.1) == pytest.approx(0.1 / 0.2 + 0.2 / 2.0 + 2.0 / 100.0)
-    short = math.sqrt(1e-4 * 2.0)
-    assert _move_time(limit, 1e-4) == pytest.approx(1e-4 / short + short / 2.0 + 2.0 / 100.0)

@@ -159,6 +159,17 @@ def test_a_tie_ends_where_the_best_gains_more_than_next_to_nothing(monkeypatch):
     assert tied(monkeypatch, 1.003, 1.0)[0] is True  # the other is better: no reason to part
 
 
+@pytest.mark.parametrize(
+    ("t", "bic", "alike"), [(1.9, 50.0, True), (2.1, 50.0, False), (2.1, 2.1, False),
+                            (2.1, 1.9, True), (9.0, 1.9, True), (-9.0, 50.0, True)],
+)  # fmt: skip
+def test_a_tie_is_parted_by_t_above_two_and_evidence_above_two(monkeypatch, t, bic, alike):
+    found = type("Found", (), {"t": t, "delta_bic": bic})
+    monkeypatch.setattr(ranking, "held_out_gain", lambda other, best, floor: found)
+    monkeypatch.setattr(ranking, "evidence", lambda other, best, parameters: found)
+    assert tied(monkeypatch, 1.0, 1.0)[0] is alike
+
+
 def test_the_evidence_parts_two_candidates_by_more_than_ten(monkeypatch):
     assert tied(monkeypatch, 1.0, 1.0, (1.0101, 1.0))[0] is False
     assert tied(monkeypatch, 1.0, 1.0, (1.0099, 1.0))[0] is True

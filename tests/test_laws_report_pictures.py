@@ -13,6 +13,7 @@ from identify.report.drawing import (
     BLUE,
     GREY,
     ORANGE,
+    settle,
 )
 from identify.report.subject import Subject
 
@@ -77,6 +78,14 @@ def test_each_axis_has_the_floor_of_its_own_comparison(monkeypatch):
     growth.section(subject_of())
     axes = made.compared().axes
     assert seen == [(2, axes["x"].floor), (1, axes["y"].floor)]
+
+
+def test_a_picture_is_laid_out_on_a_grid_once():
+    figure = ranking._figure(made.diagnosis_of())
+    settle(figure)
+    assert figure.get_layout_engine() is None
+    places = [axes.get_position().bounds for axes in figure.axes]
+    np.testing.assert_allclose(np.array(places) * 1e4, np.rint(np.array(places) * 1e4), atol=1e-7)
 
 
 def test_a_bar_for_each_candidate_ends_at_its_error():

@@ -86,6 +86,18 @@ def test_a_step_beyond_a_bound_stops_there_and_the_others_follow():
     assert squared == pytest.approx(float(left @ left), rel=1e-3)
 
 
+@pytest.mark.parametrize("wanted", [-0.9, 2e4])
+def test_a_strength_alone_stops_at_either_bound(wanted):
+    column = RNG.standard_normal((300, 1))
+    effect = CATALOGUE["coulomb_viscous"]
+    where = [Coordinate(effect.name, effect.parameter("Fc"))]
+    first = Fitted.at_start(effect, {"Fc": 0.5, "Fs": 0.6})
+    found, _ = _bounded_step(
+        np.zeros((300, 0)), -column[:, 0] * (wanted - 0.5), column, where, first
+    )
+    assert found[0] == pytest.approx(0.0 if wanted < 0.0 else 1e4, abs=1e-4)
+
+
 def test_a_ridge_decides_where_the_base_explains_a_strength_already():
     n = 200
     column = RNG.standard_normal((n, 1))
