@@ -145,6 +145,7 @@ def test_the_signature_of_an_effect_is_drawn_at_its_force(tmp_path):
     assert np.ptp(force) == pytest.approx(0.0, abs=1e-12)
     again = exemplary_motion()
     np.testing.assert_array_equal(motion.position, again.position)
+    assert again.others.shape == again.signals.shape
     np.testing.assert_allclose(np.gradient(again.position, 1e-3), again.velocity)
     assert np.abs(again.position).max() == pytest.approx(0.15)
     assert len(again.position) == 21_000
@@ -157,6 +158,37 @@ def test_the_signature_of_an_effect_is_drawn_at_its_force(tmp_path):
     np.testing.assert_allclose(peaks, 0.15 * np.pi / np.array([1.5, 3.0, 6.0]), rtol=1e-2)
     with pytest.raises(InputError, match="end the name"):
         draw(CATALOGUE["constant_force"], CATALOGUE, tmp_path / "f.txt")
+
+
+def test_the_signature_of_a_friction_is_its_own_and_of_others_is_beside_one():
+    motion, force = signature(CATALOGUE["coulomb_viscous"], CATALOGUE)
+    fast = np.abs(motion.velocity) > 0.01
+    assert np.abs(force[fast]).min() > 0.0
+    assert (np.sign(force[fast]) == -np.sign(motion.velocity[fast])).all()
+    _, modified = signature(CATALOGUE["asymmetric_friction"], CATALOGUE)
+    assert rms(modified) == pytest.approx(FORCE, rel=1e-6)  # of a friction that it modifies
+
+
+def test_the_picture_of_an_effect_is_over_time_position_and_speed(monkeypatch, tmp_path):
+    import matplotlib.pyplot as plt
+
+    shown = []
+    monkeypatch.setattr(plt, "close", shown.append)
+    draw(CATALOGUE["constant_force"], CATALOGUE, tmp_path / "f.svg")
+    motion, force = signature(CATALOGUE["constant_force"], CATALOGUE)
+    (figure,) = shown
+    across = {
+        "Time (s)": motion.time, "Position (mm)": 1e3 * motion.position,
+        "Speed (mm/s)": 1e3 * motion.velocity,
+    }  # fmt: skip
+    assert [a.get_xlabel() for a in figure.axes] == list(across)
+    assert len({round(a.get_position().y0, 3) for a in figure.axes}) == 1  # side by side
+    for axes, values in zip(figure.axes, across.values(), strict=True):
+        x, y = axes.get_lines()[0].get_data()
+        np.testing.assert_allclose(x, values)
+        np.testing.assert_allclose(y, force)
+    assert figure.axes[0].get_ylabel() == "Added force (N)"
+    assert "<svg" in (tmp_path / "f.svg").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(("part", "seen"), [(0.49, True), (0.51, False)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import built_results as made
+import numpy as np
 import pytest
 from built_fits import built_fit
 from built_results import Page
@@ -23,7 +24,7 @@ from identify.report import (
     render,
     sections,
 )
-from identify.report.blocks import Picture, Table, Tone
+from identify.report.blocks import Heading, Picture, Table, Tone
 from identify.report.subject import Subject
 from identify.report.units import Scale, number, quantity, spaced, title_case
 
@@ -163,6 +164,38 @@ def test_the_worst_regions_in_words():
     )
     assert regions.in_words(back).startswith("Moving backwards: 87.0 mN RMS, 7.70 times")
     assert regions.in_words(replace(back, low=0.0, high=1.5)).startswith("Moving forwards")
+
+
+def test_a_narrow_region_has_the_digits_of_its_width():
+    near, _ = made.comparison_of().worst
+    narrow = regions.in_words(replace(near, low=0.01231, high=0.01257))
+    assert narrow.startswith("Position between 12.31 and 12.57 mm:")
+
+
+def test_regions_have_headings_only_among_several_axes():
+    quiet = replace(made.comparison_of("y"), residual=np.full(9, 0.001))
+    for axes, expected in (
+        ({"x": made.comparison_of(), "y": made.comparison_of("y")}, ["Axis x", "Axis y"]),
+        ({"x": made.comparison_of(), "y": quiet}, ["Axis x"]),
+        ({"x": made.comparison_of()}, []),
+    ):
+        subject = Subject("t", None, made.Comparison(made.MODEL, axes), (), ())
+        found = regions.section(subject)
+        assert [b.text for b in found.blocks if isinstance(b, Heading)] == expected
+        assert (found.anchor, found.title) == ("regions", "Where the error is")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (1.234e-4, "0.000123"),
+        (9.87e-5, "9.87×10⁻⁵"),
+        (-1.234e7, "−1.23×10⁷"),
+        (1234567.0, "1234567"),
+    ],
+)
+def test_very_large_and_small_numbers_have_a_power_of_ten(value, text):
+    assert number(value) == text
 
 
 @pytest.mark.parametrize(("ratio", "shown"), [(1.29, False), (1.31, True)])

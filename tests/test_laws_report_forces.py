@@ -211,6 +211,20 @@ def test_the_histogram_and_correlations_have_their_bounds():
     assert rest[0].get_ylabel() == "Autocorrelation (1)"
 
 
+def test_the_tests_of_each_axis_are_in_words_and_their_reason_once(monkeypatch):
+    monkeypatch.setattr(whiteness, "_figure", lambda tests: tests)
+    compared = made.compared()
+    *blocks, reason = whiteness.section(subject_of(comparison=compared)).blocks
+    assert reason.items == (made.whiteness_of().reason,)
+    for axis, (heading, picture, listing) in zip("xy", (blocks[:3], blocks[3:]), strict=True):
+        tests = compared.axes[axis].tests
+        assert heading.text == f"Axis {axis}"
+        assert picture.figure is tests
+        assert "The force residual on 387 windows" in picture.caption
+        words = [c.in_words() for c in tests.correlations]
+        assert listing.items == [f"F{w[1:]}." for w in words]
+
+
 def test_a_description_is_drawn_forwards_and_backwards():
     effect = CATALOGUE["empirical_map"]
     names = [p.name for part in effect.parts for p in effect.strengths if p.name in part.strengths]

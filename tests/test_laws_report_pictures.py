@@ -148,7 +148,16 @@ def test_the_map_of_each_coordinate_has_its_error_above_its_noise():
         np.testing.assert_allclose(noise.values, found.floor)
         np.testing.assert_allclose(error.values, np.where(found.visited > 0, found.rms, np.nan))
         assert axes.get_yscale() == "log"
+    heights = [round(a.get_subplotspec().rowspan.start) for a in figure.axes]
+    assert heights == [0, 0, 0]
     # The last bin of the first map was never visited: its error sets no limit, its noise does.
     lowest = min(m.floor.min() for m in c.maps)
     assert first.get_ylim()[0] == pytest.approx(0.5 * lowest)
     assert first.get_ylabel() == "RMS error (N)"
+
+
+def test_the_least_error_of_a_bin_that_was_visited_sets_the_limit():
+    low = replace(made.comparison_of().maps[0], rms=np.array([0.011, 0.5, 0.0013]))
+    picture = maps.picture(replace(made.comparison_of(), maps=[low]))
+    assert picture.figure.axes[0].get_ylim()[0] == pytest.approx(0.5 * 0.011)
+    assert picture.caption.startswith("RMS force error by region")
