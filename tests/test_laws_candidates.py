@@ -152,6 +152,21 @@ def test_the_held_out_logs_judge_before_and_after_in_that_order(quiet):
     assert not found.supported
 
 
+def test_held_out_windows_at_rest_are_left_out_where_either_friction_sticks(quiet, monkeypatch):
+    asked = []
+
+    def moving(logs, either):
+        asked.append(either)
+        return slice(None)
+
+    monkeypatch.setattr(candidates, "moving", moving)
+    monkeypatch.setattr(candidates, "residual", lambda axis, logs: RNG.standard_normal(300))
+    study, lugre = study_stub(holdout=("held",)), PLAIN.with_effect(fitted("lugre"))
+    for one, two in ((PLAIN, lugre), (lugre, PLAIN), (lugre, lugre)):
+        score(built_fit(2.0, axis=one), built_fit(1.0, axis=two), study, CATALOGUE["lugre"])
+    assert asked == [True, True, False]
+
+
 def test_blocks_are_left_out_only_where_evidence_asks(quiet, monkeypatch):
     noise = RNG.standard_normal(600)
     fit = built_fit(0, axis=axis_of(fitted("constant_force")), residual=noise)

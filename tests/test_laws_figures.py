@@ -34,6 +34,28 @@ def test_the_picture_has_the_share_of_each_answer(tmp_path):
         draw(EVERY, tmp_path / "m.txt")
 
 
+def test_the_share_of_an_answer_stands_in_its_row_and_column(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure as Drawing
+
+    drawn = []
+    monkeypatch.setattr(Drawing, "savefig", lambda self, out, format: drawn.append((self, format)))
+    other = Outcome(Case(("b",), 5.0, 3), "MISSING_EFFECT", (("c",),))
+    draw([*EVERY, *EVERY[:2], other, EVERY[0]], tmp_path / "m.pdf")
+    ((figure, kind),) = drawn
+    (axes,) = figure.axes
+    rows = [t.get_text() for t in axes.get_yticklabels()]
+    columns = [t.get_text() for t in axes.get_xticklabels()]
+    assert (rows, kind) == (["a", "b", "nothing"], "pdf")
+    assert columns == ["a", "b", "c", "ambiguous with it", "unexplained", "nothing"]
+    found = {(rows[y], columns[x]): t.get_text() for t in axes.texts for x, y in [t.get_position()]}
+    assert found == {
+        ("a", "a"): "60", ("a", "unexplained"): "40", ("b", "c"): "100",
+        ("nothing", "nothing"): "100",
+    }  # fmt: skip
+    shares = axes.get_images()[0].get_array()
+    assert (shares[0, 0], shares[0, 4], shares[1, 2], shares[2, 5]) == (0.6, 0.4, 1.0, 1.0)
+
+
 @pytest.mark.parametrize(
     ("target", "met", "missed", "words"),
     [
