@@ -113,6 +113,10 @@ def tried(monkeypatch, effect, *, promising=True, looked=None, errors=(0.5, 0.4,
 
         return part
 
+    def simplest(fit, where, what):
+        assert (where, what) == (study, CATALOGUE[effect])
+        return fit
+
     def promises(asked, start):
         assert (asked, start) == (base, starts[0])
         return promising
@@ -132,7 +136,7 @@ def tried(monkeypatch, effect, *, promising=True, looked=None, errors=(0.5, 0.4,
     monkeypatch.setattr(candidates, "starts", begin)
     monkeypatch.setattr(candidates, "fit_axis", fit_axis)
     monkeypatch.setattr(candidates, "fit_thoroughly", lambda axis, s: built_fit(0.2, 0.1, axis))
-    monkeypatch.setattr(candidates, "simplified", lambda fit, study, effect: fit)
+    monkeypatch.setattr(candidates, "simplified", simplest)
     monkeypatch.setattr(candidates, "_promising", promises)
     monkeypatch.setattr(candidates, "_glance", given(built_fit(1.7, 0.1)))
     monkeypatch.setattr(candidates, "_audition", given(looked))
@@ -175,7 +179,12 @@ def auditioned(monkeypatch, *, after, head=40, whole=100):
         assert axis.names == ("dahl",)
         return built_fit(1.0, axis=new_axis)
 
-    monkeypatch.setattr(candidates, "_on_heads", lambda base, study: built_fit(1.0))
+    def on_heads(given, where):
+        assert (given, where) == (base, study)
+        return built_fit(1.0)
+
+    base = built_fit(2.0)
+    monkeypatch.setattr(candidates, "_on_heads", on_heads)
     monkeypatch.setattr(candidates, "fit_axis", fit_axis)
     monkeypatch.setattr(candidates, "moving", lambda logs, either: np.full(400, either))
     monkeypatch.setattr(
@@ -183,7 +192,7 @@ def auditioned(monkeypatch, *, after, head=40, whole=100):
         lambda axis, logs: noise if axis is PLAIN else after(noise),
     )  # fmt: skip
     monkeypatch.setattr(candidates, "finished", lambda axis, *_: built_fit(0.5, axis=axis))
-    return _audition(built_fit(2.0), study, fitted("dahl")), noise, new_axis
+    return _audition(base, study, fitted("dahl")), noise, new_axis
 
 
 @pytest.mark.parametrize(("part", "passed"), [(0.9, False), (1.1, True)])

@@ -92,11 +92,20 @@ def test_an_effect_must_show_and_the_mass_is_held_where_it_would_hide(
         return Fitted.at_start(effect)
 
     monkeypatch.setattr(cases, "simulate", simulate)
-    monkeypatch.setattr(cases, "studies", lambda stage, logs, held: {"x": trial})
+
+    def studied(stage, logs, held):
+        assert (list(stage.axes), list(logs), held) == (["x"], ["trial"], {})
+        return {"x": trial}
+
+    def seen(fitted, base, study):
+        assert (fitted.effect.name, study, base.floor) == ("wear", trial, 0.02)
+        return visible * 5.0 * 0.02
+
+    monkeypatch.setattr(cases, "studies", studied)
     monkeypatch.setattr(cases, "fit_axis", lambda axis, logs: built_fit(1.0, 0.02, axis))
     monkeypatch.setattr(cases, "draw_effect", drawn)
     monkeypatch.setattr(cases, "hidden_part", lambda fitted, base, study: hidden)
-    monkeypatch.setattr(cases, "visible_force", lambda fitted, base, study: visible * 5.0 * 0.02)
+    monkeypatch.setattr(cases, "visible_force", seen)
 
     def plant():
         rng = np.random.default_rng(1)

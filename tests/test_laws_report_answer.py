@@ -168,8 +168,8 @@ def test_the_worst_regions_in_words():
 
 def test_a_narrow_region_has_the_digits_of_its_width():
     near, _ = made.comparison_of().worst
-    narrow = regions.in_words(replace(near, low=0.01231, high=0.01257))
-    assert narrow.startswith("Position between 12.31 and 12.57 mm:")
+    narrow = regions.in_words(replace(near, low=0.01131, high=0.01157))
+    assert narrow.startswith("Position between 11.31 and 11.57 mm:")
 
 
 def test_regions_have_headings_only_among_several_axes():

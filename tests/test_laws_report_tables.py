@@ -85,6 +85,8 @@ def test_the_ledger_has_the_unit_of_its_largest_error():
     steps = (replace(made.STEPS[0], fit_error_before=0.713, fit_error_after=0.0341),)
     (row,) = growth._table(steps).rows
     assert row.cells[1:3] == ("0.713 N", "0.0341 N")
+    rising = (replace(made.STEPS[0], fit_error_before=0.0341, fit_error_after=0.713),)
+    assert growth._table(rising).rows[0].cells[1:3] == ("0.0341 N", "0.713 N")
     table = growth._table(made.STEPS)
     assert [c.numeric for c in table.columns] == [False, True, True, True, True]
     assert [c.numeric for c in logs._table(made.comparison_of()).columns] == [False] + 4 * [True]
@@ -120,6 +122,8 @@ def test_the_ledger_of_positions():
     one = Subject("t", None, made.Comparison(made.MODEL, {"x": made.comparison_of()}),
                   made.STEPS[:2], ())  # fmt: skip
     assert "Axis x" not in page_of(one, growth).texts["growth"]
+    both = replace(one, history=made.STEPS)
+    assert "Axis y" in page_of(both, growth).texts["growth"]
 
 
 def test_the_growth_is_that_of_the_history_or_else_of_the_additions():
