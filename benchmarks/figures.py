@@ -8,7 +8,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -100,9 +100,10 @@ def _table(figures: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _as_json(figure: Figure) -> dict[str, Any]:
+    value = None if figure.value is None else float(figure.value)
     return {
         "figure": figure.what,
-        "value": None if figure.value is None else float(figure.value),
+        "value": None if value is None or not isfinite(value) else value,  # JSON knows no NaN
         "unit": figure.unit,
         "target": str(figure.target) if figure.target else None,
         "passed": figure.passed,

@@ -11,6 +11,8 @@ from twin.errors import InputError
 
 __all__ = ["loop", "machine", "main", "plan", "selftest"]
 
+INTERRUPTED = 130  # exit code that typer makes of Ctrl-C, without a word
+
 
 def main() -> None:
     """Entry point of `twin`: errors are one line, exit code 2."""
@@ -18,6 +20,8 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         code = app(standalone_mode=False)
+        if code == INTERRUPTED:
+            raise KeyboardInterrupt
     except InputError as error:
         code = fail(str(error))
     except KeyboardInterrupt:

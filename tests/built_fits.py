@@ -1,0 +1,133 @@
+"""Fits, candidates and motions built from given numbers: nothing is simulated or diagnosed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.candidates import Candidate
+from identify.diagnose import Stage, Step
+from identify.evidence import Evidence, Gain
+from identify.fit import Fit, Outcome
+from identify.motion import Motion
+from identify.residual import Windowed
+from identify.scaling import Scaling
+from identify.study import Study
+from twin.effect import Effect, Excitation
+from twin.effects import load_catalogue
+from twin.model import AxisModel, Fitted, Hardware, coordinates
+
+Array = NDArray[np.float64]
+
+CATALOGUE = load_catalogue()
+NOISE = CATALOGUE["encoder_quantization"]  # lowers no error
+PERIOD = 1e-3  # s
+HARDWARE = Hardware(
+    travel=(-0.11, 0.13), encoder_noise=1e-9, current_noise=1e-3, force_constant=10.0,
+    velocity=0.2, acceleration=2.0, jerk=100.0,
+)  # fmt: skip
+FRICTION = Fitted.at_start(CATALOGUE["coulomb_viscous"], {"Fc": 0.31, "Fs": 0.31, "sigma2": 0.53})
+
+
+def axis_of(*effects: Fitted, mass: float = 5.3) -> AxisModel:
+    """An axis with a Coulomb friction and these effects."""
+    return AxisModel(mass, HARDWARE, (FRICTION, *effects))
+
+
+def fitted(name: str, **values: float) -> Fitted:
+    return Fitted.at_start(CATALOGUE[name], values)
+
+
+PLAIN = axis_of()
+
+
+def built_fit(
+    error: float,
+    floor: float = 1.0,
+    axis: AxisModel = PLAIN,
+    *,
+    residual: Array | None = None,
+    kept: NDArray[np.bool_] | None = None,
+    logs: Sequence[Windowed] = (),
+    jacobian: Array | None = None,
+    lessened: float = 1.0,
+    outcome: Outcome = Outcome.CONVERGED,
+    begun: AxisModel | None = None,
+) -> Fit:
+    """A fit with this RMS error and noise floor (N)."""
+    if residual is None:
+        residual = error * np.array([1.0, -1.0] * 8)
+    kept = np.ones(len(residual), dtype=bool) if kept is None else kept
+    scaling = Scaling(coordinates(axis))
+    fit = Fit(axis, logs, scaling, outcome, residual, kept, begun or axis)
+    fit.__dict__.update(floor=floor, lessened=lessened)
+    if jacobian is not None:
+        fit.__dict__["jacobian"] = jacobian
+    return fit
+
+
+def built(
+    effect: str | Effect = "cogging",
+    bic: float = 500.0,
+    t: float = 9.0,
+    before: float = 7.0,
+    after: float = 2.0,
+    *,
+    fit: Fit | None = None,
+    gain: float | None = None,
+    axis: str = "x",
+) -> Candidate:
+    """A candidate with this difference of BIC; gain: of the log squared error, alone."""
+    effect = CATALOGUE[effect] if isinstance(effect, str) else effect
+    proof = Evidence(bic / 100.0 if gain is None else gain, 0, 100.0)
+    if fit is None:
+        fit = built_fit(after, axis=axis_of().with_effect(Fitted.at_start(effect)))
+    return Candidate(effect, axis, fit, proof, Gain(before, after, t))
+
+
+def step(effect: str = "cogging", tied: tuple[str, ...] = (), **changes: object) -> Step:
+    """A step with a well supported candidate."""
+    keys = ("dropped", "beside", "rivals")
+    told = {k: changes.pop(k) for k in keys if k in changes}
+    return Step(built(effect, **changes), tied, **told)  # type: ignore[arg-type]
+
+
+def stage(fit: Fit, *steps: Step) -> Stage:
+    return Stage(tuple(steps), fit)
+
+
+def study_stub(holdout: Sequence[object] = (), fit: Sequence[object] = ()) -> SimpleNamespace:
+    """What the rules ask of a study, with no logs in it."""
+    return SimpleNamespace(axis="x", holdout=tuple(holdout), fit=tuple(fit), shift=0.0)
+
+
+def built_motion(name: str = "run", seconds: float = 3.0, seed: int = 1, slow: float = 1.0):
+    """A smooth motion of 5.3 kg against a dry friction, with white noise on the command."""
+    rng = np.random.default_rng(seed)
+    t = PERIOD * np.arange(round(seconds / PERIOD))
+    w1, w2 = 2.0 * np.pi * 0.9 / slow, 2.0 * np.pi * 2.3 / slow
+    x = 0.04 * np.sin(w1 * t) + 0.011 * np.cos(w2 * t + 0.3)
+    v = 0.04 * w1 * np.cos(w1 * t) - 0.011 * w2 * np.sin(w2 * t + 0.3)
+    a = -0.04 * w1**2 * np.sin(w1 * t) - 0.011 * w2**2 * np.cos(w2 * t + 0.3)
+    u = 5.3 * a + 0.31 * np.sign(v) + 0.53 * v + 0.02 * rng.standard_normal(len(t))
+    others = np.stack([0.3 * np.roll(x, 700), 0.3 * np.roll(v, 700), 0.3 * np.roll(a, 700)])
+    return Motion(
+        name=name, axis="x", signals=np.stack([x, v, u]), others=others, period=PERIOD, start=0.0,
+        sample_period=PERIOD, position_noise=3e-9, raw=np.stack([v, u]),
+    )  # fmt: skip
+
+
+def built_study(*names: str, held: Sequence[str] = (), window: float = 0.04) -> Study:
+    """A study of built motions, of a length and seed of their own each."""
+
+    def logs(which: Sequence[str], first: int) -> tuple[Windowed, ...]:
+        return tuple(
+            Windowed.of(built_motion(n, 2.0 + 0.5 * i, seed=first + i, slow=1.0 + 0.2 * i), window)
+            for i, n in enumerate(which)
+        )
+
+    seen = Excitation(-0.05, 0.05, 0.4, 0.3, 3.0, PERIOD)
+    return Study("x", logs(names or ("run",), 1), logs(held, 11), seen)

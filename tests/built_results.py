@@ -1,0 +1,243 @@
+"""One small result of every kind, all of whose numbers are different."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_study, fitted
+
+from identify.compare import AxisComparison, MisfitMap, Region
+from identify.contest import Trial
+from identify.coverage import Gap
+from identify.diagnose import AxisDiagnosis, Step, Verdict
+from identify.fit import Outcome
+from identify.given import Change, Refit
+from identify.plan import Plan
+from identify.repeats import Repeat
+from identify.structure import Structure
+from identify.uncertainty import Estimate
+from identify.whiteness import Correlation, Loop, ResidualTests
+from identify.workflow import Addition, Comparison, Diagnosis, FitResult
+from twin.effects import Catalogue
+from twin.experiment_kinds import Passes, Tracking
+from twin.model import HistoryStep, StageModel
+
+STUDY = replace(built_study("run 1", "run 2", held=("held 1",)), shift=0.000217)
+RNG = np.random.default_rng(9)
+
+
+def estimates(offset: float) -> tuple[Estimate, ...]:
+    """Free with an interval, free without one, and held."""
+    o = offset
+    return (
+        Estimate("mass", 5.31 + o, "kg", 5.23 + o, 5.47 + o, True),
+        Estimate("cogging.p", 0.0241 + o, "m", None, None, True, "no interval: not shown"),
+        Estimate("coulomb_viscous.Fs", 0.337 + o, "N", None, None, False),
+    )
+
+
+def refit_of(offset: float) -> Refit:
+    first = Change("mass", 15.1 + offset, 15.7 + offset, "kg", 0.572 + offset, ("payload_mass",))
+    second = Change("cogging.a1", 0.113 + offset, 0.127 + offset, "N", 0.219 + offset)
+    return Refit(0.913 + offset, 0.127 + 2 * offset, (first, second))
+
+
+def candidate(name: str, o: float, *, bic: float = 510.0, t: float = 9.1, **values: float):
+    fit = built_fit(1.19 + o, 1.03 + o, axis_of().with_effect(fitted(name, **values)))
+    return built(name, bic + 100 * o, t + o, 7.13 + o, 2.17 + o, fit=fit)
+
+
+BEST = candidate("cogging", 0.0, p=0.0261, a1=0.127, b1=0.0353)
+RIVAL = candidate("quadratic_drag", 0.21, bic=402.0)
+WEAK = candidate("constant_force", 0.33, bic=33.0, t=1.0, F0=0.0717)
+LATER = candidate("lugre", 0.44, bic=205.0)
+
+CHOSEN = Passes("x", 0.0831, 0.0127, 7)
+TRIALS = (
+    Trial(CHOSEN, 8.3, 0.0412, 0.0113, 57.3, STUDY.fit[0], np.array([0.3, 0.1])),
+    Trial(Tracking(9.7), 9.9, 0.0287, 0.0107, 31.9, STUDY.fit[1], np.array([0.2, 0.1])),
+)
+
+
+def plan_of(*between: str, **changes: object) -> Plan:
+    plan = Plan(
+        axis="x", between=between, ranking=TRIALS, gap=Gap("speed", "m/s", 0.0137, 0.0591, 0.0117),
+        favoured=None, excited_by={between[0]: "slow passes"}, supposed=False,
+    )  # fmt: skip
+    return replace(plan, **changes)
+
+
+def diagnosis_of(verdict: Verdict = Verdict.AMBIGUOUS, **changes: object) -> AxisDiagnosis:
+    steps = (
+        Step(BEST, ("quadratic_drag",)),
+        Step(LATER, (), dropped=("wear",), beside="cogging"),
+    )
+    base = built_fit(8.37, 2.11, PLAIN)
+    final = built_fit(3.19, 2.03, LATER.fit.axis)
+    found = AxisDiagnosis(STUDY, base, (BEST, RIVAL, WEAK), steps, final, verdict, None, **{})
+    found = replace(found, **changes)
+    found.__dict__["repeat"] = None
+    return found
+
+
+STRUCTURE = Structure(0.631, "other_axis_position", 0.0273, "m", {"time": 0.117, "position": 0.231})
+REPEAT = Repeat(0.00253, {"run 1": 1.07, "run 2": 0.93}, {"run 1": 0.31, "run 2": 2.13})
+
+
+def map_of(coordinate: str, unit: str, offset: float) -> MisfitMap:
+    edges = np.array([0.01, 0.03, 0.06, 0.1]) + offset
+    return MisfitMap(
+        coordinate, unit, 0.5 * (edges[1:] + edges[:-1]) + 0.001, edges[:-1], edges[1:],
+        np.array([0.11, -0.12, 0.13]) + offset, np.array([0.71, 0.52, 0.33]) + offset,
+        np.array([0.61, 0.27, 0.12]) + offset, np.array([0.21, 0.34, 0.0]) + offset / 10,
+        np.array([0.041, 0.052, 0.063]) + offset,
+    )  # fmt: skip
+
+
+def correlation(signal: str, o: float) -> Correlation:
+    lag = 0.02 * np.arange(-2, 3)
+    value = np.array([0.05, -0.31, 0.9, 0.07, 0.02]) + o
+    tested = np.array([False, False, False, True, True])
+    return Correlation(signal, lag, value, tested, 0.061 + o, 0.113 + o)
+
+
+SIGNALS = ("residual", "command", "speed")
+
+
+def whiteness_of(o: float = 0.0) -> ResidualTests:
+    edges = np.linspace(-0.5, 0.5, 6) + o
+    density = np.array([0.1, 0.9, 2.3, 1.1, 0.6]) + o
+    made = tuple(
+        correlation(n, o + i / 1e3) for i, n in enumerate(("residual", "command", "speed"))
+    )
+    return ResidualTests(Loop.OPEN, 387, 0.0737 + o, edges, density, 0.883 - o, made)
+
+
+def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:
+    residual = np.concatenate([RNG.standard_normal(len(w)) for w in STUDY.fit])
+    position = np.linspace(-0.031, 0.047, len(residual))
+    return AxisComparison(
+        axis=axis,
+        force_error={"run 1": 0.0517 + o, "run 2": 0.0731 + o},
+        floor=0.0113 + o,
+        position_error={"run 1": 3.17e-6 + o, "run 2": 4.29e-6 + o},
+        position_floor=2.13e-9 + o,
+        residual=residual * (0.0647 + o) / np.sqrt(np.mean(residual**2)),
+        logs=STUDY.fit,
+        coordinates={
+            "position": position, "velocity": 3.0 * position[::-1],
+            "roller_phase": np.mod(position, 0.034),
+        },
+        maps=[map_of("position", "m", o), map_of("velocity", "m/s", o + 0.011)],
+        worst=[
+            Region("position", "m", 0.0123 + o, 0.0257 + o, 0.121 + o, 14.3 + o, 0.37 + o),
+            Region("direction", "1", -1.5, 0.0, 0.087 + o, 7.7 + o, 0.53 + o),
+        ],
+        tests=whiteness_of(o),
+    )  # fmt: skip
+
+
+MODEL = StageModel("the stage", {"x": PLAIN, "y": replace(PLAIN, mass=7.9)})
+
+
+def compared() -> Comparison:
+    return Comparison(MODEL, {"x": comparison_of(), "y": comparison_of("y", 0.0019)})
+
+
+def diagnosed(x: AxisDiagnosis | None = None) -> Diagnosis:
+    """x as given, and y where nothing is missing."""
+    other = replace(STUDY, axis="y", shift=0.0)
+    y = AxisDiagnosis(
+        other, built_fit(1.07, 0.97), (replace(WEAK, axis="y"),), (), built_fit(1.07, 0.97),
+        Verdict.NOTHING_MISSING, None,
+    )  # fmt: skip
+    return Diagnosis(
+        MODEL, {"y": y, "x": x or diagnosis_of()}, compared(),
+        {"x": plan_of("cogging", "quadratic_drag")}, {"x": refit_of(0.0), "y": refit_of(0.01)},
+    )  # fmt: skip
+
+
+def fit_result() -> FitResult:
+    x = built_fit(0.0513, 0.0127, outcome=Outcome.AT_BOUND)
+    y = built_fit(0.0317, 0.0131)
+    studies = {"x": STUDY, "y": replace(STUDY, axis="y", shift=0.0)}
+    result = FitResult(
+        MODEL, studies, {"x": x, "y": y}, {"x": estimates(0.0), "y": estimates(0.02)},
+        {"x": 0.0611, "y": None}, MODEL, Catalogue([]),
+    )  # fmt: skip
+    result.__dict__["refits"] = {"x": refit_of(0.0), "y": Refit(0.0319, 0.0317, ())}
+    return result
+
+
+STEPS = (
+    HistoryStep("add", "cogging", "x", 7.31, 4.57, 7.83, 4.91, notes=("mass moved",)),
+    HistoryStep("add", "lugre", "x", 4.53, 2.29, 4.97, 2.71),
+    HistoryStep("replace", "wear", "y", 3.41, 3.13, None, None),
+)
+
+
+def addition(kept: bool = True) -> Addition:
+    return Addition(
+        MODEL, STEPS[0], BEST, kept, (3.71e-6, 1.93e-6), 1.97e-6, ("a note of what moved",)
+    )
+
+
+class Page(HTMLParser):
+    """A page's sections: headings, tables as rows of cells, and facts by name."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.sections: dict[str, list[list[list[str]]]] = {}
+        self.texts: dict[str, str] = {}
+        self.pairs: list[tuple[str, str]] = []
+        self.tones: dict[str, list[str]] = {}
+        self._anchor, self._tag, self._cell = "", "", None
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        if tag == "section":
+            self._anchor = given["id"]
+            self.sections[self._anchor], self.texts[self._anchor] = [], ""
+            self.tones[self._anchor] = []
+        elif tag == "table":
+            self.sections[self._anchor].append([])
+        elif tag == "tr":
+            self.sections[self._anchor][-1].append([])
+            self.tones[self._anchor].append(given.get("class", "head"))
+        elif tag in ("th", "td"):
+            self.sections[self._anchor][-1][-1].append("")
+            self._cell = self.sections[self._anchor][-1][-1]
+        elif tag in ("dt", "dd"):
+            self.pairs.append((tag, ""))
+        self._tag = tag
+
+    def handle_endtag(self, tag):
+        if tag in ("th", "td"):
+            self._cell = None
+        self._tag = ""
+
+    def handle_data(self, data):
+        if self._cell is not None:
+            self._cell[-1] += data
+        if self._anchor:
+            self.texts[self._anchor] += data
+        if self._tag in ("dt", "dd"):
+            self.pairs[-1] = (self._tag, self.pairs[-1][1] + data)
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """Named facts, the last of each name."""
+        names = [text for tag, text in self.pairs if tag == "dt"]
+        values = [text for tag, text in self.pairs if tag == "dd"]
+        return dict(zip(names, values, strict=True))
+
+    def table(self, anchor: str, index: int = 0) -> dict[str, dict[str, str]]:
+        """A table as row label -> column title -> cell."""
+        (_, *titles), *rows = self.sections[anchor][index]
+        return {row[0]: dict(zip(titles, row[1:], strict=True)) for row in rows}
+
+
+__all__ = ["CATALOGUE", "Page"]

@@ -1,0 +1,62 @@
+"""The command line with its input stubbed: what a command was called with, and what it said."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+
+from identify.cli import loop, machine, main
+from identify.cli import plan as plan_command
+from twin.model import StageModel
+
+
+class Stub:
+    """Records how it was called, and answers what it was given."""
+
+    def __init__(self, answer: object = None) -> None:
+        self.answer, self.calls = answer, []
+
+    def __call__(self, *given: object, **named: object) -> object:
+        named.pop("progress", None)
+        self.calls.append((given, named))
+        return self.answer
+
+    @property
+    def only(self) -> tuple:
+        (call,) = self.calls
+        return call
+
+
+def stubbed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, folder: Path):
+    """A function that runs `twin`: exit code, standard output and standard error."""
+    monkeypatch.chdir(folder)
+    for module in (loop, machine, plan_command):
+        for name, answer in (
+            ("stage_model", lambda name, catalogue: StageModel(f"{name} {catalogue['all']}", {})),
+            ("catalogue_with", lambda files: {"all": [str(f) for f in files or ()], "wear": "W"}),
+            ("read_logs", lambda paths: {str(p): f"log {p}" for p in paths or ()}),
+            ("checked", lambda logs: [f"warned of {n}" for n in logs]),
+            ("bars_on_stderr", lambda: nullcontext(Stub())),
+        ):
+            if hasattr(module, name):
+                monkeypatch.setattr(module, name, answer)
+    monkeypatch.setattr("identify.cli.shared.read_logs", loop.read_logs)
+    monkeypatch.setattr("identify.cli.shared.bars_on_stderr", lambda: nullcontext(Stub()))
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["twin", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return ended.value.code, out, err
+
+    return run
+
+
+def stub(monkeypatch, where: object, name: str, answer: object = None) -> Stub:
+    made = Stub(answer)
+    monkeypatch.setattr(where, name, made)
+    return made

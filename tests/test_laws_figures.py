@@ -1,0 +1,110 @@
+"""The self-test's picture and the benchmark's figures: targets, files, and no NaN in JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.figures import Figure, Target, write_results
+from identify.selftest.picture import _shares, draw
+from identify.selftest.trial import Case, Outcome
+from twin.errors import InputError
+
+EVERY = [
+    Outcome(Case(("a",), 5.0, 1), "MISSING_EFFECT", (("a",),)),
+    Outcome(Case(("a",), 5.0, 2), "UNEXPLAINED"),
+    Outcome(Case((), 0.0, 1), "NOTHING_MISSING"),
+]
+
+
+# --- picture and figures --------------------------------------------------------------------
+
+
+def test_the_picture_has_the_share_of_each_answer(tmp_path):
+    table = {"a": {"b": 0.25, "a": 0.75}, "nothing": {"nothing": 1.0}}
+    np.testing.assert_array_equal(
+        _shares(table, ["a", "nothing"], ["a", "b", "nothing"]), [[0.75, 0.25, 0], [0, 0, 1]]
+    )
+    draw(EVERY, tmp_path / "m.svg")
+    assert "<svg" in (tmp_path / "m.svg").read_text(encoding="utf-8")
+    with pytest.raises(InputError, match="ends in"):
+        draw(EVERY, tmp_path / "m.txt")
+
+
+def test_the_share_of_an_answer_stands_in_its_row_and_column(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure as Drawing
+
+    drawn = []
+    monkeypatch.setattr(Drawing, "savefig", lambda self, out, format: drawn.append((self, format)))
+    other = Outcome(Case(("b",), 5.0, 3), "MISSING_EFFECT", (("c",),))
+    draw([*EVERY, *EVERY[:2], other, EVERY[0]], tmp_path / "m.pdf")
+    ((figure, kind),) = drawn
+    (axes,) = figure.axes
+    rows = [t.get_text() for t in axes.get_yticklabels()]
+    columns = [t.get_text() for t in axes.get_xticklabels()]
+    assert (rows, kind) == (["a", "b", "nothing"], "pdf")
+    assert columns == ["a", "b", "c", "ambiguous with it", "unexplained", "nothing"]
+    found = {(rows[y], columns[x]): t.get_text() for t in axes.texts for x, y in [t.get_position()]}
+    assert found == {
+        ("a", "a"): "60", ("a", "unexplained"): "40", ("b", "c"): "100",
+        ("nothing", "nothing"): "100",
+    }  # fmt: skip
+    shares = axes.get_images()[0].get_array()
+    assert (shares[0, 0], shares[0, 4], shares[1, 2], shares[2, 5]) == (0.6, 0.4, 1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("target", "met", "missed", "words"),
+    [
+        (Target(low=2.0), (2.0, 9.0), (1.9,), "at least 2"),
+        (Target(high=3.0), (3.0, -1.0), (3.1,), "at most 3"),
+        (Target(2.0, 3.0), (2.0, 3.0), (1.9, 3.1), "at least 2 and at most 3"),
+        (Target(), (-1e300, 1e300), (math.nan,), ""),
+    ],
+)
+def test_a_target_is_an_interval_with_its_ends(target, met, missed, words):
+    assert all(Figure("w", v, target=target).passed is True for v in met)
+    assert all(Figure("w", v, target=target).passed is False for v in missed)
+    assert str(target) == words
+    assert [Figure("w", v, target=target).verdict for v in (met[0], missed[0])] == ["pass", "FAIL"]
+
+
+def test_figures_without_value_or_target_have_no_verdict():
+    assert (Figure("w", None, target=Target()).passed, Figure("w", 1.0).passed) == (None, None)
+    assert (Figure("w", None).verdict, Figure("w", 1.0).verdict) == ("skipped", "")
+
+
+def strict(path):
+    def refuse(constant):
+        raise AssertionError(f"{constant} is no JSON")
+
+    return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+
+
+def test_results_are_kept_for_what_was_not_run(tmp_path):
+    old = [Figure("speed", 12.345, "ns", Target(high=20.0), "a note"), Figure("rate", None)]
+    write_results({"first": old, "second": [Figure("x", 1.0)]}, tmp_path)
+    write_results({"second": [Figure("y", np.float64(3.0), "s", Target(low=4.0))]}, tmp_path)
+    found = strict(tmp_path / "RESULTS.json")["benchmarks"]
+    assert found["first"] == [
+        {"figure": "speed", "value": 12.345, "unit": "ns", "target": "at most 20", "passed": True,
+         "note": "a note"},
+        {"figure": "rate", "value": None, "unit": "1", "target": None, "passed": None, "note": ""},
+    ]  # fmt: skip
+    assert [f["figure"] for f in found["second"]] == ["y"]
+    text = (tmp_path / "RESULTS.md").read_text(encoding="utf-8")
+    rows = [[c.strip() for c in line.split("|")[1:-1]] for line in text.splitlines() if "|" in line]
+    assert ["speed", "12.3", "ns", "at most 20", "pass", "a note"] in rows
+    assert ["rate", "", "1", "", "", ""] in rows
+    assert ["y", "3", "s", "at least 4", "FAIL", ""] in rows
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["RESULTS.json", "RESULTS.md"]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_figure_that_is_no_number_is_null_in_the_file(tmp_path, value):
+    write_results({"first": [Figure("speed", value, target=Target(low=0.0))]}, tmp_path)
+    (row,) = strict(tmp_path / "RESULTS.json")["benchmarks"]["first"]
+    assert row["value"] is None
