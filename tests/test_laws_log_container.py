@@ -22,7 +22,6 @@ from mcap.records import (
     ChunkIndex,
     DataEnd,
     Footer,
-    Header,
     Message,
     MessageIndex,
     Metadata,
@@ -129,8 +128,8 @@ def test_the_checksums_are_those_of_the_bytes(data):
         assert chunk.uncompressed_crc == zlib.crc32(payload(chunk)) != 0
         assert chunk.uncompressed_size == len(payload(chunk))
         assert chunk.compression == "zstd"
-    for piece in of(data, ATTACHMENT):
-        assert int.from_bytes(piece.body[-4:], "little") == zlib.crc32(piece.body[:-4])
+    for body in (p.body for p in of(data, ATTACHMENT)):
+        assert int.from_bytes(body[-4:], "little") == zlib.crc32(body[:-4])
 
 
 def test_the_sections_follow_each_other_as_the_format_orders(data):
@@ -141,7 +140,6 @@ def test_the_sections_follow_each_other_as_the_format_orders(data):
         *[SCHEMA] * 3, *[CHANNEL] * 4, STATISTICS, *[CHUNK_INDEX] * count,
         *[ATTACHMENT_INDEX] * 3, METADATA_INDEX, *[SUMMARY_OFFSET] * 6, FOOTER,
     ]  # fmt: skip
-    assert parsed(Header, of(data, HEADER)[0]).profile == ""
 
 
 def test_the_statistics_are_a_recount(data):

@@ -6,54 +6,33 @@ sample that is kept must be the one that was written.
 """
 
 import re
-from dataclasses import dataclass
 
-import numpy as np
 import pytest
+from damage_cases import (
+    CHUNKS,
+    COUNT,
+    LOG,
+    PER_CHUNK,
+    RATE,
+    ROW,
+    Case,
+    account,
+    recovered,
+    runs_without,
+    samples_of,
+    spoilt,
+)
 from mcap.records import Attachment
 from mcap_bytes import (
     ATTACHMENT,
     CHUNK,
-    MESSAGE_INDEX,
-    Piece,
+    METADATA,
     parsed,
     records,
 )
 
 from twin.errors import InputError
-from twin.log import AxisLog, Log, Recovery, encode, read_log, recover_log, write_log
-
-RATE, COUNT, PER_CHUNK = 500.0, 33, 7
-CHUNKS = -(-COUNT // PER_CHUNK)
-ROW = (31 + 4 * 9) + (31 + 2 * 9) + (31 + 9)
-NAMES = ("position", "velocity", "current", "force")
-LOG = Log(
-    RATE,
-    {
-        "x": AxisLog({n: 1e3 * i + np.arange(COUNT) for i, n in enumerate(NAMES, 1)}),
-        "y": AxisLog(
-            {n: 1e5 * i + np.arange(COUNT) for i, n in enumerate(NAMES[:1] + NAMES[3:], 1)}
-        ),
-    },
-    {"source": "a test"},
-    {"x": {"z": 1e7 + np.arange(COUNT)}},
-    {"model.toml": b"mass = 1.0\n"},
-)
-
-
-@dataclass(frozen=True)
-class Case:
-    data: bytes
-    records: list[Piece]
-
-    @property
-    def chunks(self) -> list[Piece]:
-        return [r for r in self.records if r.opcode == CHUNK]
-
-    def behind(self, chunk: Piece) -> int:
-        """End of the message indexes behind a chunk."""
-        following = self.records[self.records.index(chunk) + 1 :]
-        return next(r.start for r in following if r.opcode != MESSAGE_INDEX)
+from twin.log import encode, recover_log, write_log
 
 
 @pytest.fixture(scope="module")
@@ -66,92 +45,6 @@ def intact(tmp_path_factory) -> Case:
     case = Case(data, records(data))
     assert len(case.chunks) == CHUNKS
     return case
-
-
-def samples_of(chunk: int) -> set[int]:
-    return set(range(chunk * PER_CHUNK, min((chunk + 1) * PER_CHUNK, COUNT)))
-
-
-def span(count: str, seconds: str) -> set[int]:
-    first = round(float(seconds) * RATE)
-    return set(range(first, first + int(count)))
-
-
-@dataclass(frozen=True)
-class Account:
-    """Samples by what became of them, as the sentences of a recovery state it."""
-
-    kept: set[int]
-    left_out: list[set[int]]
-    damaged: set[int]
-
-    @property
-    def all(self) -> set[int]:
-        return self.kept.union(self.damaged, *self.left_out)
-
-
-def account(case: Case, recovery: Recovery) -> Account:
-    """Read the sentences; a chunk is damaged where it or bytes of it are named."""
-    left_out, damaged = [], set()
-    for sentence in recovery.lost:
-        if found := re.match(r"(\d+) intact samples from (\S+) s are left out", sentence):
-            left_out.append(span(*found.groups()))
-        for number, chunk in enumerate(case.chunks):
-            if re.search(rf"[Cc]hunk (record )?at byte {chunk.start}: ", sentence):
-                damaged |= samples_of(number)
-            if found := re.match(r"bytes (\d+) to (\d+): ", sentence):
-                first, last = (int(g) for g in found.groups())
-                if first < chunk.end and last >= chunk.start:
-                    damaged |= samples_of(number)
-        if found := re.match(r"the chunk of samples from (\S+) s to (\S+) s that", sentence):
-            first, last = (round(float(g) * RATE) for g in found.groups())
-            damaged |= set(range(first, last + 1))
-    whole = recovery.kept == f"all {COUNT} samples"
-    match = re.fullmatch(r"(\d+) samples from (\S+) s", recovery.kept)
-    assert whole or match, recovery.kept
-    kept = set(range(COUNT)) if whole else span(*match.groups())
-    return Account(kept, left_out, damaged)
-
-
-def recovered(path, data: bytes) -> tuple[Log, Recovery]:
-    """The file is refused by strict reading; what is recovered is what was written."""
-    path.write_bytes(data)
-    with pytest.raises(InputError) as caught:
-        read_log(path)
-    log, recovery = recover_log(path)
-    assert recovery.lost
-    assert all("\n" not in loss for loss in recovery.lost)
-    reason = str(caught.value).removeprefix(f"{path}: ")
-    assert reason.startswith(recovery.lost[0])
-    match = re.fullmatch(r"(\d+) samples from (\S+) s", recovery.kept)
-    assert match
-    assert log.metadata["recovered"] == recovery.kept
-    where = sorted(span(*match.groups()))
-    assert len(log) == len(where)
-    for name, axis in LOG.axes.items():
-        for field, column in axis.columns.items():
-            np.testing.assert_array_equal(log.axes[name].columns[field], column[where])
-    np.testing.assert_array_equal(log.truth["x"]["z"], LOG.truth["x"]["z"][where])
-    return log, recovery
-
-
-def spoilt(case: Case, *chunks: int) -> bytes:
-    """Flip a bit of the compressed samples of some chunks."""
-    data = bytearray(case.data)
-    for number in chunks:
-        data[case.chunks[number].end - 20] ^= 0x40
-    return bytes(data)
-
-
-def runs_without(*missing: int) -> list[set[int]]:
-    """Samples of the stretches of chunks between those missing."""
-    runs: list[set[int]] = [set()]
-    for number in range(CHUNKS):
-        if number in missing:
-            runs.append(set())
-        else:
-            runs[-1] |= samples_of(number)
-    return [r for r in runs if r]
 
 
 PAIRS = [(i, j) for i in range(CHUNKS) for j in range(i, CHUNKS)]
@@ -249,6 +142,31 @@ def test_a_bit_flipped_in_any_kind_of_record_is_told_and_costs_its_chunk_at_most
                 assert len(got.kept) == COUNT, (record.opcode, at, recovery.lost)
 
 
+@pytest.mark.parametrize("chunks", [(0, 1), (0, 3), (1, 3), (2, 4)], ids=str)
+def test_two_lengths_that_are_damaged_are_two_places(tmp_path, intact, chunks):
+    flipped = bytearray(intact.data)
+    places = [intact.chunks[c].start + 4 for c in chunks]
+    for place in places:
+        flipped[place] ^= 0x10
+    _, recovery = recovered(tmp_path / "a.mcap", bytes(flipped))
+    ranges = re.findall(r"bytes (\d+) to (\d+): ", " ".join(recovery.lost))
+    for place in places:
+        assert any(int(a) <= place <= int(b) for a, b in ranges), recovery.lost
+
+
+def test_a_rate_in_the_metadata_that_contradicts_the_chunks_gives_way(tmp_path, intact):
+    """A bit makes 500.0 Hz of the metadata record, which has no checksum of its own, 700.0 Hz."""
+    metadata = next(r for r in intact.records if r.opcode == METADATA)
+    place = intact.data.index(b"500.0", metadata.start)
+    assert place < metadata.end
+    flipped = bytearray(intact.data)
+    flipped[place] ^= 2
+    log, recovery = recovered(tmp_path / "a.mcap", bytes(flipped))
+    assert log.sample_rate == RATE
+    assert len(log) == COUNT
+    assert "wrong checksum" in recovery.lost[0]
+
+
 @pytest.mark.parametrize("position", [0, 5, 7])
 @pytest.mark.parametrize("end", ["front", "back"])
 def test_a_bit_flipped_in_the_magic_is_told(tmp_path, intact, position, end):
@@ -274,13 +192,6 @@ def test_each_extra_that_is_damaged_is_named_and_the_others_are_kept(tmp_path, i
     log, recovery = recovered(tmp_path / "a.mcap", bytes(flipped))
     assert log.attachments == LOG.attachments
     assert "checksum" in recovery.lost[0]
-
-
-def test_an_intact_log_is_kept_whole_and_nothing_is_said_to_be_lost(tmp_path, intact):
-    (tmp_path / "a.mcap").write_bytes(intact.data)
-    log, recovery = recover_log(tmp_path / "a.mcap")
-    assert recovery == Recovery(f"all {COUNT} samples", ())
-    assert "recovered" not in log.metadata
 
 
 def test_a_log_of_which_every_chunk_is_damaged_is_refused_and_names_each(tmp_path, intact):
