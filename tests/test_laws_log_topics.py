@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, Footer, Header, Message, Schema
+from mcap.records import Channel, Chunk, DataEnd, Footer, Header, Message, Metadata, Schema
 from mcap_bytes import MAGIC, joined, json_channel, json_message, json_schema, plain_file
 from plain_cases import HEAD, MS, SAMPLES, accepted, refused, sample
 
@@ -87,7 +87,7 @@ def test_every_field_arrives_as_itself_in_every_encoding(tmp_path):
     order = np.random.default_rng(8).permutation(FIELDS).tolist()
     values = {f: 1.0 + 10.0 * i for i, f in enumerate(order)}
     ros = "\n".join(f"float64 {f}" for f in order).encode()
-    idl = ("module a { struct S { " + " ".join(f"double {f};" for f in order) + " }; };").encode()
+    idl = ("module a { struct S {" + "".join(f"double {f};" for f in order) + " }; };").encode()
     doubles = list(values.values())
     cases = {
         "json": (json_schema(1), lambda k: json_message(1, MS * k, values).data),
@@ -97,7 +97,7 @@ def test_every_field_arrives_as_itself_in_every_encoding(tmp_path):
         ),
         "cdr ": (
             Schema(1, idl, "ros2idl", "S"),
-            lambda k: b"\0\0\0\0" + struct.pack(">7d", *doubles),
+            lambda k: b"\0\2\0\0" + struct.pack(">7d", *doubles),
         ),
     }
     for encoding, (schema, data) in cases.items():
@@ -139,6 +139,41 @@ def test_a_number_that_must_be_positive_is(tmp_path, key, text):
     assert accepted(tmp_path / "a.mcap", items).axes["x"].force_constant == 1e-300
 
 
+@pytest.mark.parametrize("missing", ["position", "force"])
+def test_a_topic_without_position_or_without_force_is_refused_and_its_fields_named(
+    tmp_path, missing
+):
+    values = {"position": 1.0, "force": 2.0, "velocity": 3.0, "note": 4.0}
+    del values[missing]
+    items = [*HEAD, *(json_message(1, MS * k, values) for k in range(3))]
+    lacking = "current or force" if missing == "force" else missing
+    there = ", ".join(values)
+    refused(
+        tmp_path / "a.mcap", items, f"/axis/x has no {lacking}; fields in its messages: {there}"
+    )
+
+
+@pytest.mark.parametrize("k", [0, 4])
+def test_a_sample_that_is_no_number_is_named_with_its_number_and_time(tmp_path, k):
+    spoilt = json_message(1, MS * k, {"position": 1.0, "force": np.nan})
+    items = [*SAMPLES[:k], spoilt, *SAMPLES[k + 1 :]]
+    message = rf"/axis/x: force is nan at {k / 1e3:g} s \(sample {k}\)"
+    refused(tmp_path / "a.mcap", [*HEAD, *items], message)
+    rows = [*HEAD, *SAMPLES[:2]]  # likewise in the second of two batches
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(container, "LOOSE_BYTES", len(joined(rows)))
+        refused(tmp_path / "a.mcap", [*HEAD, *items], message)
+
+
+def test_metadata_of_another_name_is_not_the_logs(tmp_path):
+    others = {"schema_version": "9", "sample_rate_hz": "7", "source": "other"}
+    twin = {"schema_version": "1", "sample_rate_hz": "1000", "source": "this"}
+    items = [Metadata("twin", twin), Metadata("other", others), *HEAD, *SAMPLES]
+    assert accepted(tmp_path / "a.mcap", items).metadata == twin
+    items[0] = Metadata("twin", others)
+    refused(tmp_path / "a.mcap", items, "version is '9', this program reads '1'")
+
+
 @pytest.mark.parametrize(("before", "behind"), [(0, 2), (3, 0), (3, 2)])
 def test_what_topics_have_in_common_is_kept_at_the_same_times(tmp_path, before, behind):
     """y begins some samples after x and ends some before it; both are cut to the same times."""
@@ -157,6 +192,17 @@ def test_what_topics_have_in_common_is_kept_at_the_same_times(tmp_path, before, 
         assert log.axes[name].force.tolist() == [-100.0 * channel - k for k in times]
     start = f"{before / 1e3:g}"
     assert recovery.kept == f"{len(times)} samples from {start} s"
+
+
+def test_topics_that_overlap_are_cut_at_both_ends(tmp_path):
+    """x holds samples 0 to 9, y those from 4 to 13: both keep 4 to 9."""
+    items = [*HEAD, json_channel(2, "/axis/y", schema=1)]
+    items += [sample(k, c) for k in range(14) for c in (1, 2) if 4 * (c - 1) <= k < 6 + 4 * c]
+    refused(tmp_path / "a.mcap", items, "/axis/x has 10 samples from 0 s to 0.009 s")
+    log, recovery = recover_log(tmp_path / "a.mcap")
+    assert log.axes["x"].position.tolist() == [10.0 + k for k in range(4, 10)]
+    assert log.axes["y"].position.tolist() == [20.0 + k for k in range(4, 10)]
+    assert recovery.kept == "6 samples from 0.004 s"
 
 
 def test_two_gaps_without_a_summary_are_two_losses(tmp_path):
