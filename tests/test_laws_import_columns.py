@@ -17,7 +17,7 @@ from scipy.io import savemat
 from twin.errors import InputError
 from twin.log.importers import import_log
 from twin.log.importers.importer import FORMATS
-from twin.log.importers.table import numbers, split_columns
+from twin.log.importers.table import numbers, require_columns, split_columns
 from twin.log.log import FIELDS
 
 RATE, COUNT = 250.0, 24
@@ -179,8 +179,9 @@ force = {{column = "u", unit = "N"}}
 # Tables
 
 
-@pytest.mark.parametrize("shape", [(2, 5), (5, 2), (1, 5), (5, 1)])
+@pytest.mark.parametrize("shape", [(2, 5), (5, 2), (1, 5), (5, 1), (2, 2)])
 def test_a_matrix_is_split_along_its_shorter_side(shape):
+    """A square one into its columns."""
     matrix = 10.0 * np.arange(shape[0])[:, None] + np.arange(shape[1])
     found = split_columns("m", matrix)
     long = matrix if shape[0] < shape[1] else matrix.T
@@ -205,3 +206,48 @@ def test_dates_are_seconds_since_the_first_and_text_names_its_row():
 def test_every_ending_belongs_to_one_format():
     endings = [e for f in FORMATS.values() for e in f.endings]
     assert len(set(endings)) == len(endings)
+
+
+@pytest.mark.parametrize(("part", "right"), [(0.9e-6, True), (1.1e-6, False), (-1.1e-6, False)])
+def test_the_rate_of_a_waveform_may_differ_from_the_maps_by_a_millionth(tmp_path, part, right):
+    nptdms = pytest.importorskip("nptdms")
+    rate, period = 50.0, {"wf_increment": 1.0 / (50.0 * (1.0 + part))}
+    columns = {"a": np.arange(4.0), "b": 7.0 + np.arange(4.0)}
+    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+        writer.write_segment([nptdms.ChannelObject("r", n, c, period) for n, c in columns.items()])
+    text = f"""
+sample_rate = {rate}
+[axes.x]
+position = {{column = "r/a", unit = "m"}}
+force = {{column = "r/b", unit = "N"}}
+"""
+    if right:
+        assert import_log(tmp_path / "log.tdms", mapping(tmp_path, text)).sample_rate == rate
+    else:
+        with pytest.raises(InputError, match="the map says 50 Hz"):
+            import_log(tmp_path / "log.tdms", mapping(tmp_path, text))
+
+
+def test_channels_of_different_rates_are_refused(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+        for name, period in (("a", 0.01), ("b", 0.02)):
+            properties = {"wf_increment": period}
+            writer.write_segment([nptdms.ChannelObject("r", name, np.arange(4.0), properties)])
+    text = """
+[axes.x]
+position = {column = "r/a", unit = "m"}
+force = {column = "r/b", unit = "N"}
+"""
+    with pytest.raises(InputError, match=r"'r/a' has a sample every 0.01 s, 'r/b' every 0.02 s"):
+        import_log(tmp_path / "log.tdms", mapping(tmp_path, text))
+
+
+@pytest.mark.parametrize("count", [40, 41, 43])
+def test_a_message_lists_forty_columns_and_counts_the_others(count):
+    there = [f"column{k}" for k in range(count)]
+    with pytest.raises(InputError) as caught:
+        require_columns(["zzz"], there)
+    assert str(caught.value).count("column") == 2 + min(count, 40)
+    tail = str(caught.value).rpartition("column39")[2]
+    assert tail == ("" if count == 40 else f" and {count - 40} more")
