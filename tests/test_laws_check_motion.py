@@ -19,6 +19,8 @@ def axis_of(log: Log) -> Axis:
     return Axis("x", log.sample_rate, log.axes["x"])
 
 
+T = np.arange(6000) / 1000.0
+
 # Outliers
 
 
@@ -32,6 +34,30 @@ def test_a_jump_is_possible_up_to_what_acceleration_and_noise_explain():
     assert axis.position_step == steps[steps > 0.0].min()
     assert axis.position_noise >= axis.position_step / 12**0.5
     assert axis.duration == 4.0
+
+
+def test_noise_makes_a_larger_jump_possible_by_ten_times_its_own_second_difference():
+    """A second difference 1, -2, 1 of white noise is sqrt(6) times the noise."""
+    white = 1e-3 * np.random.default_rng(4).standard_normal(4000)
+
+    def shake(columns):
+        columns["position"] += white
+
+    quiet, axis = axis_of(drive()), axis_of(drive(change=shake))
+    more = axis.possible_jump - 4.0 * np.quantile(np.abs(axis.acceleration), 0.99) / 1e6
+    assert more == pytest.approx(10.0 * np.std(np.diff(white, 2)), rel=0.06)
+    assert not axis.jumps.any()
+    assert axis.possible_jump > 10.0 * quiet.possible_jump
+
+
+@pytest.mark.parametrize(("speed", "moves"), [(3.3, False), (4.2, True)])
+def test_an_axis_moves_at_five_times_the_noise_of_its_velocity(speed, moves):
+    """Nine tenths of normal noise stay below 1.28 of its rms, which adds to the speed."""
+    white = 1e-6 * np.random.default_rng(6).standard_normal(6000)
+    noise = axis_of(drive()).smoother.velocity_noise(1e-6)
+    position = speed * noise * T + white
+    log = Log(1000.0, {"x": AxisLog({"position": position, "force": command(T)})})
+    assert axis_of(log).moves is moves
 
 
 @pytest.mark.parametrize("at", [700, 2500])
@@ -128,9 +154,6 @@ def one_axis(velocity: np.ndarray, rate: float = 1000.0, units=None) -> Log:
     force = 2.0 * np.gradient(velocity) * rate + 3.0 * np.tanh(velocity / 1e-3)
     axis = AxisLog({"position": position, "force": force}, **({"units": units} if units else {}))
     return Log(rate, {"x": axis})
-
-
-T = np.arange(6000) / 1000.0
 
 
 @pytest.mark.parametrize(("share", "told"), [(0.015, True), (0.03, False)])

@@ -82,6 +82,21 @@ def test_signals_that_are_not_alike_are_not_compared():
         assert bool([f for f in findings(log, Fault.UNIT) if "force constant" in f.what]) == told
 
 
+def test_signals_of_an_axis_that_stands_are_not_compared():
+    """Neither by size nor by sign; it is called idle instead."""
+
+    def stand(columns):
+        noise = np.random.default_rng(5).standard_normal(len(columns["position"]))
+        columns["position"][:] = 1e-6 * noise
+
+    for factor in (-1.0, 5.0):
+        signals = ("position", "force", "current")
+        log = drive(signals=signals, factor={"force": factor}, change=stand)
+        (found,) = check_log(log).findings
+        assert found.fault is Fault.WEAK_EXCITATION
+        assert "hardly moves" in found.what
+
+
 @pytest.mark.parametrize("name", ["position", "setpoint_position"])
 def test_a_travel_of_more_than_ten_metres_is_told_on_a_linear_axis(name):
     travel = np.ptp(drive(signals=ALL).axes["x"].columns[name])

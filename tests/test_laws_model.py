@@ -117,6 +117,13 @@ def test_a_count_of_elements_is_whole_and_from_one_to_a_thousand(count):
         Fitted.at_start(CATALOGUE[SIZED], {"elements": count})
 
 
+def test_the_most_elements_are_allowed_and_one_more_is_not(monkeypatch):
+    monkeypatch.setattr("twin.model.MOST_ELEMENTS", 3)
+    assert Fitted.at_start(CATALOGUE[SIZED], {"elements": 3}).values["elements"] == 3
+    with pytest.raises(InputError, match="from 1 to 3"):
+        Fitted.at_start(CATALOGUE[SIZED], {"elements": 4})
+
+
 @pytest.mark.parametrize("mass", [0.0, -1.0, math.nan, math.inf])
 def test_a_mass_is_positive_and_finite(mass):
     with pytest.raises(InputError, match="must be a positive number of kg"):
