@@ -131,6 +131,51 @@ def test_a_lag_longer_than_is_searched_or_drowned_in_noise_is_not_clear():
     assert not find_lag(noisy, regressors, kept, 1e-3).clear
 
 
+def wave(angle: float, noise: float):
+    """A sine that is late by an angle, with white noise that is a part of the whole."""
+    k = np.arange(6000.0)
+    rms = noise / np.sqrt(1.0 - noise**2) * 0.5**0.5
+    signal = np.sin(0.05 * k - angle) + rms * np.random.default_rng(1).standard_normal(6000)
+    return find_lag(signal, np.sin(0.05 * k)[:, None], np.ones(6000), 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("angle", "noise", "clear"),
+    [
+        # a late sine leaves the sine of its angle: three hundredths of it do not count
+        (np.arcsin(0.027), 0.005, False),
+        (np.arcsin(0.034), 0.005, True),
+        # half of the signal must be explained
+        (1.5, 0.46, True),
+        (1.5, 0.54, False),
+        # the least that is left is 0.56 or 0.64 of what is left without a lag
+        (np.arcsin(np.sqrt(((0.3 / 0.56) ** 2 - 0.09) / 0.91)), 0.3, True),
+        (np.arcsin(np.sqrt(((0.3 / 0.64) ** 2 - 0.09) / 0.91)), 0.3, False),
+    ],
+)
+def test_a_lag_is_clear_where_it_explains_much_and_much_more_than_none(angle, noise, clear):
+    found = wave(angle, noise)
+    assert found.clear is clear
+    if noise < 0.01:
+        assert found.seconds == pytest.approx(angle / 0.05 * 1e-3, abs=2e-5)
+
+
+@pytest.mark.parametrize("late", [-1.5, -0.5, 0.4, 0.5, 1.5, 2.5])
+@pytest.mark.parametrize("speed", [0.031, 0.05, 0.083])
+def test_a_sine_is_late_by_the_least_that_explains_it_though_half_a_period_does_too(late, speed):
+    """Between two samples neither of them is exact, where half a period later one may be."""
+    k = np.arange(4000.0)
+    signal = np.sin(speed * (k - late)) + 1e-3 * np.random.default_rng(2).standard_normal(4000)
+    found = find_lag(signal, np.sin(speed * k)[:, None], np.ones(4000), 1e-3)
+    assert found.seconds == pytest.approx(late * 1e-3, abs=2e-5)
+
+
+def test_a_signal_that_fits_best_at_the_longest_lag_has_none():
+    signal, regressors = signals(250.0)
+    found = find_lag(signal, regressors, np.ones(len(signal)), 1e-3)
+    assert (found.seconds, found.clear) == (0.0, False)
+
+
 def test_samples_that_are_not_kept_do_not_tell():
     signal, regressors = signals(25.0)
     spoilt, kept = regressors.copy(), np.ones(len(signal))
