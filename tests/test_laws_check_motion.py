@@ -108,6 +108,31 @@ def test_a_command_that_contradicts_the_motion_is_placed_and_sized(size, told):
         assert found[0].what.startswith("force and motion contradict each other")
 
 
+@pytest.mark.parametrize("offset", [0.0, 100.0])
+@pytest.mark.parametrize(("part", "told"), [(0.85, False), (1.2, True)])
+@pytest.mark.parametrize("kind", ["contradict", "to and fro"])
+def test_a_tenth_of_the_command_is_the_least_that_counts_whatever_its_mean(
+    monkeypatch, offset, part, told, kind
+):
+    """A push counts by its height, alternating noise by its second difference, four times it.
+
+    Without Coulomb friction, whose steps at every reversal are bends of the command too.
+    """
+    monkeypatch.setattr("check_drive.COULOMB", 0.0)
+    force = drive().axes["x"].force
+    tenth = 0.1 * np.quantile(np.abs(force - np.median(force)), 0.99)
+
+    def disturb(columns):
+        columns["force"] += offset
+        if kind == "contradict":
+            columns["force"][2000:2030] += part * tenth
+        else:
+            columns["force"][2000:2020] += part * tenth / 4.0 * (-1.0) ** np.arange(20)
+
+    found = [f for f in findings(drive(change=disturb), Fault.OUTLIERS) if kind in f.what]
+    assert len(found) == told
+
+
 @pytest.mark.parametrize(("size", "told"), [(0.05, False), (20.0, True)])
 def test_noise_on_the_command_is_told_where_it_is(size, told):
     noise = size * np.random.default_rng(2).standard_normal(30)
@@ -205,6 +230,7 @@ def test_a_position_is_too_coarse_where_its_noise_is_three_tenths_of_the_acceler
         assert stated == pytest.approx(noise, rel=0.1)
         seen = float(found[0].what.partition(" of the ")[2].split()[0])
         assert seen == pytest.approx(rms, rel=0.1)
+        assert "over 21 ms makes" in found[0].what
 
 
 @pytest.mark.parametrize(("moving", "told"), [(0.06, True), (0.16, False)])

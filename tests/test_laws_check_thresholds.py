@@ -294,5 +294,4 @@ def test_numbers_that_are_none_are_counted_and_placed(name, places):
     ],
 )
 def test_a_log_needs_a_position_and_a_command(signals, complete):
-    found = findings(drive(signals=signals), Fault.INCOMPLETE)
-    assert len(found) == (not complete)
+    assert len(findings(drive(signals=signals), Fault.INCOMPLETE)) == (not complete)
