@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from mcap.opcode import Opcode
+from mcap.records import ChunkIndex
 
 from twin.errors import InputError
 from twin.log.assemble import Extras, Run
@@ -18,6 +20,7 @@ from twin.log.topics import Topics
 
 _OPCODES = frozenset(Opcode)
 _BEFORE_COMPRESSION = RECORD_HEAD.size + 28  # bytes of a chunk record before its compression
+_CHUNK_TIMES = struct.Struct("<QQ")  # of its first and last message, ns; a chunk begins with them
 _COMPRESSIONS = (b"\x04\0\0\0zstd", b"\x03\0\0\0lz4")
 
 
@@ -61,6 +64,9 @@ class _Salvage:
         self._topics = Topics()
         self._decoder = Decoder(self._topics)
         self._best = self._run = Run(self._topics, None, {})
+        self._found: dict[int, tuple[int, int]] = {}  # place of a chunk -> its times
+        self._announced: list[ChunkIndex] = []
+        self._losses_before = 0  # how many were known when the last samples were taken
         records = self._records(data)
         while True:
             try:
@@ -70,6 +76,7 @@ class _Salvage:
             except InputError as error:  # a damaged chunk: go on with the record after it
                 self.lost.append(str(error))
         self._close()
+        self._report_absent_chunks()
 
     def log(self) -> Log:
         """The longest run; raises InputError where it is empty or not fit to be a log."""
@@ -85,6 +92,8 @@ class _Salvage:
     def _add_extra(self, record: Record) -> None:
         try:
             self._extras.add(record)
+            if record.opcode == Opcode.CHUNK_INDEX:
+                self._announced.append(record.parsed(ChunkIndex))
         except InputError as error:
             self.lost.append(str(error))
 
@@ -94,11 +103,27 @@ class _Salvage:
             try:
                 for block in blocks:
                     self._run.append(block)
-            except InputError:
+            except InputError as error:
+                unexplained = len(self.lost) == self._losses_before
                 self._close()
                 self._run = Run(self._topics, None, {})
                 for block in blocks:
                     self._run.append(block)
+                if unexplained:  # no damage was seen where the gap is
+                    self.lost.append(f"{payload.place}: {error}")
+        self._losses_before = len(self.lost)
+
+    def _report_absent_chunks(self) -> None:
+        """Chunks of the summary that were not found at all, not even damaged."""
+        times = {(i.message_start_time, i.message_end_time): i for i in self._announced}
+        for span, index in times.items():
+            instead = self._found.get(index.chunk_start_offset)
+            if span in self._found.values() or (instead is not None and instead not in times):
+                continue
+            self.lost.append(
+                f"the chunk of samples from {seconds(span[0])} to {seconds(span[1])} that the "
+                "summary announces is not there"
+            )
 
     def _close(self) -> None:
         """Keep the longer of the run at hand and the best so far, and report the other."""
@@ -127,6 +152,9 @@ class _Salvage:
         while offset < len(data) and data[offset:] != MAGIC:
             record = _record_at(data, offset)
             if record is not None:
+                if record.opcode == Opcode.CHUNK and len(record.content) >= _CHUNK_TIMES.size:
+                    first, last = _CHUNK_TIMES.unpack_from(record.content)
+                    self._found[offset] = (first, last)
                 yield record
                 previous, offset = offset, record.end
                 continue

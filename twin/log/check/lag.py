@@ -38,23 +38,27 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
     total = correlate(centred**2, weights, "valid", "fft")
     found = sum(correlate(centred, column, "valid", "fft") ** 2 for column in basis.T)
     residual = np.maximum(total - found, 0.0)
-    dips = 1 + np.flatnonzero(
-        (residual[1:-1] <= residual[:-2])
-        & (residual[1:-1] < residual[2:])
-        & (residual[1:-1] <= _AS_GOOD**2 * residual.min())
-    )
+    dips = 1 + np.flatnonzero((residual[1:-1] <= residual[:-2]) & (residual[1:-1] < residual[2:]))
     if not len(dips):
         return Lag(0.0, False)
-    best = int(dips[np.argmin(np.abs(dips - reach))])  # a periodic motion has several
-    below, at, above = residual[best - 1 : best + 2]
-    bend = below - 2.0 * at + above
-    fraction = 0.5 * (below - above) / bend if bend > 0.0 else 0.0
+    # a dip lies between two samples: the parabola through three of them has its bottom there
+    below, at, above = residual[dips - 1], residual[dips], residual[dips + 1]
+    bend = below - 2.0 * at + above  # above 0, as a dip is lower than the one behind it
+    fraction = 0.5 * (below - above) / bend
+    bottom = np.maximum(at - 0.25 * (below - above) * fraction, 0.0)
+    least = min(bottom.min(), residual.min())  # the latter where it falls to an end
+    good = (bottom <= _AS_GOOD**2 * least) | (bottom <= _WRONG**2 * total[dips])
+    if not good.any():
+        return Lag(0.0, False)
+    dips, fraction = dips[good], fraction[good]
+    nearest = int(np.argmin(np.abs(dips - reach)))  # a periodic motion has several
+    best, at = int(dips[nearest]), residual[dips[nearest]]
     clear = (
         at < _CLEAR**2 * total[best]
         and residual[reach] > _WRONG**2 * total[reach]
         and at < _BETTER**2 * residual[reach]
     )
-    return Lag(float((best - reach + fraction) * block), bool(clear))
+    return Lag(float((best - reach + fraction[nearest]) * block), bool(clear))
 
 
 def _unit_columns(matrix: Array) -> Array:

@@ -1,0 +1,88 @@
+"""A drive in closed form: its signals at any time, so that each may be recorded late or scaled."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from twin.log import LINEAR_UNITS, AxisLog, Log
+from twin.log.check import (
+    CheckReport,
+    Fault,
+    Finding,
+    check_log,
+    content,
+    excitation,
+    outliers,
+    saturation,
+    timing,
+    units,
+)
+from twin.log.check.axis import Axis
+from twin.log.log import Array
+
+MASS, DAMPING, COULOMB, BIAS = 2.5, 3.5, 1.5, 0.4  # kg, N s/m, N, N
+WAVES = ((0.031, 5.3, 0.2), (0.012, 13.7, 1.1), (0.005, 29.9, 2.3))  # m, rad/s, rad
+
+
+def motion(t: Array, derivative: int = 0) -> Array:
+    """Position of the drive in m, or its first or second derivative."""
+    return sum(a * w**derivative * np.sin(w * t + p + derivative * np.pi / 2) for a, w, p in WAVES)
+
+
+def command(t: Array) -> Array:
+    """Force in N that this motion takes."""
+    v = motion(t, 1)
+    return MASS * motion(t, 2) + DAMPING * v + COULOMB * np.tanh(v / 1e-3) + BIAS
+
+
+def drive(
+    rate: float = 1000.0,
+    seconds: float = 4.0,
+    *,
+    late: Mapping[str, float] | None = None,
+    factor: Mapping[str, float] | None = None,
+    signals: tuple[str, ...] = ("position", "force"),
+    kind: Mapping[str, str] = LINEAR_UNITS,
+    change: Callable[[dict[str, Array]], None] | None = None,
+) -> Log:
+    """A log of the drive; signals ``late`` by seconds, multiplied by a ``factor``, or changed."""
+    t = 10.0 + np.arange(round(rate * seconds)) / rate
+    of: dict[str, Callable[[Array], Array]] = {
+        "position": motion,
+        "velocity": lambda t: motion(t, 1),
+        "force": lambda t: command(t + 0.5 / rate),  # held over the sample
+        "current": lambda t: command(t + 0.5 / rate) / 7.0,
+        "setpoint_position": motion,
+        "setpoint_velocity": lambda t: motion(t, 1),
+        "setpoint_acceleration": lambda t: motion(t, 2),
+    }
+    columns = {
+        name: (factor or {}).get(name, 1.0) * of[name](t - (late or {}).get(name, 0.0))
+        for name in signals
+    }
+    if change:
+        change(columns)
+    return Log(rate, {"x": AxisLog(columns, kind, 7.0)})
+
+
+CHECKS = {
+    Fault.UNIT: units.check,
+    Fault.SIGN: units.check,
+    Fault.LAG: timing.check,
+    Fault.SATURATION: saturation.check,
+    Fault.OUTLIERS: outliers.check,
+    Fault.COARSE_POSITION: excitation.check,
+    Fault.WEAK_EXCITATION: excitation.check,
+}
+
+
+def findings(log: Log, fault: Fault) -> list[Finding]:
+    """What the check of one kind of fault finds on axis x; other checks are not run."""
+    check = CHECKS.get(fault, content.check)
+    axis = Axis("x", log.sample_rate, log.axes["x"])
+    return [f for f in check(axis) if f.fault is fault]
+
+
+def report(log: Log) -> CheckReport:
+    """All that is found."""
+    return check_log(log)

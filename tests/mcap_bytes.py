@@ -1,0 +1,88 @@
+"""MCAP taken apart and put together byte by byte, without the product's code."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from io import BytesIO
+
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.records import Channel, DataEnd, Footer, Header, McapRecord, Message, Schema
+
+MAGIC = b"\x89MCAP0\r\n"
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
+ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA = range(9, 13)
+METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(13, 16)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One record as it lies in a file: its bytes are ``data[start:end]``, its content ``body``."""
+
+    opcode: int
+    start: int
+    end: int
+    body: bytes
+
+
+def pieces(data: bytes, start: int, end: int) -> list[Piece]:
+    """Records between two bytes; they must fill the space exactly."""
+    found = []
+    while start < end:
+        opcode, length = struct.unpack_from("<BQ", data, start)
+        stop = start + 9 + length
+        assert stop <= end
+        found.append(Piece(opcode, start, stop, data[start + 9 : stop]))
+        start = stop
+    return found
+
+
+def records(data: bytes) -> list[Piece]:
+    """All records of a file."""
+    assert data[:8] == data[-8:] == MAGIC
+    return pieces(data, 8, len(data) - 8)
+
+
+def parsed(kind: type, piece: Piece):
+    """A record by the stock class."""
+    return kind.read(ReadDataStream(BytesIO(piece.body)))
+
+
+def parsed_message(piece: Piece) -> Message:
+    """A message record by the stock class."""
+    return Message.read(ReadDataStream(BytesIO(piece.body)), len(piece.body))
+
+
+def joined(items: Iterable[McapRecord]) -> bytes:
+    """Records one after the other, by the stock classes."""
+    builder = RecordBuilder()
+    for item in items:
+        item.write(builder)
+    return builder.end()
+
+
+def plain_file(items: Iterable[McapRecord]) -> bytes:
+    """A file without chunks, checksums and summary that holds these records."""
+    ends = [DataEnd(0), Footer(0, 0, 0)]
+    return MAGIC + joined([Header("", "test"), *items, *ends]) + MAGIC
+
+
+def json_channel(
+    number: int, topic: str, metadata: Mapping[str, str] | None = None, schema: int = 0
+) -> Channel:
+    """A channel of JSON messages."""
+    return Channel(number, topic, "json", dict(metadata or {}), schema)
+
+
+def json_schema(number: int, name: str = "S", data: bytes = b"{}") -> Schema:
+    """A schema that a JSON channel may name."""
+    return Schema(number, data, "jsonschema", name)
+
+
+def json_message(
+    channel: int, time: int, values: Mapping[str, object], sequence: int = 0
+) -> Message:
+    """A message of named values at a time in ns."""
+    return Message(channel, time, json.dumps(values).encode(), time, sequence)

@@ -1,0 +1,301 @@
+"""Laws of the written file: every number in it is what a recount of the bytes gives.
+
+The file is taken apart with ``struct`` and the stock record classes; checksums, offsets, counts and
+times are computed anew, times with exact fractions.
+"""
+
+import zlib
+from fractions import Fraction
+from io import BytesIO
+
+import numpy as np
+import pytest
+import zstandard
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.message_factory import GetMessages
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Message,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+from mcap_bytes import (
+    ATTACHMENT,
+    ATTACHMENT_INDEX,
+    CHANNEL,
+    CHUNK,
+    CHUNK_INDEX,
+    DATA_END,
+    FOOTER,
+    HEADER,
+    MESSAGE,
+    MESSAGE_INDEX,
+    METADATA,
+    METADATA_INDEX,
+    SCHEMA,
+    STATISTICS,
+    SUMMARY_OFFSET,
+    parsed,
+    parsed_message,
+    pieces,
+    records,
+)
+
+from twin.log import FIELDS, AxisLog, Log, encode, read_log, write_log
+
+RATE, COUNT = 3000.0, 45
+TRUTH = tuple(f"state{k}" for k in range(18))  # field numbers above 15 take two bytes
+
+
+def distinct(name: str, axis: str) -> np.ndarray:
+    """A column whose values occur in no other column."""
+    number = 100.0 * (1 + (*FIELDS, *TRUTH).index(name)) + 10_000.0 * (1 + "xyzt".index(axis))
+    return number + np.arange(COUNT) / 64.0
+
+
+LOG = Log(
+    RATE,
+    {
+        "x": AxisLog({f: distinct(f, "x") for f in FIELDS}, force_constant=7.25),
+        "y": AxisLog({f: distinct(f, "y") for f in ("position", "current")}, force_constant=3.5),
+        "z": AxisLog({f: distinct(f, "z") for f in ("position", "current")}, force_constant=2.0),
+    },
+    {"source": "a test"},
+    {"x": {f: distinct(f, "t") for f in TRUTH}},
+    {"model.toml": b"mass = 1\n", "stage.xml": b"<mujoco/>", "raw": bytes(range(200))},
+)
+ROW = (31 + 7 * 9) + 2 * (31 + 2 * 9) + (31 + 15 * 9 + 3 * 10)  # bytes of a sample on four topics
+PER_CHUNK = 7
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory) -> bytes:
+    path = tmp_path_factory.mktemp("log") / "a.mcap"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(encode, "CHUNK_BYTES", PER_CHUNK * ROW + ROW - 1)
+        write_log(LOG, path)
+    return path.read_bytes()
+
+
+def of(data: bytes, opcode: int):
+    return [p for p in records(data) if p.opcode == opcode]
+
+
+def payload(chunk: Chunk) -> bytes:
+    return zstandard.ZstdDecompressor().decompress(chunk.data)
+
+
+def in_chunks(data: bytes) -> list[list]:
+    """(record, bytes) of every chunk's content, chunk by chunk."""
+    contents = [payload(parsed(Chunk, p)) for p in of(data, CHUNK)]
+    return [pieces(content, 0, len(content)) for content in contents]
+
+
+def messages(data: bytes) -> dict[int, list[Message]]:
+    found: dict[int, list[Message]] = {}
+    for chunk in in_chunks(data):
+        for piece in chunk:
+            if piece.opcode == MESSAGE:
+                message = parsed_message(piece)
+                found.setdefault(message.channel_id, []).append(message)
+    return found
+
+
+def exact(k: int, rate: float) -> int:
+    return round(Fraction(k * 10**9) / Fraction(rate))
+
+
+def test_the_checksums_are_those_of_the_bytes(data):
+    end = of(data, DATA_END)[0]
+    assert parsed(DataEnd, end).data_section_crc == zlib.crc32(data[: end.start]) != 0
+    footer_piece = of(data, FOOTER)[0]
+    footer = parsed(Footer, footer_piece)
+    assert footer.summary_start == end.end
+    assert footer.summary_crc == zlib.crc32(data[end.end : footer_piece.end - 4]) != 0
+    for piece in of(data, CHUNK):
+        chunk = parsed(Chunk, piece)
+        assert chunk.uncompressed_crc == zlib.crc32(payload(chunk)) != 0
+        assert chunk.uncompressed_size == len(payload(chunk))
+        assert chunk.compression == "zstd"
+    for body in (p.body for p in of(data, ATTACHMENT)):
+        assert int.from_bytes(body[-4:], "little") == zlib.crc32(body[:-4])
+
+
+def test_the_sections_follow_each_other_as_the_format_orders(data):
+    order = [p.opcode for p in records(data)]
+    count = -(-COUNT // PER_CHUNK)
+    assert order == [
+        HEADER, METADATA, *[ATTACHMENT] * 3, *[CHUNK, *[MESSAGE_INDEX] * 4] * count, DATA_END,
+        *[SCHEMA] * 3, *[CHANNEL] * 4, STATISTICS, *[CHUNK_INDEX] * count,
+        *[ATTACHMENT_INDEX] * 3, METADATA_INDEX, *[SUMMARY_OFFSET] * 6, FOOTER,
+    ]  # fmt: skip
+
+
+def test_the_statistics_are_a_recount(data):
+    statistics = parsed(Statistics, of(data, STATISTICS)[0])
+    counts = {channel: len(m) for channel, m in messages(data).items()}
+    assert counts == {1: COUNT, 2: COUNT, 3: COUNT, 4: COUNT}
+    assert statistics == Statistics(
+        attachment_count=len(LOG.attachments),
+        channel_count=4,
+        channel_message_counts=counts,
+        chunk_count=len(of(data, CHUNK)),
+        message_count=4 * COUNT,
+        message_end_time=exact(COUNT - 1, RATE),
+        message_start_time=0,
+        metadata_count=1,
+        schema_count=3,
+    )
+
+
+def test_every_chunk_index_points_at_its_chunk_and_its_message_indexes(data):
+    everything = records(data)
+    indexes = [parsed(ChunkIndex, p) for p in of(data, CHUNK_INDEX)]
+    for index, piece in zip(indexes, of(data, CHUNK), strict=True):
+        chunk = parsed(Chunk, piece)
+        following = everything[everything.index(piece) + 1 :][:4]
+        places = {int.from_bytes(p.body[:2], "little"): p.start for p in following}
+        assert index == ChunkIndex(
+            chunk_length=piece.end - piece.start,
+            chunk_start_offset=piece.start,
+            compression=chunk.compression,
+            compressed_size=len(chunk.data),
+            message_end_time=chunk.message_end_time,
+            message_index_length=following[-1].end - piece.end,
+            message_index_offsets=places,
+            message_start_time=chunk.message_start_time,
+            uncompressed_size=len(payload(chunk)),
+        )
+        assert list(places) == [1, 2, 3, 4]
+
+
+def test_every_message_index_lists_every_message_with_time_and_place(data):
+    everything = records(data)
+    for piece, content in zip(of(data, CHUNK), in_chunks(data), strict=True):
+        entries: dict[int, list[tuple[int, int]]] = {}
+        for record in content:
+            if record.opcode == MESSAGE:
+                message = parsed_message(record)
+                entries.setdefault(message.channel_id, []).append((message.log_time, record.start))
+        chunk = parsed(Chunk, piece)
+        times = [time for channel in entries.values() for time, _ in channel]
+        assert (chunk.message_start_time, chunk.message_end_time) == (min(times), max(times))
+        for index in everything[everything.index(piece) + 1 :][:4]:
+            found = parsed(MessageIndex, index)
+            assert list(found.records) == entries[found.channel_id]
+
+
+def test_attachment_and_metadata_indexes_repeat_what_they_point_at(data):
+    attachments = [(p, parsed(Attachment, p)) for p in of(data, ATTACHMENT)]
+    assert {a.name: a.data for _, a in attachments} == LOG.attachments
+    assert {(a.log_time, a.create_time) for _, a in attachments} == {(0, 0)}
+    types = {a.name: a.media_type for _, a in attachments}
+    assert types == {
+        "model.toml": "application/toml",
+        "stage.xml": "application/xml",
+        "raw": "application/octet-stream",
+    }
+    assert [parsed(AttachmentIndex, p) for p in of(data, ATTACHMENT_INDEX)] == [
+        AttachmentIndex(p.start, p.end - p.start, 0, 0, len(a.data), a.name, a.media_type)
+        for p, a in attachments
+    ]
+    metadata = of(data, METADATA)[0]
+    assert [parsed(MetadataIndex, p) for p in of(data, METADATA_INDEX)] == [
+        MetadataIndex(metadata.start, metadata.end - metadata.start, "twin")
+    ]
+    assert parsed(Metadata, metadata).metadata == {
+        "source": "a test", "schema_version": "1", "sample_rate_hz": "3000.0", "axes": "x,y,z",
+    }  # fmt: skip
+
+
+def test_the_summary_offsets_cut_the_summary_into_groups_of_one_kind(data):
+    footer = parsed(Footer, of(data, FOOTER)[0])
+    offsets = [parsed(SummaryOffset, p) for p in of(data, SUMMARY_OFFSET)]
+    place = footer.summary_start
+    for offset in offsets:
+        assert offset.group_start == place
+        place += offset.group_length
+        group = pieces(data, offset.group_start, place)
+        assert {p.opcode for p in group} == {offset.group_opcode}
+    assert place == footer.summary_offset_start == of(data, SUMMARY_OFFSET)[0].start
+    assert len({o.group_opcode for o in offsets}) == 6
+
+
+def test_every_chunk_can_be_read_alone(data):
+    heads = [of(data, SCHEMA), of(data, CHANNEL)]
+    want = [(p.opcode, p.body) for group in heads for p in group]
+    for content in in_chunks(data):
+        assert [(p.opcode, p.body) for p in content[:7]] == want
+        assert {p.opcode for p in content[7:]} == {MESSAGE}
+
+
+def test_chunks_are_as_full_as_they_may_be(data):
+    rows = [(len(content) - 7) // 4 for content in in_chunks(data)]
+    assert rows == [PER_CHUNK] * (COUNT // PER_CHUNK) + [COUNT % PER_CHUNK]
+
+
+def test_every_message_has_its_number_and_its_exact_time(data):
+    for sent in messages(data).values():
+        assert [m.sequence for m in sent] == list(range(COUNT))
+        want = [exact(k, RATE) for k in range(COUNT)]
+        assert [m.log_time for m in sent] == [m.publish_time for m in sent] == want
+
+
+def test_every_value_stands_in_its_own_field_for_the_stock_decoder(data):
+    """Field numbers are those the file format promises, not those of one program."""
+    schemas = {s.id: s for s in (parsed(Schema, p) for p in of(data, SCHEMA))}
+    channels = {c.id: c for c in (parsed(Channel, p) for p in of(data, CHANNEL))}
+    wanted = {f"/axis/{n}": a.columns for n, a in LOG.axes.items()} | {"/truth/x": LOG.truth["x"]}
+    assert {c.topic for c in channels.values()} == set(wanted)
+    for number, sent in messages(data).items():
+        schema = schemas[channels[number].schema_id]
+        kind = GetMessages(FileDescriptorSet.FromString(schema.data).file)[schema.name]
+        columns = wanted[channels[number].topic]
+        truth = channels[number].topic == "/truth/x"
+        assert schema.name == ("twin.AxisTruth" if truth else "twin.AxisSample")
+        numbers = {f.name: f.number for f in kind.DESCRIPTOR.fields}
+        names = TRUTH if truth else FIELDS
+        assert numbers == {n: names.index(n) + 1 for n in columns}
+        for k, message in enumerate(sent):
+            sample = kind.FromString(message.data)
+            assert {n: getattr(sample, n) for n in columns} == {n: c[k] for n, c in columns.items()}
+
+
+def test_stock_readers_accept_every_checksum(data):
+    for reader in (make_reader(BytesIO(data), validate_crcs=True),
+                   NonSeekingReader(BytesIO(data), validate_crcs=True)):  # fmt: skip
+        assert sum(1 for _ in reader.iter_messages()) == 4 * COUNT
+
+
+@pytest.mark.parametrize("rows", [1, 2, 5, 44, 45, 46])
+def test_the_size_of_the_chunks_changes_no_sample(tmp_path, monkeypatch, rows):
+    monkeypatch.setattr(encode, "CHUNK_BYTES", rows * ROW)
+    seen = []
+    write_log(LOG, tmp_path / "a.mcap", lambda done, total: seen.append((done, total)))
+    chunks = of((tmp_path / "a.mcap").read_bytes(), CHUNK)
+    assert len(chunks) == -(-COUNT // rows)
+    assert seen == [(min(k * rows, COUNT), COUNT) for k in range(1, len(chunks) + 1)]
+    got = read_log(tmp_path / "a.mcap")
+    for name, axis in LOG.axes.items():
+        assert got.axes[name].force_constant == axis.force_constant
+        for field, column in axis.columns.items():
+            np.testing.assert_array_equal(got.axes[name].columns[field], column)
+    for field, column in LOG.truth["x"].items():
+        np.testing.assert_array_equal(got.truth["x"][field], column)
+
+
+def test_a_chunk_holds_a_row_though_it_is_larger_than_a_chunk(tmp_path, monkeypatch):
+    monkeypatch.setattr(encode, "CHUNK_BYTES", ROW // 2)
+    write_log(LOG, tmp_path / "a.mcap")
+    assert len(of((tmp_path / "a.mcap").read_bytes(), CHUNK)) == COUNT
