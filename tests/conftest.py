@@ -1,12 +1,22 @@
-"""Fixtures shared by the whole suite."""
+"""Fixtures shared by the whole suite; what every test needs is compiled once for all workers."""
 
-from pathlib import Path
+import os
 
-import pytest
+# Two workers on two cores: threads of the linear algebra would only wait for each other.
+for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(threads, "1")
+
+import time  # noqa: E402
+from collections.abc import Iterator  # noqa: E402
+from contextlib import contextmanager  # noqa: E402
+from pathlib import Path  # noqa: E402
+
+import pytest  # noqa: E402
 
 pytest_plugins = ("changed",)
 
 SHARED_DATA = Path(__file__).resolve().parent.parent.parent / "shared" / "data"
+LONGEST_WAIT = 300.0  # s for what another worker compiles
 
 
 @pytest.fixture(scope="session")
@@ -15,3 +25,44 @@ def shared_data() -> Path:
     if not SHARED_DATA.is_dir():
         pytest.skip("the real measurements (../shared/data) are not beside the repository")
     return SHARED_DATA
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_once(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Each worker compiles a part while the others compile another, and finds theirs on disk.
+
+    Left to themselves they would all compile everything, at the same time. Without xdist a test
+    compiles what it needs.
+    """
+    worker = os.environ.get("PYTEST_XDIST_WORKER")
+    if worker is None:
+        return
+    import compiling
+
+    folder = tmp_path_factory.getbasetemp().parent  # of this run, and common to its workers
+    first = int(worker.removeprefix("gw")) % len(compiling.PARTS)
+    waiting = [*compiling.PARTS[first:], *compiling.PARTS[:first]]
+    end = time.monotonic() + LONGEST_WAIT
+    while waiting:
+        for part in tuple(waiting):
+            with alone(folder / f"{part.__name__}.lock") as mine:
+                if mine:
+                    part()
+                    waiting.remove(part)
+        if waiting:
+            assert time.monotonic() < end, f"{waiting} are still being compiled elsewhere"
+            time.sleep(0.05)
+
+
+@contextmanager
+def alone(lock: Path) -> Iterator[bool]:
+    """Whether no other process is within; a file marks the one that is."""
+    try:
+        lock.touch(exist_ok=False)
+    except FileExistsError:
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        lock.unlink()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,15 +110,19 @@ def moderate(effect: Effect, rng: np.random.Generator, wanted: float = 0.3) -> d
         return legal(effect, drawn)
 
     low, high = -15.0, 0.0  # decades of the factor on the strengths
-    if action(effect, values(1.0)) < wanted:
-        return values(1.0)
-    for _ in range(12):  # to a hundredth
-        middle = 0.5 * (low + high)
-        if action(effect, values(10.0**middle)) < wanted:
-            low = middle
-        else:
-            high = middle
-    return values(10.0**high)
+    at, seen = high, action(effect, values(1.0))
+    for tries in range(60):
+        if (at == 0.0 and seen < wanted) or high - low < 0.004:
+            break
+        off = np.log10(seen / wanted) if seen > 0.0 else np.inf
+        if abs(off) < 0.004:  # to a hundredth
+            break
+        low, high = (at, high) if off < 0.0 else (low, at)
+        at = at - off  # most actions are in proportion to the strengths
+        if not low < at < high or tries % 4 == 3:
+            at = 0.5 * (low + high)
+        seen = action(effect, values(10.0**at))
+    return values(10.0**at)
 
 
 # --- running laws -------------------------------------------------------------------------------
@@ -131,7 +136,7 @@ def forces(effects: Sequence[Fitted], motion: Motion) -> dict[str, Array]:
     walk(
         table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
         np.stack([motion.x, motion.v, motion.u]), np.stack([motion.x, motion.v, motion.u]),
-        motion.dt, 0, rows,
+        motion.dt, 0, rows, 1.0, 0.0,
     )  # fmt: skip
     return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
 
@@ -198,10 +203,16 @@ def action(effect: Effect, values: Values) -> float:
         return float(np.sqrt(np.mean(forces([own], motion)[effect.name] ** 2)))
     changes = []
     for friction in FRICTIONS:
-        plain = companion(friction)
-        changed = forces([plain, own], motion)[friction.name]
-        changes.append(np.mean((changed - forces([plain], motion)[friction.name]) ** 2))
+        changed = forces([companion(friction), own], motion)[friction.name]
+        changes.append(np.mean((changed - _unmodified(friction.name)) ** 2))
     return float(np.sqrt(max(changes)))
+
+
+@cache
+def _unmodified(friction: str) -> Array:
+    """The force of a friction of the catalogue by itself along the motion of ``action``, N."""
+    plain = companion(CATALOGUE[friction])
+    return forces([plain], Motion.cycles(samples=1000))[friction]
 
 
 def with_all(model: StageModel, rng: np.random.Generator) -> StageModel:

@@ -86,14 +86,18 @@ class Gains(NamedTuple):
     limit: float  # N
 
 
-@njit(cache=True, inline="always")
+# Only `_simulated` is called from Python: wrappers of the parts would take half of the compilation.
+part = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+@part
 def look_up(table, half_span, at):
     place = (at + half_span) / (2.0 * half_span) * (table.size - 1)
     i = min(max(int(place), 0), table.size - 2)
     return table[i] + (place - i) * (table[i + 1] - table[i])
 
 
-@njit(cache=True)
+@part
 def friction_rate(p, z, v, g):
     """Rate of the bristle (m/s) or of the force (N/s, Dahl)."""
     if p.kind == LUGRE:
@@ -101,7 +105,7 @@ def friction_rate(p, z, v, g):
     return p.s0 * (v - abs(v) * z / g)
 
 
-@njit(cache=True)
+@part
 def friction_force(p, z, elements, v, g, h):
     """Advance the friction's memory over one step; force opposing motion less the viscous part."""
     if p.kind == COULOMB:
@@ -127,7 +131,7 @@ def friction_force(p, z, elements, v, g, h):
     return z, z
 
 
-@njit(cache=True)
+@part
 def command_of(gains, s, reading, target, rate):
     """Command (N) of the cascade; s holds the last reading, filtered speed and integral."""
     s[1] += gains.filter * ((reading - s[0]) * rate - s[1])
@@ -139,7 +143,7 @@ def command_of(gains, s, reading, target, rate):
     return min(max(command, -gains.limit), gains.limit)
 
 
-@njit(cache=True)
+@part
 def drive_force(p, s, u, h):
     """Force (N) for a command: dead zone, rate, lag, limit, then the motor's own faults."""
     u = np.sign(u) * max(abs(u) - p.deadband, 0.0)
@@ -155,7 +159,7 @@ def drive_force(p, s, u, h):
     return actual + p.remanence * s[REMANENCE] - p.current_drop * actual * abs(actual)
 
 
-@njit(cache=True)
+@part
 def dwelt(p, s, v, h):
     """Part of the dwell force that rest has built up and motion has not yet worn off."""
     if p.dwell_force == 0.0:
@@ -169,7 +173,7 @@ def dwelt(p, s, v, h):
     return s[DWELT]
 
 
-@njit(cache=True)
+@part
 def friction(p, s, elements, tables, x, v, a, other_a, h):
     """Friction with its memory and the viscous part, both N, opposing motion."""
     sign = np.tanh(v / SMOOTH_SIGN)
@@ -187,7 +191,7 @@ def friction(p, s, elements, tables, x, v, a, other_a, h):
     return held, viscous
 
 
-@njit(cache=True)
+@part
 def track_force(p, s, tables, drag, x, v, h):
     """Force (N) of cable, track, air, bumps and stops."""
     rub = 1.0 - abs(s[LOOP]) * (0.5 + 0.5 * np.sign(v * s[LOOP]))
@@ -206,7 +210,7 @@ def track_force(p, s, tables, drag, x, v, h):
     return force
 
 
-@njit(cache=True)
+@part
 def acceleration(p, s, x, v, force, mass, h):
     """Acceleration (m/s^2) over the frame, which with the second mass goes one step on."""
     link, shake = 0.0, 0.0
@@ -225,13 +229,19 @@ def acceleration(p, s, x, v, force, mass, h):
     return (force + link) / mass - shake
 
 
-@njit(cache=True)
-def simulate(p, gains, setpoint, other, tables, drag, disturbance, noise, rate):
+def simulate(plant, gains, setpoint, other, tables, drag, disturbance, noise, rate):
     """Run under control; (n, 4): reading m, command N, true position m, true speed m/s.
 
     setpoint (n, 3), other (n, 2: speed, acceleration of the other axis), disturbance (n,) N and
     noise (n,) m are sampled at the control's rate (Hz).
     """
+    # As records, which the parts take by address: some fifty numbers each by value compile slowly.
+    p, control = (np.array(tuple(c), [(f, float) for f in c._fields])[()] for c in (plant, gains))
+    return _simulated(p, control, setpoint, other, tables, drag, disturbance, noise, rate)
+
+
+@njit(cache=True)
+def _simulated(p, gains, setpoint, other, tables, drag, disturbance, noise, rate):
     n, h = len(setpoint), STEP
     inner, late = round(1.0 / (rate * h)), round(p.reading_delay / h)
     out = np.zeros((n, 4))

@@ -48,7 +48,7 @@ def along(fitted: Fitted, v: Array, dt: float) -> Array:
     motion = np.stack([np.cumsum(v) * dt, v, np.zeros_like(v)])
     walk(
         table.entries, 0, 1, table.parameters, np.zeros(table.n_states), table.axes[0][2], motion,
-        np.zeros_like(motion), dt, 0, rows,
+        np.zeros_like(motion), dt, 0, rows, 1.0, 0.0,
     )  # fmt: skip
     return -rows[0]
 
@@ -72,7 +72,7 @@ def dragged(
         rows = np.zeros((1, leg + 1))
         walk(
             table.entries, 0, 1, table.parameters, states, table.axes[0][2], motion,
-            np.zeros_like(motion), dt, 1, rows,
+            np.zeros_like(motion), dt, 1, rows, 1.0, 0.0,
         )  # fmt: skip
         x += [*middle, end]
         force += list(-rows[0])

@@ -34,20 +34,25 @@ def one_axis(stage: StageModel) -> StageModel:
 
 
 def machine(
-    stage: StageModel, catalogue: Catalogue, effect: str | None, force: float, seed: int
+    stage: StageModel,
+    catalogue: Catalogue,
+    effect: str | None,
+    force: float,
+    seed: int,
+    duration: float = DURATION,
 ) -> Machine:
     """Draw a machine about the stage, plant an effect of that force (N RMS) on x, and log it."""
     rng = np.random.default_rng(seed)
     drawn = stage.with_axis("x", other_machine(stage.axes["x"], rng))
     planted = None
     if effect is not None:
-        trial = simulate(drawn, "tracking", seed=seed, duration=DURATION, stage=ReducedStage)
+        trial = simulate(drawn, "tracking", seed=seed, duration=duration, stage=ReducedStage)
         study = studies(drawn, {"trial": trial}, {})["x"]
         base = fit_axis(drawn.axes["x"], study.fit)
         planted = draw_effect(catalogue[effect], base.axis, study.fit, study.excitation, force, rng)
         drawn = drawn.with_axis("x", drawn.axes["x"].with_effect(planted))
     logs = {
-        f"log {i}": simulate(drawn, "tracking", seed=100 * seed + i, duration=DURATION)
+        f"log {i}": simulate(drawn, "tracking", seed=100 * seed + i, duration=duration)
         for i in (1, 2, 3)
     }
     held = {"log 3": logs.pop("log 3")}

@@ -5,10 +5,12 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
+from unittest.mock import patch
 
 from matplotlib.figure import Figure
 
@@ -86,6 +88,14 @@ def cogging_case() -> Case:
         workflow.diagnose(model, fit, held, catalogue=few),
         workflow.add(catalogue["cogging"], model, fit, held),
     )  # fmt: skip
+
+
+BLANK = "data:image/svg+xml;base64," + base64.b64encode(b"<svg/>").decode()
+
+
+def without_drawing() -> AbstractContextManager[object]:
+    """Inside, pictures are blank: drawing them takes most of a report's time."""
+    return patch("identify.report.data_uri", lambda figure: BLANK)
 
 
 def pictures_in(page: str) -> list[str]:

@@ -1,8 +1,8 @@
 """Every effect of the catalogue, as the explanation of its own log, comes back with its values.
 
 From its own start rules and scans, with every interval covering the truth, or with the tool saying
-why there is none. No effect is named here; descriptions of what no physics explains have their own
-tests.
+why there is none. No effect is named here but for its cost; descriptions of what no physics
+explains have their own tests.
 """
 
 from dataclasses import replace
@@ -16,7 +16,12 @@ from twin.effect import OUT, Effect, Kind, Parameter, V
 from twin.model import AxisModel, Fitted
 
 PHYSICS = tuple(e for e in CATALOGUE.values() if not e.is_description)
-EVERY = pytest.mark.parametrize("effect", PHYSICS, ids=lambda e: e.name)
+LONG = "encoder_ripple"  # the search for its period takes as long as all the others do
+EVERY = pytest.mark.parametrize(
+    "effect",
+    [pytest.param(e, marks=pytest.mark.slow) if e.name == LONG else e for e in PHYSICS],
+    ids=lambda e: e.name,
+)
 SOME = pytest.mark.parametrize("effect", PHYSICS[1::6], ids=lambda e: e.name)
 SEEDS = [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))]
 

@@ -1,61 +1,24 @@
 """The command line as a user meets it: exit codes, JSON by itself, errors of one line."""
 
 import json
-import subprocess
-import sys
-from contextlib import chdir, redirect_stderr, redirect_stdout
-from io import StringIO
+from dataclasses import replace
 from pathlib import Path
-from unittest.mock import patch
 
 import numpy as np
 import pytest
+from cli_runs import RATE, in_small, process, refusal, twin
 
-from identify.cli import main
 from twin.effects import load_catalogue
 from twin.experiments import simulate
 from twin.log import AxisLog, Log, write_log
 from twin.model_file import load_model
 
 
-def twin(*arguments: object, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run `twin` in a folder as its own process."""
-    return subprocess.run(
-        [sys.executable, "-c", "from identify.cli import main; main()", *map(str, arguments)],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
-def refusal(*arguments: object, folder: Path) -> str:
-    """The one line on standard error of a refused command; nothing else may have happened.
-
-    Within this process, which spares its start.
-    """
-    before = sorted(folder.iterdir())
-    out, err = StringIO(), StringIO()
-    command = ["twin", *map(str, arguments)]
-    with (
-        chdir(folder), redirect_stdout(out), redirect_stderr(err),
-        patch.object(sys, "argv", command), pytest.raises(SystemExit) as ended,
-    ):  # fmt: skip
-        main()
-    assert ended.value.code == 2, err.getvalue()
-    assert out.getvalue() == ""
-    lines = err.getvalue().splitlines()
-    assert len(lines) == 1, err.getvalue()
-    assert lines[0].startswith("twin: ")
-    assert sorted(folder.iterdir()) == before, "something was written"
-    return lines[0]
-
-
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> Path:
     """A folder with a short log of the twin."""
     folder = tmp_path_factory.mktemp("logs")
-    model = load_model("proton_xy", load_catalogue())
+    model = replace(load_model("proton_xy", load_catalogue()), sample_rate=RATE)
     write_log(simulate(model, "tracking", seed=3, duration=4.0), folder / "log.mcap")
     return folder
 
@@ -72,19 +35,21 @@ def axis_log(**columns: np.ndarray) -> Log:
 
 
 def test_json_is_one_object_and_nothing_else(folder):
-    for arguments in (
-        ("effects",),
-        ("effects", "lugre"),
-        ("simulate", "reversals", "--duration", "1", "-o", "r.mcap"),
-        ("compare", "proton_xy", "log.mcap"),
+    for run, *arguments in (
+        (twin, "effects"),
+        (twin, "effects", "lugre"),
+        (process, "simulate", "reversals", "--duration", "1", "-o", "r.mcap"),
+        (twin, "compare", "proton_xy", "log.mcap"),
     ):
-        result = twin(*arguments, "--json", folder=folder)
+        result = run(*arguments, "--json", folder=folder)
         assert result.returncode == 0, result.stderr
         assert isinstance(json.loads(result.stdout), dict)
 
 
 def test_the_documented_keys_of_diagnose_are_there(folder):
-    answer = json.loads(twin("diagnose", "proton_xy", "log.mcap", "--json", folder=folder).stdout)
+    with in_small("quadratic_drag"):
+        done = twin("diagnose", "proton_xy", "log.mcap", "--json", folder=folder)
+    answer = json.loads(done.stdout)
     assert {"verdict", "effect", "ranking", "ambiguous_with", "unexplained", "noise_floor"} <= set(
         answer
     )
@@ -183,7 +148,7 @@ def test_an_output_folder_that_is_missing_is_refused_before_the_work(folder):
 
 def test_usage_errors_are_one_line(folder):
     assert "--help" in refusal("fit", folder=folder)
-    alone = twin("fit", folder=folder)
+    alone = process("fit", folder=folder)
     assert (alone.returncode, alone.stdout) == (2, "")
     assert len(alone.stderr.splitlines()) == 1
     assert "--help" in refusal("simulat", folder=folder)

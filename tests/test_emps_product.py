@@ -11,7 +11,7 @@ import pytest
 from identify.diagnose import Verdict
 from identify.remarks import remarks
 from identify.workflow import add, diagnose
-from twin.effects import load_catalogue
+from twin.effects import Catalogue, load_catalogue
 from twin.log import read_log, write_log
 from twin.log.importers import import_log, load_mapping
 from twin.model_file import load_model
@@ -38,9 +38,16 @@ def model():
     return load_model(EXAMPLES / "emps.toml", CATALOGUE)
 
 
+# Other explanations of a friction that differs by direction, and of what repeats along the screw.
+RIVALS = Catalogue(
+    CATALOGUE[name]
+    for name in ("asymmetric_friction", "position_dependent_friction", "quadratic_drag", "wear")
+)
+
+
 @pytest.fixture(scope="module")
 def found(model, emps):
-    return diagnose(model, *emps, catalogue=CATALOGUE, window=WINDOW)
+    return diagnose(model, *emps, catalogue=RIVALS, window=WINDOW)
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +91,14 @@ def test_then_it_stops_adding(added, emps):
     again = diagnose(added.model, *emps, catalogue=CATALOGUE, window=WINDOW)
     assert again.effect is None
     assert again.leading.verdict is Verdict.UNEXPLAINED
+
+
+@pytest.mark.slow
+def test_the_answer_among_the_whole_catalogue_is_the_same(model, emps, found):
+    whole = diagnose(model, *emps, catalogue=CATALOGUE, window=WINDOW)
+    assert whole.leading.verdict is found.leading.verdict
+    assert whole.leading.named == found.leading.named
+    assert whole.leading.unexplained is not None
 
 
 @pytest.mark.slow

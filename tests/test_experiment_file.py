@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from test_command_line import refusal, twin
+from cli_runs import in_small, refusal, twin
 
 from identify.cli.shared import app
 from twin.effects import load_catalogue
@@ -66,16 +66,18 @@ def test_a_bad_experiment_file_is_refused_in_one_line(fault, tmp_path):
 
 
 def test_the_command_writes_an_experiment_that_simulate_runs(tmp_path):
-    answer = twin(
-        "plan", "proton_xy", "--between", "cogging", "force_constant_ripple", "--duration", "4",
-        "-o", "next.toml", "--json", folder=tmp_path,
-    )  # fmt: skip
+    rivals = ("cogging", "force_constant_ripple")
+    with in_small(*rivals, proposed=2):
+        answer = twin(
+            "plan", "proton_xy", "--between", *rivals, "--duration", "4", "-o", "next.toml",
+            "--json", folder=tmp_path,
+        )  # fmt: skip
+        ran = twin("simulate", "next.toml", "--model", "proton_xy", "-o", "l.mcap", folder=tmp_path)
     assert answer.returncode == 0, answer.stderr
     result = json.loads(answer.stdout)
-    assert result["between"] == ["cogging", "force_constant_ripple"]
+    assert result["between"] == list(rivals)
     assert result["expected_difference"] > result["noise_floor"]
     assert result["file"] == "next.toml"
-    ran = twin("simulate", "next.toml", "--model", "proton_xy", "-o", "l.mcap", folder=tmp_path)
     assert ran.returncode == 0, ran.stderr
     assert read_log(tmp_path / "l.mcap").attachments["experiment.toml"]
 

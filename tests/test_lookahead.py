@@ -2,6 +2,8 @@
 
 import sys
 import zlib
+from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -15,14 +17,16 @@ from twin.model_file import load_model
 
 CATALOGUE = load_catalogue()
 PLANTED = ("position_dependent_friction", "cogging")
-FEW = Catalogue(CATALOGUE[name] for name in (*PLANTED, "wear", "actuator_deadband"))
+FEW = Catalogue(CATALOGUE[name] for name in (*PLANTED, "wear"))
 
 
 @pytest.fixture(scope="module")
 def case():
     """A fit and its study of a machine with both."""
     rng = np.random.default_rng([4, *(zlib.crc32(name.encode()) for name in PLANTED)])
-    built = machine(load_model("proton_xy", CATALOGUE), [CATALOGUE[e] for e in PLANTED], 5.0, rng)
+    stage = replace(load_model("proton_xy", CATALOGUE), sample_rate=2500.0)
+    with patch("identify.selftest.cases.DURATION", 8.0):
+        built = machine(stage, [CATALOGUE[e] for e in PLANTED], 5.0, rng)
     study = studies(built.model, built.logs, built.holdout)[AXIS]
     return fit_axis(built.model.axes[AXIS], study.fit), study
 

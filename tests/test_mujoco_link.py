@@ -3,6 +3,7 @@
 import copy
 import ctypes
 from collections.abc import Callable, Iterator
+from functools import cache
 
 import mujoco
 import numpy as np
@@ -13,20 +14,31 @@ from mujoco.rollout import rollout
 
 from twin import mujoco_link
 from twin.experiments import simulate
+from twin.model import StageModel
 from twin.model_file import load_model
 from twin.mujoco_link import Offsets, offsets, passive_callback
 from twin.simulator import MujocoStage
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 PHYSICS = mujoco.mjtState.mjSTATE_FULLPHYSICS
-MODEL = with_all(load_model("proton_xy", CATALOGUE), np.random.default_rng(41))
+
+
+@cache
+def everything() -> StageModel:
+    """The Proton stage with every effect on both axes."""
+    return with_all(load_model("proton_xy", CATALOGUE), np.random.default_rng(41))
+
+
+def fresh() -> MujocoStage:
+    """A simulation of it at its start; needs the callback."""
+    return MujocoStage(everything(), everything().table())
 
 
 @pytest.fixture
 def stage() -> Iterator[MujocoStage]:
     """The stage with every effect on both axes, under the callback."""
     with passive_callback():
-        yield MujocoStage(MODEL, MODEL.table())
+        yield fresh()
 
 
 def controls(begin: int, end: int) -> Array:
@@ -74,7 +86,7 @@ def test_looking_at_the_forces_changes_nothing(stage: MujocoStage) -> None:
 @pytest.mark.parametrize("looks", [1, 2, 7])
 def test_looking_at_the_forces_does_not_change_what_follows(looks: int) -> None:
     with passive_callback():
-        undisturbed, watched = (MujocoStage(MODEL, MODEL.table()) for _ in range(2))
+        undisturbed, watched = (fresh() for _ in range(2))
         for begin in range(0, 300, 50):
             for k in range(looks):  # also a look at what another command would do
                 watched.data.ctrl[:] = 3.0 * k
@@ -85,7 +97,7 @@ def test_looking_at_the_forces_does_not_change_what_follows(looks: int) -> None:
 
 def test_the_two_halves_of_a_step_are_a_step() -> None:
     with passive_callback():
-        whole, halves = (MujocoStage(MODEL, MODEL.table()) for _ in range(2))
+        whole, halves = (fresh() for _ in range(2))
         wanted = step(whole, 0, 200)
         for u, after in zip(controls(0, 200), wanted, strict=True):
             halves.data.ctrl[:] = u
@@ -111,7 +123,7 @@ def test_a_restored_snapshot_continues_to_the_bit(stage: MujocoStage) -> None:
 
 def test_a_copied_model_and_data_carry_their_effects(stage: MujocoStage) -> None:
     step(stage, 0, 120)
-    copied = MujocoStage(MODEL, MODEL.table())
+    copied = fresh()
     copied.model, copied.data = copy.deepcopy(stage.model), copy.deepcopy(stage.data)
     np.testing.assert_array_equal(step(copied, 120, 300), step(stage, 120, 300))
 
@@ -131,7 +143,7 @@ def test_going_back_in_time_alone_forgets_the_effects_states(stage: MujocoStage)
 
 
 def test_the_same_seed_gives_the_same_bytes() -> None:
-    one, two, other = (simulate(MODEL, "moves", seed=s, duration=0.3) for s in (7, 7, 8))
+    one, two, other = (simulate(everything(), "moves", seed=s, duration=0.3) for s in (7, 7, 8))
     for axis in one.axes:
         for name, column in one.axes[axis].columns.items():
             assert column.tobytes() == two.axes[axis].columns[name].tobytes()

@@ -28,7 +28,7 @@ def test_the_force_noise_that_was_put_in_is_found(drive, seed):
     rate, resolution, encoder, current = DRIVES[drive]
     rng = np.random.default_rng(seed)
     machine = drawn(rng, rate, resolution=resolution, encoder_noise=encoder, current_noise=current)
-    fit = workflow.fit(NOMINAL, {"log": run(machine, seed, 10.0)}).fits["x"]
+    fit = workflow.fit(NOMINAL, {"log": run(machine, seed, 6.0)}).fits["x"]
     planted = 2.0 / rate * (FORCE_CONSTANT * current) ** 2  # N^2/Hz
     found = noise_of(fit.axis, fit.logs[0].motion).force
     assert 0.5 * planted < found < 2.0 * planted

@@ -32,7 +32,7 @@ BOTH = pytest.mark.parametrize("stage", [MujocoStage, ReducedStage])
 
 
 def simulated(model: StageModel, stage: Stepper, experiment: str) -> Log:
-    return simulate(model, experiment, seed=5, duration=2.0, stage=stage)
+    return simulate(model, experiment, seed=5, duration=0.5, stage=stage)
 
 
 def columns(log: Log) -> Mapping[str, np.ndarray]:

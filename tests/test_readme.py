@@ -1,13 +1,18 @@
 """The README is true: its shell commands and its Python run as printed, in an empty folder."""
 
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from cli_runs import in_small, twin
+from report_cases import without_drawing
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -25,29 +30,60 @@ def run(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+COMMANDS = [line for line in blocks("sh")[1].splitlines() if line.startswith("twin ")]
+
+
+@pytest.mark.slow
 def test_the_loop_runs_as_printed_and_the_error_falls(tmp_path):
-    commands = [line for line in blocks("sh")[1].splitlines() if line.startswith("twin ")]
-    assert len(commands) == 10
     if shutil.which("twin", path=str(Path(sys.executable).parent)) is None:
         pytest.skip("the package is not installed, so there is no `twin` command")
-    for command in commands:
-        result = run(command.split(), tmp_path)
+    assert_the_error_falls(lambda command: run(command, tmp_path), tmp_path)
+
+
+def test_the_loop_runs_in_small_and_the_error_falls(tmp_path):
+    """The printed commands on short logs, with three effects to choose from and blank pictures."""
+    rivals = ("cogging", "force_constant_ripple", "quadratic_drag")
+    with in_small(*rivals, duration=6.0), without_drawing():
+        assert_the_error_falls(lambda command: twin(*command[1:], folder=tmp_path), tmp_path)
+
+
+def assert_the_error_falls(answer, folder):
+    """Every command ends well, and on held-out data the model with the effect errs far less."""
+    assert len(COMMANDS) == 10
+    for command in COMMANDS:
+        result = answer(command.split())
         assert result.returncode == 0, f"{command}\n{result.stderr}"
         if "diagnose" in command:
             assert "axis x" in result.stdout
             assert "cogging" in result.stdout
-    assert "held out" in run(
-        ["twin", "fit", "better.toml", "fit.mcap", "--holdout", "held.mcap"], tmp_path
-    ).stdout  # fmt: skip
-    assert (tmp_path / "after.html").stat().st_size > 10_000
-    assert (tmp_path / "next.mcap").stat().st_size > 10_000
+    after = answer(["twin", "fit", "better.toml", "fit.mcap", "--holdout", "held.mcap"])
+    assert "held out" in after.stdout
+    errors = [
+        json.loads(answer(["twin", "compare", name, "held.mcap", "--json"]).stdout)
+        for name in ("fitted.toml", "better.toml")
+    ]
+    before, after = (found["axes"]["x"]["logs"]["held.mcap"]["force_error"] for found in errors)
+    assert after < before / 3.0
+    for name in ("before.html", "diagnosis.html", "after.html", "next.mcap"):
+        assert (folder / name).stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_the_python_example_runs_and_names_the_effect(tmp_path):
     (tmp_path / "example.py").write_text(blocks("python")[0])
     result = run([sys.executable, "example.py"], tmp_path)
     assert result.returncode == 0, result.stderr
-    name, before, after = result.stdout.split()
+    assert_cogging_found(result.stdout)
+
+
+def test_the_python_example_runs_in_small():
+    with in_small("cogging", "quadratic_drag"), redirect_stdout(StringIO()) as out:
+        exec(compile(blocks("python")[0], "README.md", "exec"), {})
+    assert_cogging_found(out.getvalue())
+
+
+def assert_cogging_found(printed):
+    name, before, after = printed.split()
     assert name == "cogging"
     assert float(after) < float(before) / 3.0
 

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from report_cases import Case, Outline, cogging_case, figures, pictures_in
+from report_cases import Case, Outline, cogging_case, figures, pictures_in, without_drawing
 
 import identify.report
 from identify.diagnose import Verdict
@@ -160,7 +160,7 @@ def test_a_failure_leaves_the_old_report(
         raise OSError("no space left on the device")
 
     for target in ((os, "replace"), (identify.report, "render")):
-        with monkeypatch.context() as patch:
+        with monkeypatch.context() as patch, without_drawing():
             patch.setattr(*target, broken)
             with pytest.raises(OSError, match="no space"):
                 case.write(path)

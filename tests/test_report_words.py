@@ -9,7 +9,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from report_cases import Case, Outline, answers, cogging_case, made, pictures_in
+from report_cases import (
+    Case,
+    Outline,
+    answers,
+    cogging_case,
+    made,
+    pictures_in,
+    without_drawing,
+)
 
 from identify import workflow
 from identify.diagnose import AxisDiagnosis, Verdict
@@ -32,7 +40,8 @@ def case() -> Case:
 
 
 def test_without_a_diagnosis(case: Case, tmp_path: Path) -> None:
-    text = case.write(tmp_path / "c.html", diagnosis=None, history=(), additions=())
+    with without_drawing():
+        text = case.write(tmp_path / "c.html", diagnosis=None, history=(), additions=())
     assert re.findall(r'<section id="(\w+)">', text) == [
         "answer", "force", "residual", "regions", "tests", "parameters", "logs",
     ]  # fmt: skip

@@ -1,6 +1,7 @@
 """The encoder's resolution: found in the readings, and the noise that it makes."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from twin.effects import Catalogue, load_catalogue
 from twin.experiments import simulate
 from twin.model import Fitted
 from twin.model_file import load_model
+from twin.simulator import ReducedStage
 
 CATALOGUE = load_catalogue()
 STAGE = one_axis(load_model("proton_xy", CATALOGUE))
@@ -64,6 +66,7 @@ def test_what_rounding_did_is_taken_back_between_slow_steps():
     assert np.std(left) < 0.15 * np.std(true)
 
 
+@cache
 def study_of(step: float) -> Study:
     """Two logs and a held-out one of a machine whose encoder has that resolution."""
     axis = STAGE.axes["x"]
@@ -71,7 +74,10 @@ def study_of(step: float) -> Study:
         effect = CATALOGUE["encoder_quantization"]
         axis = axis.with_effect(Fitted.at_start(effect, {"step": step}))
     machine = replace(STAGE, axes={"x": axis})
-    runs = {s: simulate(machine, "tracking", seed=s, duration=8.0) for s in (1, 2, 3)}
+    runs = {
+        s: simulate(machine, "tracking", seed=s, duration=8.0, stage=ReducedStage)
+        for s in (1, 2, 3)
+    }
     fit = {f"log {s}": runs[s] for s in (1, 2)}
     return studies(STAGE, fit, {"log 3": runs[3]})["x"]
 
@@ -107,8 +113,7 @@ def test_a_command_without_noise_has_none():
 
 
 FEW = Catalogue(
-    CATALOGUE[name]
-    for name in ("encoder_quantization", "encoder_ripple", "actuator_delay", "quadratic_drag")
+    CATALOGUE[name] for name in ("encoder_quantization", "encoder_delay", "quadratic_drag")
 )
 
 
@@ -119,6 +124,14 @@ def test_it_is_named_where_it_makes_the_error_noise(coarse):
     assert found.best.is_noise
     step = found.final.axis["encoder_quantization"].values["step"]
     assert step == pytest.approx(STEP, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_it_is_named_beside_a_ripple_of_the_encoder(coarse):
+    """Rounding is a tone at constant speed; the search for a ripple's period takes its time."""
+    near = Catalogue([*FEW.values(), CATALOGUE["encoder_ripple"]])
+    found = diagnose_axis(fit_axis(STAGE.axes["x"], coarse.fit), coarse, near)
+    assert found.named == ("encoder_quantization",)
 
 
 def test_it_is_not_named_where_other_noise_is_larger():
