@@ -31,7 +31,7 @@ class _Callback(CFunc):
     """A C callback with such a cache."""
 
     def enable_caching(self):
-        self._cache = _Cache(self._pyfunc)
+        self._cache = _Cache(self.__wrapped__)
 
 
 def compiled(*, inline: bool = False, nogil: bool = False) -> Callable[[Any], Any]:
