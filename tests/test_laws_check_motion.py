@@ -139,6 +139,7 @@ def test_noise_on_the_command_is_told_where_it_is(size, told):
 
     def shake(columns):
         columns["force"][2000:2030] += noise
+        columns["force"][500] += size  # one bend alone is no noise
 
     found = [f for f in findings(drive(change=shake), Fault.OUTLIERS) if "to and fro" in f.what]
     assert len(found) == told
@@ -258,3 +259,26 @@ def test_an_axis_lacking_something_is_told_that_alone_and_the_other_axis_is_chec
     found = check_log(Log(1000.0, {"a": bad, "b": late, "c": good})).findings
     assert [(f.axis, f.fault) for f in found] == [("a", Fault.INCOMPLETE), ("b", Fault.LAG)]
     assert str(found[0]).startswith("axis a, whole log: there is no force")
+
+
+@pytest.mark.parametrize(
+    ("signals", "complete"),
+    [
+        (("position", "force"), True),
+        (("position", "current"), True),
+        (("force",), False),
+        (("position",), False),
+        (("position", "velocity"), False),
+    ],
+)
+def test_a_log_needs_a_position_and_a_command(signals, complete):
+    assert len(findings(drive(signals=signals), Fault.INCOMPLETE)) == (not complete)
+    if complete:
+
+        def cut(columns):
+            columns[signals[1]] = columns[signals[1]][:-1]
+
+        (found,) = findings(drive(signals=signals, change=cut), Fault.INCOMPLETE)
+        assert f"differ in length (position 4000, {signals[1]} 3999)" in found.what
+    one = check_log(drive(seconds=0.001, signals=signals)).findings
+    assert "lasts 0.001 s" in next(f.what for f in one if f.fault is Fault.TOO_SHORT)

@@ -281,17 +281,3 @@ def test_numbers_that_are_none_are_counted_and_placed(name, places):
     assert found.fault is Fault.NOT_FINITE
     assert found.what == (f"{name} is not a finite number in {len(places)} of 4000 samples")
     assert found.where == f"from {places[0] / 1000.0:g} s"
-
-
-@pytest.mark.parametrize(
-    ("signals", "complete"),
-    [
-        (("position", "force"), True),
-        (("position", "current"), True),
-        (("force",), False),
-        (("position",), False),
-        (("position", "velocity"), False),
-    ],
-)
-def test_a_log_needs_a_position_and_a_command(signals, complete):
-    assert len(findings(drive(signals=signals), Fault.INCOMPLETE)) == (not complete)

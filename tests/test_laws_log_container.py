@@ -127,7 +127,6 @@ def test_the_checksums_are_those_of_the_bytes(data):
         chunk = parsed(Chunk, piece)
         assert chunk.uncompressed_crc == zlib.crc32(payload(chunk)) != 0
         assert chunk.uncompressed_size == len(payload(chunk))
-        assert chunk.compression == "zstd"
     for body in (p.body for p in of(data, ATTACHMENT)):
         assert int.from_bytes(body[-4:], "little") == zlib.crc32(body[:-4])
 
@@ -229,7 +228,6 @@ def test_the_summary_offsets_cut_the_summary_into_groups_of_one_kind(data):
         group = pieces(data, offset.group_start, place)
         assert {p.opcode for p in group} == {offset.group_opcode}
     assert place == footer.summary_offset_start == of(data, SUMMARY_OFFSET)[0].start
-    assert len({o.group_opcode for o in offsets}) == 6
 
 
 def test_every_chunk_can_be_read_alone(data):

@@ -8,6 +8,8 @@ from mcap.records import Metadata
 from mcap_bytes import json_channel, json_schema
 from plain_cases import HEAD, MS, accepted, refused, sample
 
+from twin.log import container
+
 RATED = [json_schema(1), json_channel(1, "/axis/x", {"sample_rate_hz": "1000"}, 1)]
 
 
@@ -34,11 +36,15 @@ def test_a_time_may_be_off_by_a_tenth_of_a_period_and_no_more(tmp_path, head, k)
 
 @pytest.mark.parametrize("head", [RATED, HEAD], ids=["stated", "counted"])
 @pytest.mark.parametrize("k", [2, 5, 11])
-def test_a_gap_and_a_step_back_are_called_so(tmp_path, head, k):
+def test_a_gap_and_a_step_back_are_called_so(tmp_path, monkeypatch, head, k):
     late = dict.fromkeys(range(k, 12), 1.0)
     text = refused(tmp_path / "a.mcap", at_times(head, late), f"gap: .* at sample {k},")
     assert f"{(4 + k) / 1e3:g} s is followed by {(6 + k) / 1e3:g} s" in text
+    assert "expected a sample every 0.001 s (1000 Hz)" in text
     refused(tmp_path / "a.mcap", at_times(head, {k: -1.0}), f"not increase: .* at sample {k},")
+    monkeypatch.setattr(container, "LOOSE_BYTES", 1)  # likewise where every message comes alone
+    text = refused(tmp_path / "a.mcap", at_times(head, late), f"gap: .* at sample {k},")
+    assert "expected a sample every 0.001 s (1000 Hz)" in text
 
 
 def test_sequence_numbers_count_or_are_not_used(tmp_path):
