@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.actuation import is_noise
+from identify.actuation import forces_lessened, is_noise
 from identify.clocks import phases_found
 from identify.evidence import (
     LEAST_BIC,
@@ -178,7 +178,11 @@ def score(base: Fit, fit: Fit, study: Study, effect: Effect) -> Candidate:
     proof = evidence(before, after, added)
     if study.holdout:
         held = moving(study.holdout, sticks(base.axis) or sticks(fit.axis))
-        pair = both(lambda f: residual(f.axis, study.holdout)[held])
+        motions = [log.motion for log in study.holdout]  # a motor may be weak on those alone
+        pair = [
+            residual(f.axis, study.holdout)[held] / forces_lessened(f.axis, motions)
+            for f in (base, fit)
+        ]
     elif proof.delta_bic > LEAST_BIC:
         pair = both(lambda f: _cross_validated(f, shared[f.kept]))
     else:  # not supported, whatever blocks left out would say

@@ -19,6 +19,25 @@ SHARED_DATA = Path(__file__).resolve().parent.parent.parent / "shared" / "data"
 LONGEST_WAIT = 300.0  # s for what another worker compiles
 
 
+# With `--dist loadfile` a file is one worker's: what its tests share is made once. The longest
+# begin first, so that the workers end together.
+LONGEST = (
+    "test_catalogue_recovery",
+    "test_readme",
+    "test_descriptions",
+    "test_plan",
+    "test_catalogue_laws",
+    "test_rounding",
+    "test_report",
+    "test_selftest",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    order = {name: i for i, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: order.get(item.path.stem, len(order)))
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of real measurements beside the repository; skips where it is absent."""

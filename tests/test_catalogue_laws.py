@@ -18,6 +18,7 @@ from effect_runs import CATALOGUE, FRICTIONS, MODIFIERS, absent, moderate
 from twin import effects
 from twin.effect import DRY, OUT, TIME, VISCOUS, Effect, Kind, Parameter, V, X
 from twin.experiments import simulate
+from twin.log import Log
 from twin.model import Fitted, StageModel
 from twin.model_file import load_model
 from twin.mujoco_link import passive_callback
@@ -68,14 +69,26 @@ def with_x(fitted: Fitted) -> StageModel:
     return STAGE.with_axis("x", STAGE.axes["x"].with_effect(fitted))
 
 
-def without_x(effect: Effect) -> StageModel:
-    """The stage without that effect on x, and without the friction that it would replace."""
+def replaced(effect: Effect) -> tuple[str, ...]:
+    """Names of what that effect would replace on x: itself, or the friction."""
+    return tuple(
+        f.effect.name
+        for f in STAGE.axes["x"].effects
+        if f.effect.name == effect.name or effect.kind is f.effect.kind is Kind.FRICTION
+    )
+
+
+@cache
+def logged_without(names: tuple[str, ...], stage: type[MujocoStage] | type[ReducedStage]) -> Log:
+    """A log of the stage without those effects on x."""
     axis = STAGE.axes["x"]
-    for f in axis.effects:
-        both = effect.kind is f.effect.kind is Kind.FRICTION
-        if both or f.effect.name == effect.name:
-            axis = axis.without(f.effect.name)
-    return STAGE.with_axis("x", axis)
+    for name in names:
+        axis = axis.without(name)
+    return logged(STAGE.with_axis("x", axis), stage)
+
+
+def logged(model: StageModel, stage: type[MujocoStage] | type[ReducedStage]) -> Log:
+    return simulate(model, "moves", seed=3, duration=0.1, stage=stage)
 
 
 @EVERY
@@ -83,10 +96,8 @@ def without_x(effect: Effect) -> StageModel:
 def test_simulation_with_zero_strength_is_that_without(
     effect: Effect, stage: type[MujocoStage] | type[ReducedStage]
 ) -> None:
-    zero, without = (
-        simulate(model, "moves", seed=3, duration=0.1, stage=stage)
-        for model in (with_x(Fitted.at_start(effect, absent(effect))), without_x(effect))
-    )
+    zero = logged(with_x(Fitted.at_start(effect, absent(effect))), stage)
+    without = logged_without(replaced(effect), stage)
     assert len(zero) > 500
     for axis in STAGE.axes:
         for name in ("position", "force"):

@@ -22,7 +22,7 @@ EVERY = pytest.mark.parametrize(
     [pytest.param(e, marks=pytest.mark.slow) if e.name == LONG else e for e in PHYSICS],
     ids=lambda e: e.name,
 )
-SOME = pytest.mark.parametrize("effect", PHYSICS[1::6], ids=lambda e: e.name)
+SOME = pytest.mark.parametrize("effect", PHYSICS[1::9], ids=lambda e: e.name)
 SEEDS = [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))]
 
 
