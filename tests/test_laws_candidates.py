@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -161,7 +162,9 @@ def test_held_out_windows_at_rest_are_left_out_where_either_friction_sticks(quie
 
     monkeypatch.setattr(candidates, "moving", moving)
     monkeypatch.setattr(candidates, "residual", lambda axis, logs: RNG.standard_normal(300))
-    study, lugre = study_stub(holdout=("held",)), PLAIN.with_effect(fitted("lugre"))
+    monkeypatch.setattr(candidates, "forces_lessened", lambda axis, motions: 1.0)
+    held = SimpleNamespace(motion=None)
+    study, lugre = study_stub(holdout=(held,)), PLAIN.with_effect(fitted("lugre"))
     for one, two in ((PLAIN, lugre), (lugre, PLAIN), (lugre, lugre)):
         score(built_fit(2.0, axis=one), built_fit(1.0, axis=two), study, CATALOGUE["lugre"])
     assert asked == [True, True, False]
