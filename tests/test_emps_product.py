@@ -6,7 +6,10 @@ System Identification Benchmarks, 2019.
 
 from pathlib import Path
 
+import emps_published
+import numpy as np
 import pytest
+from emps_published import direction_dependent, identify, prediction_error, symmetric
 
 from identify.diagnose import Verdict
 from identify.remarks import remarks
@@ -69,16 +72,35 @@ def test_direction_dependent_friction_is_named_first(found):
     assert found.effect.name == "asymmetric_friction"
 
 
-def test_the_held_out_error_falls_by_about_a_third(added):
+def test_the_held_out_error_falls_as_between_the_published_models(added, shared_data):
+    """By as many N^2: the friction of a direction lasts for seconds, which windows of 0.2 s pass.
+
+    What they average out is in both errors, so that these are smaller than the published ones.
+    """
     assert added.kept
-    assert added.step.holdout_error_before == pytest.approx(1.94, abs=0.06)
-    assert added.step.holdout_error_after == pytest.approx(1.30, abs=0.06)
+    run, pulses = (
+        emps_published.load(shared_data / "emps" / f"{name}.mat")
+        for name in ("DATA_EMPS", "DATA_EMPS_PULSES")
+    )
+    force = np.sqrt(np.mean(pulses.force**2))
+    before, after = (
+        force * prediction_error(pulses, law, identify(run, law).parameters)
+        for law in (symmetric, direction_dependent)
+    )
+    step = added.step
+    fall = step.holdout_error_before**2 - step.holdout_error_after**2
+    assert fall == pytest.approx(before**2 - after**2, rel=0.25)
+    assert step.holdout_error_before < before
+    assert step.holdout_error_after < after
 
 
 def test_the_constant_force_is_said_to_have_collapsed(added):
     notes = [n for n in added.notes if n.startswith("constant_force.F0 collapsed")]
     assert len(notes) == 1
-    assert abs(added.model.axes["x"]["constant_force"].values["F0"]) < 0.4
+    # The published levels forwards and backwards, fitted without any constant force, differ by
+    # less than this: more is not left for one beside them.
+    left = abs(added.model.axes["x"]["constant_force"].values["F0"])
+    assert left < 20.6277 - 20.1440
 
 
 def test_it_adds_nothing_more(found):
@@ -110,5 +132,8 @@ def test_the_term_of_a_screw_turn_is_present_in_each_run_but_not_general(found):
     repeat = found.leading.repeat
     assert repeat is not None
     assert repeat.period == pytest.approx(2.5e-3, rel=0.005)
-    assert all(0.5 < a < 1.5 for a in repeat.amplitude.values())
+    # Its RMS a/sqrt(2) is within the error of its run, and that within sqrt(2) times both runs'.
+    final = found.leading.final
+    for amplitude in repeat.amplitude.values():
+        assert final.floor < amplitude < 2.0 * final.error
     assert any("not general" in note for note in remarks(found.leading, None))

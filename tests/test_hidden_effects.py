@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from check_cases import with_axis
 from machines import DURATION, machine, one_axis
@@ -79,8 +80,12 @@ def test_a_force_channel_of_another_machine_is_not_a_weak_motor(seed, duration):
     mixed = {name: _backwards(log) for name, log in honest.logs.items()}
     held = {name: _backwards(log) for name, log in honest.holdout.items()}
     few = Catalogue([CATALOGUE[n] for n in ("actuator_deadband", "actuator_saturation")])
-    found = diagnose(STAGE, mixed, held, catalogue=few)
-    assert found.leading.verdict is Verdict.UNEXPLAINED
+    found = diagnose(STAGE, mixed, held, catalogue=few).leading
+    assert found.verdict is Verdict.UNEXPLAINED
+    for candidate in found.ranking:  # the evidence is of errors over what the motor still gives
+        fit, base = candidate.fit, found.base
+        wanted = 2.0 * np.log(base.error / base.lessened / (fit.error / fit.lessened))
+        assert candidate.evidence.log_gain == pytest.approx(wanted, abs=0.1)
 
 
 def _backwards(log):

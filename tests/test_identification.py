@@ -10,6 +10,7 @@ from machines import machine, one_axis
 from identify.candidates import try_effect
 from identify.fit import Outcome, finished, fit_axis
 from identify.levenberg_marquardt import minimise
+from identify.residual import residual
 from identify.study import studies
 from identify.uncertainty import estimates, refusal
 from identify.weak import Window
@@ -55,9 +56,15 @@ def test_most_intervals_cover_the_truth_and_are_narrow(fitted):
     free = [e for e in estimates(fitted) if e.free]
     covered = [e.low <= truth[e.label] <= e.high for e in free if e.low is not None]
     assert len(covered) == len(free)
+    # Of ten intervals of 90 % six or fewer hold the truth in 1 of 80 cases, of more less often.
+    assert len(covered) >= 10
     assert np.mean(covered) > 0.6
     mass = next(e for e in free if e.label == "mass")
-    assert (mass.high - mass.low) < 1e-3 * mass.value
+    heavier = replace(fitted.axis, mass=fitted.axis.mass + 1.0)
+    slope = (residual(heavier, fitted.logs) - residual(fitted.axis, fitted.logs))[fitted.kept]
+    alone = 2.0 * 1.645 * fitted.floor / np.linalg.norm(slope)  # width, were all else known
+    # What else is fitted, and the colour that overlapping windows give the noise, widen it.
+    assert alone < mass.high - mass.low < 5.0 * alone
 
 
 def test_intervals_are_refused_on_a_wrong_model(study):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from import_cases import COUNT, MAP, RATE, mapping, table, write_csv
-from scipy.io import savemat
+from scipy.io import loadmat, savemat
 
 from twin.errors import InputError
 from twin.log import read_log, write_log
@@ -249,5 +249,6 @@ def test_the_emps_drive_is_imported(shared_data: Path) -> None:
     axis = log.axes["x"]
     assert (len(log), log.sample_rate) == (24_841, 1000.0)
     assert set(axis.columns) == {"position", "setpoint_position", "force"}
-    assert np.ptp(axis.position) == pytest.approx(0.2464, abs=1e-4)  # m
-    assert axis.force.max() == pytest.approx(35.15065 * 4.138482534881537)  # N
+    record = loadmat(shared_data / "emps" / "DATA_EMPS.mat")  # by SciPy, in m and V
+    np.testing.assert_array_equal(axis.position, record["qm"].ravel())
+    np.testing.assert_allclose(axis.force, record["gtau"].item() * record["vir"].ravel())

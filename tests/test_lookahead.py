@@ -20,15 +20,26 @@ PLANTED = ("position_dependent_friction", "cogging")
 FEW = Catalogue(CATALOGUE[name] for name in (*PLANTED, "wear"))
 
 
-@pytest.fixture(scope="module")
-def case():
+def drawn(seed):
     """A fit and its study of a machine with both."""
-    rng = np.random.default_rng([4, *(zlib.crc32(name.encode()) for name in PLANTED)])
+    rng = np.random.default_rng([seed, *(zlib.crc32(name.encode()) for name in PLANTED)])
     stage = replace(load_model("proton_xy", CATALOGUE), sample_rate=2500.0)
     with patch("identify.selftest.cases.DURATION", 8.0):
         built = machine(stage, [CATALOGUE[e] for e in PLANTED], 5.0, rng)
     study = studies(built.model, built.logs, built.holdout)[AXIS]
     return fit_axis(built.model.axes[AXIS], study.fit), study
+
+
+@pytest.fixture(scope="module")
+def case():
+    return drawn(4)
+
+
+@pytest.mark.slow
+def test_both_are_named_on_most_machines():
+    """Of pairs the self-test names 89 %: fewer than three of five are then one case in 80."""
+    found = [diagnose_axis(*drawn(seed), FEW).named for seed in range(1, 6)]
+    assert sum(set(named) == set(PLANTED) for named in found) >= 3
 
 
 def test_both_are_named(case):

@@ -24,10 +24,12 @@ from twin.errors import InputError
 from twin.experiment import Experiment
 from twin.experiment_kinds import KINDS, Passes
 from twin.experiments import simulate
+from twin.log import Log
 from twin.model import Fitted, StageModel
 from twin.model_file import load_model
 from twin.simulator import ReducedStage
 
+Logs = dict[str, Log]
 CATALOGUE = load_catalogue()
 PROTON = load_model("proton_xy", CATALOGUE)
 RATE = 2500.0  # Hz, of the machines that are identified: quicker than 10 kHz, and enough
@@ -109,15 +111,11 @@ def test_what_a_weak_motor_cannot_do_is_not_planned():
 
 @dataclass(frozen=True)
 class Case:
-    """Two effects, each with the values of a machine; the model that lacks both; poor motion.
-
-    seed: of the noise of the first log; with some noises even this motion tells the two apart.
-    """
+    """Two effects, each with the values of a machine; the model that lacks both; poor motion."""
 
     stage: StageModel
     pair: dict[str, dict[str, float]]
     poor: Experiment
-    seed: int = 1
 
     def machine(self, truth: str) -> StageModel:
         planted = Fitted.at_start(CATALOGUE[truth], self.pair[truth])
@@ -157,7 +155,6 @@ CASES = {
         stage_of(effect("stribeck", Fc=0.285, Fs=0.335, v0=0.01, sigma2=0.018)),
         {"constant_force": {"F0": 2.6e-3}, "asymmetric_friction": {"coulomb": -0.0091}},
         Passes("x", span=0.3, speed=0.25, repeats=1),
-        seed=7,
     ),
 }
 TRUTHS = [(name, truth) for name, case in CASES.items() for truth in case.pair]
@@ -180,12 +177,24 @@ def test_after_the_planned_experiment_the_ambiguity_is_gone(name, truth):
     assert_resolved(CASES[name], truth, Catalogue([CATALOGUE[e] for e in CASES[name].pair]))
 
 
+def poorly_logged(case: Case, machine: StageModel, seed: int) -> tuple[Logs, Logs]:
+    """A log of the poor motion, and one held out."""
+    poor = simulate(machine, case.poor, seed=seed, stage=ReducedStage)
+    held = simulate(machine, case.poor, seed=seed + 10, stage=ReducedStage)
+    return {"poor": poor}, {"held": held}
+
+
 def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
     machine = case.machine(truth)
-    poor = {"poor": simulate(machine, case.poor, seed=case.seed, stage=ReducedStage)}
-    held = {"held": simulate(machine, case.poor, seed=case.seed + 10, stage=ReducedStage)}
-    before = diagnose(case.stage, poor, held, catalogue=catalogue, window=WINDOW)
-    assert abs(separation(before.axes["x"].ranking)) < LEAST_SEPARATION
+    # With some noises even this motion tells the two apart; where it does so half the time, six
+    # logs in a row that do are one case in 64.
+    for seed in range(1, 7):
+        poor, held = poorly_logged(case, machine, seed)
+        before = diagnose(case.stage, poor, held, catalogue=catalogue, window=WINDOW)
+        if abs(separation(before.axes["x"].ranking)) < LEAST_SEPARATION:
+            break
+    else:
+        pytest.fail("the poor motion tells the two apart")
     found = before.next_experiments.get("x")
     if before.axes["x"].verdict is not Verdict.AMBIGUOUS:
         assert found is None
@@ -196,9 +205,8 @@ def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
     assert found.decides
     assert set(found.between) == set(case.pair)
     new = {"new": simulate(machine, found.chosen.experiment, seed=3, stage=ReducedStage)}
-    after = diagnose(case.stage, {**poor, **new}, held, catalogue=catalogue, window=WINDOW).axes[
-        "x"
-    ]
+    logs = {**poor, **new}
+    after = diagnose(case.stage, logs, held, catalogue=catalogue, window=WINDOW).axes["x"]
     assert after.verdict is Verdict.MISSING_EFFECT
     assert after.ranking[0].effect.name == truth
     assert separation(after.ranking) > LEAST_SEPARATION
@@ -208,7 +216,7 @@ def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
 @pytest.mark.parametrize(("name", "truth"), TRUTHS)
 def test_the_same_among_the_whole_catalogue(name, truth):
     machine, case = CASES[name].machine(truth), CASES[name]
-    poor = {"poor": simulate(machine, case.poor, seed=case.seed, stage=ReducedStage)}
+    poor, _ = poorly_logged(case, machine, 1)
     rivals = [CATALOGUE[e] for e in case.pair]
     found = plan(case.stage, poor, between=rivals, catalogue=CATALOGUE, window=WINDOW)
     new = {

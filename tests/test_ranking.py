@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from identify import ranking
-from identify.evidence import Evidence
+from identify.candidates import Candidate
+from identify.evidence import LEAST_BIC, LEAST_T, Evidence, Gain
+from twin.effects import load_catalogue
 
 
 def candidate(scale: float, gain: float):
@@ -33,3 +35,24 @@ def test_tie(scale, gain, tied, monkeypatch):
     monkeypatch.setattr(ranking, "sticks", lambda axis: False)
     study = SimpleNamespace(holdout=("held out",), fit=())
     assert ranking.tie(study, candidate(1.0, 1.0), candidate(scale, gain)) is tied
+
+
+@pytest.mark.parametrize(
+    ("bic", "t", "after", "supported"),
+    [
+        (1.01 * LEAST_BIC, 1.01 * LEAST_T, 0.9, True),
+        (0.99 * LEAST_BIC, 1.01 * LEAST_T, 0.9, False),
+        (1.01 * LEAST_BIC, 0.99 * LEAST_T, 0.9, False),
+        (1.01 * LEAST_BIC, 1.01 * LEAST_T, 1.1, False),
+    ],
+    ids=["both", "little evidence", "held out by chance", "a larger error held out"],
+)
+def test_an_effect_is_supported_by_the_evidence_and_the_held_out_logs_together(
+    bic, t, after, supported
+):
+    samples = 500.0
+    evidence = Evidence((bic + 2.0 * np.log(samples)) / samples, 2, samples)
+    assert evidence.delta_bic == pytest.approx(bic)
+    effect = load_catalogue()["cogging"]
+    found = Candidate(effect, "x", SimpleNamespace(), evidence, Gain(1.0, after, t))
+    assert found.supported is supported
