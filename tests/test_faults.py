@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("cosmic_ray", reason="comes with the extra `bench`")
 
-from benchmarks.mutation.faults import Fault, draw, faults_on, operators
+from benchmarks.mutation.faults import Fault, draw, faults_on, is_native, operators
 from benchmarks.mutation.noticed import figures
 from benchmarks.mutation.reach import Reach
 from benchmarks.mutation.trial import Trial
@@ -61,6 +61,16 @@ def test_tests_of_a_line_come_quickest_first_and_within_the_budget() -> None:
     assert known.tests_for(Fault("x.py", 7, "k", 0), 3.5) == ["b", "c"]
     assert known.tests_for(Fault("x.py", 9, "k", 0), 10.0) == ["b", "c", "a"]  # native or import
     assert known.tests_for(Fault("y.py", 1, "k", 0), 1.0) == ["d"]
+    assert known.tests_for(Fault("x.py", 7, "k", 0), 1.0, native=True) == ["d"]
+    named = Reach({"a": 0.1, "b[gms]": 2.0}, {"gms.py": {1: frozenset({"a", "b[gms]"})}})
+    assert named.tests_for(Fault("gms.py", 1, "k", 0), 9.0) == ["b[gms]", "a"]
+
+
+def test_laws_and_compiled_functions_are_native() -> None:
+    law = "def law(p, s, io):\n    io[0] = p[0]\n\n\ndef f(x):\n    return x\n"
+    assert [is_native(law, n) for n in (2, 6)] == [True, False]
+    core = "@compiled(inline=True)\ndef f(x):\n    return x\n"
+    assert is_native(core, 3)
 
 
 def test_shares_are_counted_by_folder() -> None:

@@ -180,6 +180,16 @@ def _idle_lines(source: str) -> frozenset[int]:
     return frozenset(idle)
 
 
+def is_native(source: str, line: int) -> bool:
+    """Whether a line is of a function that runs compiled: a law, or one made with ``compiled``."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef) and node.lineno <= line <= (node.end_lineno or 0):
+            law = [a.arg for a in node.args.args] == ["p", "s", "io"]
+            if law or any("compiled" in ast.dump(d) for d in node.decorator_list):
+                return True
+    return False
+
+
 def files(root: Path) -> list[str]:
     """The product's Python files, by their path from the root."""
     found = [p for package in PACKAGES for p in sorted((root / package).rglob("*.py"))]

@@ -33,18 +33,20 @@ class Reach:
     seconds: Mapping[str, float]
     contexts: Mapping[str, Mapping[int, frozenset[str]]]
 
-    def tests_for(self, fault: Fault, budget: float) -> list[str]:
-        """Tests that can notice a fault, quickest first, of ``budget`` seconds together.
+    def tests_for(self, fault: Fault, budget: float, native: bool = False) -> list[str]:
+        """Tests that can notice a fault, of ``budget`` seconds together.
 
-        Native code and what runs at import leave no trace of their line: there any test may notice.
+        First those that name its file's subject, an effect say, then the quickest. Native code and
+        what runs at import leave no trace of their line: there any test may notice.
         """
         by_line = self.contexts.get(fault.path, {})
         chosen = by_line.get(fault.line) or frozenset().union(*by_line.values())
         chosen &= self.seconds.keys()
-        if not chosen:
+        if native or not chosen:
             chosen = frozenset(self.seconds)
+        subject = Path(fault.path).stem
         out, spent = [], 0.0
-        for test in sorted(chosen, key=lambda t: (self.seconds[t], t)):
+        for test in sorted(chosen, key=lambda t: (subject not in t, self.seconds[t], t)):
             spent += self.seconds[test]
             if out and spent > budget:
                 break

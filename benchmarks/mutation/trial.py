@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.mutation.faults import PACKAGES, Fault
+from benchmarks.mutation.faults import PACKAGES, Fault, is_native
 from benchmarks.mutation.reach import Reach, environment, reach
 
 BUDGET = 40.0  # s of tests that a fault is put to
@@ -49,7 +49,7 @@ def _trial(clean: Path, fault: Fault, known: Reach, number: int) -> Trial:
     shutil.copytree(clean, copy)
     try:
         (copy / fault.path).write_text(fault.applied(source))
-        tests = known.tests_for(fault, BUDGET)
+        tests = known.tests_for(fault, BUDGET, is_native(source, fault.line))
         noticed, by = _tested(copy, tests)
     finally:
         shutil.rmtree(copy, ignore_errors=True)
