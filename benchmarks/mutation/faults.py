@@ -181,11 +181,12 @@ def _idle_lines(source: str) -> frozenset[int]:
 
 
 def is_native(source: str, line: int) -> bool:
-    """Whether a line is of a function that runs compiled: a law, or one made with ``compiled``."""
+    """Whether a line is of a function that runs compiled: a law, what it calls, the core."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.FunctionDef) and node.lineno <= line <= (node.end_lineno or 0):
             law = [a.arg for a in node.args.args] == ["p", "s", "io"]
-            if law or any("compiled" in ast.dump(d) for d in node.decorator_list):
+            made = " ".join(ast.dump(d) for d in node.decorator_list)
+            if law or "compiled" in made or "jit" in made:
                 return True
     return False
 
