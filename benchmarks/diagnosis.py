@@ -10,12 +10,12 @@ import numpy as np
 from benchmarks.figures import Figure, Target
 from benchmarks.timing import interleaved
 from identify import workflow
-from identify.candidates import absent_effects
-from identify.ranking import rank
+from identify.selection.candidates import absent_effects
+from identify.selection.ranking import rank
+from twin.core.native import law_address
 from twin.effects import load_catalogue
-from twin.experiments import simulate
-from twin.model_file import load_model
-from twin.native import law_address
+from twin.experiments.named import simulate
+from twin.model.file import load_model
 
 DURATION = 30.0  # s of each log
 RUNS = ("tracking", "moves", "tracking", "moves")
@@ -41,7 +41,7 @@ def measure() -> list[Figure]:
 
     def ranked(workers: int) -> None:
         for axis, base in fitted.fits.items():
-            rank(base, fitted.studies[axis], catalogue, workers=workers)
+            rank(base, fitted.datasets[axis], catalogue, workers=workers)
 
     runs = interleaved([partial(ranked, 1), partial(ranked, 2)], 1)
     one, two = (float(t) for t in np.median(runs, axis=0))

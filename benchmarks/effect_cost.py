@@ -10,6 +10,7 @@ import numpy as np
 
 from benchmarks.figures import Figure
 from benchmarks.timing import Array, interleaved, ratio
+from twin.core.native import call_law, law_address
 from twin.effect import (
     DRY,
     DT,
@@ -26,7 +27,6 @@ from twin.effect import (
     X,
 )
 from twin.effects import load_catalogue
-from twin.native import call_law, law_address
 
 TITLE = "Cost of one effect and sample (CPU time of its compiled law)"
 REFERENCE = "coulomb_viscous"

@@ -19,7 +19,7 @@ LINKED = BARE + ".linalg"  # which numba loads with its first function
 WHOLE = "from twin.effects import load_catalogue\ncatalogue = load_catalogue()\n"
 READY = (
     WHOLE
-    + "from twin.native import law_address\n"
+    + "from twin.core.native import law_address\n"
     + "for effect in catalogue.values():\n    law_address(effect)\n"
 )
 

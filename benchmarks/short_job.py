@@ -12,8 +12,8 @@ from numba.core import event
 
 from identify import workflow
 from twin.effects import load_catalogue
-from twin.experiments import simulate
-from twin.model_file import load_model
+from twin.experiments.named import simulate
+from twin.model.file import load_model
 
 
 def main() -> None:

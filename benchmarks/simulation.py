@@ -14,18 +14,18 @@ import numpy as np
 from benchmarks.figures import Figure, Target
 from benchmarks.timing import interleaved, ratio
 from twin.effects import load_catalogue
-from twin.experiment_kinds import Tracking
-from twin.model import StageModel
-from twin.model_file import load_model
-from twin.mujoco_link import call_step, step_address
-from twin.simulator import MujocoStage, ReducedStage, run
-from twin.trajectory import Setpoint
+from twin.experiments.kinds import Tracking
+from twin.experiments.trajectory import Setpoint
+from twin.model.file import load_model
+from twin.model.machine import MachineModel
+from twin.mujoco.callback import call_step, step_address
+from twin.simulator import MujocoSimulator, ReducedSimulator, run
 
 TITLE = "Simulation: LuGre, cable and roller spikes on both axes, 10 kHz"
 DURATION = 20.0  # s of random tracking
 ROUNDS = 7
 
-Stage = type[MujocoStage] | type[ReducedStage]
+Stage = type[MujocoSimulator] | type[ReducedSimulator]
 
 
 @numba.njit(cache=True)
@@ -37,14 +37,14 @@ def _bare_steps(step, model, data, n):
 class _Simulation:
     """Runs one setpoint in a stage; ``stepping`` collects the seconds within its steps."""
 
-    def __init__(self, model: StageModel, setpoint: Setpoint, stage: Stage) -> None:
+    def __init__(self, model: MachineModel, setpoint: Setpoint, stage: Stage) -> None:
         self.stepping: list[float] = []
         self._model, self._setpoint = model, setpoint
         self._stage = self._timed(stage)
 
     def __call__(self) -> None:
         self.stepping.append(0.0)
-        run(self._model, self._setpoint, np.random.default_rng(2), stage=self._stage)
+        run(self._model, self._setpoint, np.random.default_rng(2), simulator=self._stage)
 
     def _timed(self, stage: Stage) -> Stage:
         stepping = self.stepping
@@ -63,10 +63,10 @@ def measure() -> list[Figure]:
     model = load_model("proton_xy", load_catalogue())
     setpoint = Tracking(DURATION).setpoint(model, np.random.default_rng(1))
     n = len(setpoint.position)
-    bare_model = MujocoStage(model, model.table()).model
+    bare_model = MujocoSimulator(model, model.table()).model
     bare_data = mujoco.MjData(bare_model)
-    in_mujoco = _Simulation(model, setpoint, MujocoStage)
-    in_reduced = _Simulation(model, setpoint, ReducedStage)
+    in_mujoco = _Simulation(model, setpoint, MujocoSimulator)
+    in_reduced = _Simulation(model, setpoint, ReducedSimulator)
     bare, whole, reduced = interleaved(
         [
             lambda: _bare_steps(step_address(), bare_model._address, bare_data._address, n),

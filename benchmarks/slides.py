@@ -16,7 +16,15 @@ import numpy as np
 from benchmarks.timing import Array
 from twin.effects import load_catalogue
 from twin.log import AxisLog, Log
-from twin.model import AxisModel, Coordinate, Fitted, StageModel, coordinates, read, write
+from twin.model.machine import (
+    AxisModel,
+    Fitted,
+    MachineModel,
+    ParameterReference,
+    free_parameters,
+    read,
+    write,
+)
 
 PERIOD = 1e-4  # s
 DURATION = 5.0  # s
@@ -40,18 +48,18 @@ class Slide:
     mjcf: Callable[[Array, float], str]
 
     @property
-    def where(self) -> tuple[Coordinate, ...]:
+    def where(self) -> tuple[ParameterReference, ...]:
         """The fitted parameters."""
-        return coordinates(self.axis)
+        return free_parameters(self.axis)
 
     @property
     def true(self) -> Array:
         """Their true values, (n_parameters,) SI."""
         return read(self.axis, self.where)
 
-    def model(self, values: Array) -> StageModel:
+    def model(self, values: Array) -> MachineModel:
         """Our model with these values."""
-        return StageModel("slide", {"x": write(self.axis, self.where, values)})
+        return MachineModel("slide", {"x": write(self.axis, self.where, values)})
 
     def largest_error(self, values: Array) -> float:
         """Largest relative error over the parameters."""
@@ -70,7 +78,7 @@ def damped_slide() -> Slide:
 
 
 def lugre_slide() -> Slide:
-    """The six LuGre parameters of the thesis' simulation study on a known mass."""
+    """The six LuGre parameters of the thesis' simulation dataset on a known mass."""
     effect = load_catalogue()["lugre"]
     values = {
         "Fc": 0.285, "Fs": 0.335, "v0": 0.01, "sigma2": 0.018, "sigma0": 260.0, "sigma1": 0.6,
@@ -136,7 +144,7 @@ def record(slide: Slide, seed: int = 1) -> Recording:
     position, force = np.empty((2, len(t)))
     for k in range(len(t)):
         v = data.qvel[0]
-        position[k] = data.qpos[0] - 0.5 * model.opt.timestep * v  # see twin.loop
+        position[k] = data.qpos[0] - 0.5 * model.opt.timestep * v  # see twin.core.loop
         force[k] = push[k] + MASS * omega * (omega / 3.0 * (aim[k] - position[k]) + speed[k] - v)
         data.ctrl[0] = force[k]
         mujoco.mj_step(model, data, FINER)

@@ -18,13 +18,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from twin.control import Controller
+from twin.core.control import Controller
+from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
+from twin.core.native import walk
 from twin.effects import load_catalogue
-from twin.loop import POSITION_COLUMN, VELOCITY_COLUMN
-from twin.model import AxisModel, Fitted, StageModel, axis_table
-from twin.native import walk
-from twin.simulator import ReducedStage, run
-from twin.trajectory import Setpoint
+from twin.experiments.trajectory import Setpoint
+from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
+from twin.simulator import ReducedSimulator, run
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -64,10 +64,10 @@ def pushed(fitted: Fitted, force: Array, spring: float = 0.0) -> tuple[Array, Ar
     """Position m, velocity m/s and friction N of 1 kg under a force (n,) N and a spring (N/m)."""
     hung = Fitted.at_start(CATALOGUE["cable_slab"], {"k1": spring})
     still = np.zeros((len(force), 1))
-    model = StageModel("mass", {"x": AxisModel(1.0, effects=(fitted, hung))}, sample_rate=RATE)
+    model = MachineModel("mass", {"x": AxisModel(1.0, effects=(fitted, hung))}, sample_rate=RATE)
     done = run(
         model, Setpoint(still, still, still, force[:, None], RATE), np.random.default_rng(0),
-        stage=ReducedStage, controllers={"x": Controller()},
+        simulator=ReducedSimulator, controllers={"x": Controller()},
     )  # fmt: skip
     row = [effect for _, effect in done.table.labels].index(fitted.effect.name)
     motion = done.signals[:, 0]

@@ -9,24 +9,23 @@ from pathlib import Path
 import numpy as np
 
 from identify import workflow
-from identify.fit import Fit, fit_axis
-from identify.planting import draw_effect, hidden_part, other_machine
-from identify.report import write_report
-from identify.study import Study, studies
-from identify.workflow import Addition, Diagnosis
+from identify.dataset.dataset import Dataset, datasets
+from identify.estimation.fit import Fit, fit_axis
+from identify.experiment_design.planting import draw_effect, hidden_part, other_machine
+from identify.output.report import write_report
+from identify.output.results import Addition, Diagnosis
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
-from twin.experiments import simulate
+from twin.experiments.named import simulate
 from twin.log import Log, write_log
-from twin.model import Fitted, StageModel
-from twin.model_file import save_model
+from twin.model.file import save_model
+from twin.model.machine import Fitted, MachineModel
 
 DURATION = 20.0  # s of each log
 RUNS = ("tracking", "moves", "tracking")  # the last is held out
 FORCE = 0.05  # N RMS of the hidden effect, about 50 times the noise floor
 VISIBLE = 0.5  # part of the hidden force that the baseline must not be able to absorb
-AXIS = "x"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +45,7 @@ class Demo:
 
 
 def demo(
-    model: StageModel,
+    model: MachineModel,
     catalogue: Catalogue,
     folder: Path,
     seed: int,
@@ -72,15 +71,15 @@ def demo(
         for i, experiment in enumerate(RUNS, start=1)
     }
     held = {"machine_3.mcap": logs.pop("machine_3.mcap")}
-    known = ", ".join(model.axes[AXIS].names)
+    known = ", ".join(model.axes[_first(model)].names)
     say(f"2. the model ({known}) is fitted, and every absent effect tried")
     diagnosis = workflow.diagnose(model, logs, held, catalogue=catalogue, progress=progress)
     addition = None
     final = diagnosis.model
     if diagnosis.effect is not None:
-        say(f"3. the diagnosis names {diagnosis.effect.name} on {diagnosis.leading.study.axis}")
+        say(f"3. the diagnosis names {diagnosis.effect.name} on {diagnosis.leading.dataset.axis}")
         addition = workflow.add(
-            diagnosis.effect, diagnosis.model, logs, held, axis=diagnosis.leading.study.axis,
+            diagnosis.effect, diagnosis.model, logs, held, axis=diagnosis.leading.dataset.axis,
             progress=progress,
         )  # fmt: skip
         final = addition.model
@@ -99,7 +98,7 @@ def demo(
 
 
 def _record(
-    machine: StageModel, experiment: str, path: Path, seed: int, progress: workflow.Progress
+    machine: MachineModel, experiment: str, path: Path, seed: int, progress: workflow.Progress
 ) -> Log:
     log = simulate(
         machine, experiment, seed=seed, duration=DURATION,
@@ -112,43 +111,52 @@ def _record(
 def _fallen(addition: Addition) -> str:
     step = addition.step
     floor = addition.candidate.fit.floor
+    unit = f"m{step.unit}"
     before, after = step.holdout_error_before, step.holdout_error_after
     assert before is not None
     assert after is not None
     return (
-        f"4. added: the held-out force error falls from {1e3 * before:.2f} mN to "
-        f"{1e3 * after:.2f} mN, {before / after:.0f} times; the noise floor is {1e3 * floor:.2f} mN"
+        f"4. added: the held-out force error falls from {1e3 * before:.2f} {unit} to "
+        f"{1e3 * after:.2f} {unit}, {before / after:.0f} times; the noise floor is "
+        f"{1e3 * floor:.2f} {unit}"
     )
 
 
 def hidden_machine(
-    model: StageModel, catalogue: Catalogue, rng: np.random.Generator
-) -> tuple[StageModel, Fitted]:
-    """A machine of other values with one catalogue effect more on x, drawn from those that show."""
+    model: MachineModel, catalogue: Catalogue, rng: np.random.Generator
+) -> tuple[MachineModel, Fitted]:
+    """A machine of other values with one catalogue effect more on its first axis, that shows."""
     machine = model
     for name, axis in model.axes.items():
         machine = machine.with_axis(name, other_machine(axis, rng))
     trial = simulate(machine, "tracking", seed=int(rng.integers(1 << 30)), duration=DURATION)
-    study = studies(machine, {"trial": trial}, {})[AXIS]
-    base = fit_axis(machine.axes[AXIS], study.fit)
+    name = _first(machine)
+    dataset = datasets(machine, {"trial": trial}, {})[name]
+    base = fit_axis(machine.axes[name], dataset.fit)
     absent = [e for e in catalogue.values() if _can_hide(e, machine)]
     for index in rng.permutation(len(absent)):
         hidden = draw_effect(
-            absent[index], machine.axes[AXIS], study.fit, study.excitation, FORCE, rng
+            absent[index], machine.axes[name], dataset.fit, dataset.excitation, FORCE, rng
         )
-        if shows(hidden, base, study):
-            return machine.with_axis(AXIS, machine.axes[AXIS].with_effect(hidden)), hidden
+        if shows(hidden, base, dataset):
+            return machine.with_axis(name, machine.axes[name].with_effect(hidden)), hidden
     raise InputError("no effect of the catalogue shows in this stage's motion; try another seed")
 
 
-def _can_hide(effect: Effect, machine: StageModel) -> bool:
+def _first(model: MachineModel) -> str:
+    """The axis that gets the hidden effect."""
+    return next(iter(model.axes))
+
+
+def _can_hide(effect: Effect, machine: MachineModel) -> bool:
     return (
-        effect.name not in machine.axes[AXIS].names
+        effect.name not in machine.axes[_first(machine)].names
+        and machine.can_use(effect)
         and effect.kind in (Kind.FORCE, Kind.MODIFIER, Kind.ACTUATION)
-        and not effect.is_description
+        and not effect.is_nonparametric
     )  # fmt: skip
 
 
-def shows(hidden: Fitted, base: Fit, study: Study) -> bool:
+def shows(hidden: Fitted, base: Fit, dataset: Dataset) -> bool:
     """Whether the parameters of the base can not take over the hidden effect's force."""
-    return hidden_part(hidden, base, study) < 1.0 - VISIBLE
+    return hidden_part(hidden, base, dataset) < 1.0 - VISIBLE

@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 
-from identify.alignment import fit_aligned
-from identify.candidates import Candidate, score, try_effect
-from identify.clocks import with_clocks
-from identify.compare import AxisComparison, compare_axis, position_errors
-from identify.describe import describe, in_words, physics_alone
-from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
-from identify.fit import Fit, error_on, rms
-from identify.freerun import free_run, rms_error
-from identify.given import Refit, refit
-from identify.plan import Plan, next_experiment, plan
-from identify.ranking import COLLAPSE
-from identify.study import Study, studies
-from identify.uncertainty import Estimate, estimates, half_widths
+from identify.dataset.dataset import Dataset, by_log, datasets
+from identify.dataset.prepared_log import moving, sticks
+from identify.estimation.channel_delay import aligned, fit_aligned
+from identify.estimation.fit import Fit, error_on, rms
+from identify.estimation.force_balance import residual
+from identify.estimation.intervals import estimates
+from identify.experiment_design.plan import next_experiment, plan
+from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+from identify.selection.candidates import Candidate, score, try_effect, usable
+from identify.selection.confounded import moved_parameters
+from identify.selection.forward_selection import diagnose_axis
+from identify.selection.nonparametric import describe, in_words, physics_alone
+from identify.validation.free_run import free_run, rms_error
+from identify.validation.misfit_maps import compare_axis, position_errors
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.log import Log
-from twin.model import HistoryStep, StageModel, read
-from twin.simulator import MujocoStage
+from twin.model.machine import AxisModel, HistoryStep, MachineModel
+from twin.simulator import MujocoSimulator
 
 Logs = Mapping[str, Log]
 Progress = Callable[[str, int, int], None]
@@ -36,88 +36,8 @@ def silent(what: str, done: int, total: int) -> None:
     """Progress that nobody watches."""
 
 
-@dataclass(frozen=True, eq=False)
-class FitResult:
-    """A fitted stage: fits and estimates by axis, held-out force errors (N RMS) where given.
-
-    given: the stage before the fit. catalogue: whose absent effects a parameter may stand in for.
-    """
-
-    model: StageModel
-    studies: Mapping[str, Study]
-    fits: Mapping[str, Fit]
-    estimates: Mapping[str, tuple[Estimate, ...]]
-    holdout_error: Mapping[str, float | None]
-    given: StageModel
-    catalogue: Catalogue
-
-    @cached_property
-    def refits(self) -> Mapping[str, Refit]:
-        """What the fit changed of the model given, by axis."""
-        return {a: refit(self.given.axes[a], f, self.catalogue) for a, f in self.fits.items()}
-
-
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """A stage against logs, by axis."""
-
-    model: StageModel
-    axes: Mapping[str, AxisComparison]
-
-
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
-    """Diagnoses by axis; the answer is that of the axis with the strongest evidence.
-
-    next_experiments: for an axis whose diagnosis is ambiguous, the experiment that decides.
-    refits: what fitting the model as given changed, by axis.
-    """
-
-    model: StageModel
-    axes: Mapping[str, AxisDiagnosis]
-    comparison: Comparison
-    next_experiments: Mapping[str, Plan] = field(default_factory=dict)
-    refits: Mapping[str, Refit] = field(default_factory=dict)
-
-    @property
-    def leading(self) -> AxisDiagnosis:
-        """The axis that the answer is about."""
-        order = [Verdict.NOTHING_MISSING, Verdict.UNEXPLAINED, Verdict.AMBIGUOUS]
-        order.append(Verdict.MISSING_EFFECT)
-
-        def weight(d: AxisDiagnosis) -> tuple[bool, int, float]:
-            bic = d.ranking[0].delta_bic if d.ranking else 0.0
-            return d.best is not None, order.index(d.verdict), bic if d.best else d.base.ratio
-
-        return max(self.axes.values(), key=weight)
-
-    @property
-    def effect(self) -> Effect | None:
-        """The effect that is named, if any."""
-        best = self.leading.best
-        return best.effect if best else None
-
-
-@dataclass(frozen=True, eq=False)
-class Addition:
-    """A stage with one effect more.
-
-    step: errors before and after. kept: whether the effect earned its place on held-out data.
-    position_error: free-running error before and after, m RMS. replayed: the same of the new model
-    stepped by MuJoCo, m RMS.
-    """
-
-    model: StageModel
-    step: HistoryStep
-    candidate: Candidate
-    kept: bool
-    position_error: tuple[float, float]
-    replayed: float
-    notes: tuple[str, ...] = field(default=())
-
-
 def fit(
-    model: StageModel,
+    model: MachineModel,
     logs: Logs,
     holdout: Logs | None = None,
     *,
@@ -129,43 +49,69 @@ def fit(
 
     logs, holdout: by name. catalogue: its absent effects are told where a parameter stands in for
     them. window: of the weak form in s; from the noise where None. Raises InputError for logs that
-    do not fit the model.
+    do not fit the model, and where they leave nothing to fit: an axis that comes to rest in every
+    window, a force that is not a number.
     """
-    found, given = studies(model, logs, holdout or {}, window), model
+    found, given = datasets(model, logs, holdout or {}, window), model
     fits: dict[str, Fit] = {}
-    for i, (axis, study) in enumerate(list(found.items())):
-        found[axis], fits[axis] = fit_aligned(model.axes[axis], study)
+    for i, (axis, dataset) in enumerate(list(found.items())):
+        require_residual(model.axes[axis], dataset)
+        found[axis], fits[axis] = fit_aligned(model.axes[axis], dataset)
+        require_residual(fits[axis].axis, found[axis])
         progress("fitting", i + 1, len(found))
     for axis, result in fits.items():
         model = model.with_axis(axis, result.axis)
     held = {a: holdout_error(f, found[a]) for a, f in fits.items()}
-    known = Catalogue([]) if catalogue is None else catalogue
+    known = Catalogue([]) if catalogue is None else usable(catalogue, given)
     intervals = {a: estimates(f) for a, f in fits.items()}
     return FitResult(model, found, fits, intervals, held, given, known)
 
 
-def holdout_error(fitted: Fit, study: Study) -> float | None:
+def require_residual(axis: AxisModel, dataset: Dataset) -> None:
+    """Raise InputError where the logs leave nothing to judge the axis by, or no number at all."""
+    kept = moving(dataset.fit, sticks(axis))
+    names = ", ".join(log.motion.name for log in dataset.fit)
+    if not kept.any():
+        raise InputError(
+            f"axis {dataset.axis} comes to rest within every window of {dataset.window:g} s of "
+            f"{names}, where its friction may be any force; give a log in which it moves for "
+            "longer at a time, or a shorter --window (s)"
+        )
+    with np.errstate(all="ignore"):
+        bad = np.count_nonzero(~np.isfinite(residual(axis, dataset.fit)[kept]))
+    if bad:
+        raise InputError(
+            f"axis {dataset.axis}: the force of the model is not a finite number in {bad} of "
+            f"{np.count_nonzero(kept)} windows of {names}; check the values of its effects, or "
+            "leave them to their start values"
+        )
+
+
+def holdout_error(fitted: Fit, dataset: Dataset) -> float | None:
     """RMS force error on the held-out logs in N, or None where there are none."""
-    return rms(error_on(fitted.axis, study.holdout)) if study.holdout else None
+    return rms(error_on(fitted.axis, dataset.holdout)) if dataset.holdout else None
 
 
 def compare(
-    model: StageModel, logs: Logs, *, window: float | None = None, progress: Progress = silent
+    model: MachineModel, logs: Logs, *, window: float | None = None, progress: Progress = silent
 ) -> Comparison:
     """Error numbers of a model as it stands, and where it fails. Raises InputError."""
-    found = {a: with_clocks(model.axes[a], s) for a, s in studies(model, logs, {}, window).items()}
-    errors = position_errors(_only(model, found), logs, partial(progress, "comparing"))
-    axes = {a: compare_axis(model, study, logs, errors[a]) for a, study in found.items()}
+    found = datasets(model, logs, {}, window)
+    for axis, dataset in found.items():
+        require_residual(model.axes[axis], dataset)
+    found = {axis: aligned(model.axes[axis], dataset) for axis, dataset in found.items()}
+    return _compared(model, found, progress)
+
+
+def _compared(model: MachineModel, found: Mapping[str, Dataset], progress: Progress) -> Comparison:
+    """The same on logs that are prepared already."""
+    errors, floors = position_errors(model, found, partial(progress, "comparing"))
+    axes = {a: compare_axis(model, dataset, errors[a], floors[a]) for a, dataset in found.items()}
     return Comparison(model, axes)
 
 
-def _only(model: StageModel, axes: Mapping[str, object]) -> StageModel:
-    """The model less the axes that do not move in the logs."""
-    return replace(model, axes={a: m for a, m in model.axes.items() if a in axes})
-
-
 def diagnose(
-    model: StageModel,
+    model: MachineModel,
     logs: Logs,
     holdout: Logs | None = None,
     *,
@@ -177,14 +123,15 @@ def diagnose(
 
     Descriptions that the model holds are set aside: what they describe is to be explained.
     """
+    known = usable(catalogue, model)
     result = fit(
         physics_alone(model), logs, holdout, catalogue=catalogue, window=window, progress=progress
     )
     axes = {
         axis: diagnose_axis(
             fitted,
-            result.studies[axis],
-            catalogue,
+            result.datasets[axis],
+            known,
             partial(progress, f"trying effects on {axis}"),
         )
         for axis, fitted in result.fits.items()
@@ -193,15 +140,16 @@ def diagnose(
     return Diagnosis(
         result.model,
         axes,
-        compare(result.model, logs, window=window, progress=progress),
+        _compared(result.model, result.datasets, progress),
         {axis: found for axis, found in plans.items() if found is not None},
         result.refits,
+        tuple(name for name in catalogue if name not in known),
     )
 
 
 def add(
     effect: Effect,
-    model: StageModel,
+    model: MachineModel,
     logs: Logs,
     holdout: Logs | None = None,
     *,
@@ -214,7 +162,8 @@ def add(
     Descriptions that the model holds make way for a physical effect. Raises InputError where the
     axis has the effect already.
     """
-    given, model = model, model if effect.is_description else physics_alone(model)
+    model.require_usable(effect, axis or next(iter(model.axes)))
+    given, model = model, model if effect.is_nonparametric else physics_alone(model)
     before = fit(model, logs, holdout, window=window, progress=progress)
     names = [axis] if axis else list(before.fits)
     for name in names:
@@ -226,18 +175,18 @@ def add(
         raise InputError(
             f"axis {', '.join(names)} has the effect '{effect.name}' already; `twin fit` refits it"
         )
-    attempt = describe if effect.is_description else try_effect
-    tried = [attempt(before.fits[n], before.studies[n], effect) for n in open_axes]
+    attempt = describe if effect.is_nonparametric else try_effect
+    tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]
     best = max(tried, key=lambda c: c.delta_bic)
     progress("adding", 1, 1)
-    return _addition(best, before, logs, given)
+    return _addition(best, before, given)
 
 
-def _addition(best: Candidate, before: FitResult, logs: Logs, given: StageModel) -> Addition:
+def _addition(best: Candidate, before: FitResult, given: MachineModel) -> Addition:
     name = best.axis
-    base, study = before.fits[name], before.studies[name]
+    base, dataset = before.fits[name], before.datasets[name]
     notes = moved_parameters(base, best.fit)
-    if best.effect.is_description:
+    if best.effect.is_nonparametric:
         notes = (in_words(best.fit.axis[best.effect.name]), *notes)
     gone = [n for n in given.axes[name].names if n not in before.model.axes[name].names]
     if gone:
@@ -248,48 +197,25 @@ def _addition(best: Candidate, before: FitResult, logs: Logs, given: StageModel)
         axis=name,
         fit_error_before=base.error,
         fit_error_after=best.fit.error,
-        holdout_error_before=holdout_error(base, study),
-        holdout_error_after=holdout_error(best.fit, study),
+        holdout_error_before=holdout_error(base, dataset),
+        holdout_error_after=holdout_error(best.fit, dataset),
+        unit=best.fit.axis.units.force,
         notes=notes,
     )
     new = before.model.with_axis(name, best.fit.axis).with_history(step)
-    first = next(iter(logs.values()))
-    moving_old, moving_new = (_only(m, before.fits) for m in (before.model, new))
+    first = next(iter(by_log(before.datasets).values()))
     return Addition(
         model=new,
         step=step,
         candidate=best,
         kept=best.supported,
         position_error=(
-            rms_error(free_run(moving_old, first), name),
-            rms_error(free_run(moving_new, first), name),
+            rms_error(free_run(before.model, first), name),
+            rms_error(free_run(new, first), name),
         ),
-        replayed=rms_error(free_run(moving_new, first, MujocoStage), name),
+        replayed=rms_error(free_run(new, first, MujocoSimulator), name),
         notes=notes,
     )
-
-
-def moved_parameters(before: Fit, after: Fit) -> tuple[str, ...]:
-    """Sentences on parameters that moved by more than their interval when the effect came."""
-    shared = [c for c in before.scaling.where if c in after.scaling.where]
-    old, new = read(before.axis, shared), read(after.axis, shared)
-    index = [after.scaling.where.index(c) for c in shared]
-    width = half_widths(after)[index]
-    earlier = half_widths(before)[[before.scaling.where.index(c) for c in shared]]
-    allowed = np.hypot(width, earlier)
-    out = []
-    for c, a, b, limit, first in zip(shared, old, new, allowed, earlier, strict=True):
-        p = c.parameter
-        # Its own new interval does not matter here: what stood in for the effect may be collinear.
-        collapsed = p.strength and abs(b) < COLLAPSE * abs(a) and abs(a) > first
-        if not collapsed and not abs(b - a) > limit:
-            continue
-        verb = "collapsed" if collapsed else "moved"
-        tail = (
-            "it stood in for the effect that was missing" if collapsed else "more than its interval"
-        )
-        out.append(f"{c.label} {verb} from {a:.4g} to {b:.4g} {p.unit}: {tail}")
-    return tuple(out)
 
 
 __all__ = [

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from effect_runs import CATALOGUE, Array
 
-from twin.control import Controller
-from twin.loop import POSITION_COLUMN, VELOCITY_COLUMN
-from twin.model import AxisModel, Fitted, StageModel
-from twin.simulator import MujocoStage, ReducedStage, run
-from twin.trajectory import Setpoint
+from twin.core.control import Controller
+from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
+from twin.experiments.trajectory import Setpoint
+from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.simulator import MujocoSimulator, ReducedSimulator, run
 
 RATE = 5000.0  # Hz
-Stepper = type[MujocoStage] | type[ReducedStage]
-BOTH = (MujocoStage, ReducedStage)
+Stepper = type[MujocoSimulator] | type[ReducedSimulator]
+BOTH = (MujocoSimulator, ReducedSimulator)
 
 
 def effect(name: str, **values: float) -> Fitted:
@@ -41,16 +41,16 @@ def pushed(
     mass: float,
     effects: Sequence[Fitted],
     force: Array,
-    stage: Stepper = ReducedStage,
+    stage: Stepper = ReducedSimulator,
     start: float = 0.0,
     rate: float = RATE,
 ) -> Pushed:
     """An axis (kg) from rest at ``start`` m under a force (n,) N."""
     zero = np.zeros((len(force), 1))
-    model = StageModel("axis", {"x": AxisModel(mass, effects=tuple(effects))}, sample_rate=rate)
+    model = MachineModel("axis", {"x": AxisModel(mass, effects=tuple(effects))}, sample_rate=rate)
     done = run(
         model, Setpoint(zero + start, zero, zero, force[:, None], rate), np.random.default_rng(0),
-        stage=stage, controllers={"x": Controller()},
+        simulator=stage, controllers={"x": Controller()},
     )  # fmt: skip
     return Pushed(
         done.signals[:, 0, POSITION_COLUMN],

@@ -8,17 +8,17 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.candidates import Candidate
-from identify.diagnose import Stage, Step
-from identify.evidence import Evidence, Gain
-from identify.fit import Fit, Outcome
-from identify.motion import Motion
-from identify.residual import Windowed
-from identify.scaling import Scaling
-from identify.study import Study
+from identify.dataset.dataset import Dataset
+from identify.dataset.motion import Motion
+from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.evidence import Evidence, Gain
+from identify.estimation.fit import Fit, Outcome
+from identify.estimation.scaling import Scaling
+from identify.selection.candidates import Candidate
+from identify.selection.forward_selection import Stage, Step
 from twin.effect import Effect, Excitation
 from twin.effects import load_catalogue
-from twin.model import AxisModel, Fitted, Hardware, coordinates
+from twin.model.machine import AxisModel, Fitted, Hardware, free_parameters
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ def built_fit(
     *,
     residual: Array | None = None,
     kept: NDArray[np.bool_] | None = None,
-    logs: Sequence[Windowed] = (),
+    logs: Sequence[PreparedLog] = (),
     jacobian: Array | None = None,
     lessened: float = 1.0,
     outcome: Outcome = Outcome.CONVERGED,
@@ -61,9 +61,9 @@ def built_fit(
     if residual is None:
         residual = error * np.array([1.0, -1.0] * 8)
     kept = np.ones(len(residual), dtype=bool) if kept is None else kept
-    scaling = Scaling(coordinates(axis))
+    scaling = Scaling(free_parameters(axis))
     fit = Fit(axis, logs, scaling, outcome, residual, kept, begun or axis)
-    fit.__dict__.update(floor=floor, lessened=lessened)
+    fit.__dict__.update(floor=floor, lessened=lessened, at_bound=())
     if jacobian is not None:
         fit.__dict__["jacobian"] = jacobian
     return fit
@@ -100,8 +100,8 @@ def stage(fit: Fit, *steps: Step) -> Stage:
 
 
 def study_stub(holdout: Sequence[object] = (), fit: Sequence[object] = ()) -> SimpleNamespace:
-    """What the rules ask of a study, with no logs in it."""
-    return SimpleNamespace(axis="x", holdout=tuple(holdout), fit=tuple(fit), shift=0.0)
+    """What the rules ask of a dataset, with no logs in it."""
+    return SimpleNamespace(axis="x", holdout=tuple(holdout), fit=tuple(fit), channel_delay=0.0)
 
 
 def built_motion(name: str = "run", seconds: float = 3.0, seed: int = 1, slow: float = 1.0):
@@ -120,14 +120,16 @@ def built_motion(name: str = "run", seconds: float = 3.0, seed: int = 1, slow: f
     )  # fmt: skip
 
 
-def built_study(*names: str, held: Sequence[str] = (), window: float = 0.04) -> Study:
-    """A study of built motions, of a length and seed of their own each."""
+def built_study(*names: str, held: Sequence[str] = (), window: float = 0.04) -> Dataset:
+    """A dataset of built motions, of a length and seed of their own each."""
 
-    def logs(which: Sequence[str], first: int) -> tuple[Windowed, ...]:
+    def logs(which: Sequence[str], first: int) -> tuple[PreparedLog, ...]:
         return tuple(
-            Windowed.of(built_motion(n, 2.0 + 0.5 * i, seed=first + i, slow=1.0 + 0.2 * i), window)
+            PreparedLog.of(
+                built_motion(n, 2.0 + 0.5 * i, seed=first + i, slow=1.0 + 0.2 * i), window
+            )
             for i, n in enumerate(which)
         )
 
     seen = Excitation(-0.05, 0.05, 0.4, 0.3, 3.0, PERIOD)
-    return Study("x", logs(names or ("run",), 1), logs(held, 11), seen)
+    return Dataset("x", logs(names or ("run",), 1), logs(held, 11), seen)

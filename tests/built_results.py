@@ -8,23 +8,23 @@ from html.parser import HTMLParser
 import numpy as np
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_study, fitted
 
-from identify.compare import AxisComparison, MisfitMap, Region
-from identify.contest import Trial
-from identify.coverage import Gap
-from identify.diagnose import AxisDiagnosis, Step, Verdict
-from identify.fit import Outcome
-from identify.given import Change, Refit
-from identify.plan import Plan
-from identify.repeats import Repeat
-from identify.structure import Structure
-from identify.uncertainty import Estimate
-from identify.whiteness import Correlation, Loop, ResidualTests
-from identify.workflow import Addition, Comparison, Diagnosis, FitResult
+from identify.estimation.fit import Outcome
+from identify.estimation.intervals import Estimate
+from identify.experiment_design.discrimination import Trial
+from identify.experiment_design.missing_excitation import Gap
+from identify.experiment_design.plan import Plan
+from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+from identify.selection.confounded import Change, Refit
+from identify.selection.forward_selection import AxisDiagnosis, Step, Verdict
+from identify.selection.repeating_force import Repeat
+from identify.selection.residual_dependence import Dependence
+from identify.validation.misfit_maps import AxisComparison, MisfitMap, Region
+from identify.validation.whiteness import Correlation, Loop, ResidualTests
 from twin.effects import Catalogue
-from twin.experiment_kinds import Passes, Tracking
-from twin.model import HistoryStep, StageModel
+from twin.experiments.kinds import Passes, Tracking
+from twin.model.machine import HistoryStep, MachineModel
 
-STUDY = replace(built_study("run 1", "run 2", held=("held 1",)), shift=0.000217)
+STUDY = replace(built_study("run 1", "run 2", held=("held 1",)), channel_delay=0.000217)
 RNG = np.random.default_rng(9)
 
 
@@ -82,7 +82,9 @@ def diagnosis_of(verdict: Verdict = Verdict.AMBIGUOUS, **changes: object) -> Axi
     return found
 
 
-STRUCTURE = Structure(0.631, "other_axis_position", 0.0273, "m", {"time": 0.117, "position": 0.231})
+STRUCTURE = Dependence(
+    0.631, "other_axis_position", 0.0273, "m", {"time": 0.117, "position": 0.231}
+)
 REPEAT = Repeat(0.00253, {"run 1": 1.07, "run 2": 0.93}, {"run 1": 0.31, "run 2": 2.13})
 
 
@@ -123,12 +125,12 @@ def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:
         force_error={"run 1": 0.0517 + o, "run 2": 0.0731 + o},
         floor=0.0113 + o,
         position_error={"run 1": 3.17e-6 + o, "run 2": 4.29e-6 + o},
-        position_floor=2.13e-9 + o,
+        position_floor={"run 1": 2.13e-7 + o, "run 2": 2.57e-7 + o},
         residual=residual * (0.0647 + o) / np.sqrt(np.mean(residual**2)),
         logs=STUDY.fit,
         coordinates={
             "position": position, "velocity": 3.0 * position[::-1],
-            "roller_phase": np.mod(position, 0.034),
+            "roller_spikes_phase": np.mod(position, 0.034),
         },
         maps=[map_of("position", "m", o), map_of("velocity", "m/s", o + 0.011)],
         worst=[
@@ -139,7 +141,7 @@ def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:
     )  # fmt: skip
 
 
-MODEL = StageModel("the stage", {"x": PLAIN, "y": replace(PLAIN, mass=7.9)})
+MODEL = MachineModel("the stage", {"x": PLAIN, "y": replace(PLAIN, mass=7.9)})
 
 
 def compared() -> Comparison:
@@ -148,7 +150,7 @@ def compared() -> Comparison:
 
 def diagnosed(x: AxisDiagnosis | None = None) -> Diagnosis:
     """x as given, and y where nothing is missing."""
-    other = replace(STUDY, axis="y", shift=0.0)
+    other = replace(STUDY, axis="y", channel_delay=0.0)
     y = AxisDiagnosis(
         other, built_fit(1.07, 0.97), (replace(WEAK, axis="y"),), (), built_fit(1.07, 0.97),
         Verdict.NOTHING_MISSING, None,
@@ -162,9 +164,9 @@ def diagnosed(x: AxisDiagnosis | None = None) -> Diagnosis:
 def fit_result() -> FitResult:
     x = built_fit(0.0513, 0.0127, outcome=Outcome.AT_BOUND)
     y = built_fit(0.0317, 0.0131)
-    studies = {"x": STUDY, "y": replace(STUDY, axis="y", shift=0.0)}
+    datasets = {"x": STUDY, "y": replace(STUDY, axis="y", channel_delay=0.0)}
     result = FitResult(
-        MODEL, studies, {"x": x, "y": y}, {"x": estimates(0.0), "y": estimates(0.02)},
+        MODEL, datasets, {"x": x, "y": y}, {"x": estimates(0.0), "y": estimates(0.02)},
         {"x": 0.0611, "y": None}, MODEL, Catalogue([]),
     )  # fmt: skip
     result.__dict__["refits"] = {"x": refit_of(0.0), "y": Refit(0.0319, 0.0317, ())}

@@ -7,18 +7,18 @@ from functools import cache
 import numpy as np
 
 from twin.effects import load_catalogue
-from twin.experiments import simulate
+from twin.experiments.named import simulate
 from twin.log import Log
 from twin.log.check import CheckReport, Fault, Finding
 from twin.log.log import Array
-from twin.model import StageModel
-from twin.model_file import load_model
+from twin.model.file import load_model
+from twin.model.machine import MachineModel
 
 Columns = dict[str, Array]
 
 
 @cache
-def stage() -> StageModel:
+def stage() -> MachineModel:
     """The Proton stage as it comes."""
     return load_model("proton_xy", load_catalogue())
 

@@ -14,11 +14,11 @@ from unittest.mock import patch
 import pytest
 
 from identify.cli import main
-from identify.proposals import proposals
+from identify.experiment_design.candidate_experiments import proposals
 from twin.effects import Catalogue, load_catalogue
-from twin.experiment import Experiment
-from twin.model import StageModel
-from twin.model_file import load_model
+from twin.experiments.experiment import Experiment
+from twin.model.file import load_model
+from twin.model.machine import MachineModel
 
 Done = subprocess.CompletedProcess[str]
 RATE = 2500.0  # Hz, of the stages in small
@@ -72,17 +72,17 @@ def in_small(*rivals: str, duration: float = 5.0, proposed: int = 4) -> Iterator
         yours = {Path(f).stem for f in user_files}
         return Catalogue([e for n, e in known.items() if n in {*rivals, *own, *yours}])
 
-    def slower(name: str | Path, catalogue: Catalogue) -> StageModel:
+    def slower(name: str | Path, catalogue: Catalogue) -> MachineModel:
         return replace(load_model(name, catalogue), sample_rate=RATE)
 
-    def fewer(model: StageModel, axis: str, seconds: float) -> list[Experiment]:
+    def fewer(model: MachineModel, axis: str, seconds: float) -> list[Experiment]:
         every = proposals(model, axis, seconds)
         return every[:: max(len(every) // proposed, 1)]
 
     with (
         patch("twin.effects.load_catalogue", few),
-        patch("twin.model_file.load_model", slower),
-        patch("identify.plan.proposals", fewer),
-        patch("twin.experiments.DURATION", duration),
+        patch("twin.model.file.load_model", slower),
+        patch("identify.experiment_design.plan.proposals", fewer),
+        patch("twin.experiments.named.DURATION", duration),
     ):
         yield

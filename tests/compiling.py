@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from twin.calling import law_address
+from twin.core.calling import law_address
+from twin.core.native import walk, walk_sensing
 from twin.effects import load_catalogue
-from twin.experiments import simulate
-from twin.model import AxisModel, Hardware, StageModel, axis_table
-from twin.native import walk, walk_sensing
-from twin.simulator import MujocoStage, ReducedStage
+from twin.experiments.named import simulate
+from twin.model.machine import AxisModel, Hardware, MachineModel, axis_table
+from twin.simulator import MujocoSimulator, ReducedSimulator
 
 HARDWARE = Hardware(travel=(-0.1, 0.1), velocity=0.2, acceleration=2.0, jerk=100.0)
-BARE = StageModel("bare", {"x": AxisModel(1.0, HARDWARE)}, sample_rate=1000.0)
+BARE = MachineModel("bare", {"x": AxisModel(1.0, HARDWARE)}, sample_rate=1000.0)
 
 
 def laws() -> None:
@@ -21,7 +21,7 @@ def laws() -> None:
 
 def reduced() -> None:
     """The loop of the reduced model."""
-    simulate(BARE, "moves", duration=0.1, stage=ReducedStage)
+    simulate(BARE, "moves", duration=0.1, simulator=ReducedSimulator)
 
 
 def measured() -> None:
@@ -41,7 +41,7 @@ def measured() -> None:
 
 def mujoco() -> None:
     """The loop in MuJoCo and its callback."""
-    simulate(BARE, "moves", duration=0.1, stage=MujocoStage)
+    simulate(BARE, "moves", duration=0.1, simulator=MujocoSimulator)
 
 
 def second_simulator() -> None:

@@ -9,15 +9,15 @@ import numpy as np
 from effect_runs import companion
 from numpy.typing import NDArray
 
-from identify.fit import Fit, finished
-from identify.fit import Outcome as Ended
-from identify.motion import Motion, motion_of
-from identify.residual import Windowed
-from identify.study import Study
+from identify.dataset.dataset import Dataset
+from identify.dataset.motion import Motion, motion_of
+from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.fit import Fit, finished
+from identify.estimation.fit import Outcome as Ended
 from twin.effect import Excitation
 from twin.effects import load_catalogue
 from twin.log import AxisLog, Log
-from twin.model import AxisModel, Fitted
+from twin.model.machine import AxisModel, Fitted
 
 Array = NDArray[np.float64]
 CATALOGUE = load_catalogue()
@@ -58,9 +58,9 @@ def moved(
     return motion_of(log_of(rate, x, force, other), "x", name)
 
 
-def windowed(motion: Motion, length: float = 0.05) -> Windowed:
+def windowed(motion: Motion, length: float = 0.05) -> PreparedLog:
     """The motion in windows of that length (s)."""
-    return Windowed.of(motion, length)
+    return PreparedLog.of(motion, length)
 
 
 def effect(name: str, values: Mapping[str, float] | None = None) -> Fitted:
@@ -68,18 +68,20 @@ def effect(name: str, values: Mapping[str, float] | None = None) -> Fitted:
     return Fitted.at_start(CATALOGUE[name], values)
 
 
-def fit_of(axis: AxisModel, *logs: Windowed) -> Fit:
+def fit_of(axis: AxisModel, *logs: PreparedLog) -> Fit:
     """The fit that an axis is at its present values."""
     return finished(axis, axis, logs, Ended.CONVERGED)
 
 
-def study_of(*fit: Windowed, holdout: tuple[Windowed, ...] = (), shift: float = 0.0) -> Study:
-    """A study of some logs of axis x."""
-    return Study("x", fit, holdout, COVERED, shift)
+def dataset_of(
+    *fit: PreparedLog, holdout: tuple[PreparedLog, ...] = (), channel_delay: float = 0.0
+) -> Dataset:
+    """A dataset of some logs of axis x."""
+    return Dataset("x", fit, holdout, COVERED, channel_delay)
 
 
 SHORT = moved(np.random.default_rng(1), 1.0).head(0.4)
-SHORT = replace(SHORT, clock=0.137)
+SHORT = replace(SHORT, time_origin=0.137)
 SENSING = (
     effect("encoder_delay", {"tau": 7.3e-4}),
     effect("encoder_ripple", {"period": 3.1e-3, "a1": 2e-5, "b1": -1.3e-5, "a2": 7e-6, "b2": 3e-6}),

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.core.native import law_address, walk
 from twin.effect import (
     DRY,
     DT,
@@ -31,8 +32,7 @@ from twin.effect import (
     X,
 )
 from twin.effects import load_catalogue
-from twin.model import AxisModel, Fitted, StageModel, axis_table
-from twin.native import law_address, walk
+from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -215,7 +215,7 @@ def _unmodified(friction: str) -> Array:
     return forces([plain], Motion.cycles(samples=1000))[friction]
 
 
-def with_all(model: StageModel, rng: np.random.Generator) -> StageModel:
+def with_all(model: MachineModel, rng: np.random.Generator) -> MachineModel:
     """The stage with every effect of the catalogue on every axis, save that it keeps its friction.
 
     Each acts with about 0.1 N.

@@ -14,9 +14,9 @@ from foreign_machine import Machine, drawn, gaussian, logs_of, run
 from machines import one_axis
 
 from identify import workflow
-from identify.diagnose import diagnose_axis
+from identify.selection.forward_selection import diagnose_axis
 from twin.effects import load_catalogue
-from twin.model_file import load_model
+from twin.model.file import load_model
 
 CATALOGUE = load_catalogue()
 STAGE = one_axis(load_model("proton_xy", CATALOGUE))
@@ -62,7 +62,7 @@ def sized(planted: Planted, base: Machine, model, wanted: float, seed: int):
 def diagnosed(model, machine: Machine, seed: int, duration=DURATION, catalogue=CATALOGUE):
     """The diagnosis of the x axis from two logs and one held out, less the free runs."""
     fitted = workflow.fit(model, *logs_of(machine, seed, duration))
-    return diagnose_axis(fitted.fits["x"], fitted.studies["x"], catalogue)
+    return diagnose_axis(fitted.fits["x"], fitted.datasets["x"], catalogue)
 
 
 def describe(d, planted: Planted) -> dict:
@@ -88,7 +88,7 @@ def describe(d, planted: Planted) -> dict:
     }  # fmt: skip
 
 
-def study(name: str, wanted: float, seed: int) -> dict:
+def dataset(name: str, wanted: float, seed: int) -> dict:
     """One machine, diagnosed."""
     planted = EFFECTS[name]
     code = 1000 * seed + zlib.crc32(name.encode()) % 997
@@ -146,13 +146,13 @@ def main() -> None:
     for seed in given.seeds:
         for n in names:
             levels = given.floors[:1] if EFFECTS[n].fixed else given.floors
-            jobs += [(study, (n, floors, seed)) for floors in levels]
+            jobs += [(dataset, (n, floors, seed)) for floors in levels]
     if not given.out.exists():
         given.out.write_text(line({f: f for f in FIELDS}) + "|---" * len(FIELDS) + "|\n")
     for job, args in jobs:
         try:
             text = line(job(*args))
-        except Exception as error:  # one that fails must not end the study
+        except Exception as error:  # one that fails must not end the dataset
             text = f"| {args} FAILED | {type(error).__name__}: {error} |\n"
         with given.out.open("a") as out:
             out.write(text)

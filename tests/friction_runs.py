@@ -8,12 +8,12 @@ import numpy as np
 from effect_runs import CATALOGUE, Array
 from scipy.optimize import brentq
 
-from twin.control import Controller
-from twin.loop import POSITION_COLUMN, VELOCITY_COLUMN
-from twin.model import AxisModel, Fitted, StageModel, axis_table
-from twin.native import walk
-from twin.simulator import MujocoStage, ReducedStage, run
-from twin.trajectory import Setpoint
+from twin.core.control import Controller
+from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
+from twin.core.native import walk
+from twin.experiments.trajectory import Setpoint
+from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
+from twin.simulator import MujocoSimulator, ReducedSimulator, run
 
 # Table I of C. Canudas de Wit et al., IEEE TAC 40 (1995), as A. Manurung's reconstruction of that
 # paper's simulations gives it (github.com/auralius/LuGre, demo2.m); the paper itself could not be
@@ -89,17 +89,17 @@ def pushed(
     effects: Sequence[Fitted],
     force: Array,
     mass: float = 1.0,
-    stage: type[MujocoStage] | type[ReducedStage] = ReducedStage,
+    simulator: type[MujocoSimulator] | type[ReducedSimulator] = ReducedSimulator,
 ) -> tuple[Array, Array, Array]:
     """Position m, velocity m/s of a mass (kg) under a force (n,) N from rest, and its friction N.
 
     The friction is the first of the effects.
     """
     still = np.zeros((len(force), 1))
-    model = StageModel("mass", {"x": AxisModel(mass, effects=tuple(effects))}, sample_rate=RATE)
+    model = MachineModel("mass", {"x": AxisModel(mass, effects=tuple(effects))}, sample_rate=RATE)
     done = run(
         model, Setpoint(still, still, still, force[:, None], RATE), np.random.default_rng(0),
-        stage=stage, controllers={"x": Controller()},
+        simulator=simulator, controllers={"x": Controller()},
     )  # fmt: skip
     row = [effect for _, effect in done.table.labels].index(effects[0].effect.name)
     motion = done.signals[:, 0]

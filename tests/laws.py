@@ -26,7 +26,7 @@ from effect_runs import (
 )
 
 from twin.effect import DRY, OUT, READING, STATIC, VISCOUS, Effect, Kind, U
-from twin.model import Fitted
+from twin.model.machine import Fitted
 
 RESULTS = {
     Kind.SENSING: {READING},

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.fit import fit_axis
-from identify.planting import draw_effect, other_machine
-from identify.study import studies
+from identify.dataset.dataset import datasets
+from identify.estimation.fit import fit_axis
+from identify.experiment_design.planting import draw_effect, other_machine
 from twin.effects import Catalogue
-from twin.experiments import simulate
+from twin.experiments.named import simulate
 from twin.log import Log
-from twin.model import Fitted, StageModel
-from twin.simulator import ReducedStage
+from twin.model.machine import Fitted, MachineModel
+from twin.simulator import ReducedSimulator
 
 DURATION = 12.0  # s of each log
 
@@ -22,19 +22,19 @@ DURATION = 12.0  # s of each log
 class Machine:
     """A machine, the effect planted on its x axis, and its logs."""
 
-    stage: StageModel
+    stage: MachineModel
     planted: Fitted | None
     logs: dict[str, Log]
     holdout: dict[str, Log]
 
 
-def one_axis(stage: StageModel) -> StageModel:
+def one_axis(stage: MachineModel) -> MachineModel:
     """The stage less its y axis, as a plain slide: quicker to analyse."""
-    return StageModel(stage.name, {"x": stage.axes["x"]}, stage.sample_rate)
+    return MachineModel(stage.name, {"x": stage.axes["x"]}, stage.sample_rate)
 
 
 def machine(
-    stage: StageModel,
+    stage: MachineModel,
     catalogue: Catalogue,
     effect: str | None,
     force: float,
@@ -46,10 +46,14 @@ def machine(
     drawn = stage.with_axis("x", other_machine(stage.axes["x"], rng))
     planted = None
     if effect is not None:
-        trial = simulate(drawn, "tracking", seed=seed, duration=duration, stage=ReducedStage)
-        study = studies(drawn, {"trial": trial}, {})["x"]
-        base = fit_axis(drawn.axes["x"], study.fit)
-        planted = draw_effect(catalogue[effect], base.axis, study.fit, study.excitation, force, rng)
+        trial = simulate(
+            drawn, "tracking", seed=seed, duration=duration, simulator=ReducedSimulator
+        )
+        dataset = datasets(drawn, {"trial": trial}, {})["x"]
+        base = fit_axis(drawn.axes["x"], dataset.fit)
+        planted = draw_effect(
+            catalogue[effect], base.axis, dataset.fit, dataset.excitation, force, rng
+        )
         drawn = drawn.with_axis("x", drawn.axes["x"].with_effect(planted))
     logs = {
         f"log {i}": simulate(drawn, "tracking", seed=100 * seed + i, duration=duration)

@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from effect_runs import CATALOGUE
 
-from identify.actuation import is_noise, parts_of, reading_error
-from identify.candidates import Candidate, try_effect
-from identify.fit import Fit, fit_axis, rms
-from identify.planting import added_force, draw_effect
-from identify.residual import residual
-from identify.study import Study, studies
-from identify.uncertainty import Estimate, estimates
+from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.drive import is_noise, parts_of, reading_error
+from identify.estimation.fit import Fit, fit_axis, rms
+from identify.estimation.force_balance import residual
+from identify.estimation.intervals import Estimate, estimates
+from identify.experiment_design.planting import added_force, draw_effect
+from identify.selection.candidates import Candidate, try_effect
 from twin.effect import Effect, Kind
-from twin.experiments import simulate
-from twin.model import AxisModel, Fitted, Hardware, StageModel
-from twin.simulator import ReducedStage
+from twin.experiments.named import simulate
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.simulator import ReducedSimulator
 
 HARDWARE = Hardware(
     travel=(-0.17, 0.17), force_constant=53.4, encoder_noise=1e-9, current_noise=2e-4,
@@ -45,19 +45,19 @@ class Setting:
     velocity: float = 0.25
     mass_known: bool = False
 
-    def stage(self) -> StageModel:
+    def stage(self) -> MachineModel:
         """Two axes with that friction."""
         fitted = Fitted.at_start(CATALOGUE[self.friction], self.values)
         hardware = replace(HARDWARE, velocity=self.velocity)
         x, y = (AxisModel(m, hardware, (fitted,), self.mass_known) for m in (15.0, 6.0))
-        return StageModel("stage", {"x": x, "y": y})
+        return MachineModel("stage", {"x": x, "y": y})
 
-    def study(self, model: StageModel, seed: int) -> Study:
-        """Its motion on that stage, as a study of x."""
+    def dataset(self, model: MachineModel, seed: int) -> Dataset:
+        """Its motion on that stage, as a dataset of x."""
         log = simulate(
-            model, self.experiment, seed=seed, duration=self.duration, stage=ReducedStage
+            model, self.experiment, seed=seed, duration=self.duration, simulator=ReducedSimulator
         )
-        return studies(model, {"log": log}, {})["x"]
+        return datasets(model, {"log": log}, {})["x"]
 
 
 SLIDING = {"Fc": 0.285, "Fs": 0.285, "sigma2": 0.5}
@@ -103,24 +103,24 @@ class Recovered:
         return abs(e.value - true) > WIDER * half + DISCRETE * abs(true)
 
 
-def planted(effect: Effect, axis: AxisModel, study: Study, seed: int) -> Fitted | None:
+def planted(effect: Effect, axis: AxisModel, dataset: Dataset, seed: int) -> Fitted | None:
     """Drawn values with which it acts along this motion; None where it does not."""
     rng, size = np.random.default_rng(seed), SEEN
     if effect.kind is Kind.FRICTION:  # as strong as the one whose place it takes
-        size = rms(residual(bare(axis), study.fit) - residual(axis, study.fit))
+        size = rms(residual(bare(axis), dataset.fit) - residual(axis, dataset.fit))
         axis = bare(axis)
     for _ in range(DRAWS):
-        drawn = draw_effect(effect, axis, study.fit, study.excitation, size, rng)
-        acts = added_force(drawn, axis, study.fit, residual(axis, study.fit))
-        if rms(acts) > 0.5 * size and _rises(drawn, axis, study):
+        drawn = draw_effect(effect, axis, dataset.fit, dataset.excitation, size, rng)
+        acts = added_force(drawn, axis, dataset.fit, residual(axis, dataset.fit))
+        if rms(acts) > 0.5 * size and _rises(drawn, axis, dataset):
             return drawn
     return None
 
 
-def _rises(drawn: Fitted, axis: AxisModel, study: Study) -> bool:
+def _rises(drawn: Fitted, axis: AxisModel, dataset: Dataset) -> bool:
     """Whether an encoder with that effect reads more the farther the axis is, as any does."""
     part = parts_of(axis.with_effect(drawn), Kind.SENSING)
-    motion = study.fit[0].motion
+    motion = dataset.fit[0].motion
     if not part.effects or is_noise(drawn.effect):
         return True
     _, rate = reading_error(part, motion)
@@ -143,15 +143,15 @@ def attempts(effect: Effect, seed: int, lie: Change = lambda axis: axis) -> Iter
     """
     for setting in SETTINGS:
         model = setting.stage()
-        drawn = planted(effect, model.axes["x"], setting.study(model, seed), seed)
+        drawn = planted(effect, model.axes["x"], setting.dataset(model, seed), seed)
         if drawn is None:
             continue
         truth = model.axes["x"].with_effect(drawn)
-        study = setting.study(model.with_axis("x", lie(truth)), seed)
+        dataset = setting.dataset(model.with_axis("x", lie(truth)), seed)
         own = effect.name == setting.friction
         without = bare(model.axes["x"]) if own else model.axes["x"]
-        base = fit_axis(without, study.fit)
-        yield Recovered(truth, base, try_effect(base, study, effect))
+        base = fit_axis(without, dataset.fit)
+        yield Recovered(truth, base, try_effect(base, dataset, effect))
 
 
 def recovered(effect: Effect, seed: int, lie: Change = lambda axis: axis) -> Recovered:

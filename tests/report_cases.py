@@ -15,17 +15,17 @@ from unittest.mock import patch
 from matplotlib.figure import Figure
 
 from identify import workflow
-from identify.diagnose import AxisDiagnosis
-from identify.report import sections, write_report
-from identify.report.blocks import Answer, Picture, Section
-from identify.report.drawing import drawing_style
-from identify.report.subject import Subject
-from identify.workflow import Addition, Diagnosis
+from identify.output.report import sections, write_report
+from identify.output.report.blocks import Answer, Picture, Section
+from identify.output.report.drawing import drawing_style
+from identify.output.report.subject import Subject
+from identify.output.results import Addition, Diagnosis
+from identify.selection.forward_selection import AxisDiagnosis
 from twin.effects import Catalogue, load_catalogue
-from twin.experiments import simulate
+from twin.experiments.named import simulate
 from twin.log import Log
-from twin.model import AxisModel, Fitted, Hardware, StageModel
-from twin.simulator import ReducedStage
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.simulator import ReducedSimulator
 
 HARDWARE = Hardware(
     travel=(-0.1, 0.1), encoder_noise=1e-9, current_noise=1e-3, force_constant=10.0, velocity=0.2,
@@ -37,7 +37,7 @@ HARDWARE = Hardware(
 class Case:
     """A drive with cogging that its model lacks: the model, its logs and what was found."""
 
-    model: StageModel
+    model: MachineModel
     fit: dict[str, Log]
     held: dict[str, Log]
     diagnosis: Diagnosis
@@ -75,11 +75,12 @@ def cogging_case() -> Case:
     axis = AxisModel(
         5.0, HARDWARE, tuple(Fitted.at_start(catalogue[n], values) for n, values in effects)
     )
-    model = StageModel("drive", {"x": axis}, 2000.0)
+    model = MachineModel("drive", {"x": axis}, 2000.0)
     hidden = Fitted.at_start(catalogue["cogging"], {"p": 0.025, "a1": 0.1})
     truth = model.with_axis("x", axis.with_effect(hidden))
     first, second = (
-        simulate(truth, "tracking", seed=seed, duration=6.0, stage=ReducedStage) for seed in (1, 2)
+        simulate(truth, "tracking", seed=seed, duration=6.0, simulator=ReducedSimulator)
+        for seed in (1, 2)
     )
     fit, held = {"run 1": first}, {"run 2": second}
     few = Catalogue([catalogue["cogging"], catalogue["quadratic_drag"]])
@@ -95,7 +96,7 @@ BLANK = "data:image/svg+xml;base64," + base64.b64encode(b"<svg/>").decode()
 
 def without_drawing() -> AbstractContextManager[object]:
     """Inside, pictures are blank: drawing them takes most of a report's time."""
-    return patch("identify.report.data_uri", lambda figure: BLANK)
+    return patch("identify.output.report.data_uri", lambda figure: BLANK)
 
 
 def pictures_in(page: str) -> list[str]:

@@ -10,7 +10,7 @@ import pytest
 
 from identify.cli import loop, machine, main
 from identify.cli import plan as plan_command
-from twin.model import StageModel
+from twin.model.machine import MachineModel
 
 
 class Stub:
@@ -35,7 +35,10 @@ def stubbed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, fold
     monkeypatch.chdir(folder)
     for module in (loop, machine, plan_command):
         for name, answer in (
-            ("stage_model", lambda name, catalogue: StageModel(f"{name} {catalogue['all']}", {})),
+            (
+                "machine_model",
+                lambda name, catalogue: MachineModel(f"{name} {catalogue['all']}", {}),
+            ),
             ("catalogue_with", lambda files: {"all": [str(f) for f in files or ()], "wear": "W"}),
             ("read_logs", lambda paths: {str(p): f"log {p}" for p in paths or ()}),
             ("checked", lambda logs: [f"warned of {n}" for n in logs]),

@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 from twin.effects import load_catalogue
-from twin.model_file import load_model, models_folder
+from twin.model.file import load_model, models_folder
 
 ROOT = Path(__file__).parent.parent
 

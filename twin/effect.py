@@ -12,7 +12,7 @@ modifier multiplies DRY, STATIC or VISCOUS; a sensing effect changes READING.
 A structure effect writes OUT, the force (N) that bodies attached to the axis add to its motion. It
 answers linearly to ACC when it rides on the axis, to NET when the axis stands on it; where WHEN is
 0 it is only asked, and leaves its states alone.
-It is plain Python and also compiles, once, to native code (see twin.native).
+It is plain Python and also compiles, once, to native code (see twin.core.native).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ X = 3  # m, true position
 V = 4  # m/s, true velocity
 U = 5  # N, actuator force; commanded on entry, actual after the actuation effects
 MASS = 6  # kg, what a force moves, with what is attached; infinite along a measured motion
-X_OTHER = 7  # m, position of the other axis
+X_OTHER = 7  # m, position of the other axis of two (zero on a machine with more: see MachineModel)
 V_OTHER = 8  # m/s
 A_OTHER = 9  # m/s^2
 FRICTION = 10  # N, friction of the previous sample (opposing motion)
@@ -97,11 +97,14 @@ class Excitation:
 class Parameter:
     """One number of a law.
 
-    unit: SI unit text ("1" for a ratio). start: value before anything is known; start_rule gives a
+    unit: SI unit text ("1" for a ratio) on a linear axis; on a rotary one it is shown as its
+    counterpart (twin.model.units). start: value before anything is known; start_rule gives a
     better one from the data. lower, upper: bounds, same unit. strength: the effect is absent when
     every strength is zero. fixed: known by design, held by a fit. at_least: name of a parameter of
     the same effect below which this one may not fall. scan: values that the diagnosis tries, from
     the data. screened: whether a strength takes part while those are tried; a detail need not.
+    period: whether it is a length at which the force repeats along the track. dry: whether it is a
+    level of dry friction.
     """
 
     name: str
@@ -116,6 +119,8 @@ class Parameter:
     start_rule: Callable[[Excitation], float] | None = None
     scan: Callable[[Excitation], Sequence[float]] | None = None
     screened: bool = True
+    period: bool = False
+    dry: bool = False
 
     def start_from(self, excitation: Excitation) -> float:
         """Start value for this motion, inside the bounds."""
@@ -146,12 +151,13 @@ class Effect:
     fingerprint: what is left in the residual when the effect is missing. excited_by: the motion
     that shows it. of_size: for a law of any number of elements, the effect with that many; its
     parameter ``elements``, whose bounds are both that number, tells the law. attach: of a structure
-    effect, builds its bodies in MuJoCo, given a twin.mount.Mount and the values by name; its first
-    two states are then the position (m) and speed (m/s) of the joint built. added_mass: values by
-    name -> what the effect adds to the moved mass, as a part of it. sticks: a friction that holds
-    the axis at rest by whatever force that takes. simplest: the same force in simpler values, such
-    as a pitch of which only harmonics were used. parts: of a description, whose force is linear in
-    its strengths, what these are grouped in. A description is no physics and never a diagnosis.
+    effect, builds its bodies in MuJoCo, given a twin.mujoco.bodies.Mount and the values by
+    name; its first two states are then the position (m) and speed (m/s) of the joint built.
+    added_mass: values by name -> what the effect adds to the moved mass, as a part of it.
+    sticks: a friction that holds the axis at rest by whatever force that takes. simplest: the same
+    force in simpler values, such as a pitch of which only harmonics were used. parts: of a
+    description, whose force is linear in its strengths, what these are grouped in. A description is
+    no physics and never a diagnosis.
     """
 
     kind: Kind
@@ -202,7 +208,7 @@ class Effect:
         return Path(inspect.getfile(self.law)).stem
 
     @property
-    def is_description(self) -> bool:
+    def is_nonparametric(self) -> bool:
         """Whether it describes a force without explaining it."""
         return bool(self.parts)
 
@@ -214,6 +220,15 @@ class Effect:
     def is_present(self, values: Mapping[str, float]) -> bool:
         """Whether these values give the effect any strength."""
         return any(values[p.name] != 0.0 for p in self.strengths)
+
+    def reads(self, slot: str) -> bool:
+        """Whether the law names that slot of ``io``, such as "U" or "A_OTHER"."""
+        return slot in self.law.__code__.co_names
+
+    @property
+    def reads_other_axis(self) -> bool:
+        """Whether the law depends on the motion of the machine's other axis."""
+        return any(self.reads(slot) for slot in ("X_OTHER", "V_OTHER", "A_OTHER"))
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name; KeyError where there is none."""

@@ -1,8 +1,15 @@
-"""The one error that a user may cause; the command line prints it as a single line."""
+"""Errors that a user may cause; the command line prints them as a single line."""
 
 
 class InputError(ValueError):
     """Input that cannot be used.
 
     The message is one line: what was given (with its unit), what is allowed, what to try.
+    """
+
+
+class CannotRun(InputError):
+    """A motion that cannot be run on this machine: beyond its limits, or unstable on it.
+
+    What chooses among motions may leave such a one out, and say so; any other error is a mistake.
     """

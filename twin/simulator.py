@@ -10,14 +10,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.control import Controller, gain_table
-from twin.errors import InputError
-from twin.loop import N_SIGNALS, run_mujoco, run_reduced
-from twin.model import StageModel
-from twin.mujoco_link import attach, offsets, passive_callback, step_address
-from twin.native import Table
-from twin.stage import attached_joint, stage_spec
-from twin.trajectory.setpoint import Setpoint
+from twin.core.control import Controller, gain_table
+from twin.core.loop import N_SIGNALS, run_mujoco, run_reduced
+from twin.core.native import Table
+from twin.errors import CannotRun, InputError
+from twin.experiments.trajectory.setpoint import Setpoint
+from twin.model.machine import MachineModel
+from twin.mujoco.callback import attach, offsets, passive_callback, step_address
+from twin.mujoco.mjcf import attached_joint, machine_spec
 
 CHUNK = 20_000  # samples between two reports of progress
 WATCHED_STATES = 8  # an effect with more states than this is not logged state by state
@@ -44,18 +44,20 @@ class Run:
 class Stepper(Protocol):
     """A simulation that can be placed and run on by some samples."""
 
-    def place(self, position: Array, velocity: Array, states: Array, first: int) -> None:
+    def place(
+        self, position: Array, velocity: Array, states: Array, first: int, origin: float = 0.0
+    ) -> None:
         """Set the axes' motion (n_axes,) and the effects' states before sample ``first``."""
 
     def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
         """Run setpoints.shape[0] samples and fill ``out``: signals, forces, states."""
 
 
-class MujocoStage:
+class MujocoSimulator:
     """The stage in MuJoCo with its effects attached; steps only under passive_callback()."""
 
-    def __init__(self, model: StageModel, table: Table) -> None:
-        spec = stage_spec(model)
+    def __init__(self, model: MachineModel, table: Table) -> None:
+        spec = machine_spec(model)
         axes = tuple(model.axes)
         self.user_at = attach(spec, table, model.period, axes)
         self.model = spec.compile()
@@ -83,9 +85,11 @@ class MujocoStage:
                 rows.append((joint.qposadr[0], joint.dofadr[0], int(entry[3])))
         return np.array(rows, dtype=np.int64).reshape(-1, 3)
 
-    def place(self, position: Array, velocity: Array, states: Array, first: int) -> None:
+    def place(
+        self, position: Array, velocity: Array, states: Array, first: int, origin: float = 0.0
+    ) -> None:
         """See Stepper."""
-        self.data.time = first * self.model.opt.timestep
+        self.data.time = origin + first * self.model.opt.timestep
         self.data.qpos[self._where[:, 0]] = position
         self.data.qvel[self._where[:, 1]] = velocity
         self.data.qpos[self._attached[:, 0]] = states[self._attached[:, 2]]
@@ -104,42 +108,47 @@ class MujocoStage:
         )  # fmt: skip
 
 
-class ReducedStage:
+class ReducedSimulator:
     """The same axes as point masses: what fitting simulates with."""
 
     substeps = 1  # integration steps a sample
 
-    def __init__(self, model: StageModel, table: Table) -> None:
+    def __init__(self, model: MachineModel, table: Table) -> None:
         self._motion = np.zeros((len(model.axes), 2))
         self._states = np.zeros(table.n_states)
         self._masses = table.masses
+        self._origin = 0.0
 
-    def place(self, position: Array, velocity: Array, states: Array, first: int) -> None:
+    def place(
+        self, position: Array, velocity: Array, states: Array, first: int, origin: float = 0.0
+    ) -> None:
         """See Stepper."""
         self._motion[:, 0] = position
         self._motion[:, 1] = velocity
         self._states[:] = states
+        self._origin = origin
 
     def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
         """See Stepper."""
         run_reduced(
-            self._motion, self._states, self._masses, self.substeps, first, *shared[:-1],
+            self._motion, self._states, self._masses, self.substeps, first, self._origin,
+            *shared[:-1],
             setpoints, noise, shared[-1], *out,
         )  # fmt: skip
 
 
-class FineStage(ReducedStage):
+class FineSimulator(ReducedSimulator):
     """Point masses stepped ten times a sample under a held command: finer than any analysis."""
 
     substeps = 10
 
 
 def run(
-    model: StageModel,
+    model: MachineModel,
     setpoint: Setpoint,
     rng: np.random.Generator,
     *,
-    stage: type[MujocoStage] | type[ReducedStage] = MujocoStage,
+    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
     controllers: Mapping[str, Controller] | None = None,
     progress: Progress | None = None,
 ) -> Run:
@@ -173,7 +182,7 @@ def run(
     )
     simulation: Stepper
     with passive_callback():
-        simulation = stage(model, table)
+        simulation = simulator(model, table)
         simulation.place(setpoint.position[0], np.zeros(n_axes), np.zeros(table.n_states), 0)
         for first in range(0, n, CHUNK):
             part = slice(first, first + CHUNK)
@@ -185,7 +194,7 @@ def run(
 
 
 def _watched(
-    model: StageModel, table: Table
+    model: MachineModel, table: Table
 ) -> tuple[NDArray[np.int64], tuple[tuple[str, str], ...]]:
     effects = {(a, f.effect.name): f.effect for a, m in model.axes.items() for f in m.effects}
     indices: list[int] = []
@@ -198,10 +207,10 @@ def _watched(
     return np.array(indices, dtype=np.int64), tuple(names)
 
 
-def _require_finite(signals: Array, model: StageModel) -> None:
+def _require_finite(signals: Array, model: MachineModel) -> None:
     bad = np.flatnonzero(~np.isfinite(signals).all(axis=(1, 2)))
     if len(bad):
-        raise InputError(
+        raise CannotRun(
             f"the simulation became unstable at t = {bad[0] * model.period:.4f} s; lower the "
             "bandwidth (Hz) or the damping parameters, or raise sample_rate (Hz)"
         )

@@ -15,15 +15,15 @@ from identify.cli.shared import (
     Json,
     Logs,
     Model,
-    Window,
+    TestFunction,
     app,
     bars_on_stderr,
     catalogue_with,
     checked,
+    machine_model,
     read_logs,
     require_folder,
     say,
-    stage_model,
     with_holdout,
 )
 
@@ -34,20 +34,22 @@ def fit(
     logs: Logs,
     holdout: Holdout = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Fitted model to write.")] = None,
-    window: Window = None,
+    window: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
     """Identify the parameters of the model's effects."""
-    from identify import as_json, as_text, workflow
-    from twin.model_file import save_model
+    from identify import workflow
+    from identify.output import as_json
+    from identify.output import text as as_text
+    from twin.model.file import save_model
 
     if out:
         require_folder(out)
     catalogue = catalogue_with(effects)
     result, recorded = with_holdout(
         partial(workflow.fit, catalogue=catalogue, window=window),
-        stage_model(model, catalogue), logs, holdout,
+        machine_model(model, catalogue), logs, holdout,
     )  # fmt: skip
     if out:
         save_model(result.model, out)
@@ -59,21 +61,23 @@ def compare(
     model: Model,
     logs: Logs,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")] = None,
-    window: Window = None,
+    window: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
     """Say how far model and machine are apart, and where the model fails."""
-    from identify import as_json, as_text, workflow
+    from identify import workflow
+    from identify.output import as_json
+    from identify.output import text as as_text
 
     if out:
         require_folder(out)
-    stage = stage_model(model, catalogue_with(effects))
+    stage = machine_model(model, catalogue_with(effects))
     recorded = read_logs(logs)
     with bars_on_stderr() as bars:
         result = workflow.compare(stage, recorded, window=window, progress=bars)
     if out:
-        from identify.report import write_report
+        from identify.output.report import write_report
 
         write_report(
             out, title=f"{stage.name}: model against measurement", diagnosis=None,
@@ -88,22 +92,24 @@ def diagnose(
     logs: Logs,
     holdout: Holdout = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")] = None,
-    window: Window = None,
+    window: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
     """Say which physical effect is missing, with the evidence for it."""
-    from identify import as_json, as_text, workflow
+    from identify import workflow
+    from identify.output import as_json
+    from identify.output import text as as_text
 
     if out:
         require_folder(out)
     catalogue = catalogue_with(effects)
-    stage = stage_model(model, catalogue)
+    stage = machine_model(model, catalogue)
     result, recorded = with_holdout(
         partial(workflow.diagnose, catalogue=catalogue, window=window), stage, logs, holdout
     )
     if out:
-        from identify.report import write_report
+        from identify.output.report import write_report
 
         write_report(
             out, title=f"{stage.name}: what the model lacks", diagnosis=result,
@@ -122,20 +128,22 @@ def add(
     axis: Annotated[
         str | None, typer.Option(help="Axis; the one it helps most if left out.")
     ] = None,
-    window: Window = None,
+    window: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
     """Add an effect, refit, and record the error before and after."""
-    from identify import as_json, as_text, workflow
-    from twin.model_file import save_model
+    from identify import workflow
+    from identify.output import as_json
+    from identify.output import text as as_text
+    from twin.model.file import save_model
 
     require_folder(out)
     catalogue = catalogue_with(effects)
     chosen = catalogue[effect]
     result, recorded = with_holdout(
         partial(workflow.add, chosen, axis=axis, window=window),
-        stage_model(model, catalogue), logs, holdout,
+        machine_model(model, catalogue), logs, holdout,
     )  # fmt: skip
     save_model(result.model, out)
     say(as_text.add_text(result), as_json.add_json(result), as_json_, checked(recorded))
@@ -152,11 +160,11 @@ def demo(
     as_json_: Json = False,
 ) -> None:
     """Run the whole loop on a machine with an effect that the analysis is not told of."""
-    from identify import as_json
     from identify.demo import demo as run
+    from identify.output import as_json
 
     catalogue = catalogue_with(effects)
-    stage = stage_model(model, catalogue)
+    stage = machine_model(model, catalogue)
 
     def tell(text: str) -> None:
         print(text, file=sys.stderr if as_json_ else sys.stdout, flush=True)

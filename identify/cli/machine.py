@@ -14,10 +14,10 @@ from identify.cli.shared import (
     app,
     bars_on_stderr,
     catalogue_with,
+    machine_model,
     read_logs,
     require_folder,
     say,
-    stage_model,
 )
 
 
@@ -39,13 +39,13 @@ def simulate(
     """Run an experiment on the twin in MuJoCo and log it as MCAP."""
     from functools import partial
 
-    from twin.experiment_file import SUFFIX, load_experiment
-    from twin.experiments import outside_travel
-    from twin.experiments import simulate as run
+    from twin.experiments.file import SUFFIX, load_experiment
+    from twin.experiments.named import outside_travel
+    from twin.experiments.named import simulate as run
     from twin.log import write_log
 
     require_folder(out)
-    stage = stage_model(model, catalogue_with(effects))
+    stage = machine_model(model, catalogue_with(effects))
     chosen = load_experiment(experiment) if experiment.endswith(SUFFIX) else experiment
     with bars_on_stderr() as bars:
         log = run(
@@ -79,7 +79,8 @@ def import_(
 @app.command()
 def check(logs: Logs, as_json_: Json = False) -> None:
     """Say whether logs are fit for identification, and what is wrong with them."""
-    from identify import as_json, as_text
+    from identify.output import as_json
+    from identify.output import text as as_text
     from twin.log.check import check_log
 
     reports = {name: check_log(log) for name, log in read_logs(logs).items()}
@@ -114,13 +115,14 @@ def effects(
     as_json_: Json = False,
 ) -> None:
     """Print the catalogue, or one effect with its equation, units and source."""
-    from identify import as_json, as_text
+    from identify.output import as_json
+    from identify.output import text as as_text
 
     catalogue = catalogue_with(files)
     if name is not None:
         chosen = catalogue[name]
         if plot is not None:
-            from identify.signature import draw
+            from identify.output.signature import draw
 
             require_folder(plot)
             draw(chosen, catalogue, plot)

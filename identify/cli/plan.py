@@ -13,20 +13,20 @@ from identify.cli.shared import (
     Holdout,
     Json,
     Model,
-    Window,
+    TestFunction,
     app,
     bars_on_stderr,
     catalogue_with,
     checked,
+    machine_model,
     read_logs,
     require_folder,
     say,
-    stage_model,
 )
 from twin.errors import InputError
 
 if TYPE_CHECKING:
-    from identify.explanations import Rival
+    from identify.experiment_design.rival_hypotheses import Rival
     from twin.effects import Catalogue
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Experiment to write (.toml).")]
@@ -46,19 +46,21 @@ def plan(
     duration: Annotated[float, typer.Option(help="About that of the experiment, s.")] = 20.0,
     out: Out = Path("experiment.toml"),
     holdout: Holdout = None,
-    window: Window = None,
+    window: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
     """Choose the experiment that decides between explanations; `twin simulate` runs it."""
-    from identify import as_json, as_text, workflow
-    from twin.experiment_file import SUFFIX, save_experiment
+    from identify import workflow
+    from identify.output import as_json
+    from identify.output import text as as_text
+    from twin.experiments.file import SUFFIX, save_experiment
 
     if out.suffix != SUFFIX:
         raise InputError(f"{out}: an experiment is a {SUFFIX} file; give such a name")
     require_folder(out)
     catalogue = catalogue_with(effects)
-    stage = stage_model(model, catalogue)
+    stage = machine_model(model, catalogue)
     rivals = [_rival(name, catalogue) for name in between or ()]
     recorded = read_logs(logs)
     with bars_on_stderr() as bars:
@@ -69,7 +71,9 @@ def plan(
     text, file = as_text.plan_text(result), None
     if result.decides:
         file = str(out)
-        save_experiment(result.chosen.experiment, out, *text.splitlines()[:3])
+        save_experiment(
+            result.chosen.experiment, out, *text.splitlines()[:3], units=result.chosen.units
+        )
         text += f"\n{out}: run it on the machine, or `twin simulate {out} --model MODEL -o LOG`"
     say(text, {**as_json.plan_json(result), "file": file}, as_json_, checked(recorded))
     if not result.decides:
@@ -79,5 +83,5 @@ def plan(
 def _rival(name: str, catalogue: Catalogue) -> Rival:
     """The model of that file, or the effect of that name."""
     if name.endswith(".toml"):
-        return replace(stage_model(name, catalogue), name=name)
+        return replace(machine_model(name, catalogue), name=name)
     return catalogue[name]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from identify.workflow import Progress
     from twin.effects import Catalogue
     from twin.log import Log
-    from twin.model import StageModel
+    from twin.model.machine import MachineModel
 
 Result = TypeVar("Result")
 
@@ -34,10 +34,29 @@ Model = Annotated[str, typer.Argument(metavar="MODEL", help="Stage model (.toml)
 Holdout = Annotated[
     list[Path] | None, typer.Option("--holdout", help="MCAP log held out; may be repeated.")
 ]
-Window = Annotated[
+TestFunction = Annotated[
     float | None,
     typer.Option("--window", help="Weak-form window in s; from the noise if left out."),
 ]
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from twin.log.writer import software_version
+
+        print(software_version())
+        raise typer.Exit
+
+
+@app.callback()
+def front_door(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Say which.")
+    ] = False,
+) -> None:
+    """Find out why the model and the machine disagree."""
+
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Effects = Annotated[
     list[Path] | None, typer.Option("--effects", help="Your own effect file; may be repeated.")
@@ -67,7 +86,7 @@ def bars_on_stderr() -> Iterator[Progress]:
 
 def say(text: str, result: dict[str, Any], as_json: bool, warnings: Sequence[str] = ()) -> None:
     """Print the warnings on standard error, and the result as text or as one JSON object."""
-    from identify.as_json import plain
+    from identify.output.as_json import plain
 
     for warning in warnings:
         print(f"twin: {warning}", file=sys.stderr)
@@ -80,14 +99,14 @@ def catalogue_with(files: list[Path] | None) -> Catalogue:
     return load_catalogue(files or ())
 
 
-def stage_model(name: str, catalogue: Catalogue) -> StageModel:
-    from twin.model_file import load_model
+def machine_model(name: str, catalogue: Catalogue) -> MachineModel:
+    from twin.model.file import load_model
 
     return load_model(name, catalogue)
 
 
 def with_holdout(
-    job: Callable[..., Result], stage: StageModel, logs: list[Path], holdout: list[Path] | None
+    job: Callable[..., Result], stage: MachineModel, logs: list[Path], holdout: list[Path] | None
 ) -> tuple[Result, dict[str, Log]]:
     """What a job makes of a stage, logs and held-out logs; and the logs."""
     recorded = read_logs(logs)

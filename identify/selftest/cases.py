@@ -7,16 +7,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.fit import fit_axis
-from identify.noise import floor_of
-from identify.planting import draw_effect, hidden_part, other_machine, visible_force
-from identify.study import studies
+from identify.dataset.dataset import datasets
+from identify.dataset.noise_floor import floor_of
+from identify.estimation.fit import fit_axis
+from identify.experiment_design.planting import (
+    draw_effect,
+    hidden_part,
+    other_machine,
+    visible_force,
+)
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
-from twin.experiments import simulate
+from twin.experiments.named import simulate
 from twin.log import Log
-from twin.model import Fitted, StageModel
-from twin.simulator import FineStage, ReducedStage
+from twin.model.machine import Fitted, MachineModel
+from twin.simulator import FineSimulator, ReducedSimulator
 
 AXIS = "x"
 DURATION = 12.0  # s of each log
@@ -34,8 +39,8 @@ class Machine:
     model: what the analysis begins with. true: the machine. planted: effects that the model lacks.
     """
 
-    model: StageModel
-    true: StageModel
+    model: MachineModel
+    true: MachineModel
     planted: tuple[Fitted, ...]
     logs: Mapping[str, Log]
     holdout: Mapping[str, Log]
@@ -46,7 +51,7 @@ class NotShown(Exception):
 
 
 def machine(
-    stage: StageModel, effects: Sequence[Effect], strength: float, rng: np.random.Generator
+    stage: MachineModel, effects: Sequence[Effect], strength: float, rng: np.random.Generator
 ) -> Machine:
     """Draw a machine about a stage, plant effects of ``strength`` times the noise floor, log it.
 
@@ -71,7 +76,7 @@ def machine(
         planted.append(fitted)
     held = replace(model.axes[AXIS], mass_fixed=true.axes[AXIS].mass_fixed)
     logs = {
-        f"log {i}": simulate(true, run, seed=seed, duration=DURATION, stage=FineStage)
+        f"log {i}": simulate(true, run, seed=seed, duration=DURATION, simulator=FineSimulator)
         for i, (run, seed) in enumerate(zip(RUNS, seeds, strict=False), start=1)
     }
     last = list(logs)[-1]
@@ -84,7 +89,7 @@ def machine(
     )
 
 
-def plain_friction(stage: StageModel, other: Effect) -> Fitted:
+def plain_friction(stage: MachineModel, other: Effect) -> Fitted:
     """The simplest friction of the catalogue, at the level of the stage's own.
 
     Raises NotShown where the other friction is the simplest itself.
@@ -100,13 +105,13 @@ def plain_friction(stage: StageModel, other: Effect) -> Fitted:
 
 
 def _with_friction(
-    true: StageModel,
-    model: StageModel,
+    true: MachineModel,
+    model: MachineModel,
     effect: Effect,
     strength: float,
     seed: int,
     rng: np.random.Generator,
-) -> tuple[StageModel, Fitted]:
+) -> tuple[MachineModel, Fitted]:
     """The machine with another friction, so strong that the model's falls short by the strength."""
     own = next(f for f in true.axes[AXIS].effects if f.effect.kind is Kind.FRICTION)
     free = [p for p in effect.parameters if not p.fixed]
@@ -118,12 +123,12 @@ def _with_friction(
     }
     fitted = Fitted.at_start(effect, {**effect.starts(), **drawn, **shared})
 
-    def left(machine: StageModel) -> float:
+    def left(machine: MachineModel) -> float:
         """Error of the model on that machine above the noise floor, in floors."""
-        trial = simulate(machine, RUNS[0], seed=seed, duration=DURATION, stage=ReducedStage)
-        study = studies(model, {"trial": trial}, {})[AXIS]
-        base = fit_axis(model.axes[AXIS], study.fit)
-        floor = floor_of(machine.axes[AXIS], study.fit)
+        trial = simulate(machine, RUNS[0], seed=seed, duration=DURATION, simulator=ReducedSimulator)
+        dataset = datasets(model, {"trial": trial}, {})[AXIS]
+        base = fit_axis(model.axes[AXIS], dataset.fit)
+        floor = floor_of(machine.axes[AXIS], dataset.fit)
         return float(np.sqrt(max(base.error**2 - floor**2, 1e-4 * floor**2)) / floor)
 
     machine = true.with_axis(AXIS, true.axes[AXIS].with_effect(fitted))
@@ -138,20 +143,20 @@ def _with_friction(
 
 
 def _with_planted(
-    true: StageModel, effect: Effect, strength: float, seed: int, rng: np.random.Generator
-) -> tuple[StageModel, Fitted]:
+    true: MachineModel, effect: Effect, strength: float, seed: int, rng: np.random.Generator
+) -> tuple[MachineModel, Fitted]:
     """The machine with one effect more; its mass is held where the effect would hide in it."""
-    trial = simulate(true, RUNS[0], seed=seed, duration=DURATION, stage=ReducedStage)
-    study = studies(replace(true, axes={AXIS: true.axes[AXIS]}), {"trial": trial}, {})[AXIS]
-    base = fit_axis(true.axes[AXIS], study.fit)
+    trial = simulate(true, RUNS[0], seed=seed, duration=DURATION, simulator=ReducedSimulator)
+    dataset = datasets(replace(true, axes={AXIS: true.axes[AXIS]}), {"trial": trial}, {})[AXIS]
+    base = fit_axis(true.axes[AXIS], dataset.fit)
     at_start = draw_effect(
-        effect, base.axis, study.fit, study.excitation, base.floor, np.random.default_rng(seed)
+        effect, base.axis, dataset.fit, dataset.excitation, base.floor, np.random.default_rng(seed)
     )
-    if hidden_part(at_start, base, study) > HIDDEN:
-        base = fit_axis(replace(true.axes[AXIS], mass_fixed=True), study.fit)
+    if hidden_part(at_start, base, dataset) > HIDDEN:
+        base = fit_axis(replace(true.axes[AXIS], mass_fixed=True), dataset.fit)
     wanted = strength * base.floor
-    fitted = draw_effect(effect, base.axis, study.fit, study.excitation, wanted, rng, base)
-    if visible_force(fitted, base, study) < REACHED * wanted:
+    fitted = draw_effect(effect, base.axis, dataset.fit, dataset.excitation, wanted, rng, base)
+    if visible_force(fitted, base, dataset) < REACHED * wanted:
         raise NotShown(effect.name)
     axis = replace(true.axes[AXIS], mass_fixed=base.axis.mass_fixed)
     return true.with_axis(AXIS, axis.with_effect(fitted)), fitted

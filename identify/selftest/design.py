@@ -15,7 +15,7 @@ from identify.selftest.cases import AXIS
 from identify.selftest.trial import STAGE, Case, Outcome, run
 from twin.effect import Kind
 from twin.effects import Catalogue, load_catalogue
-from twin.model_file import load_model
+from twin.model.file import load_model
 
 PAIR_STRENGTH = 5.0  # times the noise floor, of each of two planted effects
 
@@ -61,7 +61,7 @@ FULL = Design(strengths=(2.0, 5.0, 20.0), each=3, empty=200, pairs=60, left_out=
 def plantable(catalogue: Catalogue) -> list[str]:
     """Physical effects that the stage of the self-test lacks."""
     own = load_model(STAGE, catalogue).axes[AXIS].names
-    return [e.name for e in catalogue.values() if e.name not in own and not e.is_description]
+    return [e.name for e in catalogue.values() if e.name not in own and not e.is_nonparametric]
 
 
 def run_all(

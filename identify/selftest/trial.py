@@ -9,18 +9,18 @@ from time import perf_counter
 
 import numpy as np
 
-from identify.alignment import fit_aligned
-from identify.diagnose import AxisDiagnosis, Verdict, diagnose_axis
-from identify.fit import Fit
-from identify.residual import residual
+from identify.dataset.dataset import Dataset, datasets
+from identify.estimation.channel_delay import fit_aligned
+from identify.estimation.fit import Fit
+from identify.estimation.force_balance import residual
+from identify.estimation.intervals import estimates
+from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.selection.forward_selection import AxisDiagnosis, Verdict, diagnose_axis
+from identify.selection.residual_dependence import dependences
 from identify.selftest.cases import AXIS, Machine, NotShown, machine
-from identify.structure import dependences
-from identify.study import Study, studies
-from identify.subspace import orthonormal, unabsorbed
-from identify.uncertainty import estimates
 from twin.effects import Catalogue, load_catalogue
-from twin.model import Fitted, read
-from twin.model_file import load_model
+from twin.model.file import load_model
+from twin.model.machine import Fitted, read
 
 STAGE = "proton_xy"
 NEARLY = 0.8  # part of the strongest dependence from which a coordinate counts as right
@@ -113,9 +113,9 @@ def run(case: Case) -> Outcome:
         return Outcome(case, shown=False)
     known = [e for e in catalogue.values() if case.known or e.name not in case.effects]
     begun = perf_counter()
-    study = studies(built.model, built.logs, built.holdout)[AXIS]
-    study, base = fit_aligned(built.model.axes[AXIS], study)
-    found = diagnose_axis(base, study, Catalogue(known), workers=1)
+    dataset = datasets(built.model, built.logs, built.holdout)[AXIS]
+    dataset, base = fit_aligned(built.model.axes[AXIS], dataset)
+    found = diagnose_axis(base, dataset, Catalogue(known), workers=1)
     return Outcome(
         case=case,
         verdict=found.verdict.name,
@@ -124,28 +124,28 @@ def run(case: Case) -> Outcome:
         ratio=base.ratio,
         left=found.final.ratio,
         depends_on=found.unexplained.depends_on if found.unexplained else None,
-        coordinates=_right_coordinates(built, base, study),
+        coordinates=_right_coordinates(built, base, dataset),
         covered=_covered(built, found) if not case.effects else (),
         seconds=perf_counter() - begun,
     )
 
 
-def _right_coordinates(built: Machine, base: Fit, study: Study) -> tuple[str, ...]:
+def _right_coordinates(built: Machine, base: Fit, dataset: Dataset) -> tuple[str, ...]:
     """Coordinates that the planted force depends on about as much as on the best of them."""
     if not built.planted:
         return ()
-    force = _planted_force(built.planted, base, study)
+    force = _planted_force(built.planted, base, dataset)
     if not force.any():  # noise alone
         return ()
-    shares = dependences(force, base, study)
+    shares = dependences(force, base, dataset)
     return tuple(name for name, s in shares.items() if s >= NEARLY * max(shares.values()))
 
 
-def _planted_force(planted: tuple[Fitted, ...], base: Fit, study: Study) -> np.ndarray:
+def _planted_force(planted: tuple[Fitted, ...], base: Fit, dataset: Dataset) -> np.ndarray:
     axis = base.axis
     for fitted in planted:
         axis = axis.with_effect(fitted)
-    force = base.residual - residual(axis, study.fit)[base.kept]
+    force = base.residual - residual(axis, dataset.fit)[base.kept]
     return unabsorbed(force, orthonormal(base.jacobian))
 
 

@@ -69,7 +69,9 @@ def _user_effect(path: Path) -> Effect:
             f"{path}: defines no EFFECT of type twin.effect.Effect; "
             "see the worked example in examples/my_effect.py"
         )
-    from twin.user_effect import require_sound  # only a user's file needs the compiler to be read
+    from twin.core.user_effect import (
+        require_sound,  # only a user's file needs the compiler to be read
+    )
 
     require_sound(effect, path)
     return effect

@@ -45,7 +45,7 @@ EFFECT = Effect(
     equation="F = sum_{k=1..3} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)",
     source="Gieras, Piech, Tomczuk, Linear Synchronous Motors, 2011 (cogging as a Fourier series)",
     parameters=(
-        Parameter("p", "m", 0.024, 1e-4, 1.0, "magnet pitch", scan=pitches),
+        Parameter("p", "m", 0.024, 1e-4, 10.0, "magnet pitch", scan=pitches, period=True),
         *(
             Parameter(
                 f"{c}{k}", "N", 0.0, -1e4, 1e4, f"{f} term of harmonic {k}", strength=True,

@@ -41,7 +41,7 @@ EFFECT = Effect(
     source="Dahl 1968; Dahl 1976; with the viscous part added",
     parameters=(
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True,
+            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),

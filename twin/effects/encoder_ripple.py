@@ -34,7 +34,9 @@ EFFECT = Effect(
     equation="reading = x + sum_{k=1,2} a_k sin(2 pi k x/period) + b_k cos(2 pi k x/period)",
     source="Heydemann 1981, quadrature errors to first order",
     parameters=(
-        Parameter("period", "m", 2e-5, 1e-8, 0.1, "signal period of the scale", scan=periods),
+        Parameter(
+            "period", "m", 2e-5, 1e-8, 10.0, "signal period of the scale", scan=periods, period=True
+        ),
         *(
             Parameter(f"{c}{k}", "m", 0.0, -1e-4, 1e-4, f"{f} term of harmonic {k}", strength=True)
             for k in (1, 2)

@@ -32,7 +32,7 @@ EFFECT = Effect(
     equation="u_actual = u (1 + sum_{k=1,2} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p))",
     source="Rohrig, Jochheim 2001, force ripple in proportion to current",
     parameters=(
-        Parameter("p", "m", 0.024, 1e-4, 1.0, "magnet pitch", scan=pitches),
+        Parameter("p", "m", 0.024, 1e-4, 10.0, "magnet pitch", scan=pitches, period=True),
         *(
             Parameter(f"{c}{k}", "1", 0.0, -0.5, 0.5, f"{f} term of harmonic {k}", strength=True)
             for k in (1, 2)

@@ -107,11 +107,11 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
             "elements", "1", elements, elements, elements, "number N, from the model file"
         ),
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True,
+            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.35, 0.0, 1e4, "static friction", strength=True, at_least="Fc",
+            "Fs", "N", 0.35, 0.0, 1e4, "static friction", strength=True, dry=True, at_least="Fc",
             start_rule=lambda e: 1.15 * e.dry_level,
         ),
         Parameter(

@@ -41,7 +41,9 @@ EFFECT = Effect(
     "r = 2 (x - phase - k pitch)/width",
     source="L. Jia 2023, force spikes every 34 mm; bump form is an assumption",
     parameters=(
-        Parameter("pitch", "m", 0.034, 1e-4, 1.0, "distance between rollers", fixed=True),
+        Parameter(
+            "pitch", "m", 0.034, 1e-4, 10.0, "distance between rollers", fixed=True, period=True,
+        ),
         Parameter(
             "width", "m", 0.004, 1e-4, 0.1, "full width of a bump",
             scan=lambda e: (0.002, 0.006, 0.015),

@@ -36,11 +36,11 @@ EFFECT = Effect(
     source="Tustin 1947 (n = 1); Bo, Pavelescu 1982 (n); L. Jia 2023, eq. 2.4-2.5",
     parameters=(
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True,
+            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.35, 0.0, 1e4, "static friction", strength=True, at_least="Fc",
+            "Fs", "N", 0.35, 0.0, 1e4, "static friction", strength=True, dry=True, at_least="Fc",
             start_rule=lambda e: 1.15 * e.dry_level,
         ),
         Parameter(

@@ -1,4 +1,4 @@
-"""The log in memory: equally spaced samples of one or two axes, columns with units."""
+"""The log in memory: equally spaced samples of some axes, columns with units."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
+from twin.model.units import AxisUnits, rotary_unit, units_of
 
 Array = NDArray[np.float64]
 
@@ -22,9 +23,7 @@ FIELDS = (
     "force",
 )
 LINEAR_UNITS = dict(zip(FIELDS, ("m", "m/s", "m/s^2", "m", "m/s", "A", "N"), strict=True))
-ROTARY_UNITS = dict(
-    zip(FIELDS, ("rad", "rad/s", "rad/s^2", "rad", "rad/s", "A", "N m"), strict=True)
-)
+ROTARY_UNITS = {name: rotary_unit(unit) for name, unit in LINEAR_UNITS.items()}
 
 
 @dataclass(frozen=True)
@@ -45,6 +44,11 @@ class AxisLog:
         return len(next(iter(self.columns.values())))
 
     @property
+    def kind(self) -> AxisUnits:
+        """The units of a linear or of a rotary axis, whichever the log states."""
+        return units_of(self.units.get("position"))
+
+    @property
     def position(self) -> Array:
         """(n,) encoder reading in m."""
         return self.columns["position"]
@@ -59,7 +63,7 @@ class AxisLog:
             return self.columns["force"]
         if self.force_constant is None:
             raise InputError(
-                "the log has current (A) but no force and no force constant (N/A); "
+                f"the log has current (A) but no force and no force constant ({self.kind('N/A')}); "
                 "give force_constant in the axis' channel metadata or in the import map"
             )
         return self.force_constant * self.columns["current"]

@@ -142,7 +142,7 @@ def _check_axis(axis: AxisLog) -> None:
         raise InputError("a log needs position and one of current and force; add what is missing")
     constant = axis.force_constant
     if constant is not None and not 0.0 < constant < math.inf:
-        raise InputError(f"force constant is {constant} N/A; give a number above 0")
+        raise InputError(f"force constant is {constant} {axis.kind('N/A')}; give a number above 0")
 
 
 def _check_columns(signals: Signals, count: int, sample_rate: float) -> None:

@@ -86,7 +86,7 @@ class McapWriter:
         self._chunks: list[ChunkIndex] = []
         self._counts: defaultdict[int, int] = defaultdict(int)
         self._write(MAGIC)
-        self._write(encoded([Header(profile="", library=f"proton-twin {_version()}")]))
+        self._write(encoded([Header(profile="", library=f"proton-twin {software_version()}")]))
 
     def add_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
         """Write a metadata record."""
@@ -178,7 +178,8 @@ class McapWriter:
         return start, len(data)
 
 
-def _version() -> str:
+def software_version() -> str:
+    """The version of this package, or that it is not installed."""
     try:
         return version("proton-twin")
     except PackageNotFoundError:

@@ -7,7 +7,12 @@ from twin.log.check.axis import Axis
 from twin.log.check.report import CheckReport, Fault, Finding, Severity
 from twin.log.log import Log
 
-__all__ = ["CheckReport", "Fault", "Finding", "Severity", "check_log"]
+__all__ = ["CheckReport", "Fault", "Finding", "Severity", "check_log", "moves"]
+
+
+def moves(log: Log, axis: str) -> bool:
+    """Whether an axis of a log moves beyond the noise of its encoder."""
+    return Axis(axis, log.sample_rate, log.axes[axis]).moves
 
 
 def check_log(log: Log) -> CheckReport:

@@ -16,7 +16,9 @@ _IMPOSSIBLE = 4.0  # times the acceleration that 99 % of the samples stay below
 _NOISE = 10.0  # times the rms of noise
 _SLOW = 0.02  # times the highest speed: below, Coulomb friction is not yet full
 _TINY = float(np.finfo(float).tiny)
+_COVERED = 15.0  # rms of noise; of 3 million samples white noise covers 10
 _MOVING = 5.0  # speed, in units of its noise
+_LEAST_MOTION = 0.3  # s; a loop that is closed at rest settles within half of that
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +43,7 @@ class Axis:
     def position_step(self) -> float:
         """Smallest change of the position in m: the encoder's step, where it is seen."""
         steps = np.abs(np.diff(self.log.position))
-        return float(steps[steps > 0.0].min())
+        return float(steps[steps > 0.0].min(initial=np.inf)) if steps.any() else 0.0
 
     @cached_property
     def position_noise(self) -> float:
@@ -65,6 +67,18 @@ class Axis:
 
     @cached_property
     def moves(self) -> bool:
+        """Whether the position covers more than its noise can, and is in motion for 0.3 s in all.
+
+        An axis that is held at rest covers a little while its loop settles.
+        """
+        if not np.ptp(self.log.position) > _COVERED * self.position_noise:
+            return False
+        fast = _MOVING * self.smoother.velocity_noise(self.position_noise)
+        moving = np.count_nonzero(np.abs(self.velocity) > fast)
+        return bool(moving * self.smoother.block > _LEAST_MOTION)
+
+    @cached_property
+    def moves_often(self) -> bool:
         """Whether a tenth of the log or more has motion beyond the noise of the encoder."""
         speed = float(np.quantile(np.abs(self.velocity), 0.9))
         return speed > _MOVING * self.smoother.velocity_noise(self.position_noise)

@@ -37,7 +37,7 @@ def _missing(axis: Axis) -> Iterator[Finding]:
         "there is no position": ("position" not in columns, "record the encoder"),
         "there is no force, nor a current with a force constant": (
             not commanded,
-            "add the command, or force_constant (N/A) to the axis",
+            f"add the command, or force_constant ({axis.log.kind('N/A')}) to the axis",
         ),
         f"the columns differ in length ({', '.join(f'{n} {k}' for n, k in lengths.items())})": (
             len(set(lengths.values())) > 1,

@@ -18,12 +18,13 @@ _SAME_SPEED = 0.05  # spread of the speeds as a part of their median
 def check(axis: Axis) -> Iterator[Finding]:
     """Weak excitation and coarse position."""
     unit = axis.log.units["position"]
-    if not axis.moves:
+    if not (axis.moves and axis.moves_often):
         yield _warning(
             axis,
             Fault.WEAK_EXCITATION,
             f"the axis hardly moves: {np.ptp(axis.log.position):.2g} {unit} in all, most of the "
-            f"time too slowly for the noise of its position ({axis.position_noise:.2g} {unit})",
+            f"time too slowly for the noise of its position ({axis.position_noise:.2g} {unit} "
+            "rms); a fit leaves this log out",
             "move it, or leave it out of the fit",
         )
         return

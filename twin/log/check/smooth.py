@@ -104,5 +104,8 @@ class Smoother:
 
 
 def white_noise(signal: Array) -> float:
-    """RMS of the white part of a signal: a fourth difference holds little else, sqrt(70) times."""
+    """RMS of the white part of a smooth signal: its fourth difference holds little else.
+
+    The fourth difference of white noise is sqrt(70) times as large.
+    """
     return float(np.median(np.abs(np.diff(signal, 4)))) / 0.6745 / 70**0.5

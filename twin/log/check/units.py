@@ -43,7 +43,7 @@ def check(axis: Axis) -> Iterator[Finding]:
 def _travel(axis: Axis) -> Iterator[Finding]:
     for name in ("position", "setpoint_position"):
         travel = np.ptp(axis.log.columns[name]) if name in axis.log.columns else 0.0
-        if travel > LONGEST_TRAVEL and axis.log.units[name] == "m":
+        if travel > LONGEST_TRAVEL and not axis.log.kind.rotary:
             yield Finding(
                 Severity.ERROR,
                 Fault.UNIT,
@@ -116,12 +116,13 @@ def _reversed_force(axis: Axis) -> Iterator[Finding]:
         return
     fit = axis.dynamics
     if fit.explains and fit.mass_matters and fit.mass < 0.0:
-        unit = "kg" if axis.log.units["position"] == "m" else "kg m^2"
+        units = axis.log.kind
         yield Finding(
             Severity.ERROR,
             Fault.SIGN,
             axis.name,
-            f"the force acts against the acceleration, as if the mass were {fit.mass:.3g} {unit}",
+            f"the force acts against the acceleration, as if the "
+            f"{units.mass_name} were {fit.mass:.3g} {units.mass}",
             "whole log",
             "give the force or the position the sign -1 in the import map",
         )

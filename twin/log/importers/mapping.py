@@ -28,6 +28,7 @@ from twin.log.container import at, reading
 from twin.log.importers.units import Unit, field_unit, find_unit
 from twin.log.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, Array
 from twin.log.topics import IDENTIFIER
+from twin.model.units import ROTARY
 
 _MAP_KEYS = ("format", "sample_rate", "time", "delimiter", "decimal", "header_line", "axes")
 _COLUMN_KEYS = ("column", "unit", "scale", "offset", "sign", "delay_samples")
@@ -161,7 +162,10 @@ def _axis(name: str, entry: Any) -> AxisMap:
         _require_known(entry, ("force_constant", *FIELDS))
         constant = _number(entry, "force_constant", None)
         if constant is not None and constant <= 0.0:
-            raise InputError(f"force_constant = {constant:g} N/A: give a number above 0")
+            raise InputError(
+                f"force_constant = {constant:g} N/A: give a number above 0 ({ROTARY('N/A')} on a "
+                "rotary axis)"
+            )
         columns = {}
         for field in FIELDS:
             if field in entry:

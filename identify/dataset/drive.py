@@ -1,0 +1,98 @@
+"""What actuator and encoder made of a log: the actual force, and the motion behind the readings.
+
+A delay or a lag is a fraction of a millisecond, and an encoder ripple a few micrometres long,
+so these effects are stepped sample by sample, not over blocks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.motion import Motion
+from twin.core.native import walk, walk_sensing
+from twin.effect import Effect, Kind
+from twin.model.machine import AxisModel, axis_table
+
+Array = NDArray[np.float64]
+
+LESSENED = 0.5  # of the commanded force, below which the motor gives another one altogether
+PASSES = 3  # from the reading to the position it was taken at
+
+
+def parts_of(axis: AxisModel, *kinds: Kind) -> AxisModel:
+    """The axis with its effects of these kinds alone."""
+    return replace(axis, effects=tuple(f for f in axis.effects if f.effect.kind in kinds))
+
+
+def is_noise(effect: Effect) -> bool:
+    """Whether an effect shows in the readings as noise alone: nothing of it can be fitted."""
+    return effect.kind is Kind.SENSING and all(p.fixed for p in effect.parameters)
+
+
+def actual_force(axis: AxisModel, motion: Motion) -> Array:
+    """The command after the axis' actuation effects, (n,) N at the log's own rate."""
+    command = motion.raw[1]
+    part = parts_of(axis, Kind.ACTUATION)
+    if not part.effects:
+        return command
+    signals = motion.at_samples(0.5)
+    table = axis_table({motion.axis: part})
+    rows = np.zeros((len(table.entries), len(command)))
+    first, last, state, _, _ = table.axes[0]
+    walk(
+        table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
+        signals, np.zeros_like(signals), motion.sample_period, 0, rows, axis.mass,
+        motion.time_origin,
+    )  # fmt: skip
+    return command + rows.sum(axis=0)
+
+
+def forces_lessened(axis: AxisModel, motions: Sequence[Motion]) -> float:
+    """RMS force of the motor over that commanded, where it is less than half; else 1.
+
+    A millionth at least, which keeps what is divided by it finite.
+    """
+    given = np.linalg.norm(np.concatenate([actual_force(axis, m) for m in motions]))
+    asked = np.linalg.norm(np.concatenate([m.raw[1] for m in motions]))
+    return 1.0 if given >= LESSENED * asked else max(float(given / asked), 1e-6)
+
+
+def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
+    """The motion that the readings come from, and the rate of their error, (n,) m/s.
+
+    The rate is at the log's own rate.
+    """
+    sensing = parts_of(axis, Kind.SENSING)
+    part = replace(sensing, effects=tuple(f for f in sensing.effects if not is_noise(f.effect)))
+    if not part.effects:
+        return motion, np.zeros(motion.raw.shape[1])
+    error, rate = reading_error(part, motion)
+    blocks = motion.signals.copy()
+    blocks[:2] -= np.stack([error, rate]).reshape(2, blocks.shape[1], -1).mean(axis=2)
+    raw = np.stack([motion.raw[0] - rate, motion.raw[1]])
+    return replace(motion, signals=blocks, raw=raw), rate
+
+
+def reading_error(sensing: AxisModel, motion: Motion) -> tuple[Array, Array]:
+    """What these sensing effects add to the readings, (n,) m, and its rate, m/s.
+
+    A reading is the true position and an error that depends on it, so the error is taken at the
+    reading, then where that says the axis was, and so on. The readings are smoothed for that: a
+    delay undone on their noise would make more of it.
+    """
+    table = axis_table({motion.axis: sensing})
+    _, _, _, first, last = table.axes[0]
+    true = motion.smoothed.copy()
+    path, seen = motion.smoothed[0], np.empty(true.shape[1])
+    for _ in range(PASSES):
+        walk_sensing(
+            table.entries, first, last, table.parameters, np.zeros(table.n_states), true,
+            motion.sample_period, seen,
+        )  # fmt: skip
+        error = seen - true[0]
+        true[0] = path - error
+    return error, np.diff(error, append=error[-1]) / motion.sample_period

@@ -1,0 +1,288 @@
+"""A log seen as motion of one axis: equally spaced means, so that nothing is differentiated twice.
+
+The command u_k is held over [t_k, t_k + dt), so the force belongs to the middle of the sample; the
+position there is (x_k + x_{k+1})/2 and the velocity (x_{k+1} - x_k)/dt. Means over blocks of whole
+samples keep these relations exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from twin.errors import InputError
+from twin.log import AxisLog, Log
+from twin.log.check.smooth import white_noise
+from twin.model.machine import MOST_AXES_OF_A_PAIR
+from twin.model.units import LINEAR, AxisUnits
+
+Array = NDArray[np.float64]
+
+SHORTEST_BLOCK = 1e-3  # s
+LONGEST_BLOCK = 1e-2  # s
+SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
+SHORTEST_LOG = 1.0  # s
+READ_BACK = 32  # readings that a controller is supposed to use
+ENOUGH = 200_000  # samples that tell the noise of a command
+SMOOTHED = 11  # samples over which readings are smoothed to undo their errors
+GAP = 8.0  # ratio of differences between readings that only a resolution leaves empty
+FOLLOWS = 0.5  # squared correlation of position and setpoint from which the loop is closed
+WHOLE = 0.15  # of a step, RMS, by which such differences may miss whole steps
+
+
+@dataclass(frozen=True, eq=False)
+class OtherAxis:
+    """Another axis of the machine. signals (3, n): position, velocity, acceleration, in units."""
+
+    signals: Array
+    units: AxisUnits
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Motion:
+    """Motion of one axis over one log, in blocks.
+
+    name: of the log. signals (3, n): position m, velocity m/s, command N. others (3, n): position,
+    velocity, acceleration of the other axis (zero where there is none, or more than one). period:
+    s, of a block. start: s, middle of the first block. sample_period: s, of the log.
+    position_noise: m rms. raw (2, n * samples a block): velocity m/s and command N at the log's own
+    rate. time_origin: s, when the log began, by the phase of what repeats in time. follows: whether
+    the position follows a logged setpoint; None where none was logged. units, other_units: of the
+    axis and of the other one, by which m, N and so on are to be read. beside: on a machine with
+    more than two axes the others, by name.
+    """
+
+    name: str
+    axis: str
+    signals: Array
+    others: Array
+    period: float
+    start: float
+    sample_period: float
+    position_noise: float
+    raw: Array
+    time_origin: float = 0.0
+    follows: bool | None = None
+    units: AxisUnits = LINEAR
+    other_units: AxisUnits = LINEAR
+    beside: Mapping[str, OtherAxis] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return (
+            f"<Motion of {self.axis} in {self.name}: {self.signals.shape[1] * self.period:.4g} s>"
+        )
+
+    def head(self, duration: float) -> Motion:
+        """Its first ``duration`` seconds."""
+        n = min(max(round(duration / self.period), 1), self.signals.shape[1])
+        samples = self.raw.shape[1] // self.signals.shape[1]
+        return replace(
+            self,
+            signals=np.ascontiguousarray(self.signals[:, :n]),
+            others=np.ascontiguousarray(self.others[:, :n]),
+            raw=self.raw[:, : n * samples],
+            beside={a: replace(o, signals=o.signals[:, :n]) for a, o in self.beside.items()},
+        )
+
+    def with_force_ahead(self, shift: float) -> Motion:
+        """The same with its command moved ahead by ``shift`` seconds."""
+        at = np.arange(self.raw.shape[1], dtype=float)
+        return self.with_force(np.interp(at + shift / self.sample_period, at, self.raw[1]))
+
+    def with_force(self, force: Array) -> Motion:
+        """The same under another force (n * samples a block,) N, at the log's own rate."""
+        signals = self.signals.copy()
+        signals[2] = force.reshape(signals.shape[1], -1).mean(axis=1)
+        return replace(self, signals=signals, raw=np.stack([self.raw[0], force]))
+
+    @property
+    def time(self) -> Array:
+        """(n,) s."""
+        return np.asarray(self.start + self.period * np.arange(self.signals.shape[1]))
+
+    @property
+    def position(self) -> Array:
+        """(n,) m."""
+        return self.signals[0]
+
+    @property
+    def velocity(self) -> Array:
+        """(n,) m/s."""
+        return self.signals[1]
+
+    @property
+    def command(self) -> Array:
+        """(n,) N."""
+        return self.signals[2]
+
+    def at_samples(self, instant: float) -> Array:
+        """Position m, velocity m/s and command N at the log's own rate, (3, n).
+
+        instant: where in the sample the position is taken, 0 its start, 1/2 its middle.
+        """
+        velocity, command = self.raw
+        travelled = velocity * self.sample_period
+        middle = np.cumsum(travelled) - 0.5 * travelled
+        middle += self.position[0] - middle[: len(middle) // len(self.position)].mean()
+        return np.stack([middle + (instant - 0.5) * travelled, velocity, command])
+
+    @cached_property
+    def smoothed(self) -> Array:
+        """Position m at the start of each sample, smoothed; velocity m/s and command N, (3, n)."""
+        signals = self.at_samples(0.0)
+        signals[0] = savgol_filter(signals[0], SMOOTHED, 2)
+        return signals
+
+    @cached_property
+    def command_noise(self) -> float:
+        """White noise in the command that its controller did not make of the readings, N^2/Hz.
+
+        One-sided. Second differences leave little of a setpoint; what a linear controller makes of
+        its last readings is taken off, and the median passes by what is not linear.
+        """
+        velocity, command = self.raw[:, :ENOUGH]
+        command, bend = np.diff(command, 2), np.diff(velocity)
+        lags = min(READ_BACK, len(command) // 8)
+        past = sliding_window_view(bend[: len(command)], lags)
+        scale = np.sqrt(np.mean(past**2)) or 1.0
+        rows, wanted = past / scale, command[lags - 1 :]
+        gains = np.linalg.lstsq(rows.T @ rows, rows.T @ wanted, rcond=1e-12)[0]
+        left = np.median(np.abs(wanted - rows @ gains)) / 0.6745
+        return float(2.0 * self.sample_period * left**2 / 6.0)
+
+    @cached_property
+    def resolution(self) -> float:
+        """Step between the readings, m; 0 where their noise, or the lack of one, hides it.
+
+        Differences of readings are then near 0 or near whole steps, with a wide gap between. Of two
+        steps, a fine one of the log's numbers and a coarse one of the encoder, the coarse counts.
+        """
+        apart = np.sort(np.abs(self.raw[0])) * self.sample_period
+        apart = apart[len(apart) // 100 :]
+        for held in (apart[apart > 0.0], np.maximum(apart, np.finfo(float).tiny)):
+            if step := _step(held, fewest=len(apart) // 100):
+                return step
+        return 0.0
+
+    @cached_property
+    def rounding(self) -> Array:
+        """What rounding to the readings' step made of the position, (n + 1,) m, about.
+
+        Where a reading changes, the position was half way; between such times it goes straight.
+        """
+        readings = np.concatenate([[0.0], np.cumsum(self.raw[0] * self.sample_period)])
+        step = self.resolution
+        if step == 0.0:
+            return np.zeros(len(readings))
+        at = np.flatnonzero(np.abs(np.diff(readings)) > 0.5 * step)
+        middle = 0.5 * (readings[at] + readings[at + 1])
+        return readings - np.interp(np.arange(len(readings)), at + 0.5, middle)
+
+
+def motion_of(log: Log, axis: str, name: str, machine: Sequence[str] = ()) -> Motion:
+    """The motion of one axis of a log.
+
+    machine: the axes of the machine; on one of two axes others that were logged do not matter.
+    Raises InputError where the axis is not in the log, does not move or is shorter than 1 s.
+    """
+    if axis not in log.axes:
+        raise InputError(f"{name}: has no axis '{axis}'; it has {', '.join(log.axes)}")
+    position = log.axes[axis].position
+    if len(log) * log.period < SHORTEST_LOG:
+        raise InputError(
+            f"{name}: lasts {len(log) * log.period:.3g} s; identification needs {SHORTEST_LOG:g} s"
+        )
+    if np.ptp(position) == 0.0:
+        raise InputError(f"{name}: axis {axis} stands still; give a log in which it moves")
+    noise = white_noise(position)
+    block = _block_samples(position, noise, log.period)
+    force = log.axes[axis].force
+    signals = _blocks(*_midpoints(position, force, log.period), block)
+    found = {a: _other(log, a, block) for a in _other_axes(log, axis, machine)}
+    several = len(found) > 1 or len(machine) > MOST_AXES_OF_A_PAIR
+    other = None if several else next(iter(found.values()), None)
+    return Motion(
+        name=name,
+        axis=axis,
+        signals=signals,
+        others=np.zeros_like(signals) if other is None else other.signals,
+        period=block * log.period,
+        start=0.5 * block * log.period,
+        sample_period=log.period,
+        units=log.axes[axis].kind,
+        other_units=LINEAR if other is None else other.units,
+        beside=found if several else {},
+        position_noise=noise,
+        raw=np.stack([np.diff(position) / log.period, force[:-1]])[:, : block * signals.shape[1]],
+        follows=_follows(log.axes[axis]),
+    )
+
+
+def _follows(signals: AxisLog) -> bool | None:
+    """Whether position and setpoint share at least half of their variance; None without setpoint.
+
+    A setpoint that stands still is not followed.
+    """
+    if "setpoint_position" not in signals.columns:
+        return None
+    wanted, position = signals.columns["setpoint_position"], signals.position
+    if np.ptp(wanted) == 0.0 or np.ptp(position) == 0.0:
+        return False
+    return bool(np.corrcoef(wanted, position)[0, 1] ** 2 > FOLLOWS)
+
+
+def _other_axes(log: Log, axis: str, machine: Sequence[str]) -> list[str]:
+    """The other axes of the log, of the machine alone where that has two."""
+    pair = len(machine) == MOST_AXES_OF_A_PAIR
+    return [a for a in log.axes if a != axis and (a in machine or not pair)]
+
+
+def _other(log: Log, axis: str, block: int) -> OtherAxis:
+    """Another axis of a log in blocks of some samples."""
+    x = log.axes[axis].position
+    position, velocity, _ = _blocks(*_midpoints(x, x, log.period), block)
+    acceleration = np.gradient(velocity, block * log.period)
+    return OtherAxis(np.stack([position, velocity, acceleration]), log.axes[axis].kind)
+
+
+def _block_samples(position: Array, noise: float, period: float) -> int:
+    """Samples a block: 1 ms, or longer where the encoder's noise asks for it."""
+    span = max(round(SHORTEST_BLOCK / period), 1)
+    fastest = np.abs(position[span:] - position[:-span]).max() / (span * period)
+    quiet = np.sqrt(2.0) * noise / (SPEED_NOISE * fastest)
+    return max(round(min(max(SHORTEST_BLOCK, quiet), LONGEST_BLOCK) / period), 1)
+
+
+def _midpoints(position: Array, force: Array, period: float) -> tuple[Array, Array, Array]:
+    return (
+        0.5 * (position[1:] + position[:-1]),
+        np.diff(position) / period,
+        force[:-1],
+    )
+
+
+def _blocks(position: Array, velocity: Array, force: Array, samples: int) -> Array:
+    whole = len(position) // samples * samples
+    stacked = np.stack([position[:whole], velocity[:whole], force[:whole]])
+    return np.ascontiguousarray(stacked.reshape(3, -1, samples).mean(axis=2))
+
+
+def _step(apart: Array, fewest: int) -> float:
+    """Step of which rising distances (n,) m are near whole multiples, or 0."""
+    if len(apart) < 2 or fewest < 1:
+        return 0.0
+    widest = int(np.argmax(apart[1:] / apart[:-1]))
+    step = apart[widest + 1]
+    if step < GAP * apart[widest] or not fewest <= len(apart) - widest:
+        return 0.0
+    for reach in (1.5, 4.5, 16.5):
+        near = apart[widest + 1 :][apart[widest + 1 :] < reach * step]
+        counts = np.rint(near / step)
+        step = float(near @ counts / (counts @ counts))
+    return step if np.std(near / step - counts) < WHOLE else 0.0

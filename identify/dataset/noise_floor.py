@@ -1,0 +1,181 @@
+"""The noise floor of a force residual, from the data alone.
+
+The raw residual, with a from second differences, is all noise at high frequency: white
+noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 cos(w dt))/dt^2)^2. A and B
+are fitted to its spectrum above the band of the effects, and give what passes the windows. Where
+the encoder's noise hides that of the force in all of that band, the force's is what the controller
+did not make of its readings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+from scipy.optimize import nnls
+from scipy.signal import welch
+from scipy.signal.windows import hann
+
+from identify.dataset.drive import actual_force, is_noise
+from identify.dataset.motion import Motion
+from identify.dataset.prepared_log import REST_SPEED, PreparedLog, on_blocks, sticks, total_force
+from identify.dataset.test_function import TestFunction
+from twin.model.machine import AxisModel
+
+Array = NDArray[np.float64]
+
+SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
+LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
+ROUNDS = 12
+TOLERATED = 0.5  # logarithm of the power over the fit from which a frequency weighs half
+BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
+PLAIN = 3.0  # of the reading's noise where the band begins, from which the force's is seen in it
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Measurement noise of one log, before any window.
+
+    frequency (k,): Hz. force: N^2/Hz, one-sided and white. reading: m^2/Hz, one-sided and white.
+    bend (k,): power gain from a reading to the force that it pretends, N^2/m^2. segment: samples
+    that the frequencies belong to.
+    """
+
+    frequency: Array
+    force: float
+    reading: float
+    bend: Array
+    segment: int
+
+    @property
+    def power(self) -> Array:
+        """What is left in a force residual, (k,) N^2/Hz."""
+        return np.asarray(self.force + self.reading * self.bend)
+
+
+def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
+    """RMS noise floor in N of the windowed residual of these logs."""
+    return noise_floor(axis, [(log.motion, log.window) for log in logs])
+
+
+def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
+    """RMS in N of what measurement noise leaves in the windowed residual of these logs."""
+    parts = [_variance(axis, *log) for log in logs]
+    weights = [motion.signals.shape[1] for motion, _ in logs]
+    return float(np.sqrt(np.average(parts, weights=weights)))
+
+
+def _variance(axis: AxisModel, motion: Motion, window: TestFunction) -> float:
+    noise = noise_of(axis, motion)
+    passed = noise.power
+    if any(is_noise(f.effect) for f in axis.effects):
+        passed = passed + _rounding(axis, motion, noise.segment)
+    response = window.response(motion.sample_period, noise.segment)
+    return float(np.trapezoid(passed * response, noise.frequency))
+
+
+def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
+    """One-sided power (segment // 2 + 1,) N^2/Hz of what the readings' rounding pretends.
+
+    White at speed, where the spectrum's median holds it already; its slow steps are added.
+    """
+    frequency, power = welch(
+        motion.rounding, 1.0 / motion.sample_period, nperseg=segment, detrend="linear"
+    )
+    return np.asarray(_bend(axis, motion, frequency) * power)
+
+
+def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
+    """Power gain (k,) from a position m to the force N that it pretends."""
+    dt = motion.sample_period
+    return ((2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * dt)) * axis.mass / dt**2) ** 2
+
+
+def noise_of(axis: AxisModel, motion: Motion) -> Noise:
+    """The measurement noise of one log, from its raw residual."""
+    dt = motion.sample_period
+    velocity = motion.raw[0]
+    # The loop's own noise is in the command and moves the axis; a delay left out would tear the two
+    # apart and pass for measurement noise.
+    command = actual_force(axis, motion)
+    raw = 0.5 * (command[1:] + command[:-1]) - axis.mass * np.diff(velocity) / dt
+    # What the model explains, a bump passed at speed say, is not noise either.
+    raw += _between_samples(total_force(on_blocks(axis), motion), motion)
+    # The median over segments passes by those with spikes and reversals.
+    segment = min(max(round(SEGMENT / dt), 256), len(raw))
+    frequency, power = _median_spectrum(raw, segment, dt, _at_rest(axis, motion))
+    half = np.cos(np.pi * frequency * dt) ** 2
+    bend = _bend(axis, motion, frequency)
+    band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < BAND[2] / dt)
+    force, reading = map(float, _fit_levels(np.stack([half, bend], axis=1)[band], power[band]))
+    if force < PLAIN * reading * bend[band][0]:
+        force = motion.command_noise
+    return Noise(frequency, force, reading, bend, segment)
+
+
+def _between_samples(force: Array, motion: Motion) -> Array:
+    """Means over blocks (n,) N as values at the log's inner samples."""
+    samples = np.arange(1, motion.raw.shape[1]) * motion.sample_period
+    return np.asarray(np.interp(samples, motion.time, force))
+
+
+def _at_rest(axis: AxisModel, motion: Motion) -> NDArray[np.bool_]:
+    """Where the axis may stick, (n,) over the log's inner samples.
+
+    Static friction then takes up the command and its noise, however large.
+    """
+    speed = np.abs(motion.velocity)
+    still = speed < REST_SPEED * speed.max()
+    samples = motion.raw.shape[1] // len(still)
+    return np.asarray(np.repeat(still & sticks(axis), samples)[1:])
+
+
+def _median_spectrum(
+    signal: Array, segment: int, dt: float, left_out: NDArray[np.bool_]
+) -> tuple[Array, Array]:
+    """Welch's one-sided density with medians: frequency Hz, power unit^2/Hz, (segment // 2 + 1,).
+
+    Of the segments with the least of what is left out, at least a quarter.
+    As scipy.signal.welch with average="median" and linear detrending, whose segment by segment
+    detrending took a third of a fit. P. D. Welch (1967); bias of the median: B. Allen et al.,
+    Phys. Rev. D 85, 122006 (2012).
+    """
+    step = max(segment - segment // 2, 1)
+    out = sliding_window_view(left_out, segment)[::step].mean(axis=1)
+    pieces = sliding_window_view(signal, segment)[::step][out <= np.quantile(out, LEAST_KEPT)]
+    ramp = np.linspace(-1.0, 1.0, segment)
+    slope = (pieces @ ramp) / (ramp @ ramp)
+    level = pieces.mean(axis=1, keepdims=True) + slope[:, None] * ramp
+    taper = hann(segment, sym=False)
+    power = np.abs(np.fft.rfft((pieces - level) * taper)) ** 2 * (2.0 * dt / (taper @ taper))
+    power[:, 0] /= 2.0
+    if segment % 2 == 0:
+        power[:, -1] /= 2.0
+    odd = np.arange(2, (len(pieces) - 1) // 2 * 2 + 1, 2)
+    bias = 1.0 + np.sum(1.0 / (odd + 1.0) - 1.0 / odd)
+    return np.asarray(np.fft.rfftfreq(segment, dt)), np.asarray(np.median(power, axis=0) / bias)
+
+
+def _fit_levels(shapes: Array, power: Array) -> Array:
+    """Non-negative levels by least squares on the relative error, repeated: a Whittle fit.
+
+    What stands above the fit, such as a resonance, weighs the less the higher it stands.
+    """
+    model = _underneath(power)
+    levels = np.zeros(shapes.shape[1])
+    for _ in range(ROUNDS):
+        above = np.maximum(np.log(power / model), 0.0) / TOLERATED
+        weight = 1.0 / (1.0 + above**2)
+        levels, _ = nnls(shapes * (weight / model)[:, None], power / model * weight)
+        model = np.maximum(shapes @ levels, 1e-12 * power.max())
+    return levels
+
+
+def _underneath(power: Array) -> Array:
+    """The smallest power at this or any higher frequency: noise of these shapes never falls."""
+    smooth = uniform_filter1d(power, 9, mode="nearest")
+    return np.maximum(np.minimum.accumulate(smooth[::-1])[::-1], 1e-300)

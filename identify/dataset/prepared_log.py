@@ -1,0 +1,94 @@
+"""One log's motion of an axis with its test functions, and the model's force along it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.drive import parts_of
+from identify.dataset.motion import Motion
+from identify.dataset.test_function import TestFunction
+from twin.core.native import Table, walk
+from twin.effect import Kind
+from twin.model.machine import AxisModel, axis_table
+
+Array = NDArray[np.float64]
+
+REST_SPEED = 1e-3  # of the highest speed; below it a friction that sticks can be anything
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PreparedLog:
+    """One log's motion of an axis with its weak form.
+
+    window, fine: over the motion's blocks, and the same over the log's samples. command (n,) N and
+    acceleration (n,) m/s^2 are windowed means.
+    """
+
+    motion: Motion
+    window: TestFunction
+    fine: TestFunction
+    command: Array
+    acceleration: Array
+
+    def __repr__(self) -> str:
+        return (
+            f"<PreparedLog {self.motion.name}: {len(self)} test functions of "
+            f"{self.window.length:g} s>"
+        )
+
+    @classmethod
+    def of(cls, motion: Motion, length: float) -> PreparedLog:
+        """Weak form with windows of that length (s)."""
+        window = TestFunction.of_length(length, motion.period)
+        samples = round(motion.period / motion.sample_period)
+        fine, window = window.refined(samples), window.sharpened(samples)
+        velocity, command = motion.raw
+        return cls(motion, window, fine, fine.mean(command), fine.acceleration(velocity))
+
+    @property
+    def time(self) -> Array:
+        """(n,) s, middle of each window."""
+        return self.window.mean(self.motion.time)
+
+    def __len__(self) -> int:
+        return len(self.command)
+
+
+def total_force(table: Table, motion: Motion) -> Array:
+    """Sum of the forces of a table's first axis along a measured motion, (n,) N, less command."""
+    rows = np.zeros((len(table.entries), motion.signals.shape[1]))
+    if not len(rows):
+        return np.zeros(motion.signals.shape[1])
+    first, last, state, _, _ = table.axes[0]
+    walk(
+        table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
+        motion.signals, motion.others, motion.period, 0, rows, table.masses[0],
+        motion.time_origin,
+    )  # fmt: skip
+    return np.asarray(rows.sum(axis=0))
+
+
+def on_blocks(axis: AxisModel) -> Table:
+    """Table of what acts between actuator and encoder, which blocks of a motion resolve."""
+    return axis_table(
+        {"": parts_of(axis, Kind.FORCE, Kind.MODIFIER, Kind.FRICTION, Kind.STRUCTURE)}
+    )
+
+
+def sticks(axis: AxisModel) -> bool:
+    """Whether the axis' friction is a static one, whose force at rest can be anything."""
+    return any(f.effect.sticks for f in axis.effects)
+
+
+def moving(logs: Sequence[PreparedLog], sticks: bool) -> NDArray[np.bool_]:
+    """Which windows carry information: for a friction that sticks, those without standstill."""
+    masks = []
+    for log in logs:
+        speed = np.abs(log.motion.velocity)
+        still = (speed < REST_SPEED * speed.max()).astype(float)
+        masks.append(log.window.mean(still) < 0.02 if sticks else np.ones(len(log), bool))
+    return np.concatenate(masks)

@@ -1,0 +1,95 @@
+"""The weak form: forces averaged by smooth windows, the acceleration integrated by parts.
+
+With a window phi that vanishes at its ends, integral(phi m a) = -integral(phi' m v), so that only
+the velocity of the log is needed. D. A. Messenger, D. M. Bortz, "Weak SINDy", Multiscale Model.
+Simul. 19 (2021). The window is (1 - r^2)^2, normalised to unit sum: a windowed force is a mean, N.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+
+Array = NDArray[np.float64]
+
+OVERLAP = 4  # windows that cover one instant
+LEAST_BLOCKS = 8  # that a window spans
+
+
+@dataclass(frozen=True, eq=False)
+class TestFunction:
+    """A smooth weight over blocks of ``period`` (s).
+
+    weights: (w,) 1. slope: (w,) 1/s. stride: from one to the next, in blocks.
+    """
+
+    __test__: ClassVar[bool] = False  # pytest: no test, whatever its name
+
+    period: float
+    weights: Array
+    slope: Array
+    stride: int
+
+    @property
+    def length(self) -> float:
+        """Full length in s."""
+        return len(self.weights) * self.period
+
+    @classmethod
+    def of_length(cls, length: float, period: float) -> TestFunction:
+        """A test function of that length (s); InputError where it spans too few blocks."""
+        n = round(length / period)
+        if n < LEAST_BLOCKS:
+            raise InputError(
+                f"window = {length:g} s: shorter than {LEAST_BLOCKS} blocks of {period:g} s; "
+                f"give at least {LEAST_BLOCKS * period:g} s"
+            )
+        return cls._of_blocks(n, period, max(n // OVERLAP, 1))
+
+    @classmethod
+    def _of_blocks(cls, n: int, period: float, stride: int) -> TestFunction:
+        edges = (1.0 - (np.arange(n + 1) / n * 2.0 - 1.0) ** 2) ** 2
+        phi = 0.5 * (edges[1:] + edges[:-1])
+        return cls(period, phi / phi.sum(), np.diff(edges) / phi.sum() / period, stride)
+
+    def sharpened(self, parts: int) -> TestFunction:
+        """The same for means over blocks of ``parts`` samples of what varies within a block.
+
+        The weights and the means are each smoothed over a block, which the window refined to the
+        samples is not; the second difference takes that off again, to fourth order in the block.
+        """
+        bend = np.diff(np.pad(self.weights, 1), 2)
+        weights = self.weights - (2.0 - 1.0 / parts**2) / 12.0 * bend
+        return replace(self, weights=weights / weights.sum())
+
+    def refined(self, parts: int) -> TestFunction:
+        """The same windows over blocks ``parts`` times shorter."""
+        n = len(self.weights) * parts
+        return self._of_blocks(n, self.period / parts, self.stride * parts)
+
+    def mean(self, signals: Array) -> Array:
+        """Means of signals (..., n) -> (..., n_windows)."""
+        return self._apply(signals, self.weights)
+
+    def acceleration(self, velocity: Array) -> Array:
+        """Mean acceleration (n_windows,) m/s^2 of a velocity (n,) m/s."""
+        return -self._apply(velocity, self.slope)
+
+    def _apply(self, signals: Array, kernel: Array) -> Array:
+        views = sliding_window_view(signals, len(kernel), axis=-1)
+        return views[..., :: self.stride, :] @ kernel
+
+    def response(self, period: float, segment: int) -> Array:
+        """Squared magnitude of the mean's frequency response for samples of ``period`` (s).
+
+        At the frequencies of a Fourier transform over ``segment`` samples, (segment // 2 + 1,).
+        """
+        weights = TestFunction.of_length(self.length, period).weights
+        fold = -(-len(weights) // segment)
+        return np.abs(np.fft.rfft(weights, fold * segment)[::fold]) ** 2

@@ -1,0 +1,129 @@
+"""Force and position channels that were not sampled together, found before physics is blamed.
+
+A command that acts later than its stamp is a delay, which the catalogue has effects for. One that
+seems to act earlier cannot be physics: the channels' time stamps disagree, or the log holds every
+n-th sample of a faster controller, whose mean force lies ahead of the sample logged. Such a shift
+is taken off the log, and said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.decision import RULE
+from identify.estimation.evidence import evidence
+from identify.estimation.fit import Fit, Outcome, error_on, finished, fit_axis, rms
+from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.time_origin import depends_on_time_origin, synchronised, with_time_origins
+from identify.estimation.variable_projection import fit_thoroughly
+from twin.model.machine import AxisModel
+
+Array = NDArray[np.float64]
+
+ROUNDS = 3
+
+
+def fit_aligned(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
+    """The fit of an axis, and the dataset with its force channel moved to where it acted.
+
+    The dataset's clocks are set by what repeats in time.
+    """
+    fit = fit_thoroughly(axis, dataset)
+    for _ in range(ROUNDS):
+        shift = misalignment(fit, dataset)
+        if shift == 0.0:
+            break
+        moved = realigned(dataset, dataset.channel_delay + shift)
+        again = fit_thoroughly(fit.axis, moved)
+        if again.error > np.sqrt(1.0 - RULE.least_fall) * fit.error:
+            break
+        dataset, fit = moved, replace(again, begun=fit.begun)
+    if not depends_on_time_origin(fit.axis, dataset):
+        return synchronised(fit, dataset)
+    dataset = with_time_origins(fit.axis, dataset)
+    return dataset, replace(fit_thoroughly(fit.axis, dataset), begun=fit.begun)
+
+
+def aligned(axis: AxisModel, dataset: Dataset) -> Dataset:
+    """The dataset as a model with these values sees it: its force channel and its time origins.
+
+    Nothing is fitted, so that the values stand; ``fit_aligned`` finds the same where it fits them.
+    """
+    for _ in range(ROUNDS):
+        fit = finished(axis, axis, dataset.fit, Outcome.CONVERGED)
+        if not len(fit.residual) or (shift := misalignment(fit, dataset)) == 0.0:
+            break
+        moved = realigned(dataset, dataset.channel_delay + shift)
+        error = rms(error_on(axis, moved.fit))
+        if error > np.sqrt(1.0 - RULE.least_fall) * fit.error:
+            break
+        dataset = moved
+    return with_time_origins(axis, dataset)
+
+
+def misalignment(fit: Fit, dataset: Dataset) -> float:
+    """How much earlier than its stamp the force seems to act, s; 0 where nothing says so.
+
+    One linear step: the residual against the rate of the command, beside the fit's own parameters.
+    Of a dataset whose force was moved already, by how much more, or less; in all never backwards.
+    """
+    rate = np.concatenate([w.fine.acceleration(w.motion.raw[1]) for w in dataset.fit])[fit.kept]
+    basis = orthonormal(fit.jacobian)
+    left, own = unabsorbed(fit.residual, basis), unabsorbed(rate, basis)
+    power = float(own @ own)
+    if power <= 1e-12 * float(rate @ rate):
+        return 0.0
+    shift = -float(own @ left) / power
+    after = left + shift * own
+    sample = dataset.fit[0].motion.sample_period
+    fall = 1.0 - float(after @ after) / max(float(left @ left), 1e-300)
+    told = fall > RULE.least_fall and evidence(left, after, 1).delta_bic > RULE.least_bic
+    in_all = dataset.channel_delay + shift
+    return shift if told and RULE.least_shift * sample < in_all < RULE.most_shift * sample else 0.0
+
+
+def moved_by(fit: Fit, dataset: Dataset) -> Dataset | None:
+    """The dataset with its force channel where a larger model says that it acted, if elsewhere.
+
+    What the smaller model lacked can have passed for a shift, or hidden one.
+    """
+    if ahead := misalignment(fit, dataset):
+        return realigned(dataset, dataset.channel_delay + ahead)
+    if dataset.channel_delay == 0.0:
+        return None
+    back = realigned(dataset, 0.0)
+    better = np.sqrt(1.0 - RULE.least_fall) * fit.error
+    return back if fit_axis(fit.axis, back.fit).error < better else None
+
+
+def realigned(dataset: Dataset, shift: float) -> Dataset:
+    """The dataset with the force channel of its logs moved ahead by ``shift`` (s) in all."""
+    more = shift - dataset.channel_delay
+    return replace(
+        dataset,
+        fit=_moved(dataset.fit, more),
+        holdout=_moved(dataset.holdout, more),
+        channel_delay=shift,
+    )
+
+
+def _moved(logs: Sequence[PreparedLog], shift: float) -> tuple[PreparedLog, ...]:
+    return tuple(PreparedLog.of(w.motion.with_force_ahead(shift), w.window.length) for w in logs)
+
+
+def shift_in_words(dataset: Dataset) -> str | None:
+    """A sentence on the shift that was taken off the logs, or None."""
+    if dataset.channel_delay == 0.0:
+        return None
+    samples = dataset.channel_delay / dataset.fit[0].motion.sample_period
+    return (
+        f"axis {dataset.axis}: the force acts {1e6 * dataset.channel_delay:.0f} us "
+        f"({samples:.2f} samples) before its time stamp, which no drive can do; the log was "
+        "corrected. Check how force and position are sampled"
+    )

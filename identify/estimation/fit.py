@@ -1,0 +1,247 @@
+"""Fit an axis model to logs: least squares on the windowed force residual.
+
+Several starts where the model has shape parameters; weak priors keep what the data cannot see near
+its start. The result says in a full sentence how it ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.drive import forces_lessened
+from identify.dataset.noise_floor import floor_of
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.estimation.decision import RULE
+from identify.estimation.evidence import effective_samples
+from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.levenberg_marquardt import minimise
+from identify.estimation.scaling import Scaling
+from identify.estimation.smoothing import described, smoothing
+from twin.effect import Kind
+from twin.model.machine import AxisModel, ParameterReference, free_parameters, read
+
+Array = NDArray[np.float64]
+
+PRIOR_FORCE = 0.1  # expected force of what is added to the friction, over that to be explained
+PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
+MOST_EVALUATIONS = 40
+PUSHED = 3.0  # standard errors by which the data ask for a value beyond a bound
+AT_EDGE = 1e-6  # of a bound, within which a value is at it
+
+
+class Outcome(Enum):
+    """How a fit ended."""
+
+    CONVERGED = "The fit converged: no parameter change lowers the force error further."
+    NOT_CONVERGED = (
+        "The fit stopped after its most evaluations before it converged; start nearer or fix some "
+        "parameters."
+    )
+    AT_BOUND = "The fit converged with a parameter at its bound; the data ask for a value beyond."
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit:
+    """A fitted axis.
+
+    residual (n,): N at the end over the windows of the logs that carry information (kept). begun:
+    the axis that the fit started from.
+    """
+
+    axis: AxisModel
+    logs: Sequence[PreparedLog]
+    scaling: Scaling
+    outcome: Outcome
+    residual: Array
+    kept: NDArray[np.bool_]
+    begun: AxisModel
+
+    def __repr__(self) -> str:
+        return f"<Fit: {self.error:.4g} N over {len(self.residual)} test functions>"
+
+    @cached_property
+    def error(self) -> float:
+        """RMS force residual in N."""
+        return rms(self.residual)
+
+    @cached_property
+    def floor(self) -> float:
+        """RMS noise floor in N."""
+        return floor_of(self.axis, self.logs)
+
+    @cached_property
+    def lessened(self) -> float:
+        """RMS force of the motor over that commanded, where it is less than half; else 1."""
+        return forces_lessened(self.axis, [log.motion for log in self.logs])
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Derivative of the residual by the free coordinates, (n, k) N per unit."""
+        return jacobian(self.axis, self.logs, self.scaling.where)[self.kept]
+
+    @cached_property
+    def at_bound(self) -> tuple[str, ...]:
+        """Labels of the parameters at a bound, beyond which the data ask for a value.
+
+        The gradient must push outwards by more than the residual's noise makes of it.
+        """
+        if not len(self.residual):
+            return ()
+        noise = self.error * np.sqrt(len(self.residual) / effective_samples(self.residual))
+        values = read(self.axis, self.scaling.where)
+        out = []
+        for c, value, column in zip(self.scaling.where, values, self.jacobian.T, strict=True):
+            pushed = -float(column @ self.residual)  # > 0: a larger value would be better
+            p = c.parameter
+            edge = p.upper if pushed > 0.0 else p.lower
+            sure = abs(pushed) > PUSHED * noise * float(np.linalg.norm(column))
+            if sure and abs(value - edge) <= AT_EDGE * max(abs(edge), abs(p.start)):
+                out.append(c.label)
+        return tuple(out)
+
+    @property
+    def ended(self) -> Outcome:
+        """How the optimisation ended, with what the bounds did."""
+        held = self.outcome is Outcome.CONVERGED and self.at_bound
+        return Outcome.AT_BOUND if held else self.outcome
+
+    @property
+    def at_floor(self) -> bool:
+        """Whether the error is hardly more than noise."""
+        return self.ratio < RULE.at_floor
+
+    @property
+    def ratio(self) -> float:
+        """Error over noise floor."""
+        return self.error / self.floor
+
+
+def _is_added(axis: AxisModel, c: ParameterReference) -> bool:
+    """Whether zero means the absence of a physical effect beside mass and friction."""
+    if not (c.effect and c.parameter.strength):
+        return False
+    effect = axis[c.effect].effect
+    return effect.kind is not Kind.FRICTION and not effect.is_nonparametric
+
+
+def _describes(axis: AxisModel, c: ParameterReference) -> bool:
+    """Whether it is a strength of a description."""
+    return bool(c.effect) and c.parameter.strength and axis[c.effect].effect.is_nonparametric
+
+
+def rms(values: Array) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
+
+
+class _Problem:
+    """Residual and Jacobian of one fit in internal variables, with priors as extra rows.
+
+    The prior on what is added to the friction is a force of a tenth of what is to be explained; it
+    matters only along directions that the data cannot tell apart, such as a constant force and a
+    Coulomb asymmetry, where it shares the force out instead of opposing large ones to each other.
+    Beside a description the physical effects are pulled to where they were: what both could explain
+    stays with the physics. The description itself is smoothed.
+    """
+
+    def __init__(self, axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int) -> None:
+        self.axis = axis
+        self.most_evaluations = most_evaluations
+        self.logs = logs
+        self.scaling = Scaling(free_parameters(axis))
+        self.kept = moving(logs, sticks(axis))
+        self.bounds = self.scaling.bounds()
+        self.start = np.clip(self.scaling.inside(axis), *self.bounds)
+        self.added = np.array([_is_added(axis, c) for c in self.scaling.where], dtype=bool)
+        self.centre = np.where(self.added & (not described(axis)), 0.0, self.start)
+        self.pull = np.zeros(len(self.start))
+        self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
+        # A description is linear in its strengths: their columns are taken once.
+        self.constant = np.array([_describes(axis, c) for c in self.scaling.where], dtype=bool)
+        self.described = jacobian(axis, logs, self._where(self.constant))
+
+    def set_priors(self, internal: Array) -> None:
+        """Weigh the priors by the residual's size, its colour, and the force to be explained."""
+        axis = self.scaling.outside(self.axis, internal)
+        left = residual(axis, self.logs)[self.kept]
+        inertia = axis.mass * np.concatenate([log.acceleration for log in self.logs])
+        command = np.concatenate([log.command for log in self.logs])
+        explained = rms((command - inertia)[self.kept])
+        noise = rms(left) * np.sqrt(len(left) / effective_samples(left))
+        columns = self.columns(internal)
+        size = np.linalg.norm(columns, axis=0) / np.sqrt(max(len(left), 1))
+        expected = max(PRIOR_FORCE * explained, noise)
+        self.pull = np.where(self.added, noise * size / expected, 0.0)
+        self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD
+
+    def _where(self, mask: NDArray[np.bool_]) -> list[ParameterReference]:
+        return [c for c, wanted in zip(self.scaling.where, mask, strict=True) if wanted]
+
+    def jacobian(self, axis: AxisModel) -> Array:
+        """Derivative of the residual by the free coordinates, (n, k) N per unit."""
+        columns = np.empty((len(self.kept), len(self.constant)))
+        columns[:, self.constant] = self.described
+        columns[:, ~self.constant] = jacobian(axis, self.logs, self._where(~self.constant))
+        return columns
+
+    def columns(self, internal: Array) -> Array:
+        axis = self.scaling.outside(self.axis, internal)
+        return self.scaling.chain(axis, self.jacobian(axis))[self.kept]
+
+    def rows(self, internal: Array) -> Array:
+        force = residual(self.scaling.outside(self.axis, internal), self.logs)[self.kept]
+        pulled = self.pull * (internal - self.centre)
+        return np.concatenate([force, pulled, self.smooth @ internal])
+
+    def slopes(self, internal: Array) -> Array:
+        return np.vstack([self.columns(internal), np.diag(self.pull), self.smooth])
+
+    def solve(self, internal: Array, tolerance: float) -> tuple[Array, bool]:
+        """Least squares from these values; the solution and whether it converged."""
+        solution = minimise(
+            self.rows, self.slopes, internal, self.bounds,
+            tolerance=tolerance, most_evaluations=self.most_evaluations,
+        )  # fmt: skip
+        return solution.x, solution.converged
+
+
+def fit_axis(
+    axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int = MOST_EVALUATIONS
+) -> Fit:
+    """Fit the free parameters of an axis from its present values."""
+    problem = _Problem(axis, logs, most_evaluations)
+    internal, converged = problem.start, True
+    if len(internal):
+        problem.set_priors(internal)
+        internal, _ = problem.solve(internal, 1e-3)
+        problem.set_priors(internal)
+        internal, converged = problem.solve(internal, 1e-7)
+    outcome = Outcome.CONVERGED if converged else Outcome.NOT_CONVERGED
+    return finished(problem.scaling.outside(axis, internal), axis, logs, outcome)
+
+
+def finished(
+    axis: AxisModel, begun: AxisModel, logs: Sequence[PreparedLog], outcome: Outcome
+) -> Fit:
+    """The fit that an axis is at its present values."""
+    kept = moving(logs, sticks(axis))
+    return Fit(
+        axis=axis,
+        logs=logs,
+        scaling=Scaling(free_parameters(axis)),
+        outcome=outcome,
+        residual=residual(axis, logs)[kept],
+        kept=kept,
+        begun=begun,
+    )
+
+
+def error_on(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
+    """Force residual (n,) N of a model on other logs, without refitting."""
+    return residual(axis, logs)[moving(logs, sticks(axis))]

@@ -1,0 +1,154 @@
+"""Intervals that survive coloured residuals, and are refused on a wrong model.
+
+Sandwich covariance with blocks: (J'J)^-1 [sum_b J_b' r_b r_b' J_b] (J'J)^-1, where the blocks are
+longer than the residual's memory and r_b is what the fit without block b leaves there. H. White,
+Econometrica 48 (1980); K.-Y. Liang, S. L. Zeger, Biometrika 73 (1986) for blocks; R. M. Bell,
+D. F. McCaffrey, Survey Methodology 28 (2002) for left-out residuals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from identify.estimation.evidence import left_out
+from identify.estimation.fit import Fit
+from identify.estimation.force_balance import residual
+from twin.model.machine import ParameterReference, read, write
+
+Array = NDArray[np.float64]
+
+BLOCKS = 30
+RIDGE = 1e-6  # keeps a fit without one block finite
+INSEPARABLE = 0.9999  # correlation of two estimates from which they are one number
+CONFIDENCE = 0.90
+FAR = 4.0  # half widths to either side at which the error must have risen
+LEAST_RISE = 0.1  # of the rise that the slopes foresee
+LARGEST_RATIO = 3.0  # of error to noise floor; above it the model is wrong and no interval holds
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter: value with its unit and 90 % interval, or the reason why there is none."""
+
+    label: str
+    value: float
+    unit: str
+    low: float | None
+    high: float | None
+    free: bool
+    reason: str | None = None
+
+
+def estimates(fit: Fit) -> tuple[Estimate, ...]:
+    """Estimates of all parameters of a fitted axis, free ones first."""
+    values = read(fit.axis, fit.scaling.where)
+    half = half_widths(fit)
+    reason = refusal(fit)
+    twins = inseparable(fit)
+    free = []
+    units = fit.axis.units
+    for c, value, width in zip(fit.scaling.where, values, half, strict=True):
+        p = c.parameter
+        low: float | None = None
+        high: float | None = None
+        why = reason
+        if why is None and not np.isfinite(width):
+            why = "no interval: this motion does not show the parameter"
+        if why is None and c.label in twins:
+            why = f"no interval: this data cannot tell it from {twins[c.label]}"
+        if why is None and (side := open_side(fit, c, width)):
+            why = f"no interval: a {side} value fits as well, these logs do not reach it"
+        if why is None:
+            low, high = max(value - width, p.lower), min(value + width, p.upper)
+        free.append(Estimate(c.label, float(value), units(p.unit), low, high, True, why))
+    return (*free, *_held(fit))
+
+
+def open_side(fit: Fit, c: ParameterReference, half: float) -> str | None:
+    """The side, "smaller" or "larger", to which the error hardly rises; None where it does.
+
+    An end stop out of reach is the example: where it just touches the motion the fit has a slope.
+    """
+    column = fit.jacobian[:, fit.scaling.where.index(c)]
+    value = read(fit.axis, [c])[0]
+    for side, step in (("smaller", -FAR * half), ("larger", FAR * half)):
+        moved = write(fit.axis, [c], [np.clip(value + step, c.parameter.lower, c.parameter.upper)])
+        step = read(moved, [c])[0] - value
+        foreseen = 2.0 * step * float(fit.residual @ column) + step**2 * float(column @ column)
+        if abs(step) < 0.5 * FAR * half or foreseen <= 0.0:  # a bound is in the way
+            continue
+        there = residual(moved, fit.logs)[fit.kept]
+        if float(there @ there - fit.residual @ fit.residual) < LEAST_RISE * foreseen:
+            return side
+    return None
+
+
+def inseparable(fit: Fit) -> dict[str, str]:
+    """Pairs of parameters, by label, whose estimates are correlated to all but one."""
+    norms = np.linalg.norm(fit.jacobian, axis=0)
+    seen = np.flatnonzero(norms > 0)
+    columns = fit.jacobian[:, seen] / norms[seen]
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-15, hermitian=True)
+    spread = np.sqrt(np.diag(inverse))
+    correlation = np.abs(inverse / np.outer(spread, spread)) - np.eye(len(seen))
+    labels = [fit.scaling.where[i].label for i in seen]
+    return {
+        label: labels[int(np.argmax(row))]
+        for label, row in zip(labels, correlation, strict=True)
+        if row.max() > INSEPARABLE
+    }
+
+
+def refusal(fit: Fit) -> str | None:
+    """Why the fit has no intervals, or None where it has."""
+    if len(fit.residual) == 0:
+        return "no interval: the axis comes to rest within every window of these logs"
+    if fit.ratio <= LARGEST_RATIO:
+        return None
+    unit = fit.axis.units.force
+    return (
+        f"no interval: the force error {fit.error:.3g} {unit} stands {fit.ratio:.1f} times above "
+        f"the noise floor {fit.floor:.3g} {unit}, so the model is wrong by more than noise"
+    )
+
+
+def half_widths(fit: Fit) -> Array:
+    """Half widths (k,) of the 90 % intervals, in the parameters' units; inf where unseen."""
+    norms = np.linalg.norm(fit.jacobian, axis=0)
+    seen = norms > 0
+    out = np.full(len(norms), np.inf)
+    if not seen.any():
+        return out
+    columns = fit.jacobian[:, seen] / norms[seen]
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-12, hermitian=True)
+    edges = np.linspace(0, len(fit.residual), BLOCKS + 1).astype(int)
+    # Residuals of a block are smaller than its errors, by what the fit took from it: left out of
+    # the fit they are not (jackknife, CR3).
+    honest = left_out(fit.residual, columns, np.full(columns.shape[1], RIDGE), BLOCKS)
+    scores = np.stack([columns[a:b].T @ honest[a:b] for a, b in pairwise(edges)])
+    covariance = inverse @ (scores.T @ scores * (BLOCKS - 1) / BLOCKS) @ inverse
+    # What holds a parameter off the least squares, a prior or a bound, shifts it by this much.
+    shift = np.abs(inverse @ (columns.T @ fit.residual))
+    quantile = student.ppf(0.5 + CONFIDENCE / 2.0, BLOCKS - 1)
+    spread_of = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    out[seen] = (quantile * spread_of + shift) / norms[seen]
+    return out
+
+
+def _held(fit: Fit) -> list[Estimate]:
+    free = {c.label for c in fit.scaling.where}
+    units, mass = fit.axis.units, fit.axis.mass_parameter
+    out = []
+    if mass.name not in free:
+        out.append(Estimate(mass.name, fit.axis.mass, units(mass.unit), None, None, False))
+    for f in fit.axis.effects:
+        for p in f.effect.parameters:
+            label = f"{f.effect.name}.{p.name}"
+            if label not in free:
+                out.append(Estimate(label, f.values[p.name], units(p.unit), None, None, False))
+    return out

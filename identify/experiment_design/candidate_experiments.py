@@ -1,0 +1,193 @@
+"""The experiments among which a plan chooses: a modest family, each within the stage's limits."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from twin.errors import CannotRun
+from twin.experiments.experiment import Experiment, OneAxis, gentle, machine_limits
+from twin.experiments.file import in_short
+from twin.experiments.kinds import (
+    Moves,
+    Passes,
+    Rests,
+    Staircase,
+    Steps,
+    Sweep,
+    Tracking,
+)
+from twin.experiments.trajectory import Limits
+from twin.model.machine import MachineModel
+from twin.model.units import LINEAR, AxisUnits
+
+USED = 0.9  # part of the travel that passes cover
+SLOWEST = 5e-4  # m/s
+LOWEST = 2.0  # Hz, where a sweep begins
+SWEPT = (60.0, 120.0)  # Hz, where it ends: the shortest windows pass little above
+EFFORTS = (1.0, 0.3)  # parts of the acceleration limit that steps use in turn
+STEP_DWELL = 0.05  # s
+MARGIN = 0.5  # part of the allowed force that a sweep uses; the loop adds to it near its bandwidth
+GENTLE = 0.5  # part of the acceleration limit that the passes under a sweep use
+FORCE_USED = 0.4  # part of the force limit that moves use; friction and the loop need theirs
+MOST_REPEATS = 1000
+
+
+def proposals(
+    model: MachineModel, axis: str, duration: float
+) -> tuple[list[Experiment], tuple[str, ...]]:
+    """Experiments of about that duration (s) for one axis, all within the stage's limits.
+
+    And why others of the family are not among them, a sentence each. Raises CannotRun where the
+    travel is not known, and where none fits.
+    """
+    model.axis(axis)
+    limits = dict(zip(model.axes, machine_limits(model), strict=True))
+    effort = _affordable(model, axis)
+    limits[axis] = gentle(limits[axis], effort)
+    drafts = (
+        *_random(duration),
+        *_passes(limits, axis, duration),
+        *_reversing(limits, axis, duration),
+        *_accelerating(limits, axis, duration),
+        *_swept(model, limits, axis, duration),
+    )
+    found, not_run = [], []
+    for experiment in (_eased(draft, effort) for draft in drafts):
+        try:
+            _require_fit(experiment, model, duration)
+        except CannotRun as why:
+            not_run.append(refused(experiment, why, model.axes[axis].units))
+        else:
+            found.append(experiment)
+    if not found:
+        raise CannotRun(
+            f"no experiment of {duration:g} s fits axis {axis}; give a longer --duration (s)"
+        )
+    return found, tuple(not_run)
+
+
+def refused(experiment: Experiment, why: CannotRun, units: AxisUnits = LINEAR) -> str:
+    """The sentence that says which experiment cannot run, and why."""
+    return f"{in_short(experiment, units)}: {why}"
+
+
+def _affordable(model: MachineModel, axis: str) -> float:
+    """Part of the acceleration limit that the motor's force allows, 0..1."""
+    h, mass = model.axes[axis].hardware, model.axes[axis].mass
+    return min(1.0, FORCE_USED * h.force_limit / (mass * h.acceleration))
+
+
+def _eased(draft: Experiment, effort: float) -> Experiment:
+    """The experiment with its moves no harder than that part of the limits."""
+    if effort < 1.0 and isinstance(draft, OneAxis):
+        return replace(draft, effort=neat(effort * draft.effort))
+    return draft
+
+
+def _require_fit(experiment: Experiment, model: MachineModel, duration: float) -> None:
+    """Raise CannotRun unless the stage can run it, in not much more than that time (s)."""
+    setpoint = experiment.setpoint(model, np.random.default_rng(0))
+    if setpoint.duration >= TOLERANCE * duration:
+        raise CannotRun(
+            f"takes {setpoint.duration:.3g} s of the {duration:g} s asked for; give a longer "
+            "--duration (s)"
+        )
+
+
+TOLERANCE = 1.3  # times the duration asked for that an experiment may take
+
+
+def _random(duration: float) -> Iterator[Experiment]:
+    yield Tracking(duration)
+    yield Moves(count=max(int(duration / 0.9), 2))
+    yield Moves(count=max(int(duration / 1.8), 2), dwell=1.0)
+
+
+def _other_span(limits: dict[str, Limits], axis: str) -> float:
+    """Span (m) for the other axis, or 0 where there is none."""
+    spans = [neat(USED * (v.travel[1] - v.travel[0])) for name, v in limits.items() if name != axis]
+    return spans[0] if len(spans) == 1 else 0.0
+
+
+def _pass(axis: str, limit: Limits, span: float, speed: float, seconds: float) -> Passes:
+    """As many passes as fit in that time, at the speed or as fast as the span allows."""
+    speed = neat(min(speed, limit.fastest_plateau(span)))
+    once = span / speed + limit.ramp_time(speed) + 0.1
+    return Passes(axis, span, speed, repeats=min(max(int(seconds / once / 2), 1), MOST_REPEATS))
+
+
+def _passes(limits: dict[str, Limits], axis: str, duration: float) -> Iterator[Experiment]:
+    """Passes over the whole travel, and a velocity map; the other axis at rest, then moving."""
+    limit = limits[axis]
+    span = neat(USED * (limit.travel[1] - limit.travel[0]))
+    slow = 2.0 * span / duration
+    fast = limit.fastest_plateau(span)
+    other = _other_span(limits, axis)
+    for speed in (1.1 * slow, (slow * fast) ** 0.5, fast):
+        passes = _pass(axis, limit, span, speed, duration)
+        yield passes
+        if other:
+            yield Passes(axis, span, passes.speed, passes.repeats, other=other)
+    map_span = neat(0.3 * span)
+    speeds = np.geomspace(SLOWEST, limit.fastest_plateau(map_span), 10)
+    yield Staircase(axis, tuple(map(neat, speeds)), map_span, neat(duration / 40.0))
+
+
+def _reversing(limits: dict[str, Limits], axis: str, duration: float) -> Iterator[Experiment]:
+    """Short passes, slow and fast, and starts after rests of several lengths."""
+    limit = limits[axis]
+    other = _other_span(limits, axis)
+    for span, speed in ((2e-5, 5e-5), (2e-4, 1e-3), (2e-3, 4e-3), (0.02, 1.0)):
+        yield _pass(axis, limit, span, speed, duration)
+    if other:
+        still = _pass(axis, limit, 0.01, 2e-3, duration)
+        yield Passes(axis, still.span, still.speed, still.repeats, other=other)
+    rests = np.geomspace(0.1, duration / 3.0, 5)
+    yield Rests(axis, 2e-3, 4e-3, tuple(map(neat, rests * 0.55 * duration / rests.sum())))
+
+
+def _accelerating(limits: dict[str, Limits], axis: str, duration: float) -> Iterator[Experiment]:
+    """Steps through the travel at high and low acceleration: many forces at each place."""
+    limit = limits[axis]
+    for part in (1.0, 0.3):
+        span = neat(part * USED * (limit.travel[1] - limit.travel[0]))
+        for count in (60, 15, 3):
+            left, efforts = duration, []
+            for effort in itertools.cycle(EFFORTS):
+                moving = _move_time(gentle(limit, effort), span / count) + STEP_DWELL
+                left -= 2 * count * moving
+                if left < 0.0:
+                    break
+                efforts.append(effort)
+            if efforts:
+                yield Steps(axis, span, neat(span / count), tuple(efforts), STEP_DWELL)
+
+
+def _move_time(limit: Limits, distance: float) -> float:
+    """About the time (s) of the fastest move over a distance (m)."""
+    speed = min(limit.velocity, math.sqrt(distance * limit.acceleration))
+    steep = limit.acceleration / limit.jerk
+    return distance / speed + speed / limit.acceleration + steep
+
+
+def _swept(
+    model: MachineModel, limits: dict[str, Limits], axis: str, duration: float
+) -> Iterator[Experiment]:
+    """A force sweep on slow passes, over the whole travel and at one place."""
+    limit = limits[axis]
+    for part, highest in itertools.product((1.0, 0.1), SWEPT):
+        span = neat(part * USED * (limit.travel[1] - limit.travel[0]))
+        speed = neat(min(2.4 * span / duration, limit.fastest_plateau(span)))
+        weak = Sweep(axis, span, speed, 1, 1.0, LOWEST, highest, effort=GENTLE)
+        yield replace(weak, amplitude=neat(MARGIN * weak.most_force(model.axes[axis])))
+
+
+def neat(value: float) -> float:
+    """The value cut to three digits, so that a file reads well and no limit is passed."""
+    digits = 2 - math.floor(math.log10(value))
+    return float(f"{math.floor(value * 10.0**digits * (1.0 + 1e-12)) / 10.0**digits:.3g}")

@@ -1,0 +1,141 @@
+"""Which motion a set of logs lacks: where two explanations differ, against where the data are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.motion import Motion
+from identify.dataset.prepared_log import REST_SPEED, PreparedLog
+from identify.selection.residual_dependence import since_reversal
+from twin.model.units import LINEAR
+
+Array = NDArray[np.float64]
+
+HEART = (0.25, 0.75)  # quantiles of the squared difference between which it is said to live
+SELDOM = 0.01  # share of the data below which one motion is missed as much as another
+RARE = 0.05  # share of the data below which a motion counts as missing
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A property of motion: how it is called, its unit, and its value (n_windows,) on a log.
+
+    unit: on a linear axis. other: whether it is of the other axis.
+    """
+
+    name: str
+    unit: str
+    of: Callable[[PreparedLog], Array]
+    other: bool = False
+
+    def unit_on(self, motion: Motion) -> str:
+        """Its unit on that motion."""
+        return (motion.other_units if self.other else motion.units)(self.unit)
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Where the explanations differ and the data are not.
+
+    low, high: range of the feature in its unit. share: part of the data inside it, 0..1; None where
+    there are no data.
+    """
+
+    feature: str
+    unit: str
+    low: float
+    high: float
+    share: float | None
+
+    def in_words(self) -> str:
+        """One sentence."""
+        where = f"{self.feature} {self.low:.3g} to {self.high:.3g} {self.unit}"
+        if self.share is None:
+            return f"it shows most at {where}"
+        held = f"{100.0 * self.share:.1f} % of the data is there"
+        if self.share < RARE:
+            return f"missing motion: {where}; {held}"
+        return f"no motion is missing, but more of it is needed at {where}; {held}"
+
+
+def _speed(log: PreparedLog) -> Array:
+    return np.abs(log.window.mean(log.motion.velocity))
+
+
+def _rest(log: PreparedLog) -> Array:
+    """Time (s) that the axis stood before it last began to move, to a tenth: it settles slowly."""
+    m = log.motion
+    still = np.abs(m.velocity) < REST_SPEED * np.abs(m.velocity).max()
+    index = np.arange(len(still))
+    begun = np.maximum.accumulate(np.where(still, 0, index + 1))
+    stood = np.where(still, index + 1 - begun, 0.0)
+    ended = np.maximum.accumulate(np.where(still, index, 0))
+    return np.round(log.window.mean(stood[ended] * m.period), 1)
+
+
+def _force_rate(log: PreparedLog) -> Array:
+    return np.abs(log.window.acceleration(log.motion.command))
+
+
+def _reversal(log: PreparedLog) -> Array:
+    return log.window.mean(since_reversal(log.motion.velocity, log.motion.period))
+
+
+FEATURES = (
+    Feature("speed", LINEAR.velocity, _speed),
+    Feature("acceleration", LINEAR.acceleration, lambda log: np.abs(log.acceleration)),
+    Feature("motor force", LINEAR.force, lambda log: np.abs(log.command)),
+    Feature("rate of change of the motor force", "N/s", _force_rate),
+    Feature("distance since the last reversal", LINEAR.position, _reversal),
+    Feature("rest before the motion", "s", _rest),
+    Feature(
+        "speed of the other axis",
+        LINEAR.velocity,
+        lambda log: np.abs(log.window.mean(log.motion.others[1])),
+        other=True,
+    ),
+    Feature(
+        "acceleration of the other axis",
+        LINEAR.acceleration,
+        lambda log: np.abs(log.window.mean(log.motion.others[2])),
+        other=True,
+    ),
+)
+
+
+def gap(motion: PreparedLog, where: Array, logs: Sequence[PreparedLog]) -> Gap:
+    """The property of motion in which the logs miss the difference most.
+
+    where: squared difference (n_windows,) on the planned motion. Among those that the logs miss
+    alike, the property that tells the windows of the difference from the others best.
+    """
+    found = []
+    for feature in FEATURES:
+        values = feature.of(motion)
+        low, high = _weighted_quantiles(values, where)
+        if not high > 0.0:
+            continue
+        share = None
+        if logs:
+            share = _inside(np.concatenate([feature.of(log) for log in logs]), low, high)
+        missed = 1.0 if share is None else share + SELDOM
+        merit = missed * _inside(values, low, high)
+        found.append((merit, Gap(feature.name, feature.unit_on(motion.motion), low, high, share)))
+    return min(found, key=lambda pair: pair[0])[1]
+
+
+def _weighted_quantiles(values: Array, weights: Array) -> tuple[float, float]:
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    if not total[-1] > 0.0:
+        return float(values.min()), float(values.max())
+    low, high = np.searchsorted(total, np.array(HEART) * total[-1])
+    return float(values[order[low]]), float(values[order[min(high, len(order) - 1)]])
+
+
+def _inside(values: Array, low: float, high: float) -> float:
+    return float(np.mean((values >= low) & (values <= high)))

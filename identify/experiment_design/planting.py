@@ -1,0 +1,155 @@
+"""Draw a machine: a stage with other values than the model's, and an effect the model lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.drive import is_noise, reading_error
+from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.fit import Fit, rms
+from identify.estimation.force_balance import residual
+from identify.estimation.subspace import orthonormal, unabsorbed
+from twin.effect import Effect, Excitation, Parameter
+from twin.model.machine import AxisModel, Fitted, free_parameters, read, write
+
+Array = NDArray[np.float64]
+
+SPREAD = 0.2  # relative spread of a machine's values about the model's
+SHAPE_SPREAD = 0.3  # of the logarithm of shape parameters that nothing scans
+
+
+def other_machine(axis: AxisModel, rng: np.random.Generator) -> AxisModel:
+    """The axis with every free value of its effects moved by up to 20 %."""
+    where = [c for c in free_parameters(axis) if c.effect]
+    values = read(axis, where) * (1.0 + SPREAD * rng.uniform(-1.0, 1.0, len(where)))
+    for i, c in enumerate(where):
+        if c.parameter.at_least:
+            floor = next(
+                (
+                    values[j]
+                    for j, d in enumerate(where)
+                    if d.effect == c.effect and d.parameter.name == c.parameter.at_least
+                ),
+                c.parameter.lower,
+            )
+            values[i] = max(values[i], floor)
+        values[i] = min(max(values[i], c.parameter.lower), c.parameter.upper)
+    return write(axis, where, values)
+
+
+def draw_effect(
+    effect: Effect,
+    axis: AxisModel,
+    logs: Sequence[PreparedLog],
+    excitation: Excitation,
+    force: float,
+    rng: np.random.Generator,
+    beside: Fit | None = None,
+) -> Fitted:
+    """Random values of an effect such that it changes the axis' force by ``force`` (N RMS).
+
+    Shape parameters are drawn between the ends of what a diagnosis would scan, or about their start
+    where nothing scans them; strengths in a random direction, scaled along the motion of the logs.
+    beside: a fit to those logs; only what its parameters cannot take over counts then.
+    """
+    values = effect.starts(excitation)
+    for p in effect.parameters:
+        if not (p.strength or p.fixed):
+            values[p.name] = _drawn_shape(p, values[p.name], excitation, rng)
+    base = residual(axis, logs)
+    basis = orthonormal(beside.jacobian) if beside else np.zeros((len(base), 0))
+    kept = beside.kept if beside else np.ones(len(base), dtype=bool)
+
+    def added(fitted: Fitted) -> Array:
+        force = added_force(fitted, axis, logs, base)[kept]
+        return unabsorbed(force, basis)
+
+    return strength_for(effect, added, force, values, rng)
+
+
+def _drawn_shape(
+    p: Parameter, start: float, excitation: Excitation, rng: np.random.Generator
+) -> float:
+    if p.scan:
+        low, high = min(p.scan(excitation)), max(p.scan(excitation))
+        if low > 0:
+            return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+        return float(rng.uniform(low, high))
+    drawn = start * float(np.exp(SHAPE_SPREAD * rng.uniform(-1.0, 1.0)))
+    return min(max(drawn, p.lower), p.upper)
+
+
+def strength_for(
+    effect: Effect,
+    added: Callable[[Fitted], Array],
+    force: float,
+    values: Mapping[str, float] | None = None,
+    rng: np.random.Generator | None = None,
+) -> Fitted:
+    """The effect with strengths scaled until ``added`` (the force it adds, N) has that RMS.
+
+    values: the other parameters. rng: draws the strengths' directions; all alike where None.
+    """
+    values = values or effect.starts()
+    direction = {p.name: _direction(p.lower, rng) for p in effect.strengths}
+    limits = {p.name: p.at_least for p in effect.parameters if p.at_least}
+
+    def at(scale: float) -> Fitted:
+        moved = {
+            p.name: float(np.clip(scale * direction[p.name], p.lower, p.upper))
+            for p in effect.strengths
+        }
+        drawn = {**values, **moved}
+        for name, least in limits.items():
+            drawn[least], drawn[name] = sorted((drawn[least], drawn[name]))
+        return Fitted.at_start(effect, drawn)
+
+    return at(_root(lambda scale: rms(added(at(scale))) - force))
+
+
+def _direction(lower: float, rng: np.random.Generator | None) -> float:
+    if rng is None:
+        return 1.0
+    size = rng.uniform(0.5, 1.5)
+    return float(size if lower >= 0 else size * rng.choice((-1.0, 1.0)))
+
+
+def _root(error: Callable[[float], float]) -> float:
+    """Scale at which a growing error crosses zero, by bisection on the logarithm."""
+    low, high = 1e-9, 1e9
+    for _ in range(60):
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if error(middle) < 0 else (low, middle)
+    return float(low)
+
+
+def visible_force(fitted: Fitted, base: Fit, dataset: Dataset) -> float:
+    """RMS force (N) of an effect that the parameters of a fit cannot take over."""
+    force = _beside(fitted, base, dataset)
+    return rms(unabsorbed(force, orthonormal(base.jacobian)))
+
+
+def hidden_part(fitted: Fitted, base: Fit, dataset: Dataset) -> float:
+    """Part of an effect's RMS force that the parameters of a fit take over; of no force, all."""
+    force = rms(_beside(fitted, base, dataset))
+    return 1.0 - visible_force(fitted, base, dataset) / force if force > 0.0 else 1.0
+
+
+def _beside(fitted: Fitted, base: Fit, dataset: Dataset) -> Array:
+    return added_force(fitted, base.axis, dataset.fit, residual(base.axis, dataset.fit))[base.kept]
+
+
+def added_force(
+    fitted: Fitted, axis: AxisModel, logs: Sequence[PreparedLog], without: Array
+) -> Array:
+    """What the effect adds (n,) N to the residual of an axis, or pretends in its readings."""
+    if not is_noise(fitted.effect):
+        return residual(axis.with_effect(fitted), logs) - without
+    alone = replace(axis, effects=(fitted,))
+    rates = [log.fine.acceleration(reading_error(alone, log.motion)[1]) for log in logs]
+    return np.asarray(axis.mass * np.concatenate(rates))

@@ -1,0 +1,299 @@
+"""Results as JSON objects: the documented ones, numbers in SI units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from identify.estimation.intervals import Estimate
+from identify.experiment_design.discrimination import Trial
+from identify.experiment_design.plan import Plan
+from identify.output.remarks import remarks
+from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+from identify.selection.candidates import Candidate
+from identify.selection.confounded import Refit
+from identify.selection.forward_selection import Step
+from identify.validation.misfit_maps import AxisComparison
+from identify.validation.whiteness import ResidualTests
+from twin.effect import Effect
+from twin.experiments.file import parameters
+from twin.experiments.kinds import kind_of
+from twin.log.check import CheckReport
+from twin.model.units import AxisUnits
+
+
+def plain(value: Any) -> Any:
+    """The same with NumPy numbers as numbers and what is not finite as null."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def fit_json(result: FitResult) -> dict[str, Any]:
+    """Per axis: parameters with unit and 90 % interval, the outcome, fit and held-out errors."""
+    return {
+        "axes": {
+            axis: {
+                "outcome": fit.ended.value,
+                "converged": fit.ended.name != "NOT_CONVERGED",
+                "at_bound": list(fit.at_bound),
+                "force_error": fit.error,
+                "holdout_force_error": result.holdout_error[axis],
+                "noise_floor": fit.floor,
+                "unit": fit.axis.units.force,
+                "force_shift": result.datasets[axis].channel_delay,
+                "force_shift_unit": "s",
+                "left_out": list(result.left_out[axis]),
+                "parameters": {e.label: _estimate(e) for e in result.estimates[axis]},
+                "refit": _refit(result.refits[axis]),
+            }
+            for axis, fit in result.fits.items()
+        },
+        "not_fitted": list(result.not_fitted),
+    }
+
+
+def _estimate(e: Estimate) -> dict[str, Any]:
+    interval = None if e.low is None else [e.low, e.high]
+    return {
+        "value": e.value, "unit": e.unit, "interval_90": interval, "free": e.free,
+        "interval_refused": e.reason,
+    }  # fmt: skip
+
+
+def _refit(changed: Refit | None) -> dict[str, Any] | None:
+    if changed is None:
+        return None
+    return {
+        "force_error_as_given": changed.given,
+        "force_error": changed.refitted,
+        "force_unit": changed.unit,
+        "changed": [
+            {
+                "parameter": c.label, "before": c.before, "after": c.after, "unit": c.unit,
+                "force": c.force, "force_unit": c.force_unit, "same_force_as": list(c.alike),
+            }
+            for c in changed.changes
+        ],
+    }  # fmt: skip
+
+
+def compare_json(result: Comparison) -> dict[str, Any]:
+    """Per axis and log: force and position error with ratio to the noise floor, and regions."""
+    return {"axes": {axis: _axis_comparison(c) for axis, c in result.axes.items()}}
+
+
+def _axis_comparison(c: AxisComparison) -> dict[str, Any]:
+    return {
+        "logs": {
+            name: {
+                "force_error": error,
+                "force_unit": c.units.force,
+                "force_ratio": error / c.floor,
+                "position_error": c.position_error[name],
+                "position_unit": c.units.position,
+                "position_ratio": c.position_error[name] / max(c.position_floor[name], 1e-300),
+            }
+            for name, error in c.force_error.items()
+        },
+        "noise_floor": c.floor,
+        "position_drift_of_noise": dict(c.position_floor),
+        "regions": {
+            m.coordinate: {
+                "unit": m.unit, "centre": m.centre.tolist(), "force_error": m.rms.tolist(),
+                "mean": m.mean.tolist(), "share": m.share.tolist(),
+                "noise_floor": m.floor.tolist(),
+            }
+            for m in c.maps
+        },
+        "worst": [r.in_words() for r in c.worst],
+        "residual_tests": _residual_tests(c.tests, c.units),
+    }  # fmt: skip
+
+
+def _residual_tests(t: ResidualTests, units: AxisUnits) -> dict[str, Any]:
+    return {
+        "tested": "force residual",
+        "loop": t.loop.name.lower(),
+        "reason": t.reason,
+        "samples": t.samples,
+        "passed": t.passes,
+        "histogram": {
+            "edges": t.edges.tolist(), "unit": units.force, "density": t.density.tolist(),
+            "density_unit": units("1/N"), "normal_rms": t.floor, "share_within_90": t.within,
+        },
+        "correlations": {
+            c.signal: {
+                "lag": c.lag.tolist(), "lag_unit": "s", "value": c.value.tolist(),
+                "tested": c.tested.tolist(), "bound_90": c.bound, "limit_all_99": c.limit,
+                "share_outside": c.outside, "passed": c.passes,
+            }
+            for c in t.correlations
+        },
+    }  # fmt: skip
+
+
+def diagnose_json(result: Diagnosis) -> dict[str, Any]:
+    """The documented object for the axis that the answer is about, and the same by axis."""
+    leading = result.leading
+    by_axis = {axis: _axis_diagnosis(result, axis) for axis in result.axes}
+    return {**by_axis[leading.dataset.axis], "axes": by_axis}
+
+
+def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
+    d = result.axes[axis]
+    units = d.base.axis.units
+    structure = d.unexplained
+    following = result.next_experiments.get(axis)
+    return {
+        "verdict": d.verdict.name.lower(),
+        "explanation": d.verdict.value,
+        "axis": axis,
+        "effect": d.best.effect.name if d.best else None,
+        "ranking": [_candidate(c) for c in d.ranking],
+        "ambiguous_with": list(d.ambiguous_with),
+        "missing": list(d.named),
+        "steps": [_step(s) for s in d.steps],
+        "unexplained": structure
+        and {
+            "share_of_error": structure.share_of_error,
+            "depends_on": structure.depends_on,
+            "period": structure.period,
+            "unit": structure.unit,
+        },
+        "force_error": d.base.error,
+        "noise_floor": d.base.floor,
+        "unit": units.force,
+        "force_shift": d.dataset.channel_delay,
+        "force_shift_unit": "s",
+        "repeats_not_general": d.repeat
+        and {
+            "period": d.repeat.period,
+            "period_unit": units.position,
+            "amplitude": dict(d.repeat.amplitude),
+            "unit": units.force,
+            "phase": dict(d.repeat.phase),
+            "phase_unit": "rad",
+        },
+        "refit": _refit(result.refits.get(axis)),
+        "not_tried": list(result.not_tried),
+        "notes": list(remarks(d, result.refits.get(axis), result.not_tried)),
+        "next_experiment": following and plan_json(following),
+    }
+
+
+def _step(s: Step) -> dict[str, Any]:
+    return {
+        **_candidate(s.candidate),
+        "ambiguous_with": list(s.tied),
+        "dropped": list(s.dropped),
+        "beside": s.beside,
+    }
+
+
+def _candidate(c: Candidate) -> dict[str, Any]:
+    return {
+        "effect": c.effect.name,
+        "delta_bic": c.delta_bic,
+        "holdout_error_before": c.gain.before,
+        "holdout_error_after": c.gain.after,
+        "unit": c.fit.axis.units.force,
+        "supported": c.supported,
+        "parameters": dict(c.fit.axis[c.effect.name].values),
+    }
+
+
+def plan_json(result: Plan) -> dict[str, Any]:
+    """The chosen experiment, what it is expected to show, and those it was chosen from."""
+    several = len(result.between) > 1
+    return {
+        "axis": result.axis,
+        "between": list(result.between),
+        "decides": result.decides,
+        "favoured_by_the_logs": result.favoured,
+        "refitted_on_logs": not result.supposed,
+        "missing_motion": result.gap.in_words(),
+        "excited_by": dict(result.excited_by),
+        **_trial(result.chosen, several),
+        "ranking": [_trial(t, several) for t in result.ranking],
+        "not_run": list(result.not_run),
+    }
+
+
+def _trial(t: Trial, several: bool) -> dict[str, Any]:
+    return {
+        "experiment": {"kind": kind_of(t.experiment), **parameters(t.experiment)},
+        "duration": t.duration,
+        "duration_unit": "s",
+        "expected_difference": t.difference,
+        "noise_floor": t.floor,
+        "unit": t.units.force,
+        "delta_bic" if several else "information": t.gain,
+    }
+
+
+def add_json(result: Addition) -> dict[str, Any]:
+    """Errors before and after, whether the effect earned its place, and what moved."""
+    step = result.step
+    return {
+        "effect": step.effect,
+        "axis": step.axis,
+        "is_nonparametric": result.candidate.effect.is_nonparametric,
+        "kept": result.kept,
+        "fit_error_before": step.fit_error_before,
+        "fit_error_after": step.fit_error_after,
+        "holdout_error_before": step.holdout_error_before,
+        "holdout_error_after": step.holdout_error_after,
+        "noise_floor": result.candidate.fit.floor,
+        "unit": step.unit,
+        "position_error_before": result.position_error[0],
+        "position_error_after": result.position_error[1],
+        "position_error_in_mujoco": result.replayed,
+        "position_unit": result.units.position,
+        "parameters": dict(result.candidate.fit.axis[step.effect].values),
+        "notes": list(result.notes),
+    }
+
+
+def effect_json(effect: Effect) -> dict[str, Any]:
+    """Everything the catalogue knows of one effect."""
+    return {
+        "name": effect.name,
+        "kind": effect.kind.name.lower(),
+        "is_nonparametric": effect.is_nonparametric,
+        "summary": effect.summary,
+        "equation": effect.equation,
+        "source": effect.source,
+        "states": list(effect.states),
+        "fingerprint": effect.fingerprint,
+        "excited_by": effect.excited_by,
+        "parameters": [
+            {
+                "name": p.name, "unit": p.unit, "start": p.start, "lower": p.lower,
+                "upper": p.upper, "meaning": p.meaning,
+            }
+            for p in effect.parameters
+        ],
+    }  # fmt: skip
+
+
+def check_json(reports: Mapping[str, CheckReport]) -> dict[str, Any]:
+    """Whether all logs may be fitted, and the findings of each."""
+    return {
+        "ok": all(report.ok for report in reports.values()),
+        "logs": {
+            name: [
+                {
+                    "severity": f.severity.value, "fault": f.fault.name.lower(), "axis": f.axis,
+                    "what": f.what, "where": f.where, "remedy": f.remedy,
+                }
+                for f in report.findings
+            ]
+            for name, report in reports.items()
+        },
+    }  # fmt: skip

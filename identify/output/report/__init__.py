@@ -1,0 +1,114 @@
+"""The report: one HTML file that needs nothing else, one module for each of its sections."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from identify.output.report import (
+    answer,
+    equations,
+    growth,
+    logs,
+    notes,
+    overlay,
+    parameters,
+    ranking,
+    regions,
+    residuals,
+    shape,
+    whiteness,
+)
+from identify.output.report.blocks import Section
+from identify.output.report.drawing import data_uri, drawing_style
+from identify.output.report.subject import Subject
+from identify.output.report.units import quantity
+from identify.output.results import Addition, Comparison, Diagnosis
+from twin.errors import InputError
+from twin.model.file import write_atomically
+from twin.model.machine import HistoryStep
+
+SECTIONS: tuple[Callable[[Subject], Section | None], ...] = (
+    answer.section,
+    overlay.section,
+    residuals.section,
+    regions.section,
+    whiteness.section,
+    shape.section,
+    ranking.section,
+    growth.section,
+    equations.section,
+    parameters.section,
+    logs.section,
+    notes.section,
+)
+
+
+def write_report(
+    path: Path,
+    *,
+    title: str,
+    diagnosis: Diagnosis | None,
+    comparison: Comparison,
+    history: Sequence[HistoryStep],
+    additions: Sequence[Addition] = (),
+) -> None:
+    """Write the report of a comparison, and of a diagnosis or additions where there are any.
+
+    One HTML file without outside references: styles and pictures are inside. It appears whole or
+    not at all. Raises InputError where the folder does not exist.
+    """
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
+    subject = Subject(title, diagnosis, comparison, tuple(history), tuple(additions))
+    with drawing_style():
+        page = render(subject, sections(subject))
+    write_atomically(path, page.encode("utf-8"))
+
+
+def sections(subject: Subject) -> list[Section]:
+    """The sections that have something to show."""
+    made = (section(subject) for section in SECTIONS)
+    return [s for s in made if s is not None]
+
+
+def render(subject: Subject, shown: Sequence[Section]) -> str:
+    """The page as HTML text; every text is escaped by the template."""
+    environment = Environment(
+        loader=PackageLoader("identify.output.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["data_uri"] = data_uri
+    return environment.get_template("report.html.j2").render(
+        title=subject.title,
+        facts=_facts(subject),
+        sections=shown,
+        version=importlib.metadata.version("proton-twin"),
+    )
+
+
+def _facts(subject: Subject) -> list[tuple[str, str]]:
+    """The line under the title: model, logs, windows."""
+    axes = subject.comparison.axes.values()
+    logs = list(dict.fromkeys(log.motion.name for a in axes for log in a.logs))
+    windows = list(dict.fromkeys(quantity(a.logs[0].window.length, "s") for a in axes))
+    facts = [("Model", subject.comparison.model.name), ("Logs", ", ".join(logs))]
+    if held := _held_out(subject.diagnosis):
+        facts.append(("Held out", ", ".join(held)))
+    return [*facts, ("Test function", ", ".join(windows))]
+
+
+def _held_out(diagnosis: Diagnosis | None) -> list[str]:
+    if diagnosis is None:
+        return []
+    logs = (log for d in diagnosis.axes.values() for log in d.dataset.holdout)
+    return list(dict.fromkeys(log.motion.name for log in logs))
+
+
+__all__ = ["write_report"]

@@ -1,0 +1,217 @@
+"""The answer in big words, an axis at a time: what is missing, and what it would change."""
+
+from __future__ import annotations
+
+from identify.estimation.decision import RULE
+from identify.experiment_design.plan import Plan
+from identify.output.report.blocks import Answer, Section, Tile, Tone
+from identify.output.report.subject import Subject
+from identify.output.report.units import Scale, number, quantity, spaced
+from identify.output.results import Addition
+from identify.output.text import advice
+from identify.selection.candidates import Candidate
+from identify.selection.confounded import Refit
+from identify.selection.forward_selection import AxisDiagnosis, Verdict
+from identify.selection.residual_dependence import Dependence
+from identify.validation.misfit_maps import AxisComparison
+from twin.experiments.file import in_short
+
+
+def section(subject: Subject) -> Section:
+    """A card for each axis; for a model that just got an effect, that first."""
+    cards = []
+    if subject.additions and subject.diagnosis is None:
+        cards.append(_added(subject.additions[-1]))
+    for axis in subject.axes:
+        found = subject.diagnosed(axis.axis)
+        following = subject.next_experiment(axis.axis)
+        if found is None:
+            cards.append(_compared(axis))
+        else:
+            cards.append(_diagnosed(axis, found, following, subject.refit(axis.axis)))
+    return Section("answer", "Answer", cards)
+
+
+def _diagnosed(
+    axis: AxisComparison, found: AxisDiagnosis, following: Plan | None, refit: Refit | None
+) -> Answer:
+    remarks = []
+    sentence = found.verdict.value
+    if found.unexplained is not None:
+        sentence = f"{sentence} {_dependence(found.unexplained)}"
+    if found.best is not None:
+        remarks.append(_left_over(found.best))
+    remarks.extend(_runner_up(found))
+    if found.unexplained is not None:
+        remarks.append(f"{advice()}.")
+    if following is not None:
+        remarks.append(_next_step(following))
+    if found.verdict is Verdict.NOTHING_MISSING and refit and (changed := refit.in_words()):
+        remarks.append(f"{changed[0].upper()}{changed[1:]}.")
+    return Answer(
+        headline=f"Axis {axis.axis}: {_headline(found)}",
+        sentence=sentence,
+        tiles=_tiles(axis, found),
+        remarks=remarks,
+        tone=Tone.PLAIN if found.verdict is Verdict.NOTHING_MISSING else Tone.STRONG,
+    )
+
+
+def _headline(found: AxisDiagnosis) -> str:
+    first, *more = [spaced(name) for name in found.named] or [""]
+    either = " or ".join([first, *map(spaced, found.ambiguous_with)])
+    match found.verdict:
+        case Verdict.MISSING_EFFECT | Verdict.AMBIGUOUS:
+            return f"{' and '.join([either, *more])} {'are' if more else 'is'} missing"
+        case Verdict.UNEXPLAINED:
+            return "something outside the catalogue is missing"
+        case Verdict.NOTHING_MISSING:
+            return "nothing is missing"
+
+
+def _dependence(structure: Dependence) -> str:
+    period = ""
+    if structure.period is not None:
+        period = f", with a period of {quantity(structure.period, structure.unit)}"
+    return (
+        f"It depends most on {spaced(structure.depends_on)}, which accounts for "
+        f"{100 * structure.share_of_error:.0f} % of the squared error{period}."
+    )
+
+
+def _left_over(best: Candidate) -> str:
+    name, fit = spaced(best.effect.name), best.fit
+    if fit.at_floor:
+        return f"With {name} the force error is at its noise floor."
+    return (
+        f"With {name} the force error still stands {number(fit.ratio)} times above its noise "
+        "floor: add it, then diagnose again."
+    )
+
+
+def _runner_up(found: AxisDiagnosis) -> list[str]:
+    others = found.ranking[1:] if found.best else found.ranking
+    if not others:
+        return []
+    second = others[0]
+    change = _change(found.dataset.units.force, second.gain.before, second.gain.after)
+    role = "Runner-up" if found.best else "Nearest candidate"
+    verdict = "supported" if second.supported else "not supported"
+    return [
+        f"{role}: {spaced(second.effect.name)}, ΔBIC {number(second.delta_bic)}, "
+        f"{tested_on(found)} error {change}, {verdict}."
+    ]
+
+
+def _next_step(following: Plan) -> str:
+    chosen, unit = following.chosen, following.chosen.units.force
+    what = "decides" if following.decides else "comes nearest to deciding, but is too short"
+    return (
+        f"The experiment that {what} ({quantity(chosen.duration, 's')}; twin plan writes it): "
+        f"{in_short(chosen.experiment, chosen.units)}. "
+        f"It leaves {quantity(chosen.difference, unit)} RMS to the rival, where noise is "
+        f"{quantity(chosen.floor, unit)}; {following.gap.in_words()}."
+    )
+
+
+def _change(unit: str, before: float, after: float) -> str:
+    """E.g. "73.6 → 7.25 mN"."""
+    scale = Scale.of(unit, [before, after])
+    return f"{number(before / scale.size)} → {scale.text(after)}"
+
+
+def tested_on(found: AxisDiagnosis) -> str:
+    """On what data a candidate was judged."""
+    return "held-out" if found.dataset.holdout else "cross-validated"
+
+
+def _tiles(axis: AxisComparison, found: AxisDiagnosis) -> list[Tile]:
+    base, best = found.base, found.best
+    unit = axis.units.force
+    if best is None:
+        return [*_error_tiles(base.error, base.floor, unit), *_position_tile(axis, "")]
+    name, gain = spaced(best.effect.name), best.gain
+    return [
+        Tile(
+            "Force error on the fit logs",
+            _change(unit, base.error, best.fit.error),
+            f"with {name}, RMS",
+        ),
+        Tile(
+            f"{tested_on(found).capitalize()} force error",
+            _change(unit, gain.before, gain.after),
+            f"t = {number(gain.t)} over blocks",
+        ),
+        Tile(
+            "Error over noise floor",
+            f"{number(base.ratio)} → {number(best.fit.ratio)}",
+            f"floor {quantity(base.floor, unit)} RMS",
+        ),
+        *_position_tile(axis, f", without {name}"),
+    ]
+
+
+def _error_tiles(error: float, floor: float, unit: str) -> list[Tile]:
+    return [
+        Tile("Force error", quantity(error, unit), "RMS over the logs"),
+        Tile("Error over noise floor", number(error / floor), f"floor {quantity(floor, unit)} RMS"),
+    ]
+
+
+def _position_tile(axis: AxisComparison, model: str) -> list[Tile]:
+    if not axis.position_error:
+        return []
+    worst = max(axis.position_error.values())
+    told = quantity(worst, axis.units.position)
+    return [Tile("Position, free run", told, f"RMS of the worst log{model}")]
+
+
+def _compared(axis: AxisComparison) -> Answer:
+    at_floor = axis.ratio < RULE.at_floor
+    headline = (
+        "the model explains the measurement"
+        if at_floor
+        else f"force error {number(axis.ratio)} times the noise floor"
+    )
+    sentence = (
+        "The force error is at its noise floor."
+        if at_floor
+        else "The model leaves force that noise does not explain; twin diagnose says which effect "
+        "is missing."
+    )
+    return Answer(
+        headline=f"Axis {axis.axis}: {headline}",
+        sentence=sentence,
+        tiles=[
+            *_error_tiles(axis.total_error, axis.floor, axis.units.force),
+            *_position_tile(axis, ""),
+        ],
+        remarks=[],
+        tone=Tone.PLAIN if at_floor else Tone.STRONG,
+    )
+
+
+def _added(addition: Addition) -> Answer:
+    step, unit = addition.step, addition.units.position
+    errors = _change(step.unit, step.fit_error_before, step.fit_error_after)
+    tiles = [Tile("Force error on the fit logs", errors, "RMS")]
+    if step.holdout_error_before is not None and step.holdout_error_after is not None:
+        held = _change(step.unit, step.holdout_error_before, step.holdout_error_after)
+        tiles.append(Tile("Held-out force error", held, "RMS"))
+    tiles.append(
+        Tile(
+            "Position, free run",
+            _change(unit, *addition.position_error),
+            f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo",
+        )
+    )
+    sentence = "The effect earned its place on data that the fit did not see."
+    if not addition.kept:
+        sentence = "Data that the fit did not see does not ask for this effect; leave it out."
+    return Answer(
+        headline=f"Axis {step.axis}: {spaced(step.effect)} added",
+        sentence=sentence,
+        tiles=tiles,
+        remarks=[],
+        tone=Tone.STRONG if addition.kept else Tone.PLAIN,
+    )

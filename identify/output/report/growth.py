@@ -1,0 +1,141 @@
+"""The error falling, effect by effect."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from numpy.typing import NDArray
+
+from identify.output.report.blocks import Block, Column, Heading, Picture, Row, Section, Table
+from identify.output.report.drawing import BLUE, INK, ORANGE, new_figure
+from identify.output.report.subject import Subject
+from identify.output.report.units import Scale, number, spaced, title_case
+from identify.output.results import Addition
+from twin.model.machine import HistoryStep
+
+Array = NDArray[np.float64]
+
+
+def section(subject: Subject) -> Section | None:
+    """A picture and a table for each axis that grew; position errors where they were taken."""
+    blocks: list[Block] = []
+    for axis, steps in _by_axis(subject.steps).items():
+        if len(_by_axis(subject.steps)) > 1 or subject.heading(axis):
+            blocks.append(Heading(f"Axis {axis}"))
+        compared = subject.comparison.axes.get(axis)
+        blocks.append(_picture(steps, compared.floor if compared else None))
+        blocks.append(_table(steps))
+    if subject.additions:
+        blocks.append(_positions(subject.additions))
+    return Section("growth", "The error, effect by effect", blocks) if blocks else None
+
+
+def _by_axis(steps: Sequence[HistoryStep]) -> dict[str, list[HistoryStep]]:
+    out: dict[str, list[HistoryStep]] = {}
+    for step in steps:
+        out.setdefault(step.axis, []).append(step)
+    return out
+
+
+def _picture(steps: Sequence[HistoryStep], floor: float | None) -> Picture:
+    caption = (
+        "Force error after each effect was added and the model refitted. An effect that is really "
+        "there lowers the held-out error as much as that of the fit."
+    )
+    return Picture(_figure(steps, floor), caption)
+
+
+def _figure(steps: Sequence[HistoryStep], floor: float | None) -> Figure:
+    fit = [steps[0].fit_error_before, *(s.fit_error_after for s in steps)]
+    held = _numbers([steps[0].holdout_error_before, *(s.holdout_error_after for s in steps)])
+    figure = new_figure(3.2)
+    axes = figure.subplots()
+    scale = Scale.of(steps[0].unit, fit)
+    axes.plot(scale(fit), "o-", color=BLUE, label="fit logs", linewidth=1.6)
+    if np.isfinite(held).any():
+        axes.plot(scale(held), "s--", color=ORANGE, label="held out", linewidth=1.6)
+    _number_points(axes, scale(fit), scale(held))
+    if floor is not None:
+        axes.axhline(float(scale(floor)), color=INK, linestyle=":", label="noise floor")
+    names = ["at the start", *(_label(s) for s in steps)]
+    axes.set_xticks(range(len(names)), names)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.set_xlim(-0.4, len(names) - 0.6)
+    axes.set_xlabel("Effect added")
+    axes.set_ylabel(scale.label("Force error, RMS"))
+    figure.legend(loc="outside upper right", ncols=3)
+    return figure
+
+
+def _numbers(values: Sequence[float | None]) -> Array:
+    return np.array([np.nan if v is None else v for v in values])
+
+
+def _number_points(axes: Axes, fit: Array, held: Array) -> None:
+    """Values beside the points, the larger above and the smaller below: clear of a falling line."""
+    for i, (a, b) in enumerate(zip(fit, held, strict=True)):
+        for value, color, above in ((a, BLUE, not a < b), (b, ORANGE, not b <= a)):
+            if np.isfinite(value):
+                side, align = (7.0, "left") if above else (-7.0, "right")
+                axes.annotate(
+                    number(value), (i, value), (side, side), textcoords="offset points",
+                    color=color, fontsize=8.5, ha=align, va="center",
+                )  # fmt: skip
+
+
+def _label(step: HistoryStep) -> str:
+    name = spaced(step.effect)
+    return f"+ {name}" if step.action == "add" else f"{step.action} {name}"
+
+
+def _table(steps: Sequence[HistoryStep]) -> Table:
+    errors = [e for s in steps for e in (s.fit_error_before, s.fit_error_after)]
+    scale = Scale.of(steps[0].unit, errors)
+    rows = [
+        Row(
+            (
+                title_case(s.effect) if s.action == "add" else _label(s),
+                scale.text(s.fit_error_before),
+                scale.text(s.fit_error_after),
+                scale.text(s.holdout_error_before),
+                scale.text(s.holdout_error_after),
+            )
+        )
+        for s in steps
+    ]
+    names = ("Fit, before", "Fit, after", "Held out, before", "Held out, after")
+    columns = (Column("Effect added"), *(Column(n, numeric=True) for n in names))
+    return Table(columns, rows, "RMS force error; everything is refitted at each step.")
+
+
+def _positions(additions: Sequence[Addition]) -> Table:
+    scales = {
+        unit: Scale.of(
+            unit, [e for a in additions if a.units.position == unit for e in a.position_error]
+        )
+        for unit in {a.units.position for a in additions}
+    }
+    rows = [
+        Row(
+            (
+                f"{title_case(a.step.effect)} on {a.step.axis}",
+                scales[a.units.position].text(a.position_error[0]),
+                scales[a.units.position].text(a.position_error[1]),
+                scales[a.units.position].text(a.replayed),
+                "kept" if a.kept else "not supported",
+            )
+        )
+        for a in additions
+    ]
+    names = ("Free run, before", "Free run, after", "Replayed by MuJoCo")
+    columns = (
+        Column("Effect added"), *(Column(n, numeric=True) for n in names), Column("Outcome")
+    )  # fmt: skip
+    return Table(columns, rows, "RMS position error of the model driven by the logged command.")

@@ -1,0 +1,28 @@
+"""What else the reader should know: fits that did not end well, parameters that jumped."""
+
+from __future__ import annotations
+
+from identify.output.remarks import remarks
+from identify.output.report.blocks import Listing, Section
+from identify.output.report.subject import Subject
+from identify.output.report.units import spaced
+
+
+def section(subject: Subject) -> Section | None:
+    """Notes of all axes and of the model's history, each once."""
+    notes: list[str] = []
+    for axis in subject.axes:
+        found = subject.diagnosed(axis.axis)
+        if found is not None:
+            notes.extend(
+                f"Axis {axis.axis}: {_sentence(note)}"
+                for note in remarks(found, subject.refit(axis.axis), subject.not_tried)
+            )
+    for step in (*subject.steps, *(a.step for a in subject.additions)):
+        what = f"Axis {step.axis}, {spaced(step.effect)} added"
+        notes.extend(f"{what}: {_sentence(note)}" for note in step.notes)
+    return Section("notes", "Notes", [Listing(tuple(dict.fromkeys(notes)))]) if notes else None
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith(".") else f"{text}."

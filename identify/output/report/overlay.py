@@ -1,0 +1,133 @@
+"""Measured and modelled force against time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from identify.estimation.fit import rms
+from identify.output.report.blocks import Block, Heading, Picture, Section
+from identify.output.report.drawing import (
+    BLUE,
+    GREY,
+    MEASURED,
+    ORANGE,
+    new_figure,
+    noise_band,
+    symmetric_limit,
+)
+from identify.output.report.subject import LogForces, Subject, log_forces
+from identify.output.report.units import Scale, spaced
+from identify.validation.misfit_maps import AxisComparison
+
+Array = NDArray[np.float64]
+
+STRETCH = 4.0  # s, shown at full size
+
+
+def section(subject: Subject) -> Section:
+    """One picture for each axis."""
+    blocks: list[Block] = []
+    for axis in subject.axes:
+        if heading := subject.heading(axis.axis):
+            blocks.append(Heading(heading))
+        blocks.append(_picture(subject, axis))
+    return Section("force", "Measured and modelled force", blocks)
+
+
+def _picture(subject: Subject, axis: AxisComparison) -> Picture:
+    best = subject.named(axis.axis)
+    forces = [
+        log_forces(log, subject.model(axis.axis), best.fit.axis if best else None)
+        for log in axis.logs
+    ]
+    shown = min(forces, key=lambda f: abs(_error(f, slice(None)) - axis.total_error))
+    span = representative(shown, STRETCH)
+    named = spaced(best.effect.name) if best else ""
+    caption = (
+        f"Log {shown.name}: the force that the model must explain (command less inertia) and the "
+        "force that it gives; look for where the two part. Above the whole log, below the "
+        "shaded stretch and what is left of it."
+    )
+    return Picture(_figure(shown, span, axis.floor, named), caption)
+
+
+def _error(forces: LogForces, part: slice) -> float:
+    left = (forces.explain - forces.model)[part]
+    return rms(left[np.isfinite(left)])
+
+
+def representative(forces: LogForces, length: float) -> slice:
+    """The stretch of that length (s) whose error is nearest to that of the whole log."""
+    step = forces.time[1] - forces.time[0] if len(forces.time) > 1 else length
+    n = min(max(round(length / step), 2), len(forces.time))
+    parts = [slice(a, a + n) for a in range(0, len(forces.time) - n + 1, max(n // 4, 1))]
+    whole = _error(forces, slice(None))
+    # A stretch at rest has no error to compare: it comes last.
+    distances = [abs(_error(forces, p) - whole) for p in parts]
+    return parts[int(np.argmin(np.where(np.isfinite(distances), distances, np.inf)))]
+
+
+def _figure(forces: LogForces, span: slice, floor: float, named: str) -> Figure:
+    figure = new_figure(6.4)
+    whole, stretch, left = figure.subplots(3, 1, height_ratios=(1.0, 1.5, 1.0))
+    lines = _lines(forces, named)
+    scale = Scale.of(forces.unit, forces.explain)
+    for axes, part in ((whole, slice(None)), (stretch, span)):
+        for line in lines:
+            axes.plot(
+                forces.time[part], scale(line.values[part]), color=line.color, label=line.label,
+                linewidth=line.width, rasterized=len(forces.time[part]) > MOST_POINTS,
+            )  # fmt: skip
+        axes.set_ylabel(scale.label("Force"))
+        axes.margins(x=0.01)
+    whole.axvspan(forces.time[span][0], forces.time[span][-1], color=GREY, alpha=0.18, linewidth=0)
+    _draw_residual(left, forces, span, floor, lines[1:])
+    stretch.sharex(left)
+    stretch.tick_params(labelbottom=False)
+    for axes in (whole, left):
+        axes.set_xlabel("Time (s)")
+    stretch.set_xlabel("")
+    both = zip(*(a.get_legend_handles_labels() for a in (stretch, left)), strict=True)
+    figure.legend(*(first + second for first, second in both), loc="outside upper left", ncols=4)
+    return figure
+
+
+MOST_POINTS = 3000  # of a line that is drawn as a vector
+
+
+@dataclass(frozen=True, eq=False)
+class _Line:
+    label: str
+    values: Array
+    color: str
+    width: float
+
+
+def _lines(forces: LogForces, named: str) -> list[_Line]:
+    """The measured force as a wide line, so that a model that hides it is seen to fit."""
+    lines = [
+        _Line("measured (command less inertia)", forces.explain, MEASURED, 3.0),
+        _Line("model", forces.model, BLUE, 1.2),
+    ]
+    if forces.named is not None:
+        lines.append(_Line(f"model with {named}", forces.named, ORANGE, 1.2))
+    return lines
+
+
+def _draw_residual(
+    axes: Axes, forces: LogForces, span: slice, floor: float, lines: Sequence[_Line]
+) -> None:
+    left = [(forces.explain - line.values)[span] for line in lines]
+    limit = symmetric_limit(floor, *left)
+    scale = Scale.of(forces.unit, [limit])
+    noise_band(axes, float(scale(floor)))
+    for values, line in zip(left, lines, strict=True):
+        axes.plot(forces.time[span], scale(values), color=line.color, linewidth=1.0)
+    axes.set_ylim(-float(scale(limit)), float(scale(limit)))
+    axes.set_ylabel(scale.label("Unexplained"))

@@ -1,0 +1,112 @@
+"""Parameter values with their intervals, or the reason why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from identify.estimation.fit import Fit
+from identify.estimation.intervals import Estimate, estimates, refusal
+from identify.output.report.blocks import Block, Column, Heading, Row, Section, Table, Tone
+from identify.output.report.subject import Subject
+from identify.output.report.units import NOTHING, Scale, number, quantity, spaced
+from identify.selection.forward_selection import AxisDiagnosis
+from identify.selection.nonparametric import described_labels
+from twin.model.machine import AxisModel
+
+
+def section(subject: Subject) -> Section:
+    """A table for each axis: with intervals where the model was fitted here."""
+    blocks: list[Block] = []
+    for axis in subject.axes:
+        if heading := subject.heading(axis.axis):
+            blocks.append(Heading(heading))
+        found = subject.diagnosed(axis.axis)
+        blocks.append(_given(subject.model(axis.axis)) if found is None else _fitted(found))
+    return Section("parameters", "Parameters", blocks)
+
+
+def _given(axis: AxisModel) -> Table:
+    """Values as the model has them."""
+    meanings = _meanings(axis)
+    units, mass = axis.units, axis.mass_parameter
+    rows = [Row((mass.name, quantity(axis.mass, units(mass.unit)), meanings[mass.name]))]
+    hidden = described_labels(axis)
+    for fitted in axis.effects:
+        for p in fitted.effect.parameters:
+            label = f"{fitted.effect.name}.{p.name}"
+            if label in hidden:
+                continue
+            value = quantity(fitted.values[p.name], units(p.unit))
+            rows.append(Row((label, value, meanings[label])))
+    columns = (Column("Parameter"), Column("Value", numeric=True), Column("Meaning"))
+    return Table(columns, rows, "Values of the model as it was given; twin fit adds intervals.")
+
+
+def _fitted(found: AxisDiagnosis) -> Table:
+    """Values of the fitted model, beside those of the model with the named effect."""
+    fits, richest = {"Value": found.base}, found.base
+    if found.best:
+        name, richest = spaced(found.best.effect.name), found.best.fit
+        fits = {f"Without {name}": found.base, f"With {name}": richest}
+    labels = [e.label for e in estimates(richest)]
+    meanings = _meanings(richest.axis)
+    meanings |= {e.label: f"{meanings[e.label]}, held" for e in estimates(richest) if not e.free}
+    labels += [e.label for e in estimates(found.base) if e.label not in labels]
+    parts = [_part(heading, fit, labels) for heading, fit in fits.items()]
+    columns = [c for part in parts for c in part.columns]
+    new = {c.label for c in richest.scaling.where} - {c.label for c in found.base.scaling.where}
+    rows = [
+        Row(
+            (label, *(cell for part in parts for cell in part.cells[i]), meanings.get(label, "")),
+            Tone.STRONG if label in new else Tone.PLAIN,
+        )
+        for i, label in enumerate(labels)
+    ]
+    caption = " ".join(part.remark for part in parts if part.remark)
+    return Table([Column("Parameter"), *columns, Column("Meaning")], rows, caption)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Columns of one fit, their cells label by label, and why there are no intervals."""
+
+    columns: Sequence[Column]
+    cells: Sequence[Sequence[str]]
+    remark: str
+
+
+def _part(heading: str, fit: Fit, labels: Sequence[str]) -> _Part:
+    known = {e.label: e for e in estimates(fit)}
+    cells = [_cells(known.get(label)) for label in labels]
+    columns = (Column(heading, numeric=True), Column("90 % interval"))
+    if refusal(fit) is None:
+        return _Part(columns, cells, "")
+    # The reason is the same for all: said once instead of in a column.
+    error = quantity(fit.error, fit.axis.units.force)
+    remark = (
+        f"{heading}: no intervals, because the force error of {error} stands "
+        f"{number(fit.ratio)} times above the noise floor; the model is wrong by more than noise."
+    )
+    return _Part(columns[:1], [c[:1] for c in cells], remark)
+
+
+def _cells(estimate: Estimate | None) -> tuple[str, str]:
+    if estimate is None:
+        return NOTHING, ""
+    scale = Scale.of(estimate.unit, [estimate.value])
+    if not estimate.free:
+        return scale.text(estimate.value), ""
+    if estimate.low is None or estimate.high is None:
+        return scale.text(estimate.value), estimate.reason or ""
+    low, value, high = scale.within(
+        estimate.low, estimate.high, estimate.low, estimate.value, estimate.high
+    )
+    return f"{value} {scale.unit}".rstrip(), f"{low} … {high}"
+
+
+def _meanings(axis: AxisModel) -> dict[str, str]:
+    own = {
+        f"{f.effect.name}.{p.name}": p.meaning for f in axis.effects for p in f.effect.parameters
+    }
+    return {axis.mass_parameter.name: axis.mass_parameter.meaning, **own}

@@ -1,0 +1,115 @@
+"""Every absent effect, ranked by how well it explains what the model leaves."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from identify.output.report.answer import tested_on
+from identify.output.report.blocks import Block, Column, Heading, Picture, Row, Section, Table, Tone
+from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
+from identify.output.report.subject import Subject
+from identify.output.report.units import Scale, number, quantity, spaced, title_case
+from identify.selection.candidates import Candidate
+from identify.selection.forward_selection import AxisDiagnosis
+
+WITH_VALUES = 3  # candidates whose parameter values are printed
+UNBROKEN = "\u00a0"  # space at which no line ends
+CLIP = 1.6  # of the error before; a bar that is longer is cut
+
+
+def section(subject: Subject) -> Section | None:
+    """A picture and a table for each axis that has candidates."""
+    blocks: list[Block] = []
+    for axis in subject.axes:
+        found = subject.diagnosed(axis.axis)
+        if found is None or not found.ranking:
+            continue
+        if heading := subject.heading(axis.axis):
+            blocks.append(Heading(heading))
+        blocks.extend((_picture(found), _table(found)))
+    return Section("ranking", "Candidates, ranked", blocks) if blocks else None
+
+
+def _picture(found: AxisDiagnosis) -> Picture:
+    caption = (
+        f"Force error on {tested_on(found)} data after each effect was added and everything "
+        "refitted: a missing effect brings it from the dashed line towards the noise floor."
+    )
+    return Picture(_figure(found), caption)
+
+
+def _figure(found: AxisDiagnosis) -> Figure:
+    figure = new_figure(0.9 + 0.27 * len(found.ranking))
+    axes = figure.subplots()
+    before, after = found.ranking[0].gain.before, [c.gain.after for c in found.ranking]
+    scale = Scale.of(found.dataset.units.force, [before])
+    end = float(scale(min(max(before, *after), CLIP * before)))
+    lengths = [min(float(scale(a)), end) for a in after]
+    colors = [ORANGE if c is found.best else BLUE if c.supported else GREY for c in found.ranking]
+    axes.barh([_label(c) for c in found.ranking], lengths, color=colors, height=0.62)
+    axes.axvline(float(scale(before)), color=INK, linestyle="--", label="before")
+    axes.axvline(float(scale(found.base.floor)), color=INK, linestyle=":", label="noise floor")
+    for row, error in enumerate(after):
+        cut = "bar cut, " if scale(error) > end else ""
+        axes.text(
+            1.0, row, f"{cut}{number(float(scale(error)))}", ha="right", va="center", fontsize=8.5,
+            transform=axes.get_yaxis_transform(),
+        )  # fmt: skip
+    axes.set_xlim(0.0, 1.15 * end)
+    axes.invert_yaxis()
+    axes.grid(False, axis="y")
+    axes.tick_params(axis="y", length=0)
+    axes.set_xlabel(scale.label(f"{tested_on(found).capitalize()} force error, RMS"))
+    axes.set_ylabel("Effect added")
+    figure.legend(loc="outside upper right", ncols=2)
+    return figure
+
+
+def _label(candidate: Candidate) -> str:
+    return spaced(candidate.effect.name)
+
+
+def _table(found: AxisDiagnosis) -> Table:
+    errors = [e for c in found.ranking for e in (c.gain.before, c.gain.after)]
+    scale = Scale.of(found.dataset.units.force, errors)
+    rows = [
+        Row(
+            (
+                title_case(c.effect.name),
+                number(c.delta_bic),
+                scale.text(c.gain.before),
+                scale.text(c.gain.after),
+                "yes" if c.supported else "no",
+                values_of(c) if rank < WITH_VALUES else "",
+            ),
+            _tone(found, c),
+        )
+        for rank, c in enumerate(found.ranking)
+    ]
+    columns = (
+        Column("Effect"),
+        Column("ΔBIC", numeric=True),
+        Column("Error before", numeric=True),
+        Column("Error after", numeric=True),
+        Column("Supported"),
+        Column("Values"),
+    )
+    caption = (
+        f"Error: RMS force, {tested_on(found)}. Supported: the evidence (ΔBIC above 10) and the "
+        "data that the fit did not see both ask for the effect."
+    )
+    return Table(columns, rows, caption)
+
+
+def _tone(found: AxisDiagnosis, candidate: Candidate) -> Tone:
+    if candidate is found.best:
+        return Tone.STRONG
+    return Tone.PLAIN if candidate.supported else Tone.MUTED
+
+
+def values_of(candidate: Candidate) -> str:
+    """The fitted values of a candidate's own parameters, with units."""
+    effect = candidate.effect
+    values, units = candidate.fit.axis[effect.name].values, candidate.fit.axis.units
+    texts = (f"{p.name} = {quantity(values[p.name], units(p.unit))}" for p in effect.parameters)
+    return ", ".join(t.replace(" ", UNBROKEN) for t in texts)

@@ -1,0 +1,115 @@
+"""What a report is about, and the forces that its pictures are drawn from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.prepared_log import PreparedLog, moving
+from identify.estimation.fit import sticks
+from identify.estimation.force_balance import residual
+from identify.experiment_design.plan import Plan
+from identify.output.results import Addition, Comparison, Diagnosis
+from identify.selection.candidates import Candidate
+from identify.selection.confounded import Refit
+from identify.selection.forward_selection import AxisDiagnosis, Verdict
+from identify.validation.misfit_maps import AxisComparison
+from twin.model.machine import AxisModel, HistoryStep
+from twin.model.units import LINEAR
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """Everything that a report says something about."""
+
+    title: str
+    diagnosis: Diagnosis | None
+    comparison: Comparison
+    history: Sequence[HistoryStep]
+    additions: Sequence[Addition]
+
+    @property
+    def axes(self) -> list[AxisComparison]:
+        """The axes in the order of the model, the one that the answer is about first."""
+        leading = self.diagnosis.leading if self.diagnosis else None
+        first = (
+            leading.dataset.axis
+            if leading and leading.verdict is not Verdict.NOTHING_MISSING
+            else None
+        )
+        return sorted(self.comparison.axes.values(), key=lambda a: a.axis != first)
+
+    def diagnosed(self, axis: str) -> AxisDiagnosis | None:
+        """The diagnosis of one axis, where there is one."""
+        return self.diagnosis.axes.get(axis) if self.diagnosis else None
+
+    def next_experiment(self, axis: str) -> Plan | None:
+        """The experiment that decides what the diagnosis of one axis could not."""
+        return self.diagnosis.next_experiments.get(axis) if self.diagnosis else None
+
+    @property
+    def not_tried(self) -> tuple[str, ...]:
+        """Effects that the diagnosis left out."""
+        return self.diagnosis.not_tried if self.diagnosis else ()
+
+    def refit(self, axis: str) -> Refit | None:
+        """What fitting the model as given changed on one axis."""
+        return self.diagnosis.refits.get(axis) if self.diagnosis else None
+
+    def named(self, axis: str) -> Candidate | None:
+        """The effect that the diagnosis names on this axis."""
+        found = self.diagnosed(axis)
+        return found.best if found else None
+
+    def model(self, axis: str) -> AxisModel:
+        """The model that the errors are those of."""
+        return self.comparison.model.axes[axis]
+
+    @property
+    def steps(self) -> Sequence[HistoryStep]:
+        """The model's growth, from its history or from the additions alone."""
+        return self.history or tuple(a.step for a in self.additions)
+
+    def heading(self, axis: str) -> str:
+        """Heading of what belongs to one axis of several, "" where there is one only."""
+        return f"Axis {axis}" if len(self.comparison.axes) > 1 else ""
+
+
+@dataclass(frozen=True, eq=False)
+class LogForces:
+    """PreparedLog forces of one axis over one log, each (n,) in ``unit``; time (n,) s.
+
+    explain: command less inertia, what friction and the other effects must account for. model and
+    named: the same force by the model, and by the model with the named effect; not a number where
+    a friction at rest can be anything.
+    """
+
+    name: str
+    time: Array
+    explain: Array
+    model: Array
+    named: Array | None
+    unit: str = LINEAR.force
+
+
+def log_forces(log: PreparedLog, model: AxisModel, named: AxisModel | None) -> LogForces:
+    """Forces of a model, and of a richer one, over one log."""
+    explain = log.command - model.mass * log.acceleration
+    return LogForces(
+        name=log.motion.name,
+        time=log.time,
+        explain=explain,
+        model=explain - shown_residual(model, log),
+        named=None if named is None else explain - shown_residual(named, log),
+        unit=log.motion.units.force,
+    )
+
+
+def shown_residual(model: AxisModel, log: PreparedLog) -> Array:
+    """Force residual (n,) N, not a number where it carries no information."""
+    return np.where(moving([log], sticks(model)), residual(model, [log]), np.nan)

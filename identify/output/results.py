@@ -1,0 +1,142 @@
+"""What fit, compare, diagnose and add return; each prints as the command does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from identify.dataset.dataset import Dataset
+from identify.estimation.fit import Fit
+from identify.estimation.intervals import Estimate
+from identify.experiment_design.plan import Plan
+from identify.output.text import add_text, compare_text, diagnose_text, fit_text
+from identify.selection.candidates import Candidate
+from identify.selection.confounded import Refit, refit
+from identify.selection.forward_selection import AxisDiagnosis, Verdict
+from identify.validation.misfit_maps import AxisComparison
+from twin.effect import Effect
+from twin.effects import Catalogue
+from twin.model.machine import HistoryStep, MachineModel
+from twin.model.units import AxisUnits
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FitResult:
+    """A fitted stage: fits and estimates by axis, held-out force errors (RMS) where given.
+
+    given: the stage before the fit. catalogue: whose absent effects a parameter may stand in for.
+    """
+
+    model: MachineModel
+    datasets: Mapping[str, Dataset]
+    fits: Mapping[str, Fit]
+    estimates: Mapping[str, tuple[Estimate, ...]]
+    holdout_error: Mapping[str, float | None]
+    given: MachineModel
+    catalogue: Catalogue
+
+    @property
+    def left_out(self) -> Mapping[str, tuple[str, ...]]:
+        """By axis, the logs that it was not fitted on, as it stands still in them."""
+        return {axis: dataset.still for axis, dataset in self.datasets.items()}
+
+    @property
+    def not_fitted(self) -> tuple[str, ...]:
+        """Axes of the model that move in no log."""
+        return tuple(axis for axis in self.model.axes if axis not in self.fits)
+
+    @cached_property
+    def refits(self) -> Mapping[str, Refit]:
+        """What the fit changed of the model given, by axis."""
+        return {a: refit(self.given.axes[a], f, self.catalogue) for a, f in self.fits.items()}
+
+    def __str__(self) -> str:
+        return fit_text(self)
+
+    def __repr__(self) -> str:
+        return f"<FitResult of {self.model.name}; print it to read it>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison:
+    """A stage against logs, by axis."""
+
+    model: MachineModel
+    axes: Mapping[str, AxisComparison]
+
+    def __str__(self) -> str:
+        return compare_text(self)
+
+    def __repr__(self) -> str:
+        return f"<Comparison of {self.model.name}; print it to read it>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis:
+    """Diagnoses by axis; the answer is that of the axis with the strongest evidence.
+
+    next_experiments: for an axis whose diagnosis is ambiguous, the experiment that decides.
+    refits: what fitting the model as given changed, by axis. not_tried: effects of the catalogue
+    that depend on the other axis, on a machine with more than two axes.
+    """
+
+    model: MachineModel
+    axes: Mapping[str, AxisDiagnosis]
+    comparison: Comparison
+    next_experiments: Mapping[str, Plan] = field(default_factory=dict)
+    refits: Mapping[str, Refit] = field(default_factory=dict)
+    not_tried: tuple[str, ...] = ()
+
+    @property
+    def leading(self) -> AxisDiagnosis:
+        """The axis that the answer is about."""
+        order = [Verdict.NOTHING_MISSING, Verdict.UNEXPLAINED, Verdict.AMBIGUOUS]
+        order.append(Verdict.MISSING_EFFECT)
+
+        def weight(d: AxisDiagnosis) -> tuple[bool, int, float]:
+            bic = d.ranking[0].delta_bic if d.ranking else 0.0
+            return d.best is not None, order.index(d.verdict), bic if d.best else d.base.ratio
+
+        return max(self.axes.values(), key=weight)
+
+    @property
+    def effect(self) -> Effect | None:
+        """The effect that is named, if any."""
+        best = self.leading.best
+        return best.effect if best else None
+
+    def __str__(self) -> str:
+        return diagnose_text(self)
+
+    def __repr__(self) -> str:
+        return f"<Diagnosis of {self.model.name}; print it to read it>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Addition:
+    """A stage with one effect more.
+
+    step: errors before and after. kept: whether the effect earned its place on held-out data.
+    position_error: free-running RMS error before and after. replayed: the same of the new model
+    stepped by MuJoCo. Both in the units of the axis.
+    """
+
+    model: MachineModel
+    step: HistoryStep
+    candidate: Candidate
+    kept: bool
+    position_error: tuple[float, float]
+    replayed: float
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def units(self) -> AxisUnits:
+        """Of the axis that the effect was added to."""
+        return self.candidate.fit.axis.units
+
+    def __str__(self) -> str:
+        return add_text(self)
+
+    def __repr__(self) -> str:
+        return f"<Addition of {self.model.name}; print it to read it>"

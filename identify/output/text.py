@@ -1,0 +1,243 @@
+"""Results as text for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from identify.estimation.channel_delay import shift_in_words
+from identify.estimation.intervals import Estimate, refusal
+from identify.experiment_design.discrimination import Trial
+from identify.experiment_design.plan import Plan
+from identify.experiment_design.rival_hypotheses import STRENGTH
+from identify.output.remarks import remarks
+from identify.selection.candidates import Candidate
+from identify.selection.forward_selection import Step
+from identify.selection.nonparametric import described_labels, in_words
+from twin.effect import Effect
+from twin.effects import load_catalogue
+from twin.experiments.file import in_short
+from twin.experiments.kinds import kind_of
+from twin.log.check import CheckReport
+from twin.model.units import ROTARY
+
+if TYPE_CHECKING:  # results print themselves by these functions
+    from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+
+
+def fit_text(result: FitResult) -> str:
+    """Parameters of each axis, one a line."""
+    lines = []
+    for axis, fit in result.fits.items():
+        held, unit = result.holdout_error[axis], fit.axis.units.force
+        tail = "" if held is None else f", held out {held:.4g} {unit}"
+        lines.append(
+            f"axis {axis}: force error {fit.error:.4g} {unit}{tail}, noise floor "
+            f"{fit.floor:.4g} {unit} (ratio {fit.ratio:.2f})"
+        )
+        lines.append(f"  {fit.ended.value}")
+        lines += [f"  at its bound: {label}" for label in fit.at_bound]
+        if shifted := shift_in_words(result.datasets[axis]):
+            lines.append(f"  {shifted}")
+        if result.left_out[axis]:
+            still = ", ".join(result.left_out[axis])
+            lines.append(f"  left out, as axis {axis} stands still there: {still}")
+        if changed := result.refits[axis].in_words():
+            lines.append(f"  {changed}")
+        hidden = described_labels(fit.axis)
+        common = refusal(fit)
+        if common is not None:
+            lines.append(f"  {common}")
+        lines += [
+            f"  {e.label:34s} {_with_interval(e, common)}"
+            for e in result.estimates[axis]
+            if e.label not in hidden
+        ]
+        lines += [f"  {in_words(f)}" for f in fit.axis.effects if f.effect.is_nonparametric]
+    lines += [f"axis {axis}: not fitted, as it moves in no log" for axis in result.not_fitted]
+    return "\n".join(lines)
+
+
+def _with_interval(e: Estimate, common: str | None) -> str:
+    """A value with its interval, or why it has none unless that was said for all."""
+    text = f"{e.value:12.6g} {e.unit:10s}"
+    if not e.free:
+        return text + " fixed"
+    if e.low is None:
+        return text if e.reason == common else f"{text} {e.reason}"
+    return text + f" 90 % in [{e.low:.6g}, {e.high:.6g}]"
+
+
+def compare_text(result: Comparison) -> str:
+    """Errors by log, and the three worst regions of each axis."""
+    lines = []
+    for axis, c in result.axes.items():
+        for name, error in c.force_error.items():
+            lines.append(
+                f"axis {axis}, {name}: force error {error:.4g} {c.units.force} "
+                f"({error / c.floor:.1f} x noise floor), free-running position error "
+                f"{c.position_error[name]:.3g} {c.units.position}"
+            )
+        lines += [f"  worst: {region.in_words()}" for region in c.worst]
+        if not c.worst:
+            lines.append("  nowhere does the error stand above the noise")
+        lines += [f"  {test.in_words()}" for test in c.tests.correlations]
+    lines += dict.fromkeys(c.tests.reason for c in result.axes.values())
+    return "\n".join(lines)
+
+
+def diagnose_text(result: Diagnosis) -> str:
+    """The answer for each axis with the ranking's head."""
+    lines = []
+    for axis, d in result.axes.items():
+        unit = d.base.axis.units.force
+        named = f" {d.best.effect.name}." if d.best else ""
+        lines.append(f"axis {axis}: {d.verdict.value}{named}")
+        lines.append(
+            f"  force error {d.base.error:.4g} {unit}, noise floor {d.base.floor:.4g} {unit} "
+            f"(ratio {d.base.ratio:.2f})"
+        )
+        if d.ambiguous_with:
+            lines.append(f"  cannot be told apart from: {', '.join(d.ambiguous_with)}")
+        if axis in result.next_experiments:
+            lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
+        if d.unexplained:
+            s = d.unexplained
+            again = f", period {s.period:.4g} {s.unit}" if s.period else ""
+            lines.append(
+                f"  {100 * s.share_of_error:.0f} % of the squared error depends on "
+                f"{s.depends_on.replace('_', ' ')}{again}"
+            )
+            lines.append(f"  {advice()}")
+        lines += [_ranking_line(c) for c in d.ranking[:4]]
+        lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
+        lines += [
+            f"  note: {remark}" for remark in remarks(d, result.refits.get(axis), result.not_tried)
+        ]
+    return "\n".join(lines)
+
+
+def _step_line(number: int, step: Step) -> str:
+    gain = step.candidate.gain
+    if step.candidate.is_noise:
+        return f"  step {number}: {step.candidate.effect.name} makes the rest of the error noise"
+    dropped = f"; needless then: {', '.join(step.dropped)}" if step.dropped else ""
+    beside = f" beside {step.beside}" if step.beside else ""
+    return (
+        f"  step {number}: with {step.candidate.effect.name}{beside} the held-out error falls from "
+        f"{gain.before:.4g} to {gain.after:.4g} "
+        f"{step.candidate.fit.axis.units.force}{dropped}"
+    )
+
+
+def advice() -> str:
+    """What lowers the error where no physical effect does."""
+    known = [e.name for e in load_catalogue().values() if e.is_nonparametric]
+    return (
+        f"twin add {' or '.join(known)} describes what is left without explaining it, and lowers "
+        "the error"
+    )
+
+
+def _ranking_line(c: Candidate) -> str:
+    unit, tail = c.fit.axis.units.force, "" if c.supported else "   not supported"
+    return (
+        f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   held-out error "
+        f"{c.gain.before:.4g} -> {c.gain.after:.4g} {unit}{tail}"
+    )
+
+
+SHOWN = 4  # trials of a plan that are printed
+
+
+def plan_text(result: Plan) -> str:
+    """What is decided, the chosen experiment and what it shows, and the next best."""
+    several = len(result.between) > 1
+    asked, verdict = " or ".join(result.between), "decided by"
+    if not several:
+        asked, verdict = f"the parameters of {asked}", "best shown by"
+    elif not result.decides:
+        verdict = "not decided by any experiment of this length; the nearest is"
+    lines = [
+        f"axis {result.axis}: {asked}, {verdict}",
+        f"  {in_short(result.chosen.experiment, result.chosen.units)}",
+    ]
+    lines += [f"  {result.gap.in_words()}"]
+    lines += [f"  {name} shows in {motion}" for name, motion in result.excited_by.items()]
+    if result.favoured:
+        lines.append(f"  the logs at hand favour {result.favoured} already")
+    if result.supposed and several:
+        lines.append(f"  without logs: effects at start values, {STRENGTH:g} times the noise floor")
+    lines += [_trial_line(t, several) for t in result.ranking[:SHOWN]]
+    return "\n".join([*lines, *(f"  not run: {why}" for why in result.not_run)])
+
+
+def _trial_line(t: Trial, several: bool) -> str:
+    tail = f"{t.gain:8.1f} nats on the parameters"
+    if several:
+        tail = (
+            f"{t.difference:.3g} {t.units.force} left to the rival "
+            f"({t.difference / t.floor:.1f} x noise floor), evidence {t.gain:.1f}"
+        )
+    return f"  {kind_of(t.experiment):10s} {t.duration:5.1f} s   {tail}"
+
+
+def add_text(result: Addition) -> str:
+    """What adding the effect did."""
+    s = result.step
+    lines = [
+        f"added {s.effect} to axis {s.axis}",
+        f"  force error on the fit logs   {s.fit_error_before:.4g} -> {s.fit_error_after:.4g} "
+        f"{s.unit}",
+    ]
+    if s.holdout_error_before is not None and s.holdout_error_after is not None:
+        lines.append(
+            "  force error held out          "
+            f"{s.holdout_error_before:.4g} -> {s.holdout_error_after:.4g} {s.unit}"
+        )
+    (before, after), unit = result.position_error, result.units.position
+    lines.append(
+        f"  free-running position error   {before:.3g} -> {after:.3g} {unit} "
+        f"(MuJoCo: {result.replayed:.3g} {unit})"
+    )
+    lines += [f"  {note}" for note in result.notes]
+    if not result.kept:
+        lines.append("  the data do not support this effect: it does not help held out")
+    return "\n".join(lines)
+
+
+def effects_text(effects: list[Effect]) -> str:
+    """One line an effect."""
+    width = max(len(e.name) for e in effects)
+    return "\n".join(f"{e.name:{width}s}  {e.kind.name.lower():9s}  {e.summary}" for e in effects)
+
+
+def effect_text(effect: Effect) -> str:
+    """One effect in full."""
+    rows = [
+        f"  {p.name:14s} {p.start:>10.4g} {p.unit:10s} [{p.lower:g}, {p.upper:g}]  {p.meaning}"
+        for p in effect.parameters
+    ]
+    return "\n".join(
+        [
+            f"{effect.name} ({effect.kind.name.lower()}): {effect.summary}",
+            f"equation     {effect.equation}",
+            f"source       {effect.source}",
+            f"fingerprint  {effect.fingerprint}",
+            f"excited by   {effect.excited_by}",
+            "parameters   start value, unit, bounds, meaning",
+            *rows,
+            f"on a rotary axis a unit of m is one of {ROTARY.position}, N of {ROTARY.force}, kg of "
+            f"{ROTARY.mass}",
+        ]
+    )
+
+
+def check_text(reports: Mapping[str, CheckReport]) -> str:
+    """One line a finding, or that there is none."""
+    lines = []
+    for name, report in reports.items():
+        lines += [f"{name}: {f.severity.value}: {f}" for f in report.findings]
+        if not report.findings:
+            lines.append(f"{name}: fit for identification")
+    return "\n".join(lines)

@@ -1,0 +1,241 @@
+"""One catalogue effect as the explanation: search its shape, refit the model with it, score it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.drive import forces_lessened, is_noise
+from identify.dataset.noise_floor import floor_of
+from identify.dataset.prepared_log import moving, sticks
+from identify.estimation.decision import RULE
+from identify.estimation.evidence import (
+    Evidence,
+    Gain,
+    effective_samples,
+    evidence,
+    held_out_gain,
+    left_out,
+    noise_gain,
+)
+from identify.estimation.fit import Fit, Outcome, error_on, finished, fit_axis, rms
+from identify.estimation.force_balance import residual
+from identify.estimation.time_origin import phases_found
+from identify.estimation.variable_projection import Start, fit_thoroughly, starts, stepped
+from twin.effect import Effect, Kind
+from twin.effects import Catalogue
+from twin.model.machine import AxisModel, Fitted, MachineModel
+
+Array = NDArray[np.float64]
+
+HEAD_EVALUATIONS = 12  # of a friction on the heads, twice
+RIDGE = 1e-4  # keeps the estimate of left-out blocks finite along directions nobody sees
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidate:
+    """A model with one effect more: its refit, evidence and held-out gain."""
+
+    effect: Effect
+    axis: str
+    fit: Fit
+    evidence: Evidence
+    gain: Gain
+
+    def __repr__(self) -> str:
+        return f"<Candidate {self.effect.name} on {self.axis}: evidence {self.delta_bic:.4g}>"
+
+    @property
+    def delta_bic(self) -> float:
+        """BIC without minus BIC with the effect; positive supports it."""
+        return self.evidence.delta_bic
+
+    @property
+    def supported(self) -> bool:
+        """Whether both the evidence and the held-out logs ask for the effect."""
+        return (
+            self.delta_bic > RULE.least_bic and self.gain.t > RULE.least_t
+            and (self.is_noise or self.gain.after < self.gain.before)
+        )  # fmt: skip
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether the effect lowers no error and says how large it must be."""
+        return is_noise(self.effect)
+
+
+def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
+    """Effects that could be added to the axis; another friction would take the old one's place."""
+    has_friction = any(f.effect.kind is Kind.FRICTION for f in axis.effects)
+    return [
+        e
+        for e in catalogue.values()
+        if e.name not in axis.names
+        and (e.kind is not Kind.MODIFIER or has_friction)
+        and not e.is_nonparametric
+    ]
+
+
+def usable(catalogue: Catalogue, model: MachineModel) -> Catalogue:
+    """The effects of a catalogue that a machine with as many axes can have."""
+    return Catalogue([e for e in catalogue.values() if model.can_use(e)])
+
+
+def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
+    """Refit the model together with the effect and score it against the base.
+
+    Where a first look (one linear step beside the base; a fit of the logs' heads for a friction)
+    is far from any evidence, that is scored and no refit made.
+    """
+    best, *others = starts(base, dataset, effect)
+    if is_noise(effect):
+        axis = base.axis.with_effect(best.fitted)
+        return score(base, finished(axis, base.begun, dataset.fit, base.outcome), dataset, effect)
+    if effect.kind is Kind.FRICTION:
+        looked = _fitted_to_heads(base, dataset, best.fitted)
+        if looked is not None:
+            return score(base, looked, dataset, effect)
+    elif not _promising(base, best):
+        return score(base, _one_linear_step(base, dataset, best.fitted), dataset, effect)
+    fit = simplified(fit_axis(base.axis.with_effect(best.fitted), dataset.fit), dataset, effect)
+    first = score(base, fit, dataset, effect)
+    if first.fit.at_floor or first.delta_bic < RULE.least_bic:
+        return first
+    # It helps but leaves structure: what is missing distorts the base, so begin where that did too.
+    fits = [first.fit, fit_axis(base.begun.with_effect(best.fitted), dataset.fit)]
+    fits += [fit_axis(base.axis.with_effect(other.fitted), dataset.fit) for other in others]
+    best_fit = min(fits, key=lambda f: f.error)
+    if not best_fit.at_floor:
+        best_fit = fit_thoroughly(best_fit.axis, dataset)
+    return score(base, simplified(best_fit, dataset, effect), dataset, effect)
+
+
+def _promising(base: Fit, start: Start) -> bool:
+    """Whether a refit could make evidence of what the linear step gains."""
+    samples = effective_samples(base.residual)
+    before = float(np.sum(base.residual**2))
+    if before == 0.0:
+        return False
+    gain = samples * np.log(before / max(start.squared_error, 1e-12 * before))
+    free = len(start.fitted.effect.parameters) - len(start.fitted.fixed)
+    return bool(gain > RULE.promise * (RULE.least_bic + free * np.log(samples)))
+
+
+def _one_linear_step(base: Fit, dataset: Dataset, fitted: Fitted) -> Fit:
+    """The linear step as a fit, or the effect without strength where the step does harm."""
+    fit = finished(
+        stepped(base, fitted, dataset.fit), base.begun, dataset.fit, Outcome.NOT_CONVERGED
+    )
+    if fit.error <= base.error:
+        return fit
+    free = (p.name for p in fitted.effect.strengths if p.name not in fitted.fixed)
+    absent = dict.fromkeys(free, 0.0)
+    axis = base.axis.with_effect(replace(fitted, values={**fitted.values, **absent}))
+    return finished(axis, base.begun, dataset.fit, Outcome.NOT_CONVERGED)
+
+
+def _fitted_to_heads(base: Fit, dataset: Dataset, fitted: Fitted) -> Fit | None:
+    """Another friction fitted to the heads, where that shows it to be no better; else None."""
+    if sum(map(len, dataset.heads)) > 0.5 * sum(map(len, dataset.fit)):
+        return None
+    old = _on_heads(base, dataset)
+    new = fit_axis(base.axis.with_effect(fitted), dataset.heads, HEAD_EVALUATIONS)
+    either = moving(dataset.heads, sticks(old.axis) or sticks(new.axis))
+    before, after = (residual(f.axis, dataset.heads)[either] for f in (old, new))
+    gain = effective_samples(before) * evidence(before, after, 1).log_gain
+    if gain > RULE.promise * RULE.least_bic:
+        return None
+    return finished(new.axis, base.begun, dataset.fit, new.outcome)
+
+
+@lru_cache(maxsize=1)  # every friction is compared with the same base
+def _on_heads(base: Fit, dataset: Dataset) -> Fit:
+    return fit_axis(base.axis, dataset.heads)
+
+
+def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
+    """The fit with the effect in its simplest values, where that explains as much."""
+    if effect.simplest is None:
+        return fit
+    fitted = fit.axis[effect.name]
+    simple = effect.simplest(fitted.values)
+    if simple == dict(fitted.values):
+        return fit
+    again = fit_axis(fit.axis.with_effect(replace(fitted, values=simple)), dataset.fit)
+    return again if again.error < RULE.same_error * fit.error else fit
+
+
+def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
+    """Evidence for a fitted larger model over the base, on the windows that both can use."""
+    if is_noise(effect):
+        return _score_noise(base, fit, dataset, effect)
+    shared = base.kept & fit.kept
+
+    def both(left: Callable[[Fit], Array]) -> list[Array]:
+        # What makes the motor weak makes all forces small, and the error with them.
+        return [left(f) / f.lessened for f in (base, fit)]
+
+    before, after = both(lambda f: f.residual[shared[f.kept]])
+    added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
+    added += phases_found(fit.axis, effect.name, dataset)
+    proof = evidence(before, after, added)
+    if dataset.holdout:
+        held = moving(dataset.holdout, sticks(base.axis) or sticks(fit.axis))
+        motions = [log.motion for log in dataset.holdout]  # a motor may be weak on those alone
+        pair = [
+            residual(f.axis, dataset.holdout)[held] / forces_lessened(f.axis, motions)
+            for f in (base, fit)
+        ]
+    elif proof.delta_bic > RULE.least_bic:
+        pair = both(lambda f: _cross_validated(f, shared[f.kept]))
+    else:  # not supported, whatever blocks left out would say
+        pair = [before, after]
+    return Candidate(
+        effect=effect,
+        axis=dataset.axis,
+        fit=fit,
+        evidence=proof,
+        gain=held_out_gain(pair[0], pair[1], base.floor),
+    )
+
+
+def _score_noise(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
+    """Evidence for a noise that the effect makes, where with it the error is noise."""
+    logs = dataset.holdout or dataset.fit
+    seen = error_on(fit.axis, logs)
+    floors = [floor_of(f.axis, logs) for f in (base, fit)]
+    told = fit.at_floor and not base.at_floor and rms(seen) < RULE.at_floor * floors[1]
+    gain = noise_gain(fit.residual, base.floor, fit.floor) if told else 0.0
+    unseen = effective_samples(seen) * noise_gain(seen, *floors) if told else 0.0
+    return Candidate(
+        effect=effect,
+        axis=dataset.axis,
+        fit=fit,
+        evidence=Evidence(gain, 1, effective_samples(fit.residual)),
+        gain=Gain(rms(seen), rms(seen), float(np.sqrt(max(unseen, 0.0)))),
+    )
+
+
+def _cross_validated(fit: Fit, rows: NDArray[np.bool_]) -> Array:
+    columns = fit.jacobian[rows]
+    return left_out(fit.residual[rows], columns, RIDGE * np.linalg.norm(columns, axis=0))
+
+
+def on_equal_samples(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates with no more effective samples than the one that explains most.
+
+    Each one's residual has a colour of its own; evidence on different numbers of samples would not
+    compare.
+    """
+    if not candidates:
+        return []
+    most = max(candidates, key=lambda c: c.evidence.log_gain).evidence.samples
+    return [
+        replace(c, evidence=replace(c.evidence, samples=min(c.evidence.samples, most)))
+        for c in candidates
+    ]

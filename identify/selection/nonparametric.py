@@ -1,0 +1,232 @@
+"""A description of what no physical effect explains: smoothed, judged, and fitted with the rest.
+
+A description (an Effect with ``parts``) is linear in its strengths. Beside the physics of a fitted
+base, linearised, every part is given the smoothing whose error on left-out blocks is least, or left
+out. Then the whole model is refitted: physics unsmoothed and pulled to where it was, so that what
+both could explain stays with the physics. It is kept where evidence and held-out logs ask for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.excitation import excitation
+from identify.dataset.prepared_log import moving, sticks
+from identify.estimation.evidence import BLOCKS, Evidence, effective_samples, held_out_gain
+from identify.estimation.fit import Fit, fit_axis
+from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.smoothing import part_rows, smoothing
+from identify.estimation.variable_projection import fit_without
+from identify.selection.candidates import Candidate
+from twin.effect import Effect, Part
+from twin.model.machine import AxisModel, Fitted, MachineModel, ParameterReference
+
+Array = NDArray[np.float64]
+
+STIFFNESS = 10.0 ** np.arange(1.0, -5.1, -0.5)  # tried for each part
+WORTH = 0.99  # part of the squared left-out error that a further part must leave at most
+ROUNDS = 3  # of choosing the smoothing anew, at most
+BETTER = 0.95  # part of the error that another round must leave at most
+ROUNDING = 1e-12  # of a unit diagonal, keeps a system solvable
+RIDGE = 1e-4  # on the physics, in units of their columns
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """The residual about a base: force (n,) N, columns (n, k) of physics, then of the description.
+
+    physics (k, k): the penalty that the base has already. parts: penalty (k, k) of each part at
+    unit stiffness, and its columns.
+    """
+
+    where: Sequence[ParameterReference]
+    force: Array
+    columns: Array
+    physics: Array
+    parts: Mapping[str, tuple[Array, NDArray[np.bool_]]]
+
+    @classmethod
+    def about(cls, base: Fit, dataset: Dataset, fitted: Fitted) -> _Linear:
+        effect = fitted.effect
+        own = [ParameterReference(effect.name, p) for p in effect.strengths]
+        where = [*base.scaling.where, *own]
+        alone = replace(base.axis, effects=(fitted,))
+        new = jacobian(alone, dataset.fit, own)[base.kept]
+        norms = np.linalg.norm(base.jacobian, axis=0)
+        rows = smoothing(base.axis, where, len(base.residual))
+        physics = rows.T @ rows + np.diag([*(RIDGE * norms) ** 2, *np.zeros(len(own))])
+        return cls(
+            where, base.residual, np.hstack([base.jacobian, new]), physics,
+            {part.name: _penalty(part, effect.name, where) for part in effect.parts},
+        )  # fmt: skip
+
+    def _chosen(self, stiffness: Mapping[str, float]) -> tuple[NDArray[np.bool_], Array]:
+        """Which columns take part, and the penalty (k, k), at the stiffness of some parts."""
+        used = ~np.any([mask for _, mask in self.parts.values()], axis=0)
+        penalty = self.physics.copy()
+        for name, value in stiffness.items():
+            rows, mask = self.parts[name]
+            used = used | mask
+            penalty += len(self.force) * value**2 * rows
+        return used, penalty
+
+    @cached_property
+    def blocks(self) -> list[tuple[slice, Array, Array]]:
+        """Of each block its samples, columns' products (k, k) and products with the force (k,)."""
+        edges = np.linspace(0, len(self.force), BLOCKS + 1).astype(int)
+        spans = [slice(a, b) for a, b in pairwise(edges)]
+        rows = [(self.columns[span], self.force[span]) for span in spans]
+        return [(s, c.T @ c, c.T @ f) for s, (c, f) in zip(spans, rows, strict=True)]
+
+    def left_out(self, stiffness: Mapping[str, float]) -> Array:
+        """Residual (n,) N of every block when the others alone were fitted."""
+        used, penalty = self._chosen(stiffness)
+        gram = sum(g for _, g, _ in self.blocks) + penalty
+        gradient = sum(g for _, _, g in self.blocks)
+        out = self.force.copy()
+        for span, own, pull in self.blocks:
+            rest = (gram - own)[np.ix_(used, used)]
+            out[span] -= self.columns[span][:, used] @ _solve(rest, (gradient - pull)[used])
+        return out
+
+    def solution(self, stiffness: Mapping[str, float]) -> tuple[Array, float]:
+        """Change (k,) of all coordinates that fits best, and the degrees of freedom it takes."""
+        used, penalty = self._chosen(stiffness)
+        columns = self.columns[:, used]
+        gram = columns.T @ columns
+        full = gram + penalty[np.ix_(used, used)]
+        out = np.zeros(len(self.where))
+        out[used] = -_solve(full, columns.T @ self.force)
+        return out, float(np.trace(_solve(full, gram)))
+
+
+def _penalty(
+    part: Part, effect: str, where: Sequence[ParameterReference]
+) -> tuple[Array, NDArray[np.bool_]]:
+    rows = part_rows(part, effect, where)
+    mask = np.array([c.effect == effect and c.parameter.name in part.strengths for c in where])
+    return rows.T @ rows, mask
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    """Solution of a symmetric, positive system whose unknowns have units of their own."""
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scaled = matrix / np.outer(size, size) + ROUNDING * np.eye(len(size))
+    return np.asarray((np.linalg.solve(scaled, (right.T / size).T).T / size).T)
+
+
+def choose_stiffness(linear: _Linear) -> dict[str, float]:
+    """Stiffness of each part that lowers the error on left-out blocks; a part may be missing.
+
+    The part that helps most comes first; then those before are tuned again.
+    """
+    chosen: dict[str, float] = {}
+    error = float(np.sum(linear.left_out(chosen) ** 2))
+    while len(chosen) < len(linear.parts):
+        found = [_best(linear, chosen, name) for name in linear.parts if name not in chosen]
+        further, name, value = min(found)
+        if not further < WORTH * error:
+            break
+        earlier, chosen[name] = tuple(chosen), value
+        for other in earlier:
+            further, _, chosen[other] = _best(linear, chosen, other)
+        error = further
+    return chosen
+
+
+def _best(linear: _Linear, chosen: Mapping[str, float], name: str) -> tuple[float, str, float]:
+    """Squared left-out error, name and stiffness of a part at its best beside the others."""
+    errors = [float(np.sum(linear.left_out({**chosen, name: v}) ** 2)) for v in STIFFNESS]
+    least = int(np.argmin(errors))
+    return errors[least], name, float(STIFFNESS[least])
+
+
+def describe(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
+    """Fit a description beside the physics of a base, and judge it on the held-out logs.
+
+    Without held-out logs it is judged on blocks left out of the fit. The curves reach as far as the
+    fit logs went. Evidence counts the degrees of freedom that the smoothing leaves.
+    """
+    covered = effect.starts(excitation([log.motion for log in dataset.fit], None))
+    empty = Fitted.at_start(effect, covered)
+    best = _attempt(base, base, dataset, empty)
+    for _ in range(ROUNDS):
+        # What is missing bent the physics of the base: choose anew beside what it is now.
+        again = _attempt(base, fit_without(best.fit, dataset, effect.name), dataset, empty)
+        if not again.fit.error < BETTER * best.fit.error:
+            break
+        best = again
+    return best
+
+
+def _attempt(base: Fit, ground: Fit, dataset: Dataset, empty: Fitted) -> Candidate:
+    """Choose the smoothing beside the physics of ``ground``, refit, and judge against the base."""
+    linear = _Linear.about(ground, dataset, empty)
+    stiffness = choose_stiffness(linear)
+    change, freedom = linear.solution(stiffness)
+    first = _filled(empty, linear, stiffness, change)
+    fit = fit_axis(ground.axis.with_effect(first), dataset.fit)
+    if dataset.holdout:
+        held = moving(dataset.holdout, sticks(base.axis) or sticks(fit.axis))
+        pair = [residual(f.axis, dataset.holdout)[held] for f in (base, fit)]
+    else:
+        pair = [linear.left_out(s) for s in ({}, stiffness)]
+    gain = np.log(np.sum(base.residual**2) / np.sum(fit.residual**2))
+    added = max(round(freedom - linear.solution({})[1]), 1)
+    return Candidate(
+        effect=empty.effect,
+        axis=dataset.axis,
+        fit=fit,
+        evidence=Evidence(float(gain), added, effective_samples(fit.residual)),
+        gain=held_out_gain(pair[0], pair[1], fit.floor),
+    )
+
+
+def in_words(fitted: Fitted) -> str:
+    """What a description follows, and what it is not."""
+    used = [p.name for p in fitted.effect.parts if any(fitted.values[n] for n in p.strengths)]
+    what = f"follows {', '.join(used)}" if used else "found nothing to follow"
+    return (
+        f"{fitted.effect.name} is a description, not physics: it {what}, and holds only where the "
+        "fit logs went"
+    )
+
+
+def described_labels(axis: AxisModel) -> frozenset[str]:
+    """Labels of the strengths of descriptions, which mean nothing one by one."""
+    return frozenset(
+        f"{f.effect.name}.{p.name}"
+        for f in axis.effects
+        if f.effect.is_nonparametric
+        for p in f.effect.strengths
+    )
+
+
+def physics_alone(model: MachineModel) -> MachineModel:
+    """The stage without its descriptions: what they describe is to be explained anew."""
+    for name, axis in model.axes.items():
+        kept = tuple(f for f in axis.effects if not f.effect.is_nonparametric)
+        model = model.with_axis(name, replace(axis, effects=kept))
+    return model
+
+
+def _filled(
+    empty: Fitted, linear: _Linear, stiffness: Mapping[str, float], change: Array
+) -> Fitted:
+    """The description with its strengths and stiffness; parts left out are zero and held."""
+    step = {(c.effect, c.parameter.name): x for c, x in zip(linear.where, change, strict=True)}
+    values, fixed = dict(empty.values), set(empty.fixed)
+    for part in empty.effect.parts:
+        if part.name not in stiffness:
+            fixed.update(part.strengths)
+            continue
+        values.update({n: float(step[empty.effect.name, n]) for n in part.strengths})
+        values[part.stiffness] = stiffness[part.name]
+    return replace(empty, values=values, fixed=frozenset(fixed))

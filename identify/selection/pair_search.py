@@ -1,0 +1,81 @@
+"""Two effects at once, where neither has evidence without the other.
+
+What is missing beside a candidate colours the residual and bends the base: its evidence is then
+counted on few independent samples, and it may do harm on held-out logs. Together the two can
+bring the error to the noise floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from identify.dataset.dataset import Dataset
+from identify.estimation.decision import RULE
+from identify.estimation.fit import Fit, error_on, rms
+from identify.selection.candidates import Candidate, score
+from identify.selection.ranking import less
+
+FIRSTS = 3  # candidates beside which a second is sought
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two effects that were found beside each other.
+
+    first: its fit without the second, its evidence and gain beside the second. second: beside the
+    first. together: both against the base.
+    """
+
+    first: Candidate
+    second: Candidate
+    together: Candidate
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of both."""
+        return frozenset((self.first.effect.name, self.second.effect.name))
+
+
+def search_pairs(
+    base: Fit,
+    dataset: Dataset,
+    ranking: Sequence[Candidate],
+    ranked: Callable[[Fit, Dataset], tuple[Fit, tuple[Candidate, ...]]],
+) -> list[Pair]:
+    """Pairs that bring the error to the noise floor, best first.
+
+    ranked: every absent effect tried beside a fit. Fit and held-out logs must ask for both
+    together, and for each beside the other.
+    """
+    pairs: list[Pair] = []
+    for first in sorted(ranking, key=lambda c: -c.evidence.log_gain)[:FIRSTS]:
+        if 1.0 - (first.fit.error / base.error) ** 2 < RULE.pair_first:
+            break
+        beside, seconds = ranked(first.fit, dataset)
+        if not (seconds and seconds[0].supported):
+            continue
+        pair = _pair(base, dataset, replace(first, fit=beside), seconds[0])
+        if pair is not None and all(p.names != pair.names for p in pairs):
+            pairs.append(pair)
+    return sorted(pairs, key=lambda p: -p.together.delta_bic)
+
+
+def _pair(base: Fit, dataset: Dataset, first: Candidate, second: Candidate) -> Pair | None:
+    """The two as a pair where they explain all but noise and each is needed, else None."""
+    both = second.fit
+    if not (both.at_floor or held_at_floor(both, dataset)):
+        return None
+    together = score(base, both, dataset, second.effect)
+    needed = score(less(first.effect, both, base, dataset), both, dataset, first.effect)
+    if not (together.supported and needed.supported):
+        return None
+    return Pair(replace(needed, fit=first.fit), second, together)
+
+
+def held_at_floor(fit: Fit, dataset: Dataset) -> bool:
+    """Whether the logs that the fit did not see are explained down to noise."""
+    return (
+        bool(dataset.holdout)
+        and rms(error_on(fit.axis, dataset.holdout)) < RULE.at_floor * fit.floor
+    )

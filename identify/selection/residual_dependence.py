@@ -1,0 +1,228 @@
+"""What an unexplained residual depends on: the coordinate that accounts for most of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.motion import Motion
+from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.decision import RULE
+from identify.estimation.evidence import effective_samples
+from identify.estimation.fit import Fit
+from twin.model.units import LINEAR
+
+Array = NDArray[np.float64]
+
+BINS = (24, 96, 384)  # numbers of bins along a coordinate
+PROMINENT = 0.2  # share of the residual's square from which a line is a period
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """Part of the squared error above the floor that one coordinate accounts for.
+
+    share_of_error: 0..1 of the squared force error. period: in ``unit``, or None. error: N.
+    """
+
+    share_of_error: float
+    depends_on: str
+    period: float | None
+    unit: str
+    shares: Mapping[str, float]
+
+
+# Of a linear axis; ``unit_of`` gives those of any.
+UNITS = {
+    "position": "m",
+    "velocity": "m/s",
+    "direction": "1",
+    "acceleration": "m/s^2",
+    "time": "s",
+    "distance_since_reversal": "m",
+    "other_axis_position": "m",
+    "other_axis_velocity": "m/s",
+    "other_axis_acceleration": "m/s^2",
+}
+
+
+OTHER = "other_axis_"
+
+
+def beside(axis: str, quantity: str) -> str:
+    """Name of a coordinate of one of several other axes."""
+    return f"axis_{axis}_{quantity}"
+
+
+def unit_of(coordinate: str, motion: Motion, linear: Mapping[str, str] = UNITS) -> str:
+    """Unit of a coordinate along a motion; linear: declared units, a length where not among them.
+
+    On a machine with more than two axes the others have names and units of their own.
+    """
+    for axis, other in motion.beside.items():
+        for quantity in QUANTITIES:
+            if coordinate == beside(axis, quantity):
+                return other.units(UNITS[quantity])
+    units = motion.other_units if coordinate.startswith(OTHER) else motion.units
+    return units(linear.get(coordinate, LINEAR.position))
+
+
+QUANTITIES = ("position", "velocity", "acceleration")
+
+
+def coordinates_of(log: PreparedLog) -> dict[str, Array]:
+    """Coordinates of each window (n_windows,) in SI units, by the names of UNITS.
+
+    On a machine with more than two axes each other axis has coordinates of its own name.
+    """
+    m = log.motion
+    velocity = log.window.mean(m.velocity)
+    out = {
+        "position": log.window.mean(m.position),
+        "velocity": velocity,
+        "direction": np.sign(velocity),
+        "acceleration": log.acceleration,
+        "time": log.time,
+        "distance_since_reversal": log.window.mean(since_reversal(m.velocity, m.period)),
+    }
+    if m.others.any():
+        for name, row in zip(QUANTITIES, m.others, strict=True):
+            out[f"{OTHER}{name}"] = log.window.mean(row)
+    for axis, other in m.beside.items():
+        for name, row in zip(QUANTITIES, other.signals, strict=True):
+            out[beside(axis, name)] = log.window.mean(row)
+    return out
+
+
+def since_reversal(velocity: Array, period: float) -> Array:
+    """Distance (n,) m travelled since the last change of direction."""
+    fast = np.abs(velocity) > 1e-3 * np.abs(velocity).max()
+    direction = np.sign(np.where(fast, velocity, 0.0))
+    index = np.maximum.accumulate(np.where(direction != 0, np.arange(len(direction)), 0))
+    direction = direction[index]
+    travelled = np.cumsum(np.abs(velocity)) * period
+    turned = np.flatnonzero(np.diff(direction) != 0) + 1
+    start = np.zeros(len(velocity))
+    start[turned] = travelled[turned]
+    return travelled - np.maximum.accumulate(start)
+
+
+def gathered(logs: Sequence[PreparedLog]) -> dict[str, Array]:
+    """Coordinates of all windows of several logs in a row."""
+    parts = [coordinates_of(log) for log in logs]
+    common = [k for k in parts[0] if all(k in p for p in parts)]
+    return {k: np.concatenate([p[k] for p in parts]) for k in common}
+
+
+def share(residual: Array, coordinate: Array) -> float:
+    """Part of the residual's square that its means over bins of the coordinate explain, 0..1.
+
+    The finest of several widths is taken that the data carry, each adjusted for what as many bins
+    explain of noise with the same effective sample size.
+    """
+    widths = [bins for bins in BINS if bins == BINS[0] or len(residual) > 5 * bins]
+    return max(_share(residual, coordinate, bins) for bins in widths)
+
+
+def _foremost(shares: Mapping[str, float]) -> str:
+    """The coordinate with the largest share; time only where no other comes near it.
+
+    Within one run of a program of moves, any coordinate is a function of time.
+    """
+    name = max(shares, key=lambda k: shares[k])
+    rest = {k: s for k, s in shares.items() if k != "time"}
+    other = max(rest, key=lambda k: rest[k])
+    return other if name == "time" and rest[other] > RULE.rather * shares[name] else name
+
+
+def _share(residual: Array, coordinate: Array, bins: int) -> float:
+    levels = np.unique(np.quantile(coordinate, np.linspace(0.0, 1.0, bins + 1)))
+    if len(levels) < 2:
+        return 0.0
+    index = np.clip(np.searchsorted(levels, coordinate, side="right") - 1, 0, len(levels) - 2)
+    count = np.maximum(np.bincount(index, minlength=len(levels) - 1), 1)
+    mean = np.bincount(index, residual, len(levels) - 1) / count
+    explained = float(np.sum(mean[index] * residual) / np.sum(residual**2))
+    n = effective_samples(residual - mean[index])
+    k = (count > 0).sum()
+    return max(1.0 - (1.0 - explained) * n / max(n - k, 1.0), 0.0) if n > k else 0.0
+
+
+def find_dependence(base: Fit, dataset: Dataset) -> Dependence:
+    """The coordinate on which the residual of a fit depends most, and its period if it has one."""
+    shares, lines = _shares(base.residual, _where(base, dataset))
+    name = _foremost(shares)
+    unit = unit_of(name, dataset.fit[0].motion)
+    return Dependence(shares[name], name, lines.get(name), unit, shares)
+
+
+def explains(before: Fit, after: Fit, dataset: Dataset) -> bool:
+    """Whether a larger model took away what the residual of the smaller depended on most.
+
+    What is left must be smaller along that coordinate, and depend on another more.
+    """
+    shares, _ = _shares(before.residual, _where(before, dataset))
+    left, _ = _shares(after.residual, _where(after, dataset))
+    name = _foremost(shares)
+    was = before.error * np.sqrt(shares[name])
+    smaller = after.error * np.sqrt(left[name]) < RULE.left_over * was
+    return bool(shares[name] > RULE.least_share and smaller and _foremost(left) != name)
+
+
+def dependences(force: Array, fit: Fit, dataset: Dataset) -> dict[str, float]:
+    """Share of a force's square (n,) N, on the windows of a fit, by each coordinate: 0..1."""
+    return _shares(force, _where(fit, dataset))[0]
+
+
+def _where(fit: Fit, dataset: Dataset) -> dict[str, Array]:
+    return {k: v[fit.kept] for k, v in gathered(dataset.fit).items()}
+
+
+def _shares(
+    residual: Array, where: Mapping[str, Array]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Share of each coordinate, and the periods of those in which the residual repeats."""
+    shares = {name: share(residual, values) for name, values in where.items()}
+    for name in where.keys() - {"direction", "velocity"}:
+        # Friction has the other sign backwards.
+        backwards = share(residual * where["direction"], where[name])
+        shares[name] = max(shares[name], backwards)
+    periods = {}
+    restarts = np.flatnonzero(np.diff(where["time"]) < 0.0) + 1
+    for name, runs in (("position", []), ("time", restarts)):
+        found = line(residual, where[name], runs)
+        if found is not None:
+            periods[name], strength = found
+            shares[name] = max(shares[name], strength)
+    return shares, periods
+
+
+def line(
+    residual: Array, coordinate: Array, runs: Sequence[int] | NDArray[np.int64] = ()
+) -> tuple[float, float] | None:
+    """Period (unit of the coordinate) and share of the strongest line, if one stands out.
+
+    runs: where further runs begin, between which the line keeps its period but not its phase.
+    """
+    span = float(np.ptp(coordinate))
+    if span == 0.0:
+        return None
+    place = (coordinate - coordinate.min()) / span * (GRID - 1)
+    cells = np.split(np.rint(place).astype(int), runs)
+    power = np.zeros(2 * GRID + 1)  # in quarters of a cycle over the span
+    for cell, part in zip(cells, np.split(residual, runs), strict=True):
+        power += np.abs(np.fft.rfft(np.bincount(cell, part, GRID), 4 * GRID)) ** 2 / len(part)
+    power /= np.sum(residual**2) / 2.0
+    last = int(4 * min(len(residual) / 4.0, GRID / 8.0))
+    best = FEWEST + int(np.argmax(power[FEWEST:last]))
+    strength = float(min(power[best], 1.0))
+    period = span * GRID / (GRID - 1) / best * 4.0
+    return (period, strength) if strength > PROMINENT else None
+
+
+GRID = 8192  # cells along a coordinate
+FEWEST = 8  # quarters of a cycle over the span, below which a repetition is not one

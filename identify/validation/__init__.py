@@ -1,0 +1,4 @@
+"""How a model fails: misfit maps, free run, whiteness, error spectrum.
+
+Nothing here chooses between models.
+"""

@@ -1,0 +1,88 @@
+"""Force error by frequency in newtons, beside what measurement noise leaves in the same bands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from identify.dataset.noise_floor import noise_of
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.estimation.force_balance import residual
+from twin.model.machine import AxisModel
+
+Array = NDArray[np.float64]
+
+SHORTEST = 8  # blocks of the windows taken here: as short as windows can be
+SEGMENT = 4.0  # s of each part of a log that is transformed
+SEEN = 0.2  # of the force's power that the windows must pass
+OCTAVE_PARTS = 2  # bands an octave
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """RMS force by frequency band: low, high (k,) Hz; error, noise and to_explain (k,) N.
+
+    to_explain: command less inertia, what the effects must account for.
+    """
+
+    low: Array
+    high: Array
+    error: Array
+    noise: Array
+    to_explain: Array
+
+
+def bands(axis: AxisModel, logs: Sequence[PreparedLog]) -> Bands:
+    """RMS force error of the model by band over some logs, and that of the noise alone.
+
+    The residual is taken in windows as short as can be, and what those take away of the higher
+    frequencies is given back, up to where they pass a fifth of the power. Windows in which a
+    sticking friction can be anything count as without error.
+    """
+    spectra = [_spectrum(axis, log) for log in logs]
+    weights = [log.motion.time[-1] for log in logs]
+    frequency = min((s[0] for s in spectra), key=lambda f: f[-1])
+    powers = [
+        np.average([np.interp(frequency, s[0], s[i]) for s in spectra], axis=0, weights=weights)
+        for i in (1, 2, 3)
+    ]
+    edges = _edges(frequency)
+    width = frequency[1] - frequency[0]
+    first = np.searchsorted(frequency, edges[:-1])
+    stop = np.searchsorted(frequency, edges[-1])
+    sums = [np.sqrt(np.add.reduceat(p[:stop], first) * width) for p in powers]
+    return Bands(edges[:-1], edges[1:], *sums)
+
+
+def _spectrum(axis: AxisModel, log: PreparedLog) -> tuple[Array, Array, Array, Array]:
+    """Of one log: frequencies Hz, power N^2/Hz of error, noise and what is to be explained."""
+    motion = log.motion
+    short = PreparedLog.of(motion, SHORTEST * motion.period)
+    force = np.where(moving([short], sticks(axis)), residual(axis, [short]), 0.0)
+    period = short.window.stride * motion.period
+    segment = min(round(SEGMENT / period), len(force))
+    both = np.stack([force, short.command - axis.mass * short.acceleration])
+    frequency, power = welch(both, 1.0 / period, nperseg=segment, detrend="constant")
+    ratio = round(period / motion.sample_period)
+    passed = short.window.response(motion.sample_period, segment * ratio)[: len(frequency)]
+    seen = (passed > SEEN) & (frequency > 0.0)
+    noise = noise_of(axis, motion)
+    frequency = frequency[seen]
+    error, explain = power[:, seen] / passed[seen]
+    return frequency, error, np.interp(frequency, noise.frequency, noise.power), explain
+
+
+def _edges(frequency: Array) -> Array:
+    """Edges (k + 1,) Hz of bands of part octaves, each with a frequency at least."""
+    count = int(OCTAVE_PARTS * np.log2(frequency[-1] / frequency[0])) + 1
+    top = frequency[-1] + 0.5 * (frequency[1] - frequency[0])
+    edges = [top * 2.0 ** (-k / OCTAVE_PARTS) for k in range(count, -1, -1)]
+    kept = [0.5 * frequency[0]]
+    for edge in edges:
+        if ((frequency >= kept[-1]) & (frequency < edge)).any():
+            kept.append(edge)
+    return np.array(kept)

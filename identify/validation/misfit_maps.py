@@ -1,0 +1,288 @@
+"""How far model and measurement are apart, in numbers, and where: misfit by region."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from identify.dataset.dataset import Dataset, by_log
+from identify.dataset.noise_floor import floor_of
+from identify.dataset.prepared_log import REST_SPEED, PreparedLog, moving, sticks
+from identify.estimation.evidence import effective_samples
+from identify.estimation.fit import rms
+from identify.estimation.force_balance import residual
+from identify.selection.residual_dependence import UNITS, gathered, unit_of
+from identify.validation.error_spectrum import bands
+from identify.validation.free_run import drift_of_noise, free_run, rms_error
+from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
+from twin.model.machine import AxisModel, MachineModel
+from twin.model.units import LINEAR, AxisUnits
+
+Array = NDArray[np.float64]
+
+REGIONS = 24  # bins along a coordinate
+ABOVE_FLOOR = 1.5  # error over noise floor from which a region counts as bad
+KNOWN_UNITS = {**UNITS, "command": LINEAR.force, "standstill": "1"}  # of a linear axis
+# Coordinates with two values only: their edges.
+TWO_SIDED = {"direction": np.array([-1.5, 0.0, 1.5]), "standstill": np.array([-0.5, 0.5, 1.5])}
+CHANCE = 0.01  # that noise alone makes any region of all maps count as bad
+LEAST_SHARE = 0.02  # part of the squared error, beyond that of the time, from which it is told
+
+
+@dataclass(frozen=True, eq=False)
+class MisfitMap:
+    """Misfit along one coordinate: bin centres (n,), mean and RMS force error (n,) in force_unit.
+
+    share (n,): part of the whole squared force error in each bin; visited (n,): part of the time,
+    or by frequency of the squared force that is to be explained. floor (n,): RMS of what noise
+    alone leaves in each bin, N. By frequency there is no mean.
+    """
+
+    coordinate: str
+    unit: str
+    centre: Array
+    low: Array
+    high: Array
+    mean: Array
+    rms: Array
+    share: Array
+    visited: Array
+    floor: Array
+    force_unit: str = LINEAR.force
+
+
+@dataclass(frozen=True)
+class Region:
+    """A bad place: a bin of a coordinate with its error, ratio to floor and share of error.
+
+    rms: in ``force_unit``.
+    """
+
+    coordinate: str
+    unit: str
+    low: float
+    high: float
+    rms: float
+    ratio: float
+    share: float
+    force_unit: str = LINEAR.force
+
+    def in_words(self) -> str:
+        """E.g. "position between 12 and 26 mm: 0.12 N, 14 times the noise floor, ..."."""
+        what = self.coordinate.replace("_", " ")
+        span = f"{what} between {self.low:.4g} and {self.high:.4g} {self.unit}"
+        if self.coordinate == "standstill":
+            span = "at standstill" if self.low > 0.0 else "in motion"
+        if self.coordinate == "direction":
+            span = "moving forwards" if self.low > -0.5 else "moving backwards"
+        return (
+            f"{span}: {self.rms:.3g} {self.force_unit} RMS, {self.ratio:.1f} times the noise "
+            f"floor, {100 * self.share:.0f} % of the squared error"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AxisComparison:
+    """One axis over some logs.
+
+    force_error: N RMS of the windowed residual, by log. floor: N. position_error: m RMS of the free
+    run, by log. residual (n,) N, coordinates name -> (n,). maps, worst regions, residual tests.
+    """
+
+    axis: str
+    force_error: Mapping[str, float]
+    floor: float
+    position_error: Mapping[str, float]
+    position_floor: Mapping[str, float]
+    residual: Array
+    logs: Sequence[PreparedLog]
+    coordinates: Mapping[str, Array]
+    maps: Sequence[MisfitMap]
+    worst: Sequence[Region]
+    tests: ResidualTests
+
+    def __repr__(self) -> str:
+        return f"<AxisComparison of {self.axis}: {self.total_error:.4g} N>"
+
+    @property
+    def units(self) -> AxisUnits:
+        """What the axis' quantities are given in."""
+        return self.logs[0].motion.units
+
+    @property
+    def total_error(self) -> float:
+        """RMS force error over all logs, N."""
+        return rms(self.residual)
+
+    @property
+    def ratio(self) -> float:
+        """Force error over the noise floor."""
+        return self.total_error / self.floor
+
+
+def compare_axis(
+    model: MachineModel,
+    dataset: Dataset,
+    position_error: Mapping[str, float],
+    position_floor: Mapping[str, float],
+) -> AxisComparison:
+    """Force errors of one axis over the dataset's fit logs, with maps of where they are."""
+    axis = model.axes[dataset.axis]
+    kept = moving(dataset.fit, sticks(axis))
+    every = residual(axis, dataset.fit)
+    floor = floor_of(axis, dataset.fit)
+    where = {k: v[kept] for k, v in _coordinates(axis, dataset.fit).items()}
+    force = every[kept]
+    motion = dataset.fit[0].motion
+    maps = [
+        misfit_map(name, force, values, floor, unit_of(name, motion, KNOWN_UNITS), axis.units.force)
+        for name, values in where.items()
+    ]
+    maps.append(misfit_by_frequency(axis, dataset.fit))
+    return AxisComparison(
+        axis=dataset.axis,
+        force_error=_by_log(axis, dataset),
+        floor=floor,
+        position_error=position_error,
+        position_floor=position_floor,
+        residual=force,
+        logs=dataset.fit,
+        coordinates=where,
+        maps=maps,
+        worst=worst_regions(maps, effective_samples(force)),
+        tests=residual_tests(dataset.fit, every, kept, floor, loop_of(dataset.fit)),
+    )
+
+
+def _coordinates(axis: AxisModel, logs: Sequence[PreparedLog]) -> dict[str, Array]:
+    """What the error is shown along, (n,) each: that of the motion, and what the model knows of."""
+    where = gathered(logs)
+    where["command"] = np.concatenate([log.command for log in logs])
+    speeds = np.concatenate([np.abs(log.window.mean(log.motion.velocity)) for log in logs])
+    where["standstill"] = (speeds < REST_SPEED * speeds.max()).astype(float)
+    for name, period in periods(axis).items():
+        where[phase_name(name)] = np.mod(where["position"], period)
+    return where
+
+
+def _by_log(axis: AxisModel, dataset: Dataset) -> dict[str, float]:
+    return {w.motion.name: rms(residual(axis, [w])[moving([w], sticks(axis))]) for w in dataset.fit}
+
+
+def position_errors(
+    model: MachineModel, found: Mapping[str, Dataset], progress: Callable[[int, int], None]
+) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
+    """Free-running position error, and what noise alone makes of it: axis -> log -> m RMS."""
+    errors: dict[str, dict[str, float]] = {a: {} for a in found}
+    floors: dict[str, dict[str, float]] = {a: {} for a in found}
+    logs = by_log(found)
+    for i, (name, parts) in enumerate(logs.items()):
+        progress(i, len(logs))
+        run = free_run(model, parts)
+        drift = drift_of_noise(model, parts, run)
+        for axis in parts:
+            errors[axis][name] = rms_error(run, axis)
+            floors[axis][name] = rms_error(drift, axis)
+    return errors, floors
+
+
+def periods(axis: AxisModel) -> dict[str, float]:
+    """Lengths (m) at which effects of the model repeat along the track, by effect."""
+    return {
+        f.effect.name: f.values[p.name]
+        for f in axis.effects
+        for p in f.effect.parameters
+        if p.period
+    }
+
+
+def phase_name(effect: str) -> str:
+    """Name of the coordinate that is the position within one period of an effect."""
+    return f"{effect}_phase"
+
+
+def misfit_map(
+    name: str,
+    residual: Array,
+    coordinate: Array,
+    floor: float,
+    unit: str | None = None,
+    force_unit: str = LINEAR.force,
+) -> MisfitMap:
+    """Misfit of a residual (n,) N over bins of equal width of a coordinate (n,); floor in N.
+
+    unit: of the coordinate, that on a linear axis where None.
+    """
+    if name in TWO_SIDED:
+        edges = TWO_SIDED[name]
+    else:
+        edges = np.linspace(coordinate.min(), coordinate.max() + 1e-15, REGIONS + 1)
+    index = np.clip(np.searchsorted(edges, coordinate, side="right") - 1, 0, len(edges) - 2)
+    bins = len(edges) - 1
+    count = np.maximum(np.bincount(index, minlength=bins), 1)
+    square = np.bincount(index, residual**2, bins)
+    return MisfitMap(
+        coordinate=name,
+        unit=unit or KNOWN_UNITS.get(name, LINEAR.position),
+        centre=0.5 * (edges[1:] + edges[:-1]),
+        low=edges[:-1],
+        high=edges[1:],
+        mean=np.bincount(index, residual, bins) / count,
+        rms=np.sqrt(square / count),
+        share=square / max(square.sum(), np.finfo(float).tiny),
+        visited=np.bincount(index, minlength=bins) / len(index),
+        floor=np.full(bins, floor),
+        force_unit=force_unit,
+    )
+
+
+def misfit_by_frequency(axis: AxisModel, logs: Sequence[PreparedLog]) -> MisfitMap:
+    """Misfit of a model by frequency band, beside the noise's spectrum in the same bands."""
+    found = bands(axis, logs)
+    square = found.error**2
+    return MisfitMap(
+        coordinate="frequency",
+        unit="Hz",
+        centre=np.sqrt(found.low * found.high),
+        low=found.low,
+        high=found.high,
+        mean=np.full(len(square), np.nan),
+        rms=found.error,
+        share=square / max(square.sum(), np.finfo(float).tiny),
+        visited=found.to_explain**2 / max(np.sum(found.to_explain**2), np.finfo(float).tiny),
+        floor=found.noise,
+        force_unit=axis.units.force,
+    )
+
+
+def worst_regions(maps: Sequence[MisfitMap], samples: float, count: int = 3) -> list[Region]:
+    """The regions with most error against the time spent there, one a coordinate.
+
+    samples: how many independent values the residual is worth. None where no region stands further
+    above the noise floor than the largest of as many regions of noise alone would.
+    """
+    tried = sum(int(np.count_nonzero(m.visited)) for m in maps)
+    found = []
+    for m in maps:
+        values = np.maximum(samples * m.visited, 1.0)
+        chance = np.sqrt(chi2.ppf(1.0 - CHANCE / max(tried, 1), values) / values)
+        high = m.rms > np.maximum(ABOVE_FLOOR, chance) * m.floor
+        excess = np.where(high, m.share - m.visited, 0.0)
+        i = int(np.argmax(excess))
+        if excess[i] < LEAST_SHARE:
+            continue
+        found.append(
+            (
+                float(excess[i]),
+                Region(
+                    m.coordinate, m.unit, float(m.low[i]), float(m.high[i]), float(m.rms[i]),
+                    float(m.rms[i] / m.floor[i]), float(m.share[i]), m.force_unit,
+                ),
+            )
+        )  # fmt: skip
+    found.sort(key=lambda pair: -pair[0])
+    return [region for _, region in found[:count]]

@@ -1,0 +1,212 @@
+"""Tests of the residual: is what the model leaves noise, or does it know of the past and the input?
+
+Tested is the force residual on windows that do not overlap, which is white where the model is
+right. Bounds are +-1.645/sqrt(n), n the number of those windows: 90 of 100 values of a white
+residual lie within (L. Jia 2023, residual analysis; L. Ljung, System Identification, 16.6). Which
+residual is tested and why depends on the loop, and is said in ``reason``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from identify.dataset.prepared_log import PreparedLog
+
+Array = NDArray[np.float64]
+
+WITHIN = 0.90  # part of a white residual's correlations within the bounds
+SURE = 0.99  # part of white residuals whose every correlation is within the wider limit
+MOST_LAGS = 40
+BINS = 41
+REACH = 5.0  # noise floors that the histogram spans at least
+
+
+class Loop(Enum):
+    """How the logs were taken; the value says which residual is tested, and why."""
+
+    CLOSED = (
+        "Closed loop: feedback carries position noise into the force, so the free run is done on "
+        "the logged command, and of command and speed only what came before the residual is tested "
+        "against it. Whiteness is asked of the force residual alone: a simulated-position residual "
+        "is coloured even when the model is right, and a one-step-ahead one is small even when it "
+        "is wrong."
+    )
+    OPEN = (
+        "Open loop: the command knows nothing of the measurement's noise, so it is tested against "
+        "the residual at all lags. Whiteness is asked of the force residual alone: a "
+        "simulated-position residual is coloured even when the model is right, and a "
+        "one-step-ahead one is small even when it is wrong."
+    )
+    UNKNOWN = (
+        "No setpoint was logged, so the loop is taken for closed: feedback may carry position "
+        "noise into the force, and of command and speed only what came before the residual is "
+        "tested against it. Whiteness is asked of the force residual alone: a simulated-position "
+        "residual is coloured even when the model is right."
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Correlation:
+    """Correlation of the residual with a signal: lag (k,) s, positive where the signal was earlier.
+
+    value (k,): -1..1; tested (k,): which lags a right model must keep small; bound: of 90 % of a
+    white residual's values; limit: of all tested ones in 99 of 100 white residuals.
+    """
+
+    signal: str
+    lag: Array
+    value: Array
+    tested: NDArray[np.bool_]
+    bound: float
+    limit: float
+
+    @property
+    def outside(self) -> float:
+        """Part of the tested values beyond the bound; 0.1 is expected of a white residual."""
+        return float(np.mean(np.abs(self.value[self.tested]) > self.bound))
+
+    @property
+    def passes(self) -> bool:
+        """Whether no tested value is beyond the limit."""
+        return bool(np.all(np.abs(self.value[self.tested]) < self.limit))
+
+    def in_words(self) -> str:
+        """E.g. "force residual against command: 12 % of the lags beyond the 90 % bounds, ..."."""
+        other = "its own past" if self.signal == "residual" else self.signal
+        verdict = "no more than by chance" if self.passes else "structure is left"
+        return (
+            f"force residual against {other}: {100 * self.outside:.0f} % of the lags beyond the "
+            f"90 % bounds of ±{self.bound:.2g}, {verdict}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualTests:
+    """Residual tests of one axis.
+
+    samples: windows that do not overlap. floor: N. edges (b + 1,) N and density (b,) 1/N of the
+    histogram. within: part of the windows within 1.645 noise floors, 0.9 where all is noise.
+    """
+
+    loop: Loop
+    samples: int
+    floor: float
+    edges: Array
+    density: Array
+    within: float
+    correlations: tuple[Correlation, ...]
+
+    @property
+    def reason(self) -> str:
+        """Which residual is tested, and why."""
+        return self.loop.value
+
+    @property
+    def passes(self) -> bool:
+        """Whether the residual is white and knows nothing of command and speed."""
+        return all(c.passes for c in self.correlations)
+
+
+def loop_of(logs: Sequence[PreparedLog]) -> Loop:
+    """Whether an axis was under feedback: closed where its position follows a logged setpoint.
+
+    Open where a logged setpoint is not followed in any log; unknown where one was not logged.
+    """
+    found = [log.motion.follows for log in logs]
+    if any(follows is None for follows in found):
+        return Loop.UNKNOWN
+    return Loop.CLOSED if any(found) else Loop.OPEN
+
+
+def residual_tests(
+    logs: Sequence[PreparedLog], force: Array, kept: NDArray[np.bool_], floor: float, loop: Loop
+) -> ResidualTests:
+    """Tests of the force residual (n,) N over the windows of some logs, of which some are kept."""
+    parts = np.cumsum([len(log) for log in logs])[:-1]
+    series = [
+        _series(log, own, used)
+        for log, own, used in zip(logs, np.split(force, parts), np.split(kept, parts), strict=True)
+    ]
+    residual = [s["residual"] for s in series]
+    left = np.concatenate(residual)
+    left = left[np.isfinite(left)]
+    spacing = logs[0].window.stride * _step(logs[0]) * logs[0].motion.period
+    reach = max(REACH * floor, float(np.quantile(np.abs(left), 0.995)))
+    edges = np.linspace(-reach, reach, BINS + 1)
+    count, _ = np.histogram(left, edges)
+    return ResidualTests(
+        loop=loop,
+        samples=len(left),
+        floor=floor,
+        edges=edges,
+        density=count / (len(left) * np.diff(edges)),
+        within=float(np.mean(np.abs(left) < norm.ppf(0.5 + WITHIN / 2.0) * floor)),
+        correlations=tuple(
+            correlation(name, residual, [s[name] for s in series], spacing, loop)
+            for name in ("residual", "command", "velocity")
+        ),
+    )
+
+
+def _step(log: PreparedLog) -> int:
+    """Windows from one to the next that does not overlap with it."""
+    return -(-len(log.window.weights) // log.window.stride)
+
+
+def _series(log: PreparedLog, force: Array, kept: NDArray[np.bool_]) -> dict[str, Array]:
+    """Residual (not a number where it tells nothing), command and speed on separate windows."""
+    apart = slice(None, None, _step(log))
+    return {
+        "residual": np.where(kept, force, np.nan)[apart],
+        "command": log.command[apart],
+        "velocity": log.window.mean(log.motion.velocity)[apart],
+    }
+
+
+def correlation(
+    signal: str, residual: Sequence[Array], other: Sequence[Array], spacing: float, loop: Loop
+) -> Correlation:
+    """Correlation of residual and signal, log by log (n_i,) each; values not numbers are left out.
+
+    spacing: s, from one value to the next.
+    """
+    most = max(min(MOST_LAGS, min(map(len, residual)) // 4), 1)
+    own = signal == "residual"
+    lags = np.arange(1 if own else -most, most + 1)
+    a, b = (_centred(rows) for rows in (residual, other))
+    n = sum(int(np.count_nonzero(row)) for row in a)
+    power = np.sqrt(sum(np.sum(row**2) for row in a) * sum(np.sum(row**2) for row in b))
+    products = sum(_products(x, y, lags) for x, y in zip(a, b, strict=True))
+    tested = np.ones(len(lags), bool)
+    if not own and loop is not Loop.OPEN:
+        tested = lags > 0  # feedback makes even the same instant's command know the noise
+    count = int(tested.sum())
+    root = np.sqrt(max(n, 1))
+    return Correlation(
+        signal=signal,
+        lag=np.asarray(spacing * lags),
+        value=products / max(power, 1e-300),
+        tested=tested,
+        bound=float(norm.ppf(0.5 + WITHIN / 2.0) / root),
+        limit=float(norm.ppf(1.0 - (1.0 - SURE) / 2.0 / count) / root),
+    )
+
+
+def _centred(rows: Sequence[Array]) -> list[Array]:
+    """Rows less their common mean; zero where there is no number."""
+    mean = np.nanmean(np.concatenate(rows))
+    return [np.nan_to_num(row - mean) for row in rows]
+
+
+def _products(residual: Array, other: Array, lags: NDArray[np.int64]) -> Array:
+    """Sum over k of residual[k] other[k - lag] for each lag, (n_lags,)."""
+    n = len(residual)
+    return np.array(
+        [residual[max(k, 0) : n + min(k, 0)] @ other[max(-k, 0) : n - max(k, 0)] for k in lags]
+    )

@@ -1,0 +1,83 @@
+"""The faults that `make bench` puts into the product: drawn again alike, each one a real change."""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("cosmic_ray", reason="comes with the extra `bench`")
+
+from benchmarks.mutation.faults import Fault, draw, faults_on, is_native, operators
+from benchmarks.mutation.noticed import figures
+from benchmarks.mutation.reach import Reach
+from benchmarks.mutation.trial import Trial
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def drawn() -> list[Fault]:
+    return draw(ROOT, 12, seed=5, least=1)
+
+
+def test_the_same_seed_draws_the_same_faults_and_each_changes_the_code(drawn) -> None:
+    assert draw(ROOT, 12, seed=5, least=1) == drawn
+    assert len(drawn) == 12
+    for fault in drawn:
+        source = (ROOT / fault.path).read_text()
+        altered = fault.applied(source)
+        assert ast.dump(ast.parse(altered)) != ast.dump(ast.parse(source)), fault
+
+
+@pytest.mark.parametrize(
+    ("line", "kind", "expected"),
+    [
+        ("y = f(a, b)", "SwapArguments", {"y = f(b, a)"}),
+        ("y = f(a, b, c)", "SwapArguments", {"y = f(b, a, c)", "y = f(a, c, b)"}),
+        ("y = f(a, a)", "SwapArguments", set()),
+        ("y = f(a, key=b)", "SwapArguments", set()),
+        ("y = a + b - c", "DropTerm", {"y = a - c", "y = a + b"}),
+    ],
+)
+def test_own_kinds_of_fault_do_what_they_say(line: str, kind: str, expected: set[str]) -> None:
+    found = [f for f in faults_on("x.py", line + "\n", 1) if f.kind == kind]
+    assert {f.applied(line + "\n").strip() for f in found} == expected
+    assert kind in operators()
+
+
+def test_lines_without_effect_are_left_alone() -> None:
+    source = (
+        'import numpy as np\n\n\ndef f(x: int | str = 3) -> int:\n    """2 + 2."""\n    return x\n'
+    )
+    assert [f.line for n in range(1, 7) for f in faults_on("x.py", source, n)] == []
+
+
+def test_tests_of_a_line_come_quickest_first_and_within_the_budget() -> None:
+    known = Reach({"a": 3.0, "b": 1.0, "c": 2.0, "d": 0.5}, {"x.py": {7: frozenset("abc")}})
+    assert known.tests_for(Fault("x.py", 7, "k", 0), 10.0) == ["b", "c", "a"]
+    assert known.tests_for(Fault("x.py", 7, "k", 0), 3.5) == ["b", "c"]
+    assert known.tests_for(Fault("x.py", 9, "k", 0), 10.0) == ["b", "c", "a"]  # native or import
+    assert known.tests_for(Fault("y.py", 1, "k", 0), 1.0) == ["d"]
+    assert known.tests_for(Fault("x.py", 7, "k", 0), 1.0, native=True) == ["d"]
+    named = Reach({"a": 0.1, "b[gms]": 2.0}, {"gms.py": {1: frozenset({"a", "b[gms]"})}})
+    assert named.tests_for(Fault("gms.py", 1, "k", 0), 9.0) == ["b[gms]", "a"]
+
+
+def test_laws_and_compiled_functions_are_native() -> None:
+    law = "def law(p, s, io):\n    io[0] = p[0]\n\n\ndef f(x):\n    return x\n"
+    assert [is_native(law, n) for n in (2, 6)] == [True, False]
+    core = "@compiled(inline=True)\ndef f(x):\n    return x\n"
+    assert is_native(core, 3)
+
+
+def test_shares_are_counted_by_folder() -> None:
+    done = [
+        Trial(Fault(f"{folder}/m.py", 1, "k", 0), "", 1, noticed, "")
+        for folder, noticed in [("twin", True), ("twin", False), ("identify", True)]
+    ]
+    found = {f.what: f.value for f in figures(done, 7)}
+    assert found == {"all, seed 7": pytest.approx(2 / 3), "twin": 0.5, "identify": 1.0}
+    assert Counter(f.passed for f in figures(done, 7)) == {False: 2, True: 1}

@@ -1,0 +1,144 @@
+"""Laws of what actuator and encoder make of a log: known filters, and errors undone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from constructed import (
+    LAG,
+    PAYLOAD,
+    RIPPLE,
+    SENSING,
+    SHORT,
+    STICKY,
+    effect,
+    log_of,
+    waves,
+    windowed,
+)
+
+from identify.dataset.drive import actual_force, forces_lessened, is_noise, parts_of, true_motion
+from identify.dataset.motion import motion_of
+from identify.estimation.force_balance import averaged_force, residual
+from twin.effect import Kind
+from twin.model.machine import AxisModel
+
+
+def test_a_lag_follows_its_equation_at_the_logs_own_rate():
+    """tau u' + u = command, held over a sample: a decay by exp(-dt/tau) towards it."""
+    command, dt, tau = SHORT.raw[1], SHORT.sample_period, 1.7e-3
+    u, wanted = command[0], []
+    decay = np.exp(-dt / tau)
+    for c in command:
+        begin, u = u, c + (u - c) * decay
+        wanted.append(c + (begin - c) * (1.0 - decay) * tau / dt)  # the mean over the sample
+    found = actual_force(AxisModel(1.0, effects=(LAG,)), SHORT)
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
+    np.testing.assert_array_equal(actual_force(AxisModel(1.0, effects=(STICKY,)), SHORT), command)
+
+
+def test_an_actuation_adds_the_mean_of_what_it_makes_of_the_command_to_the_residual():
+    log = windowed(SHORT)
+    for chain in (LAG, RIPPLE):
+        axis = AxisModel(1.0, effects=(chain,))
+        added = log.fine.mean(actual_force(axis, SHORT) - SHORT.raw[1])
+        found = averaged_force(axis, [log])
+        np.testing.assert_allclose(found, added, atol=5e-3 * np.std(added))
+    pushed = AxisModel(1.0, effects=(LAG, effect("constant_force", {"F0": 0.4})))
+    np.testing.assert_allclose(
+        averaged_force(pushed, [log]), 0.4 + averaged_force(AxisModel(1.0, effects=(LAG,)), [log])
+    )
+
+
+def test_a_force_ripple_acts_at_the_middle_of_the_sample():
+    found = actual_force(AxisModel(1.0, effects=(RIPPLE,)), SHORT)
+    x, _, command = SHORT.at_samples(0.5)
+    turn = 2.0 * np.pi * x / 0.013
+    gain = 1.0 + 0.05 * np.sin(turn) + 0.03 * np.cos(turn)
+    np.testing.assert_allclose(found, gain * command, atol=1e-9)
+
+
+def test_a_motor_counts_as_weaker_from_less_than_half_its_force():
+    """A saturation that loses all above its limit lowers a constant command by what it says."""
+
+    def motions(*levels):
+        return [
+            replace(SHORT, raw=np.stack([SHORT.raw[0], 0.0 * SHORT.raw[1] + v])) for v in levels
+        ]
+
+    limited = effect("actuator_saturation", {"limit": 1.0, "loss": 1.0})
+    axis = AxisModel(1.0, effects=(limited,))
+    assert forces_lessened(axis, motions(1.9)) == 1.0
+    assert forces_lessened(axis, motions(2.1)) == pytest.approx(1.0 / 2.1)
+    assert forces_lessened(axis, motions(4.0, 3.0)) == pytest.approx(np.sqrt(2.0) / 5.0)
+    dead = AxisModel(1.0, effects=(effect("actuator_deadband", {"width": 9.0}),))
+    assert forces_lessened(dead, motions(4.0)) == 1e-6
+
+
+def test_a_late_reading_is_undone():
+    """What was read is x(t - tau): the true motion is the reading tau later."""
+    axis = AxisModel(1.0, effects=(SENSING[0], PAYLOAD))
+    tau, dt = 7.3e-4, SHORT.sample_period
+    true, rate = true_motion(axis, SHORT)
+    at = np.arange(len(rate), dtype=float)
+    ahead = np.interp(at + tau / dt, at, SHORT.raw[0])
+    inner = slice(20, -20)
+    np.testing.assert_allclose(true.raw[0][inner], ahead[inner], atol=2e-3 * np.ptp(ahead))
+    np.testing.assert_allclose(true.raw[0] + rate, SHORT.raw[0], atol=1e-12)
+    np.testing.assert_array_equal(true.raw[1], SHORT.raw[1])
+    assert rate[-1] == 0.0  # nothing is known of what follows
+    means = rate.reshape(len(SHORT.time), -1).mean(axis=1)
+    np.testing.assert_allclose(SHORT.velocity - true.velocity, means, atol=1e-12)
+    seen = SHORT.at_samples(0.0)[0]
+    error = (seen - np.interp(at + tau / dt, at, seen)).reshape(len(means), -1).mean(axis=1)
+    np.testing.assert_allclose((SHORT.position - true.position)[9:-9], error[9:-9], atol=2e-6)
+    np.testing.assert_array_equal(true.command, SHORT.command)
+
+
+def test_the_residual_of_late_readings_is_none_with_the_delay_and_not_without():
+    """The force that a reading's error pretends, mass x its acceleration, is given back."""
+    rate, mass, tau = 2000.0, 1.7, 7.3e-4
+    x = waves((0.03, 1.3, 0.4), (0.006, 5.1, 1.0))
+    t = np.arange(3000) / rate
+    middle = t + 0.5 / rate
+    push = mass * (x(middle + 1e-4) - 2.0 * x(middle) + x(middle - 1e-4)) / 1e-8
+    log = windowed(motion_of(log_of(rate, x(t - tau), push), "x", ""))
+    bare, knowing = (residual(AxisModel(mass, effects=e), [log]) for e in ((), SENSING[:1]))
+    assert np.std(knowing) < 0.1 * np.std(bare)
+
+
+def test_a_ripple_of_the_encoder_is_undone():
+    """reading = x + e(x), inverted by Newton's method here and by repetition there."""
+    values = SENSING[1].values
+    true, _ = true_motion(AxisModel(1.0, effects=SENSING[1:]), SHORT)
+    seen = SHORT.smoothed[0]
+    x = seen.copy()
+    for _ in range(6):
+        turn = 2.0 * np.pi / values["period"] * x
+        e = sum(
+            values[f"a{k}"] * np.sin(k * turn) + values[f"b{k}"] * np.cos(k * turn) for k in (1, 2)
+        )
+        x = seen - e
+    blocks = (seen - x).reshape(len(SHORT.time), -1).mean(axis=1)
+    found = SHORT.position - true.position
+    np.testing.assert_allclose(found, blocks, atol=1e-2 * np.abs(blocks).max())
+
+
+def test_rounding_moves_no_motion_and_is_noise_alone():
+    step = effect("encoder_quantization")
+    assert is_noise(step.effect)
+    assert not any(is_noise(f.effect) for f in (*SENSING, PAYLOAD, effect("roller_spikes")))
+    same, rate = true_motion(AxisModel(1.0, effects=(step, PAYLOAD)), SHORT)
+    assert same is SHORT
+    assert rate.shape == (SHORT.raw.shape[1],)
+    assert not rate.any()
+    beside_delay, _ = true_motion(AxisModel(1.0, effects=(step, SENSING[0])), SHORT)
+    alone, _ = true_motion(AxisModel(1.0, effects=(SENSING[0],)), SHORT)
+    np.testing.assert_array_equal(beside_delay.signals, alone.signals)
+
+
+def test_parts_are_those_of_the_kinds_asked_in_their_order():
+    axis = AxisModel(2.0, effects=(SENSING[1], STICKY, LAG, SENSING[0]))
+    found = parts_of(axis, Kind.ACTUATION, Kind.SENSING)
+    assert found.names == ("encoder_ripple", "actuator_lag", "encoder_delay")
+    assert found.mass == 2.0

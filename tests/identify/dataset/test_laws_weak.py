@@ -1,0 +1,292 @@
+"""Laws of windows and motions: means and derivatives, exact or of the order that they must be."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from constructed import SHORT, log_of, moved, waves
+from scipy.integrate import quad
+
+from identify.dataset.excitation import excitation
+from identify.dataset.motion import LONGEST_BLOCK, SMOOTHED, Motion, _block_samples, motion_of
+from identify.dataset.test_function import LEAST_BLOCKS, TestFunction
+from twin.errors import InputError
+from twin.log.check.smooth import white_noise
+
+RATE = 4000.0
+PLACE = waves((0.03, 2.3, 0.4), (0.004, 7.1, 1.0))
+FORCE = waves((3.0, 3.7, 0.2), (1.1, 17.0, 1.9))
+T = np.arange(round(1.3 * RATE) + 1) / RATE
+SMOOTH = motion_of(log_of(RATE, PLACE(T), FORCE(T), 2.0 * PLACE(T + 0.1)), "x", "smooth")
+
+
+def bell(r):
+    return (1.0 - r**2) ** 2
+
+
+# --- windows ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("length", "period"), [(0.05, 1e-3), (0.02, 7e-4), (0.0081, 1e-3)])
+def test_windows_have_unit_sum_their_length_and_a_quarters_stride(length, period):
+    window = TestFunction.of_length(length, period)
+    n = round(length / period)
+    assert len(window.weights) == len(window.slope) == n
+    assert window.length == pytest.approx(n * period)
+    assert window.stride == n // 4  # four windows cover one instant
+    every = (window, window.refined(3), window.sharpened(5))
+    for one in every:
+        assert one.weights.sum() == pytest.approx(1.0)
+        assert one.slope.sum() == pytest.approx(0.0, abs=1e-9)
+        np.testing.assert_allclose(one.weights, one.weights[::-1])
+        np.testing.assert_allclose(one.slope, -one.slope[::-1], atol=1e-9 * one.slope.max())
+    assert every[1].period == pytest.approx(period / 3.0)
+    assert every[1].stride == 3 * window.stride
+    assert every[1].length == pytest.approx(window.length)
+    assert (every[2].period, every[2].stride) == (period, window.stride)
+
+
+def test_weights_and_slope_are_those_of_the_bell():
+    window = TestFunction.of_length(0.04, 1e-3)
+    total = quad(bell, -1.0, 1.0)[0] * 0.02
+    middle = (np.arange(40) + 0.5) / 20.0 - 1.0
+    np.testing.assert_allclose(window.weights, bell(middle) * 1e-3 / total, atol=2e-4)
+    derivative = -4.0 * middle * (1.0 - middle**2) / 0.02
+    np.testing.assert_allclose(window.slope, derivative * 1e-3 / total, atol=1e-2)
+
+
+def test_a_window_of_too_few_blocks_is_refused():
+    assert len(TestFunction.of_length(LEAST_BLOCKS * 1e-3, 1e-3).weights) == LEAST_BLOCKS
+    with pytest.raises(InputError, match=r"window = 0.007 s: shorter than 8 .* at least 0.008 s"):
+        TestFunction.of_length(7e-3, 1e-3)
+
+
+def test_the_mean_of_a_constant_and_the_acceleration_of_a_line_are_exact():
+    rng = np.random.default_rng(2)
+    a, b, c = rng.normal(size=3)
+    for window in (
+        TestFunction.of_length(0.03, 1e-3),
+        TestFunction.of_length(0.0093, 7e-4).refined(2),
+    ):
+        t = window.period * (np.arange(300) + 0.5)
+        np.testing.assert_allclose(window.mean(np.full(300, c)), c)
+        line = a * t + b
+        starts = np.arange(len(window.mean(t))) * window.stride * window.period
+        np.testing.assert_allclose(window.mean(line), a * (starts + window.length / 2.0) + b)
+        np.testing.assert_allclose(window.acceleration(line), a)
+        rows = np.stack([line, np.full(300, c)])
+        np.testing.assert_array_equal(window.mean(rows)[0], window.mean(line))
+        count = (300 - len(window.weights)) // window.stride + 1
+        assert len(window.mean(line)) == count
+
+
+def test_the_acceleration_is_the_mean_of_the_derivative():
+    """Integration by parts; the error falls with the square of the block."""
+    errors = []
+    for period in (2e-3, 1e-3):
+        window = TestFunction.of_length(0.08, period)
+        t = period * (np.arange(round(0.8 / period)) + 0.5)
+        found = window.acceleration(np.sin(40.0 * t))
+        fine = TestFunction.of_length(0.08, period / 16.0)
+        s = period / 16.0 * (np.arange(len(t) * 16) + 0.5)
+        exact = replace(fine, stride=window.stride * 16).mean(40.0 * np.cos(40.0 * s))
+        errors.append(np.abs(found - exact).max())
+    assert 3.4 < errors[0] / errors[1] < 4.6
+    assert errors[1] < 0.05
+
+
+@pytest.mark.parametrize("parts", [1, 2, 5])
+def test_a_force_in_sharpened_windows_is_the_acceleration_of_the_readings(parts):
+    """A smooth force, mean over each block, against the second difference of the positions.
+
+    Without sharpening the two differ by the second order of the block; with it by a higher one.
+    """
+    errors = []
+    for period in (2e-3, 1e-3):
+        blocks = TestFunction.of_length(0.06, period)
+        edges = period / parts * np.arange(round(0.5 / period) * parts + 1)
+        velocity = np.diff(np.sin(90.0 * edges + 0.3)) / period * parts
+        wanted = blocks.refined(parts).acceleration(velocity)
+        force = np.diff(90.0 * np.cos(90.0 * edges[::parts] + 0.3)) / period
+        both = (blocks, blocks.sharpened(parts))
+        errors.append([np.abs(w.mean(force) - wanted).max() for w in both])
+    plain, sharp = np.array(errors[0]) / np.array(errors[1])
+    assert 3.5 < plain < 4.5
+    assert sharp > 6.5  # the bell's second derivative jumps at its ends, which costs an order
+    assert errors[1][1] < 0.1 * errors[1][0]
+
+
+def test_the_response_is_what_passes_of_a_sine():
+    window = TestFunction.of_length(0.02, 1e-3)
+    samples = window.refined(4)
+    for segment in (400, 50):
+        found = window.response(2.5e-4, segment)
+        frequency = np.fft.rfftfreq(segment, 2.5e-4)
+        assert found.shape == frequency.shape
+        turn = np.exp(2j * np.pi * np.outer(frequency, np.arange(80)) * 2.5e-4)
+        np.testing.assert_allclose(found, np.abs(turn @ samples.weights) ** 2, atol=1e-12)
+
+
+# --- motions ------------------------------------------------------------------------------------
+
+
+def test_a_motion_has_the_means_of_its_blocks():
+    """With a = the reading at t_k: the middle's position, the sample's mean speed and command."""
+    block = round(SMOOTH.period * RATE)
+    n = SMOOTH.signals.shape[1]
+    x, u = PLACE(T), FORCE(T)
+    assert (block, n) == (4, (len(T) - 1) // 4)
+    for row, samples in (
+        (SMOOTH.position, 0.5 * (x[1:] + x[:-1])),
+        (SMOOTH.velocity, np.diff(x) * RATE),
+        (SMOOTH.command, u[:-1]),
+    ):
+        wanted = [np.mean(samples[k * block : (k + 1) * block]) for k in range(n)]
+        np.testing.assert_allclose(row, wanted, rtol=1e-12)
+    np.testing.assert_allclose(SMOOTH.raw[0], np.diff(x)[: n * block] * RATE)
+    np.testing.assert_allclose(SMOOTH.raw[1], u[: n * block])
+    np.testing.assert_allclose(SMOOTH.time, (np.arange(n) + 0.5) * block / RATE)
+    t = SMOOTH.time
+    np.testing.assert_allclose(SMOOTH.others[0], 2.0 * PLACE(t + 0.1), atol=2e-6)
+    h = 1e-4
+    speed = (PLACE(t + h + 0.1) - PLACE(t - h + 0.1)) / h
+    np.testing.assert_allclose(SMOOTH.others[1], speed, atol=1e-4)
+    rate = (PLACE(t + h + 0.1) - 2.0 * PLACE(t + 0.1) + PLACE(t - h + 0.1)) * 2.0 / h**2
+    np.testing.assert_allclose(SMOOTH.others[2][1:-1], rate[1:-1], atol=2e-2)
+    assert (SMOOTH.name, SMOOTH.axis, SMOOTH.sample_period) == ("smooth", "x", 1.0 / RATE)
+    assert SMOOTH.time_origin == 0.0
+    alone = motion_of(log_of(RATE, x, u), "x", "alone")
+    assert alone.others.shape == alone.signals.shape
+    assert not alone.others.any()
+
+
+@pytest.mark.parametrize("instant", [0.0, 0.5, 1.0])
+def test_the_position_at_the_samples_is_that_read(instant):
+    found = SMOOTH.at_samples(instant)
+    n = found.shape[1]
+    wanted = PLACE(T[:n]) * (1.0 - instant) + PLACE(T[1 : n + 1]) * instant
+    np.testing.assert_allclose(found[0], wanted, atol=1e-12)
+    np.testing.assert_array_equal(found[1:], SMOOTH.raw)
+
+
+def test_smoothing_keeps_parabolas_and_averages_noise():
+    bent = motion_of(log_of(1000.0, np.linspace(0, 1, 1501) ** 2, np.zeros(1501)), "x", "")
+    np.testing.assert_allclose(bent.smoothed[0], np.linspace(0, 1, 1501)[:1500] ** 2, atol=1e-12)
+    rng = np.random.default_rng(3)
+    x = np.linspace(0, 1, 9001) + rng.normal(0, 1e-6, 9001)
+    rough = motion_of(log_of(9000.0, x, np.zeros(9001)), "x", "")
+    left = rough.smoothed[0] - np.linspace(0, 1, 9001)[: rough.raw.shape[1]]
+    m = SMOOTHED // 2  # variance of a parabola's value in the middle of 2 m + 1 points
+    shrunk = 3.0 * (3 * m**2 + 3 * m - 1) / ((2 * m + 3) * (2 * m + 1) * (2 * m - 1))
+    assert np.std(left) == pytest.approx(1e-6 * np.sqrt(shrunk), rel=0.1)
+
+
+def test_a_head_is_the_beginning():
+    head = SMOOTH.head(0.4)
+    np.testing.assert_array_equal(head.signals, SMOOTH.signals[:, :400])
+    np.testing.assert_array_equal(head.others, SMOOTH.others[:, :400])
+    np.testing.assert_array_equal(head.raw, SMOOTH.raw[:, :1600])
+    assert SMOOTH.head(99.0).signals.shape == SMOOTH.signals.shape
+    assert SMOOTH.head(0.0).signals.shape[1] == 1
+
+
+def test_a_force_moved_ahead_is_that_of_later():
+    shift = 3.0 / RATE
+    found = SMOOTH.with_force_ahead(shift)
+    np.testing.assert_allclose(found.raw[1][:-3], SMOOTH.raw[1][3:])
+    np.testing.assert_allclose(found.raw[1][-3:], SMOOTH.raw[1][-1])
+    np.testing.assert_array_equal(found.raw[0], SMOOTH.raw[0])
+    np.testing.assert_allclose(found.command, found.raw[1].reshape(-1, 4).mean(axis=1))
+    np.testing.assert_array_equal(found.signals[:2], SMOOTH.signals[:2])
+    half = SMOOTH.with_force_ahead(-0.5 / RATE).raw[1]
+    np.testing.assert_allclose(half[1:], 0.5 * (SMOOTH.raw[1][1:] + SMOOTH.raw[1][:-1]))
+
+
+def test_logs_that_tell_nothing_are_refused():
+    x, u = PLACE(T), FORCE(T)
+    with pytest.raises(InputError, match="no axis 'z'; it has x"):
+        motion_of(log_of(RATE, x, u), "z", "n")
+    with pytest.raises(InputError, match="stands still"):
+        motion_of(log_of(RATE, 0.0 * x + 1.0, u), "x", "n")
+    with pytest.raises(InputError, match=r"lasts 0.999 s; identification needs 1 s"):
+        motion_of(log_of(1000.0, x[:999], u[:999]), "x", "n")
+    assert motion_of(log_of(1000.0, x[:1000], u[:1000]), "x", "n").period == 1e-3
+
+
+def test_blocks_are_a_millisecond_and_longer_where_the_encoder_is_noisy():
+    """sqrt(2) noise over the block is a thousandth of the highest speed."""
+    ramp = 0.5 * np.arange(8001) / 8000.0  # 0.5 m/s
+    assert _block_samples(ramp, 0.0, 1.0 / 8000.0) == 8
+    assert _block_samples(ramp, 2e-6, 1.0 / 8000.0) == round(np.sqrt(2) * 2e-6 / 5e-4 * 8000)
+    assert _block_samples(ramp, 2e-5, 1.0 / 8000.0) == round(LONGEST_BLOCK * 8000)
+    assert _block_samples(ramp, 0.0, 3e-3) == 1
+    backwards = _block_samples(-ramp, 2e-6, 1.0 / 8000.0)
+    assert backwards == _block_samples(ramp, 2e-6, 1.0 / 8000.0)
+
+
+def test_white_noise_is_found_beside_a_smooth_signal():
+    rng = np.random.default_rng(4)
+    t = np.arange(20_000) / RATE
+    for size in (1e-6, 3e-4):
+        assert white_noise(PLACE(t) + rng.normal(0, size, len(t))) == pytest.approx(size, rel=0.04)
+    assert white_noise(1.0 + t + t**2 + t**3) < 1e-10
+
+
+def test_the_noise_of_a_command_is_what_its_controller_did_not_make_of_the_readings():
+    """A gain on the last speeds makes force of the encoder's noise; it does not count."""
+    rng = np.random.default_rng(5)
+    n, size = 16_000, 0.03
+    x = PLACE(np.arange(n) / RATE) + rng.normal(0, 1e-7, n)
+    own = rng.normal(0, size, n)
+    answered = -900.0 * np.concatenate([[0.0], np.diff(x)]) * RATE
+    for made in (0.0, answered):
+        motion = motion_of(log_of(RATE, x, own + made), "x", "")
+        assert motion.command_noise == pytest.approx(2.0 * size**2 / RATE, rel=0.1)
+
+
+@pytest.mark.parametrize("step", [2e-5, 6.3e-5])
+def test_the_step_of_rounded_readings_is_found_and_undone(step):
+    t = np.arange(8000) / RATE
+    exact = 0.05 * PLACE(t)
+    motion = motion_of(log_of(RATE, step * np.rint(exact / step), FORCE(t)), "x", "")
+    assert motion.resolution == pytest.approx(step, rel=1e-3)
+    ramp = 1.37e-6 * np.arange(8000)  # m, 1.37 um a sample: known to a sample's travel
+    climbed = motion_of(log_of(RATE, step * np.rint(ramp / step), FORCE(t)), "x", "")
+    assert climbed.resolution == pytest.approx(step)
+    made = (step * np.rint(ramp / step) - ramp)[: len(climbed.rounding)]
+    inner = slice(60, -60)
+    assert np.abs(climbed.rounding - made)[inner].max() < 0.51 * 1.37e-6
+    assert len(climbed.rounding) == climbed.raw.shape[1] + 1
+    assert np.abs(motion.rounding).max() < 1.5 * step
+    smooth = motion_of(log_of(RATE, exact, FORCE(t)), "x", "")
+    assert smooth.resolution == 0.0
+    assert not smooth.rounding.any()
+    assert len(smooth.rounding) == smooth.raw.shape[1] + 1
+
+
+def test_the_excitation_covers_all_motions():
+    first, second = SMOOTH, replace(moved(np.random.default_rng(6), 1.2), name="b")
+    found = excitation([first, second], None)
+    both = [
+        np.concatenate([getattr(m, k) for m in (first, second)]) for k in ("position", "velocity")
+    ]
+    assert (found.position_low, found.position_high) == (both[0].min(), both[0].max())
+    assert found.speed_max == np.abs(both[1]).max()
+    assert found.duration == pytest.approx(len(first.time) * 1e-3 + len(second.time) * 1e-3)
+    assert found.force_max == max(np.abs(m.command).max() for m in (first, second))
+    wide = excitation([first], (-0.5, 0.02))
+    assert (wide.position_low, wide.position_high) == (-0.5, first.position.max())
+    assert wide.period == first.period
+
+
+def test_the_dry_level_is_half_the_gap_between_the_directions():
+    def pushed(velocity, command) -> Motion:
+        return replace(
+            SHORT, signals=np.stack([np.linspace(0, 1, len(velocity)), velocity, command])
+        )
+
+    velocity = np.concatenate([np.full(300, 0.4), np.full(200, -0.4), np.full(500, 0.0079)])
+    command = np.concatenate([np.full(300, 1.7), np.full(200, -0.5), np.full(500, 55.0)])
+    assert excitation([pushed(velocity, command)], None).dry_level == pytest.approx(1.1)
+    one_way = pushed(np.abs(velocity), command)
+    assert excitation([one_way], None).dry_level == pytest.approx(np.median(np.abs(command)))

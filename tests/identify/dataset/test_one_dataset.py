@@ -1,0 +1,334 @@
+"""Every view of a log is of one prepared dataset, so that none can disagree with another.
+
+Each test is of a fault that was mended; none of them holds on the code before.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cli_runs import refusal
+from constructed import CATALOGUE, effect, held, log_of, waves, windowed
+from machines import one_axis
+
+from identify.dataset.dataset import by_log, datasets
+from identify.dataset.motion import motion_of
+from identify.dataset.noise_floor import floor_of
+from identify.estimation.channel_delay import aligned
+from identify.estimation.fit import Fit, Outcome, fit_axis, rms
+from identify.estimation.force_balance import residual
+from identify.estimation.levenberg_marquardt import minimise
+from identify.output.as_json import fit_json
+from identify.output.text import fit_text
+from identify.validation.free_run import WINDOW, free_run, rms_error
+from identify.validation.misfit_maps import AxisComparison
+from identify.validation.whiteness import Loop, correlation
+from identify.workflow import compare, diagnose, fit
+from twin.effects import Catalogue
+from twin.errors import InputError
+from twin.experiments.named import simulate
+from twin.log import Log, write_log
+from twin.log.check import Fault, check_log, moves
+from twin.model.file import load_model, save_model
+from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.simulator import MujocoSimulator, ReducedSimulator
+
+RATE = 2000.0  # Hz
+TWO = replace(load_model("proton_xy", CATALOGUE), sample_rate=RATE)
+STAGE = one_axis(TWO)
+BOTH = [ReducedSimulator, MujocoSimulator]
+
+
+def with_effect(model: MachineModel, name: str, **values: float) -> MachineModel:
+    return model.with_axis("x", model.axes["x"].with_effect(effect(name, values)))
+
+
+def logged(model: MachineModel, seed: int = 1, seconds: float = 4.0, run: str = "tracking") -> Log:
+    return simulate(model, run, seed=seed, duration=seconds, simulator=ReducedSimulator)
+
+
+def changed(log: Log, **columns) -> Log:
+    """The log with columns of x made by functions of those that it has."""
+    x = log.axes["x"]
+    new = {name: make(x.columns[name]) for name, make in columns.items()}
+    return replace(log, axes={**log.axes, "x": replace(x, columns={**x.columns, **new})})
+
+
+def cut(log: Log, samples: int) -> Log:
+    axes = {
+        a: replace(v, columns={n: c[samples:] for n, c in v.columns.items()})
+        for a, v in log.axes.items()
+    }
+    return Log(log.sample_rate, axes)
+
+
+def compared(model: MachineModel, log: Log) -> AxisComparison:
+    return compare(model, {"log": log}).axes["x"]
+
+
+def drifts(model: MachineModel, log: Log, simulator=ReducedSimulator) -> float:
+    """Free-running position error of x on a log as the model sees it, m RMS."""
+    found = datasets(model, {"log": log}, {})
+    seen = {a: aligned(model.axes[a], d) for a, d in found.items()}
+    return rms_error(free_run(model, by_log(seen)["log"], simulator), "x")
+
+
+# --- one dataset for all --------------------------------------------------------------------------
+
+
+def test_a_force_one_sample_early_is_the_same_to_fit_compare_and_diagnose():
+    early = changed(logged(STAGE, seconds=5.0), force=lambda f: np.roll(f, 1))
+    fitted = fit(STAGE, {"log": early})
+    assert fitted.fits["x"].ratio < 1.15
+    assert fitted.datasets["x"].channel_delay == pytest.approx(1.0 / RATE, rel=0.01)
+    found = compared(fitted.model, early)
+    assert found.ratio == pytest.approx(fitted.fits["x"].ratio, rel=0.1)
+    assert found.position_error["log"] < 3.0 * found.position_floor["log"]
+    told = diagnose(STAGE, {"log": early}, catalogue=Catalogue([])).comparison.axes["x"]
+    assert told.ratio == pytest.approx(fitted.fits["x"].ratio, rel=1e-6)
+    assert told.position_error["log"] == pytest.approx(found.position_error["log"], rel=0.1)
+
+
+def test_a_log_fitted_cannot_judge_the_fit():
+    log = logged(STAGE, seconds=2.0)
+    with pytest.raises(InputError, match=r"b: held out, but has the same samples as a") as told:
+        fit(STAGE, {"a": log}, {"b": cut(log, 0)})
+    assert "\n" not in str(told.value)
+
+
+# --- the free run ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("simulator", BOTH)
+def test_a_free_run_knows_the_phase_at_which_a_log_began(simulator):
+    """Half a period later the force is the opposite one; of a friction without memory."""
+    axis = replace(STAGE.axes["x"], effects=(effect("quadratic_drag", {"c": 0.5}),))
+    pumped = with_effect(STAGE.with_axis("x", axis), "periodic_disturbance", f=12.5, a=0.3, b=0.1)
+    log = logged(pumped)
+    later = cut(log, round(0.5 / 12.5 * RATE))
+    error = drifts(pumped, later, simulator)
+    assert error < 2.0 * drifts(pumped, log, simulator)
+    off = by_log(datasets(pumped, {"log": later}, {}))["log"]
+    assert rms_error(free_run(pumped, off, simulator), "x") > 10.0 * error
+
+
+@pytest.mark.parametrize("simulator", BOTH)
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("axis_coupling", {"mass": 3.0}), ("load_dependent_friction", {"corner": 2.0})],
+)
+def test_a_restart_knows_the_other_axis_acceleration(name, values, simulator):
+    """The first sample after a restart has the other axis' force, so no error jumps there."""
+    model = with_effect(TWO, name, **values)
+    found = free_run(
+        model, by_log(datasets(model, {"log": logged(model)}, {}))["log"], simulator
+    ).error["x"]
+    bare = free_run(TWO, by_log(datasets(TWO, {"log": logged(TWO)}, {}))["log"], simulator).error[
+        "x"
+    ]
+    starts = 10 + np.arange(1, 7) * round(WINDOW * RATE)
+    jumps, usual = (np.abs(e[starts + 20]).max() for e in (found, bare))
+    assert jumps < 3.0 * usual + 2e-8
+    assert np.sqrt(np.nanmean(found**2)) < 3.0 * np.sqrt(np.nanmean(bare**2))
+
+
+def test_the_position_error_of_the_true_model_is_what_noise_makes_of_it():
+    lacking = STAGE.with_axis("x", STAGE.axes["x"].without("roller_spikes"))
+    for seed in (2, 3, 4):
+        log = logged(STAGE, seed)
+        true, wrong = (
+            c.position_error["log"] / c.position_floor["log"]
+            for c in (compared(STAGE, log), compared(lacking, log))
+        )
+        assert 0.3 < true < 3.0
+        assert wrong > 3.0 * true
+
+
+# --- the residual ---------------------------------------------------------------------------------
+
+
+def test_a_friction_behind_a_lag_sees_the_force_that_acts():
+    """Loaded by the motor, it is no farther from the floor than the lag alone is."""
+    fast = replace(STAGE, sample_rate=4000.0)
+    lagged = with_effect(fast, "actuator_lag", tau=1e-3)
+    ratios = []
+    for model in (lagged, with_effect(lagged, "load_dependent_friction", motor=0.3)):
+        logs = datasets(model, {"log": logged(model, run="moves")}, {})["x"].fit
+        axis = model.axes["x"]
+        ratios.append(rms(residual(axis, logs)) / floor_of(axis, logs))
+    assert ratios[1] < 1.3 * ratios[0]
+    assert ratios[0] < 1.5
+
+
+def test_under_feedback_the_command_of_the_same_instant_is_not_tested():
+    """It answers the very noise that the residual holds."""
+    white = np.random.default_rng(7).normal(size=1500)
+    command = np.random.default_rng(8).normal(size=1500) - 0.5 * white
+    tests = {loop: correlation("command", [white], [command], 0.02, loop) for loop in Loop}
+    for loop in (Loop.CLOSED, Loop.UNKNOWN):
+        assert (tests[loop].lag[tests[loop].tested] > 0.0).all()
+        assert tests[loop].passes
+    assert not tests[Loop.OPEN].passes
+
+
+def test_no_region_of_the_true_model_is_bad():
+    told = [r for seed in range(8) for r in compared(STAGE, logged(STAGE, 10 + seed, 3.0)).worst]
+    assert told == []
+
+
+def test_what_a_saturation_leaves_is_shown_along_the_command():
+    machine = with_effect(STAGE, "actuator_saturation", limit=20.0, loss=0.3)
+    worst = compared(STAGE, logged(machine, 2, 8.0, "moves")).worst
+    commands = [r for r in worst if r.coordinate == "command"]
+    assert commands
+    assert commands[0].share > 0.95 * worst[0].share
+    assert min(abs(commands[0].low), abs(commands[0].high)) > 20.0
+
+
+# --- bounds and what cannot be fitted -------------------------------------------------------------
+
+PLACE = waves((0.03, 1.3, 0.4), (0.006, 5.1, 1.0))
+
+
+def fitted_viscous(viscous: float, seed: int) -> Fit:
+    """A fit of Coulomb and viscous friction to a motion with that viscous friction, N s/m."""
+    t = np.arange(8000) / RATE
+    s = t + 0.5 / RATE
+    speed, acceleration = PLACE(s + 1e-4) - PLACE(s - 1e-4), PLACE(s + 1e-4) - 2.0 * PLACE(s)
+    speed, acceleration = speed / 2e-4, (acceleration + PLACE(s - 1e-4)) / 1e-8
+    force = 1.7 * acceleration + 0.4 * np.sign(speed) + viscous * speed
+    force += np.random.default_rng(seed).normal(0.0, 0.02, len(t))
+    log = windowed(motion_of(log_of(RATE, PLACE(t), force), "x", "log"))
+    axis = AxisModel(1.7, effects=(effect("coulomb_viscous", {"Fc": 0.3, "sigma2": 0.1}),))
+    return fit_axis(axis, [log])
+
+
+def test_a_parameter_that_the_data_push_beyond_its_bound_is_named():
+    found = fitted_viscous(-0.5, 1)
+    assert found.ended is Outcome.AT_BOUND
+    assert found.at_bound == ("coulomb_viscous.sigma2",)
+    assert found.axis["coulomb_viscous"].values["sigma2"] == 0.0
+
+
+def test_a_strength_that_is_truly_zero_is_not_at_its_bound():
+    for seed in range(6):
+        found = fitted_viscous(0.0, seed)
+        assert found.ended is Outcome.CONVERGED
+        assert found.at_bound == ()
+
+
+def test_a_bound_that_the_model_tightens_is_told_on_either_side():
+    log = windowed(motion_of(log_of(RATE, *pushed_by(0.5)), "x", "log"))
+    pull = effect("constant_force")
+    for low, high, told in ((-1.0, 0.2, True), (-1.0, 0.6, False), (-2.0, -1.0, True)):
+        p = replace(pull.effect.parameters[0], lower=low, upper=high, start=high, strength=False)
+        bounded = replace(pull.effect, parameters=(p,))
+        found = fit_axis(
+            AxisModel(1.7, effects=(Fitted(bounded, {"F0": low}, frozenset()),)), [log]
+        )
+        assert found.at_bound == (("constant_force.F0",) if told else ()), (low, high)
+        assert (found.ended is Outcome.AT_BOUND) == told
+
+
+def pushed_by(constant: float) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and logged forces of a mass of 1.7 kg under a constant force beside them, N."""
+    t = np.arange(4000) / RATE
+    force = waves((3.0, 2.7, 0.3))(t)
+    return held(force + constant, 1.7, 1.0 / RATE), force
+
+
+def test_no_number_is_no_convergence():
+    for start, residual_of in ((np.nan, lambda x: x), (1.0, lambda x: x + np.inf)):
+        found = minimise(
+            residual_of, lambda x: np.eye(1), np.array([start]), (-np.ones(1), np.ones(1)),
+            tolerance=1e-9, most_evaluations=9,
+        )  # fmt: skip
+        assert not found.converged
+
+
+def halting(period: float = 0.05, stop: float = 0.01, n: int = 6000) -> np.ndarray:
+    """Positions (n,) m that rest for a while in every period, s."""
+    t = np.arange(n) / RATE
+    speed = np.where(np.mod(t, period) < stop, 0.0, 0.05 * np.sign(np.sin(3.0 * t)))
+    return np.cumsum(speed) / RATE
+
+
+PLAIN = MachineModel(
+    "plain",
+    {"x": AxisModel(1.7, effects=(effect("coulomb_viscous", {"Fc": 0.3, "Fs": 0.3}),))},
+    sample_rate=RATE,
+)
+
+
+def one_line(command, *arguments, **options) -> str:
+    with pytest.raises(InputError) as error:
+        command(*arguments, **options)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_an_axis_that_rests_in_every_window_is_refused_in_one_line(tmp_path):
+    log = log_of(RATE, halting(), halting())
+    for command in (fit, compare):
+        told = one_line(command, PLAIN, {"log": log}, window=0.1)
+        assert told.startswith("axis x comes to rest within every window of 0.1 s of log")
+        assert "give a log in which it moves for longer at a time, or a shorter --window" in told
+    save_model(PLAIN, tmp_path / "model.toml")
+    write_log(log, tmp_path / "log.mcap")
+    refusal("fit", "model.toml", "log.mcap", "--window", "0.1", folder=tmp_path)
+    short = fit(PLAIN, {"log": log}, window=0.02).fits["x"]
+    assert np.isfinite(short.error)
+
+
+def test_what_is_not_a_number_is_refused_in_one_line():
+    run = logged(STAGE, seconds=2.0)
+    for signal in ("position", "force"):
+        holed = changed(run, **{signal: lambda v: np.where(np.arange(len(v)) == 700, np.nan, v)})
+        told = one_line(fit, STAGE, {"log": holed})
+        assert told.startswith(f"log: {signal} of axis x is not a finite number in 1 of 4000")
+        assert "from 0.35 s; cut the log there" in told
+    wild = with_effect(STAGE, "quadratic_drag", c=1e6)
+    law = wild.axes["x"]["quadratic_drag"]
+    endless = replace(law, values={"c": np.inf})
+    told = one_line(fit, STAGE.with_axis("x", STAGE.axes["x"].with_effect(endless)), {"log": run})
+    assert told.startswith("axis x: the force of the model is not a finite number in")
+
+
+# --- standstill -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("frequency", [5.0, 20.0, 50.0])
+def test_a_sine_moves_at_any_rate(frequency):
+    t = np.arange(4000) / 1000.0
+    x = 0.01 * np.sin(2.0 * np.pi * frequency * t)
+    assert moves(log_of(1000.0, x, x), "x")
+    assert moves(log_of(1000.0, x + np.random.default_rng(1).normal(0.0, 1e-6, len(t)), x), "x")
+
+
+def still(kind: str) -> np.ndarray:
+    rng, n = np.random.default_rng(3), 8000
+    if kind == "noise":
+        return rng.normal(0.0, 1e-6, n)
+    if kind == "between two steps":
+        return 1e-6 * np.round(0.5 + rng.normal(0.0, 0.3, n))
+    return 1e-6 * (np.arange(n) % 1000 < 500)  # a step of the encoder to and fro
+
+
+@pytest.mark.parametrize("kind", ["noise", "between two steps", "slowly to and fro"])
+def test_standstill_is_the_same_to_check_and_fit_and_told(kind):
+    moving = logged(STAGE, seconds=3.0)
+    log = log_of(RATE, still(kind), np.random.default_rng(4).normal(0.0, 0.1, 8000))
+    assert not moves(log, "x")
+    found = [f for f in check_log(log).findings if f.fault is Fault.WEAK_EXCITATION]
+    assert [f.axis for f in found] == ["x"]
+    assert not [f for f in check_log(moving).findings if f.fault is Fault.WEAK_EXCITATION]
+    model = MachineModel("s", {**PLAIN.axes, "y": AxisModel(1.0)}, RATE)
+    result = fit(model, {"run": moving, "rest": log}, {"held": log})
+    assert result.datasets["x"].still == ("rest", "held")
+    assert "left out, as axis x stands still there: rest, held" in fit_text(result)
+    assert "axis y: not fitted, as it moves in no log" in fit_text(result)
+    told = fit_json(result)
+    assert told["axes"]["x"]["left_out"] == ["rest", "held"]
+    assert told["not_fitted"] == ["y"]
+    with pytest.raises(InputError, match="no axis of the model"):
+        fit(model, {"rest": log})

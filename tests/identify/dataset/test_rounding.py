@@ -1,0 +1,157 @@
+"""The encoder's resolution: found in the readings, and the noise that it makes."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from machines import one_axis
+
+from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.motion import Motion
+from identify.dataset.noise_floor import noise_of
+from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.fit import finished, fit_axis
+from identify.selection.forward_selection import Verdict, diagnose_axis
+from twin.effects import Catalogue, load_catalogue
+from twin.experiments.named import simulate
+from twin.model.file import load_model
+from twin.model.machine import Fitted
+from twin.simulator import ReducedSimulator
+
+CATALOGUE = load_catalogue()
+STAGE = one_axis(load_model("proton_xy", CATALOGUE))
+STEP = 2.3e-7  # m
+DT = 1e-4  # s
+
+
+def moved(readings) -> Motion:
+    """A motion with these readings (n + 1,) m."""
+    n = len(readings) - 1
+    block = readings[1 : n // 10 * 10 + 1].reshape(-1, 10).mean(axis=1)
+    signals = np.stack([block, np.gradient(block, 10 * DT), np.zeros(len(block))])
+    raw = np.stack([np.diff(readings) / DT, np.zeros(n)])
+    return Motion("a log", "x", signals, np.zeros_like(signals), 10 * DT, 5 * DT, DT, 0.0, raw)
+
+
+def path(n: int = 40_001):
+    """A slow and fast motion, (n,) m."""
+    return 2e-3 * np.sin(2.0 * np.pi * 0.5 * DT * np.arange(n)) ** 3
+
+
+def rounded(x, step: float):
+    return step * np.rint(x / step)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-9, 3e-7], ids=["none", "after", "before"])
+def test_the_step_is_read_off_the_readings(noise):
+    drawn = np.random.default_rng(1).standard_normal(40_001)
+    before = rounded(path() + (noise if noise > 1e-8 else 0.0) * drawn, STEP)
+    after = rounded(before + (noise if noise < 1e-8 else 0.0) * drawn, 1e-9)
+    assert moved(after).resolution == pytest.approx(STEP, rel=1e-3)
+
+
+def test_noise_without_rounding_has_no_step():
+    noise = 1e-8 * np.random.default_rng(1).standard_normal(40_001)
+    assert moved(path() + noise).resolution == 0.0
+    assert not moved(path() + noise).rounding.any()
+
+
+def test_what_rounding_did_is_taken_back_between_slow_steps():
+    turn = 2.0 * np.pi * DT * np.arange(40_001)
+    readings = rounded(3e-5 * np.sin(turn), STEP)
+    true = readings - 3e-5 * np.sin(turn)
+    away = np.abs(np.cos(turn)) > 0.3  # at a reversal nothing tells how far it went
+    left = (moved(readings).rounding - true)[away]
+    assert np.std(left) < 0.15 * np.std(true)
+
+
+@cache
+def dataset_of(step: float) -> Dataset:
+    """Two logs and a held-out one of a machine whose encoder has that resolution."""
+    axis = STAGE.axes["x"]
+    if step:
+        effect = CATALOGUE["encoder_quantization"]
+        axis = axis.with_effect(Fitted.at_start(effect, {"step": step}))
+    machine = replace(STAGE, axes={"x": axis})
+    runs = {
+        s: simulate(machine, "tracking", seed=s, duration=8.0, simulator=ReducedSimulator)
+        for s in (1, 2, 3)
+    }
+    fit = {f"log {s}": runs[s] for s in (1, 2)}
+    return datasets(STAGE, fit, {"log 3": runs[3]})["x"]
+
+
+@pytest.fixture(scope="module")
+def coarse() -> Dataset:
+    return dataset_of(STEP)
+
+
+def test_a_floor_with_the_resolution_is_the_error_it_makes(coarse):
+    base = fit_axis(STAGE.axes["x"], coarse.fit)
+    known = Fitted.at_start(CATALOGUE["encoder_quantization"], {"step": STEP})
+    told = finished(base.axis.with_effect(known), base.begun, coarse.fit, base.outcome)
+    assert told.error == pytest.approx(base.error)  # what is read once cannot be read finer
+    assert not base.at_floor
+    assert told.at_floor
+    assert 0.8 < told.ratio < 1.2
+
+
+@pytest.mark.parametrize("step", [0.0, STEP, 2e-6])
+def test_the_noise_of_the_force_is_seen_behind_any_rounding(step):
+    """What the controller makes of the steps is not noise: it reads them off the same log."""
+    hardware = STAGE.axes["x"].hardware
+    planted = 2.0 * DT * (hardware.force_constant * hardware.current_noise) ** 2  # N^2/Hz
+    for log in dataset_of(step).fit:
+        assert log.motion.command_noise == pytest.approx(planted, rel=0.1)
+        assert noise_of(STAGE.axes["x"], log.motion).force == pytest.approx(planted, rel=0.25)
+
+
+def test_a_command_without_noise_has_none():
+    motion = dataset_of(STEP).fit[0].motion
+    still = replace(motion, raw=np.stack([motion.raw[0], np.full_like(motion.raw[1], 2.0)]))
+    assert still.command_noise == 0.0
+
+
+FEW = Catalogue(
+    CATALOGUE[name] for name in ("encoder_quantization", "encoder_delay", "quadratic_drag")
+)
+
+
+def test_it_is_named_where_it_makes_the_error_noise(coarse):
+    found = diagnose_axis(fit_axis(STAGE.axes["x"], coarse.fit), coarse, FEW)
+    assert found.named == ("encoder_quantization",)
+    assert found.verdict is Verdict.MISSING_EFFECT
+    assert found.best.is_noise
+    step = found.final.axis["encoder_quantization"].values["step"]
+    assert step == pytest.approx(STEP, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_it_is_named_beside_a_ripple_of_the_encoder(coarse):
+    """Rounding is a tone at constant speed; the search for a ripple's period takes its time."""
+    near = Catalogue([*FEW.values(), CATALOGUE["encoder_ripple"]])
+    found = diagnose_axis(fit_axis(STAGE.axes["x"], coarse.fit), coarse, near)
+    assert found.named == ("encoder_quantization",)
+
+
+def test_it_is_not_named_where_other_noise_is_larger():
+    fine = dataset_of(0.0)
+    found = diagnose_axis(fit_axis(STAGE.axes["x"], fine.fit), fine, FEW)
+    assert found.verdict is Verdict.NOTHING_MISSING
+
+
+def test_it_is_not_named_for_an_error_it_cannot_make(coarse):
+    """The resolution is there, but twice the force error that it could pretend."""
+    louder = tuple(_with_more_force(log) for log in coarse.fit)
+    dataset = replace(coarse, fit=louder, holdout=tuple(map(_with_more_force, coarse.holdout)))
+    found = diagnose_axis(fit_axis(STAGE.axes["x"], louder), dataset, FEW)
+    assert "encoder_quantization" not in found.named
+
+
+def _with_more_force(log: PreparedLog) -> PreparedLog:
+    beat = 0.03 * np.sign(np.sin(7.0 * np.sqrt(2.0) * log.motion.time) + 0.3)
+    signals = log.motion.signals + np.stack([0.0 * beat, 0.0 * beat, beat])
+    samples = log.motion.raw.shape[1] // len(beat)
+    raw = log.motion.raw + np.stack([np.zeros(log.motion.raw.shape[1]), np.repeat(beat, samples)])
+    return PreparedLog.of(replace(log.motion, signals=signals, raw=raw), log.window.length)

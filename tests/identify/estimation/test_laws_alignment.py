@@ -1,0 +1,67 @@
+"""Laws of a fit that moves the force channel: by as much as it is off, kept where it helps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from constructed import dataset_of, effect, fit_of, log_of, waves, windowed
+
+from identify.dataset.motion import motion_of
+from identify.estimation.channel_delay import fit_aligned, moved_by, realigned
+from identify.estimation.decision import RULE
+from identify.estimation.fit import fit_axis
+from twin.model.machine import AxisModel
+
+RATE, MASS = 1000.0, 1.7
+PLACE = waves((0.03, 1.3, 0.4), (0.006, 5.1, 1.0), (0.0007, 19.0, 2.0))
+
+
+def aligned(samples: float, seed: int = 5, noise: float = 1e-3, duration: float = 5.0):
+    """A log whose force channel was stamped so many samples late."""
+    t = np.arange(round(duration * RATE)) / RATE
+    s = t + (0.5 - samples) / RATE
+    push = MASS * (PLACE(s + 1e-4) - 2.0 * PLACE(s) + PLACE(s - 1e-4)) / 1e-8
+    force = push + np.random.default_rng(seed).normal(0.0, noise, len(t))
+    return windowed(motion_of(log_of(RATE, PLACE(t), force), "x", f"log {seed}"), 0.02)
+
+
+def test_a_fit_moves_the_force_by_as_much_as_it_is_off():
+    dataset = dataset_of(aligned(1.4), holdout=(aligned(1.4, 6),))
+    axis = AxisModel(1.5)
+    found, fit = fit_aligned(axis, dataset)
+    assert found.channel_delay == pytest.approx(1.4e-3, rel=0.02)
+    assert fit.axis.mass == pytest.approx(MASS, rel=3e-3)
+    assert fit.begun.mass == 1.5
+    np.testing.assert_array_equal(fit.logs[0].command, found.fit[0].command)
+    wanted = realigned(dataset, found.channel_delay)
+    np.testing.assert_allclose(found.fit[0].command, wanted.fit[0].command, atol=0.05)
+    np.testing.assert_allclose(found.holdout[0].command, wanted.holdout[0].command, atol=0.05)
+    still, fit = fit_aligned(axis, dataset_of(aligned(0.0)))
+    assert still.channel_delay == 0.0
+    assert fit.axis.mass == pytest.approx(MASS, rel=3e-3)
+
+
+def test_a_larger_model_moves_the_force_on_or_back():
+    axis = AxisModel(MASS)
+    late = dataset_of(aligned(1.4))
+    assert moved_by(fit_of(axis, *late.fit), late).channel_delay == pytest.approx(1.4e-3, rel=0.05)
+    part = realigned(late, 0.6e-3)
+    assert moved_by(fit_of(axis, *part.fit), part).channel_delay == pytest.approx(1.4e-3, rel=0.05)
+    right = dataset_of(aligned(0.0))
+    assert moved_by(fit_of(axis, *right.fit), right) is None
+    wrong = realigned(right, 0.9e-3)
+    assert moved_by(fit_of(axis, *wrong.fit), wrong).channel_delay == 0.0
+    # back only where that takes a tenth of the square away
+    base = fit_axis(axis, right.fit)
+    for part_, told in ((1.05, True), (0.95, False)):
+        error = part_ * base.error / np.sqrt(1.0 - RULE.least_fall)
+        scaled = replace(base, residual=base.residual * error / base.error)
+        found = moved_by(scaled, replace(right, channel_delay=1e-9))
+        assert (found is not None) == told
+
+
+def test_a_model_with_a_pump_sets_the_clocks_by_it():
+    dataset = dataset_of(aligned(0.0))
+    pumped = AxisModel(MASS, effects=(effect("periodic_disturbance", {"f": 23.7, "a": 0.001}),))
+    _, fit = fit_aligned(pumped, dataset)
+    assert fit.begun is pumped

@@ -1,0 +1,277 @@
+"""Laws of the force residual: zero on an exact motion, additive, and derived as it is computed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from constructed import (
+    CATALOGUE,
+    LAG,
+    PAYLOAD,
+    RIPPLE,
+    SENSING,
+    SHORT,
+    STICKY,
+    effect,
+    held,
+    log_of,
+    moved,
+    waves,
+    windowed,
+)
+from effect_runs import legal
+
+from identify.dataset.motion import motion_of
+from identify.dataset.prepared_log import (
+    REST_SPEED,
+    PreparedLog,
+    moving,
+    on_blocks,
+    sticks,
+    total_force,
+)
+from identify.dataset.test_function import TestFunction
+from identify.estimation.force_balance import (
+    averaged_force,
+    difference_step,
+    group_of,
+    jacobian,
+    residual,
+)
+from twin.effect import Kind, Parameter
+from twin.model.machine import AxisModel, Fitted, ParameterReference, free_parameters, read, write
+
+H = np.array([[-1e-4], [0.0], [1e-4]])  # s
+LOGS = [windowed(SHORT)]
+FREE = [e for e in CATALOGUE.values() if any(not p.fixed for p in e.parameters)]
+
+
+def drawn(one) -> Fitted:
+    """The effect with strengths of either sign, none like another, of a force of about 1 N."""
+    known = next((f for f in SENSING if f.effect is one), None)
+    if known:
+        return known
+    share = dict(zip(one.starts(), np.random.default_rng(3).uniform(0.2, 1.0, 200), strict=False))
+    size = {p.name: 0.4 * share[p.name] * min(p.upper, 1.0) for p in one.strengths}
+    start = {p.name: p.start * (0.8 + 0.4 * share[p.name]) for p in one.parameters if not p.fixed}
+    values = legal(one, {**one.starts(), **start, **size})
+    if one.kind in (Kind.FORCE, Kind.STRUCTURE):
+        weak = {n: 1e-3 * v if n in size else v for n, v in values.items()}
+        force = np.std(averaged_force(AxisModel(1.7, effects=(Fitted.at_start(one, weak),)), LOGS))
+        values = legal(one, {**weak, **{n: weak[n] * 0.7 / max(force, 1e-3) for n in size}})
+    return Fitted.at_start(one, values)
+
+
+def central(axis: AxisModel, logs, where) -> np.ndarray:
+    """Central differences of the whole residual, coordinate by coordinate."""
+    columns = []
+    for c in where:
+        value = read(axis, [c])[0]
+        step = abs(difference_step(c, value))
+        low, high = max(value - step, c.parameter.lower), min(value + step, c.parameter.upper)
+        ends = [residual(write(axis, [c], [v]), logs) for v in (low, high)]
+        columns.append((ends[1] - ends[0]) / (high - low))
+    return np.stack(columns, axis=1)
+
+
+def assert_derived(axis: AxisModel, where, loose: float = 2e-3) -> None:
+    """But for a fifth of the windows, where an event within a friction falls on another sample."""
+    found, wanted = jacobian(axis, LOGS, where), central(axis, LOGS, where)
+    for j, c in enumerate(where):
+        size, value = np.linalg.norm(wanted[:, j]), read(axis, [c])[0]
+        if value and size * abs(value) < 1e-5:
+            continue  # lost in rounding
+        off = np.sort(np.abs(found[:, j] - wanted[:, j]))[: -len(wanted) // 5]
+        assert np.linalg.norm(off) <= loose * min(size, np.linalg.norm(found[:, j])), c.label
+
+
+def beside(one: Fitted, *others: Fitted) -> AxisModel:
+    """The effect on an axis with those of the others that are of another name and no friction."""
+    axis = AxisModel(1.7)
+    for other in others:
+        twice = one.effect.kind is other.effect.kind is Kind.FRICTION
+        if other.effect.name != one.effect.name and not twice:
+            axis = axis.with_effect(other)
+    return axis.with_effect(one)
+
+
+@pytest.mark.parametrize("one", FREE, ids=lambda e: e.name)
+def test_the_jacobian_is_the_difference_of_the_residual_beside_every_sensing_effect(one):
+    partner = LAG if one.kind is Kind.ACTUATION else RIPPLE
+    others = [STICKY, partner, *SENSING]
+    if one.kind is not Kind.STRUCTURE:  # the answers of two structures are coupled
+        others.append(PAYLOAD)
+    axis = beside(drawn(one), *others)
+    where = [c for c in free_parameters(axis) if c.effect == one.name][:3]
+    assert_derived(axis, [c for c in free_parameters(axis) if not c.effect] + where)
+
+
+def test_the_jacobian_of_a_whole_axis_has_each_column_at_its_coordinate():
+    """Friction, its modifiers, actuation without memory and what they read of one another."""
+    loaded = effect("load_dependent_friction", {"motor": 0.11, "corner": 0.27, "offset": 0.4})
+    friction = effect("coulomb_viscous", {"Fc": 0.7, "Fs": 0.7, "sigma2": 1.3})
+    cable = effect("cable_slab", {"k1": 3.0})
+    for chain in (RIPPLE, LAG):
+        axis = AxisModel(1.3, effects=(friction, loaded, cable, chain, *SENSING[1:]))
+        where = free_parameters(axis)[::-1]
+        assert_derived(axis, where, 1e-3)
+        few = [where[k] for k in (7, 2, 4)]
+        np.testing.assert_array_equal(
+            jacobian(axis, LOGS, few), jacobian(axis, LOGS, where)[:, [7, 2, 4]]
+        )
+
+
+def test_what_does_not_act_on_an_effect_is_left_out_of_its_group():
+    axis = AxisModel(1.3, effects=(STICKY, RIPPLE, PAYLOAD, *SENSING))
+    sensing = {f.effect.name for f in SENSING}
+    assert set(group_of(axis, "payload_mass").names) == {"payload_mass", *sensing}
+    assert set(group_of(axis, "lugre").names) == {"lugre", *sensing}
+    late = AxisModel(1.3, effects=(STICKY, LAG, PAYLOAD, *SENSING))
+    assert set(group_of(late, "lugre").names) == {"lugre", *sensing}
+    assert set(group_of(late, "actuator_lag").names) == {"actuator_lag", *sensing}
+    assert group_of(late, "encoder_delay") == late
+
+
+def test_a_friction_that_follows_the_actual_force_is_in_one_group_with_its_drive():
+    load = effect("load_dependent_friction", {"motor": 0.07})
+    axis = AxisModel(1.3, effects=(STICKY, load, LAG, RIPPLE, PAYLOAD, SENSING[0]))
+    chain = {"actuator_lag", "force_constant_ripple"}
+    joint = {"lugre", "load_dependent_friction", *chain, SENSING[0].effect.name}
+    for name in ("lugre", "load_dependent_friction", *chain):
+        assert set(group_of(axis, name).names) == joint
+    where = [c for c in free_parameters(axis) if c.effect in joint]
+    columns = jacobian(axis, LOGS, where)
+    base = residual(axis, LOGS)
+    for c, column in zip(where, columns.T, strict=True):
+        value = read(axis, [c])[0]
+        step = difference_step(c, value)
+        whole = (residual(write(axis, [c], [value + step]), LOGS) - base) / step
+        np.testing.assert_allclose(column, whole, atol=2e-3 * np.abs(whole).max())
+
+
+# --- the residual -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rate", [1000.0, 4000.0])
+def test_the_residual_of_an_exactly_integrated_motion_is_zero(rate):
+    """A held force on a free mass: the weak form is an identity, not an approximation."""
+    t = np.arange(round(1.1 * rate)) / rate
+    force = waves((3.0, 2.7, 0.3), (1.0, 31.0, 1.1))(t)
+    x = held(force, 1.7, 1.0 / rate, 0.03, -0.02)
+    log = windowed(motion_of(log_of(rate, x, force), "x", "log"))
+    assert np.abs(residual(AxisModel(1.7), [log])).max() < 1e-7
+    # a mass dm too large leaves -dm a
+    left = residual(AxisModel(1.9), [log])
+    np.testing.assert_allclose(left, -0.2 / 1.7 * log.command, atol=1e-7)
+    pushed = AxisModel(1.7, effects=(effect("constant_force", {"F0": 0.37}),))
+    np.testing.assert_allclose(residual(pushed, [log]), 0.37, rtol=1e-6)
+
+
+def test_forces_of_known_form_are_taken_away_by_their_effects():
+    """A cable, a drag and a pump move a mass beside the command: command + they = mass x a."""
+    rate, mass, clock = 4000.0, 1.3, 0.057
+    x = waves((0.03, 2.3, 0.4), (0.004, 7.1, 1.0))
+    t = (np.arange(round(1.2 * rate)) + 0.5) / rate
+    speed, acceleration = (
+        (x(t + 1e-4) - x(t - 1e-4)) / 2e-4,
+        np.diff(x(t + H), 2, axis=0)[0] / 1e-8,
+    )
+    cable, drag = -12.0 * x(t) - 0.2, -0.9 * speed * np.abs(speed)
+    pump = 0.4 * np.sin(2.0 * np.pi * 11.0 * (t + clock))
+    motion = motion_of(
+        log_of(rate, x(t - 0.5 / rate), mass * acceleration - cable - drag - pump), "x", ""
+    )
+    log = windowed(replace(motion, time_origin=clock))
+    effects = (
+        effect("cable_slab", {"k1": 12.0, "offset": 0.2}),
+        effect("quadratic_drag", {"c": 0.9}),
+        effect("periodic_disturbance", {"f": 11.0, "a": 0.4}),
+    )
+    assert np.abs(residual(AxisModel(mass, effects=effects), [log])).max() < 2e-3
+    for k in range(3):
+        rest = AxisModel(mass, effects=effects[:k] + effects[k + 1 :])
+        assert np.abs(residual(rest, [log])).max() > 0.05
+
+
+def test_the_residual_is_additive_over_effects_that_act_alone():
+    parts = (effect("cable_slab", {"k1": 3.1}), effect("quadratic_drag", {"c": 0.7}), PAYLOAD)
+    whole = averaged_force(AxisModel(1.3, effects=parts), LOGS)
+    alone = [averaged_force(AxisModel(1.3, effects=(p,)), LOGS) for p in parts]
+    assert min(np.std(a) for a in alone) > 1e-3
+    np.testing.assert_allclose(whole, sum(alone), atol=1e-12)
+    bare = residual(AxisModel(1.3), LOGS)
+    np.testing.assert_allclose(residual(AxisModel(1.3, effects=parts), LOGS), bare + whole)
+
+
+def test_the_residual_of_logs_in_a_row_is_theirs_in_a_row():
+    other = windowed(moved(np.random.default_rng(5), 1.3, 1000.0), 0.04)
+    axis = AxisModel(1.3, effects=(STICKY, LAG, PAYLOAD, *SENSING))
+    both, apart = (*LOGS, other), [residual(axis, [log]) for log in (*LOGS, other)]
+    np.testing.assert_array_equal(residual(axis, both), np.concatenate(apart))
+    where = free_parameters(axis)[::4]
+    columns = [jacobian(axis, [log], where) for log in both]
+    np.testing.assert_allclose(jacobian(axis, both, where), np.vstack(columns), rtol=1e-9)
+
+
+def test_blocks_take_what_acts_between_actuator_and_encoder():
+    axis = AxisModel(1.3, effects=(STICKY, RIPPLE, PAYLOAD, effect("wear"), *SENSING))
+    names = {name for _, name in on_blocks(axis).labels}
+    assert names == {"lugre", "payload_mass", "wear"}
+    assert not total_force(on_blocks(AxisModel(1.0)), SHORT).any()
+    assert len(total_force(on_blocks(AxisModel(1.0)), SHORT)) == len(SHORT.time)
+
+
+def test_a_log_in_windows_has_the_time_of_their_middles():
+    log = LOGS[0]
+    step = log.window.stride * log.window.period
+    first = SHORT.time[0] + 0.5 * (len(log.window.weights) - 1) * SHORT.period
+    np.testing.assert_allclose(log.time, first + step * np.arange(len(log)))
+    assert len(log) == len(log.time) == len(log.acceleration)
+
+
+def test_a_step_of_a_difference_stays_in_the_bounds_and_is_small():
+    p = Parameter("a", "N", 2.0, 0.0, 5.0, "", strength=True)
+    wide = Parameter("b", "N", 0.0, -1e4, 1e4, "", strength=True)
+    assert difference_step(ParameterReference("e", p), 3.0) == pytest.approx(3e-5)
+    assert difference_step(ParameterReference("e", p), -3.0) == pytest.approx(3e-5)
+    assert difference_step(ParameterReference("e", p), 0.5) == pytest.approx(
+        2e-5
+    )  # the start's size
+    assert difference_step(ParameterReference("e", p), 5.0) == pytest.approx(-5e-5)
+    assert difference_step(ParameterReference("e", wide), 0.0) == pytest.approx(1e-8)
+    narrow = replace(wide, lower=-30.0, upper=20.0)
+    assert difference_step(ParameterReference("e", narrow), 0.0) == pytest.approx(5e-10)
+    step = difference_step(ParameterReference("e", p), 2.5)
+    assert difference_step(ParameterReference("e", replace(p, upper=2.5 + step)), 2.5) == step
+
+
+# --- standstill ---------------------------------------------------------------------------------
+
+
+def test_windows_with_standstill_are_left_out_for_a_friction_that_sticks_alone():
+    velocity = np.full(800, 0.3)
+    velocity[200:260] = 0.9 * REST_SPEED * 0.3
+    velocity[500:560] = -1.1 * REST_SPEED * 0.3
+    motion = replace(
+        SHORT, signals=np.stack([velocity, velocity, velocity]), raw=np.zeros((2, 800))
+    )
+    window = TestFunction.of_length(0.04, motion.period)
+    log = PreparedLog(motion, window, window, window.mean(velocity), window.mean(velocity))
+    kept = moving([log, log], True)
+    starts = np.arange(len(log)) * window.stride
+    overlap = np.clip(np.minimum(starts + 40, 260) - np.maximum(starts, 200), 0, None)
+    assert not kept[: len(log)][overlap > 10].any()
+    assert kept[: len(log)][overlap == 0].all()
+    # a window whose weight on the standstill is just under and just over 2 %
+    part = np.cumsum(window.weights)
+    for n, wanted in ((int(np.sum(part < 0.02)), True), (int(np.sum(part < 0.02)) + 1, False)):
+        still = np.full(40, 0.3)
+        still[:n] = 0.0
+        one = replace(motion, signals=np.stack([still, still, still]), raw=np.zeros((2, 40)))
+        found = moving([PreparedLog(one, window, window, np.zeros(1), np.zeros(1))], True)
+        assert found.tolist() == [wanted]
+    np.testing.assert_array_equal(kept[: len(log)], kept[len(log) :])
+    assert moving([log, log], False).all()
+    assert len(moving([log, log], False)) == 2 * len(log)
+    assert sticks(AxisModel(1.0, effects=(PAYLOAD, effect("coulomb_viscous"))))
+    assert not sticks(AxisModel(1.0, effects=(PAYLOAD, effect("lugre"))))

@@ -1,0 +1,275 @@
+"""The search of an effect's shape: each linear step is the least-squares solution it stands for."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from built_fits import CATALOGUE, PLAIN, axis_of, built_fit, built_study, fitted
+
+from identify.estimation import variable_projection as search
+from identify.estimation.evidence import effective_samples
+from identify.estimation.fit import Outcome, finished
+from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.variable_projection import (
+    Start,
+    _best,
+    _bounded_step,
+    _clipped,
+    _Ground,
+    _try,
+    _with_lines_left,
+    _worth_all,
+    starts,
+    stepped,
+    tried_shapes,
+)
+from twin.effect import Excitation
+from twin.model.machine import Fitted, ParameterReference
+
+# The rules as they were decided.
+BETTER, CHANCE, FULL_SHAPES, REFINED_STARTS = 0.99, 4.0, 4, 2
+RESCORED_SHAPES, RESIDUAL_LINES = 24, 12
+RNG = np.random.default_rng(3)
+SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    return built_study("one", "two")
+
+
+@pytest.fixture(scope="module")
+def base(dataset):
+    """The axis off its best values, with the residual and Jacobian that it has there."""
+    off = replace(axis_of(fitted("constant_force", F0=0.2)), mass=5.6)
+    return finished(off, PLAIN, dataset.fit, Outcome.CONVERGED)
+
+
+# --- one linear step ------------------------------------------------------------------------
+
+
+def test_a_step_within_bounds_is_the_least_squares_beside_the_base():
+    n = 300
+    basis = np.linalg.qr(RNG.standard_normal((n, 3)))[0]
+    columns, force = RNG.standard_normal((n, 2)), RNG.standard_normal(n)
+    effect = CATALOGUE["axis_coupling"]
+    first = Fitted.at_start(effect)
+    where = [ParameterReference(effect.name, p) for p in effect.strengths]
+    found, squared = _bounded_step(basis, force, columns, where, first)
+    both = np.hstack([columns, basis])
+    solution = np.linalg.lstsq(both, -force, rcond=None)[0]
+    np.testing.assert_allclose(found, solution[:2], rtol=1e-5)
+    assert squared == pytest.approx(float(np.sum((force + both @ solution) ** 2)), rel=1e-6)
+
+
+def test_a_step_beyond_a_bound_stops_there_and_the_others_follow():
+    n = 400
+    columns = RNG.standard_normal((n, 2)) * (0.2, 30.0)
+    effect = CATALOGUE["coulomb_viscous"]
+    own = {p.name: p for p in effect.parameters}
+    where = [ParameterReference(effect.name, own[name]) for name in ("Fc", "sigma2")]
+    first = Fitted.at_start(effect, {"Fc": 0.5, "Fs": 0.6, "sigma2": 0.1})
+    columns[:, 1] += 20.0 * columns[:, 0]
+    wanted = np.array([-4.0, 0.3])  # Fc would end at -3.5 N, below its bound of 0
+    force = -columns @ wanted + 0.01 * RNG.standard_normal(n)
+    nothing = np.zeros((n, 0))
+    found, squared = _bounded_step(nothing, force, columns, where, first)
+    assert found[0] == pytest.approx(0.0, abs=1e-6)
+    rest = force + columns[:, 0] * -0.5
+    step = -float(columns[:, 1] @ rest) / float(columns[:, 1] @ columns[:, 1])
+    assert found[1] == pytest.approx(0.1 + step, rel=1e-4)
+    left = rest + columns[:, 1] * step
+    assert squared == pytest.approx(float(left @ left), rel=1e-3)
+
+
+@pytest.mark.parametrize("wanted", [-0.9, 2e4])
+def test_a_strength_alone_stops_at_either_bound(wanted):
+    column = RNG.standard_normal((300, 1))
+    effect = CATALOGUE["coulomb_viscous"]
+    where = [ParameterReference(effect.name, effect.parameter("Fc"))]
+    first = Fitted.at_start(effect, {"Fc": 0.5, "Fs": 0.6})
+    found, _ = _bounded_step(
+        np.zeros((300, 0)), -column[:, 0] * (wanted - 0.5), column, where, first
+    )
+    assert found[0] == pytest.approx(0.0 if wanted < 0.0 else 1e4, abs=1e-4)
+
+
+def test_a_ridge_decides_where_the_base_explains_a_strength_already():
+    n = 200
+    column = RNG.standard_normal((n, 1))
+    basis = column / np.linalg.norm(column)
+    effect = CATALOGUE["constant_force"]
+    where = [ParameterReference(effect.name, effect.parameters[0])]
+    found, _ = _bounded_step(basis, RNG.standard_normal(n), column, where, Fitted.at_start(effect))
+    assert abs(found[0]) < 1e-3
+
+
+@pytest.mark.parametrize("name", ["axis_coupling", "cogging", "coulomb_viscous"])
+def test_a_try_of_a_linear_effect_is_the_joint_least_squares(dataset, base, name):
+    effect = CATALOGUE[name]
+    shape = {"p": 0.021} if name == "cogging" else {}
+    ground = _Ground.of(base, dataset, effect, SEEN, on_heads=False)
+    found = _try(ground, shape, effect.strengths)
+    at = Fitted.at_start(effect, {**effect.starts(SEEN), **shape})
+    where = [ParameterReference(effect.name, p) for p in effect.strengths if not p.fixed]
+    axis = base.axis.with_effect(at)  # a friction takes the place of the old one
+    own = jacobian(axis, dataset.fit, where)[base.kept]
+    both = np.hstack([own, ground.basis])
+    force = residual(axis, dataset.fit)[base.kept]
+    step, *_ = np.linalg.lstsq(both / np.linalg.norm(both, axis=0), -force, rcond=None)
+    step = step / np.linalg.norm(both, axis=0)
+    left = force + both @ step
+    assert found.squared_error == pytest.approx(float(left @ left), rel=1e-4)
+    values = [found.fitted.values[c.parameter.name] for c in where]
+    start = [at.values[c.parameter.name] for c in where]
+    np.testing.assert_allclose(np.array(values) - start, step[: len(where)], rtol=0.02)
+    assert found.shape == shape
+    assert shape.items() <= found.fitted.values.items()
+
+
+def test_a_friction_is_tried_in_the_place_of_the_old_one(dataset, base):
+    ground = _Ground.of(base, dataset, CATALOGUE["lugre"], SEEN, on_heads=False)
+    assert ground.rest.names == ("constant_force",)
+    other = _Ground.of(base, dataset, CATALOGUE["cogging"], SEEN, on_heads=False)
+    assert other.rest.names == base.axis.names
+    assert other.basis.shape[1] == len(base.scaling.where)
+    assert ground.basis.shape[1] == len(base.scaling.where) - 2  # Fc, sigma2
+
+
+def test_a_ground_on_the_heads_is_that_part_of_the_whole(base, monkeypatch):
+    dataset = built_study("one", "two")
+    heads = tuple(type(w).of(w.motion.head(1.1), w.window.length) for w in dataset.fit)
+    dataset.__dict__["heads"] = heads
+    head = _Ground.of(base, dataset, CATALOGUE["cogging"], SEEN, on_heads=True)
+    whole = _Ground.of(base, dataset, CATALOGUE["cogging"], SEEN, on_heads=False)
+    assert (head.logs, whole.logs) == (heads, dataset.fit)
+    rows = dataset.in_heads[base.kept]
+    assert 0 < rows.sum() < len(rows)
+    np.testing.assert_array_equal(head.unchanged, base.residual[rows])
+    np.testing.assert_array_equal(whole.unchanged, base.residual)
+    assert len(head.kept) == sum(map(len, heads))
+    assert head.kept.sum() == rows.sum()
+    np.testing.assert_allclose(head.basis.T @ head.basis, np.eye(head.basis.shape[1]), atol=1e-9)
+    columns = base.jacobian[rows]
+    np.testing.assert_allclose(head.basis @ (head.basis.T @ columns), columns, atol=1e-6)
+
+
+def test_the_base_moves_along_by_one_linear_step_within_its_bounds(dataset, base):
+    added = fitted("quadratic_drag")
+    moved = stepped(base, added, dataset.fit)
+    assert moved.names == (*base.axis.names, "quadratic_drag")
+    left = residual(moved, dataset.fit)[base.kept]
+    norms = np.linalg.norm(base.jacobian, axis=0)
+    # All is linear here but that a bound may hold: what is left is normal to the columns.
+    np.testing.assert_allclose(base.jacobian.T @ left / norms, 0.0, atol=1e-3)
+    assert moved.mass != base.axis.mass
+    lugre = stepped(base, fitted("lugre"), dataset.fit)
+    assert lugre.names == ("constant_force", "lugre")
+    assert lugre["lugre"].values == fitted("lugre").values
+    tight = replace(base, residual=base.residual)
+    tight.__dict__["jacobian"] = base.jacobian * -1e-9  # steps of a huge size, the wrong way
+    far = stepped(tight, added, dataset.fit)
+    for f in far.effects[:2]:
+        for p in f.effect.parameters:
+            assert p.lower <= f.values[p.name] <= p.upper
+
+
+# --- which shapes ---------------------------------------------------------------------------
+
+
+def test_every_combination_of_the_scanned_values_is_tried_once():
+    effect = CATALOGUE["end_stop"]
+    scanned = {p.name: list(p.scan(SEEN)) for p in effect.parameters if p.scan}
+    assert scanned
+    found = [tuple(s.items()) for s in tried_shapes(effect, SEEN)]
+    expected = [
+        tuple(zip(scanned, values, strict=True)) for values in itertools.product(*scanned.values())
+    ]
+    assert found == expected
+    assert list(tried_shapes(CATALOGUE["constant_force"], SEEN)) == [{}]
+
+
+def test_a_shape_starts_from_the_data_within_its_bounds():
+    effect = CATALOGUE["coulomb_viscous"]
+    found = _clipped(effect, replace(SEEN, dry_level=0.37), {"sigma2": -2.0, "Fs": 1e9})
+    assert found == {"Fc": 0.37, "Fs": 1e4, "sigma2": 0.0}
+
+
+def test_the_best_tries_come_first_and_no_more_than_asked(monkeypatch):
+    errors = [5.0, 1.0, 4.0, 2.0, 3.0]
+    tried = [Start(0.0, {"i": i}, None) for i in range(5)]
+    monkeypatch.setattr(
+        search, "_try", lambda g, shape, s: Start(errors[int(shape["i"])], {**shape, "s": s}, None)
+    )
+    found = _best(None, tried, "all", 3)
+    assert [(s.squared_error, s.shape["i"], s.shape["s"]) for s in found] == [
+        (1.0, 1, "all"), (2.0, 3, "all"), (3.0, 4, "all"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("effect", "shapes", "worth", "rounds"),
+    [
+        ("quadratic_drag", 1, True, [("whole", 1, 1)]),
+        ("dahl", FULL_SHAPES, True, [("whole", FULL_SHAPES, 2)]),
+        ("dahl", 5, False, [("head", 5, 2), ("whole", FULL_SHAPES, 2)]),
+        ("backlash", 5, True, [("head", 5, 1), ("whole", FULL_SHAPES, 1)]),
+        ("backlash", 5, False, [("head", 5, 1), ("whole", 1, 1)]),
+        ("cogging", RESCORED_SHAPES, True, [("head", 24, 6), ("whole", 4, 6)]),
+        ("cogging", 25, True, [("head", 25, 2), ("head", 24, 6), ("whole", 4, 6)]),
+        ("end_stop", 25, True, [("head", 25, None), ("whole", 4, None)]),
+    ],
+)
+def test_many_shapes_are_sifted_on_the_heads_first(monkeypatch, effect, shapes, worth, rounds):
+    seen = []
+    effect = CATALOGUE[effect]
+
+    def best(ground, tried, strengths, count):
+        assert all(isinstance(s.fitted, Fitted) and "i" in s.shape for s in tried)
+        seen.append((ground, len(tried), len(strengths)))
+        return list(tried)[:count]
+
+    monkeypatch.setattr(search, "_with_lines_left", lambda base, dataset: SEEN)
+    monkeypatch.setattr(search, "tried_shapes", lambda e, x: ({"i": i} for i in range(shapes)))
+    monkeypatch.setattr(search, "_best", best)
+    monkeypatch.setattr(search, "_worth_all", lambda *_: worth)
+
+    def of(*given, on_heads):
+        assert given == ("base", "dataset", effect, SEEN)
+        return "head" if on_heads else "whole"
+
+    monkeypatch.setattr(search, "_Ground", SimpleNamespace(of=of))
+    found = starts("base", "dataset", effect)
+    full = len(effect.strengths)
+    assert seen == [(g, n, full if k is None else k) for g, n, k in rounds]
+    assert len(found) == min(REFINED_STARTS, rounds[-1][1])
+
+
+def test_more_than_one_shape_deserves_a_try_where_the_gain_is_no_chance():
+    noise = RNG.standard_normal(900)
+    base = built_fit(0.0, residual=noise)
+    n = effective_samples(noise)
+    head, whole = (SimpleNamespace(unchanged=noise[:k]) for k in (300, 900))
+    before = float(np.sum(noise[:300] ** 2))
+    for effect in ("constant_force", "axis_coupling"):
+        free = len(CATALOGUE[effect].strengths)
+        for part, worth in ((0.98, False), (1.02, True)):
+            gain = part * CHANCE * free * 900 / 300
+            start = Start(before * np.exp(-gain / n), {}, fitted(effect))
+            assert _worth_all(base, head, whole, start) is worth
+
+
+def test_a_tone_in_the_residual_is_among_the_first_lines_tried(dataset):
+    base = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
+    tone = np.concatenate([np.sin(2.0 * np.pi * 7.3 * w.time) for w in dataset.fit])
+    loud = replace(base, residual=tone[base.kept])
+    known = replace(dataset, excitation=replace(SEEN, lines=(3.21, 4.56)))
+    found = _with_lines_left(loud, known)
+    assert found.lines[-2:] == (3.21, 4.56)
+    assert abs(found.lines[0] - 7.3) < 0.5
+    assert len(found.lines) <= RESIDUAL_LINES + 2
+    assert replace(found, lines=()) == replace(known.excitation, lines=())

@@ -1,0 +1,88 @@
+"""A shape is sought anew where the first fit leaves more than noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from built_fits import PLAIN, axis_of, built_fit, built_study, fitted
+
+from identify.estimation import variable_projection as search
+from identify.estimation.fit import Outcome, finished
+from identify.estimation.force_balance import residual
+from identify.estimation.variable_projection import (
+    Start,
+    fit_thoroughly,
+    fit_without,
+)
+from twin.effect import Excitation
+
+# The rules as they were decided.
+BETTER, CHANCE, FULL_SHAPES, REFINED_STARTS = 0.99, 4.0, 4, 2
+RESCORED_SHAPES, RESIDUAL_LINES = 24, 12
+RNG = np.random.default_rng(3)
+SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    return built_study("one", "two")
+
+
+@pytest.fixture(scope="module")
+def base(dataset):
+    """The axis off its best values, with the residual and Jacobian that it has there."""
+    off = replace(axis_of(fitted("constant_force", F0=0.2)), mass=5.6)
+    return finished(off, PLAIN, dataset.fit, Outcome.CONVERGED)
+
+
+# --- fitted thoroughly ----------------------------------------------------------------------
+
+
+def thorough(monkeypatch, again, first=4.0, floor=1.0):
+    """fit_thoroughly of an axis with two effects, one with a shape; the axes fitted."""
+    axes, errors = [], [first, first * again]
+    shape = fitted("cogging", p=0.02, a1=0.4)
+    held = replace(shape, fixed=frozenset({"b1"}), values={**shape.values, "b1": 0.77})
+    axis = axis_of(fitted("constant_force"), held)
+
+    def fit_axis(axis, logs):
+        axes.append(axis)
+        return built_fit(errors.pop(0), floor, axis=axis)
+
+    def started(rest, dataset, effect):
+        assert "cogging" not in rest.axis.names
+        return [Start(0.0, {}, fitted("cogging", p=0.03, a1=0.9, b1=0.5)), None]
+
+    monkeypatch.setattr(search, "fit_axis", fit_axis)
+    monkeypatch.setattr(search, "starts", started)
+    monkeypatch.setattr(
+        search, "fit_without", lambda fit, dataset, name: built_fit(9.0, axis=axis.without(name))
+    )
+    return fit_thoroughly(axis, SimpleNamespace(fit=())), axes, axis
+
+
+@pytest.mark.parametrize(("again", "taken"), [(BETTER - 0.001, True), (BETTER + 0.001, False)])
+def test_a_shape_found_anew_is_taken_where_it_is_better(monkeypatch, again, taken):
+    found, axes, axis = thorough(monkeypatch, again)
+    assert len(axes) == 2
+    values = axes[1]["cogging"].values
+    assert (values["p"], values["a1"], values["b1"]) == (0.03, 0.9, 0.77)
+    assert axes[1]["cogging"].fixed == {"b1"}
+    assert found.error == pytest.approx(4.0 * again if taken else 4.0)
+    assert found.begun is axis
+
+
+def test_at_the_floor_no_shape_is_sought_anew(monkeypatch):
+    assert len(thorough(monkeypatch, 0.1, first=1.2)[1]) == 1
+
+
+def test_without_an_effect_the_rest_stays_where_it_was(dataset, base):
+    found = fit_without(base, dataset, "constant_force")
+    assert found.axis == base.axis.without("constant_force")
+    assert (found.begun, found.outcome) == (base.begun, base.outcome)
+    np.testing.assert_allclose(
+        found.residual, residual(base.axis, dataset.fit)[found.kept] - 0.2, atol=1e-9
+    )

@@ -1,0 +1,133 @@
+"""Laws of coverage: what the logs lack is where a difference lives and the data do not."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from constructed import SHORT, moved, windowed
+
+from identify.dataset.prepared_log import REST_SPEED
+from identify.experiment_design import missing_excitation as coverage
+from identify.experiment_design.missing_excitation import (
+    FEATURES,
+    RARE,
+    Feature,
+    Gap,
+    _inside,
+    _weighted_quantiles,
+    gap,
+)
+from twin.model.units import LINEAR
+
+LOG = windowed(SHORT)
+FEATURE = {f.name: f for f in FEATURES}
+
+
+def test_features_are_windowed_properties_of_the_motion():
+    m, w = SHORT, LOG.window
+    for name, wanted in {
+        "speed": np.abs(w.mean(m.velocity)),
+        "acceleration": np.abs(LOG.acceleration),
+        "motor force": np.abs(LOG.command),
+        "rate of change of the motor force": np.abs(w.mean(np.gradient(m.command, m.period))),
+        "speed of the other axis": np.abs(w.mean(m.others[1])),
+        "acceleration of the other axis": np.abs(w.mean(m.others[2])),
+    }.items():
+        found = FEATURE[name].of(LOG)
+        np.testing.assert_allclose(found, wanted, atol=0.01 * np.ptp(wanted))
+
+
+def test_a_rest_is_the_time_stood_before_the_motion():
+    """Walked sample by sample: how long the last standstill was, while it lasts how long so far."""
+    for length, rounded in ((84, 0.3), (116, 0.3), (83, 0.2), (117, 0.4)):  # of 3 ms each
+        speed = np.full(1000, 0.2)
+        speed[100 : 100 + length] = 0.99 * REST_SPEED * 0.2
+        speed[600:620] = -0.5 * REST_SPEED * 0.2
+        speed[700:900] = 3.0 * REST_SPEED * 0.2
+        motion = replace(SHORT, signals=np.stack([speed, speed, speed]), period=3e-3)
+        log = replace(LOG, motion=motion)
+        stood, last, rest = 0, 0.0, []
+        for v in speed:
+            stood = stood + 1 if abs(v) < REST_SPEED * 0.2 else 0
+            last = stood * motion.period if stood else last
+            rest.append(last)
+        wanted = np.round(log.window.mean(np.array(rest)), 1)
+        np.testing.assert_allclose(FEATURE["rest before the motion"].of(log), wanted)
+        assert wanted.max() == pytest.approx(rounded)
+    assert FEATURE["distance since the last reversal"].unit == "m"
+
+
+def test_quantiles_are_those_of_the_weight():
+    rng = np.random.default_rng(1)
+    values, weights = rng.normal(size=200), rng.integers(0, 5, 200).astype(float)
+    repeated = np.sort(np.repeat(values, weights.astype(int)))
+    n = len(repeated)
+    low, high = _weighted_quantiles(values, weights)
+    assert low == repeated[int(np.ceil(0.25 * n)) - 1]
+    assert high == repeated[int(np.ceil(0.75 * n)) - 1]
+    assert _weighted_quantiles(values, 0.0 * weights) == (values.min(), values.max())
+    assert _inside(np.array([1.0, 2.0, 3.0, 4.0]), 2.0, 3.0) == 0.5
+
+
+def test_the_gap_is_where_the_difference_is_and_the_data_are_not():
+    planned = windowed(moved(np.random.default_rng(2), 2.0, 1000.0))
+    speed = FEATURE["speed"].of(planned)
+    where = (speed > np.quantile(speed, 0.8)).astype(float)
+    slow = windowed(replace(SHORT, signals=SHORT.signals * [[1.0], [1e-3], [1.0]]))
+    found = gap(planned, where, [slow])
+    assert found.feature == "speed"
+    assert found.share == 0.0
+    ordered = np.sort(speed[where > 0])
+    assert found.low == pytest.approx(np.quantile(ordered, 0.25), rel=0.05)
+    assert found.high == pytest.approx(np.quantile(ordered, 0.75), rel=0.05)
+    alone = gap(planned, where, [])
+    assert alone.share is None
+    assert alone.feature == "speed"
+    held = gap(planned, np.ones(len(speed)), [planned])
+    assert held.share > 0.4
+
+
+class Windows(dict):
+    """Features by name, of a motion in linear units."""
+
+    motion = SimpleNamespace(units=LINEAR)
+
+
+@pytest.mark.parametrize(
+    ("inside", "shares", "wanted"),
+    [
+        ((50, 10), (0, 0), "b"),  # what tells the windows of the difference from the others
+        ((20, 30), (10, 2), "b"),  # what the data miss more
+        ((10, 90), (3, 1), "a"),  # but not where it tells nothing
+        ((30, 20), (4, 1), "b"),
+        ((10, 20), (1, 0), "a"),
+    ],
+)
+def test_a_gap_weighs_how_much_is_missed_by_how_well_it_tells(monkeypatch, inside, shares, wanted):
+    """Windows of the difference have 1 to 2 of a feature, so have some others, and some data."""
+    names = ("a", "b")
+    ones = np.tile([1.0, 1.5, 1.5, 1.5, 2.0], 2)
+
+    def log(counts, first):
+        parts = [np.concatenate([first, np.full(n, 1.5), np.full(100 - n, 9.0)]) for n in counts]
+        return Windows(zip(names, parts, strict=True), still=np.zeros(len(parts[0])))
+
+    monkeypatch.setattr(
+        coverage, "FEATURES", [Feature(n, "m", lambda log, n=n: log[n]) for n in ("still", *names)]
+    )
+    planned = log([n - 10 for n in inside], ones)
+    where = np.concatenate([np.ones(10), np.zeros(100)])
+    found = gap(planned, where, [log(shares, np.zeros(0))])
+    assert found.feature == wanted
+    assert found.share == pytest.approx(shares[names.index(wanted)] / 100.0)
+    assert (found.low, found.high) == (1.5, 1.5)
+
+
+def test_a_gap_says_whether_motion_is_missing():
+    def said(share):
+        return Gap("speed", "m/s", 0.1, 0.25, share).in_words()
+
+    assert said(None) == "it shows most at speed 0.1 to 0.25 m/s"
+    assert said(0.98 * RARE).startswith("missing motion: speed 0.1 to 0.25 m/s; 4.9 % of the data")
+    assert said(RARE).startswith("no motion is missing, but more of it is needed at speed 0.1")

@@ -1,0 +1,311 @@
+"""Laws of planted effects and of the free run: the strength asked, and a motion reproduced."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from constructed import (
+    CATALOGUE,
+    COVERED,
+    dataset_of,
+    effect,
+    fit_of,
+    held,
+    log_of,
+    moved,
+    waves,
+    windowed,
+)
+
+from identify.dataset.drive import reading_error
+from identify.dataset.motion import motion_of
+from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.fit import rms
+from identify.estimation.force_balance import residual
+from identify.experiment_design.planting import (
+    SHAPE_SPREAD,
+    SPREAD,
+    _drawn_shape,
+    added_force,
+    draw_effect,
+    hidden_part,
+    other_machine,
+    strength_for,
+    visible_force,
+)
+from identify.validation.free_run import (
+    START_FIT,
+    WINDOW,
+    FreeRun,
+    _as_logged,
+    _local_motion,
+    _states_at,
+    free_run,
+    rms_error,
+)
+from twin.core.native import walk
+from twin.effect import Parameter
+from twin.model.machine import AxisModel, Hardware, MachineModel, axis_table, free_parameters, read
+from twin.simulator import MujocoSimulator, ReducedSimulator
+
+LOGS = [
+    windowed(moved(np.random.default_rng(s), 1.0, 1000.0).head(n)) for s, n in ((1, 0.5), (2, 0.3))
+]
+AXIS = AxisModel(
+    1.7,
+    effects=(
+        effect("lugre", {"Fc": 0.31, "Fs": 0.33, "v0": 0.013, "sigma2": 1.9}),
+        effect("cable_slab", {"offset": 0.2, "k1": -3.0}),
+    ),
+)
+
+# --- planting -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name", ["cogging", "cable_slab", "quadratic_drag", "encoder_delay", "encoder_quantization"]
+)
+def test_a_drawn_effect_has_the_force_that_was_asked(name):
+    bare = AxisModel(1.7)
+    for force, seed in ((0.03, 1), (0.11, 2)):
+        found = draw_effect(
+            CATALOGUE[name], bare, LOGS, COVERED, force, np.random.default_rng(seed)
+        )
+        if name == "encoder_quantization":
+            alone = AxisModel(1.7, effects=(found,))
+            parts = [1.7 * w.fine.acceleration(reading_error(alone, w.motion)[1]) for w in LOGS]
+            assert rms(np.concatenate(parts)) == pytest.approx(force, rel=0.05)
+            continue
+        added = residual(bare.with_effect(found), LOGS) - residual(bare, LOGS)
+        assert rms(added) == pytest.approx(force, rel=1e-3)
+        np.testing.assert_allclose(added_force(found, bare, LOGS, residual(bare, LOGS)), added)
+
+
+def test_beside_a_fit_only_what_its_parameters_cannot_take_over_counts():
+    fit = fit_of(AXIS, *LOGS)
+    rng = np.random.default_rng(3)
+    found = draw_effect(CATALOGUE["cogging"], AXIS, LOGS, COVERED, 0.2, rng, fit)
+    added = residual(AXIS.with_effect(found), LOGS) - residual(AXIS, LOGS)
+    columns = fit.jacobian / np.linalg.norm(fit.jacobian, axis=0)
+    left = added - columns @ np.linalg.lstsq(columns, added, rcond=1e-6)[0]
+    assert rms(left) == pytest.approx(0.2, rel=2e-2)
+    assert rms(added) > rms(left)
+    assert visible_force(found, fit, dataset_of(*LOGS)) == pytest.approx(rms(left), rel=2e-2)
+    hidden = hidden_part(found, fit, dataset_of(*LOGS))
+    assert hidden == pytest.approx(1.0 - rms(left) / rms(added), abs=0.02)
+    tilt = effect("constant_force", {"F0": 0.7})
+    assert hidden_part(tilt, fit, dataset_of(*LOGS)) == pytest.approx(1.0, abs=1e-3)
+    assert hidden_part(effect("constant_force"), fit, dataset_of(*LOGS)) == 1.0
+
+
+def test_strengths_are_scaled_in_their_direction_and_within_bounds():
+    cable = CATALOGUE["cable_slab"]
+    norm = lambda f: np.array(list(f.values.values()))  # noqa: E731
+    alike = strength_for(cable, norm, 3.0)
+    np.testing.assert_allclose(norm(alike), 3.0, rtol=1e-6)
+    drawn = norm(strength_for(cable, norm, 3.0, None, np.random.default_rng(5)))
+    assert rms(drawn) == pytest.approx(3.0, rel=1e-6)
+    assert (drawn < 0.0).any()
+    assert (drawn > 0.0).any()
+    spread = np.abs(drawn) / np.abs(drawn).max()
+    assert 1.0 / 3.0 < spread.min() < 0.99
+    held_ = strength_for(CATALOGUE["cogging"], lambda f: np.array([f.values["a1"]]), 0.4, {
+        **CATALOGUE["cogging"].starts(), "p": 0.0371})  # fmt: skip
+    assert held_.values["p"] == 0.0371
+    assert held_.values["a1"] == pytest.approx(0.4)
+    most = strength_for(CATALOGUE["encoder_delay"], lambda f: np.array([f.values["tau"]]), 9.0)
+    assert most.values["tau"] == pytest.approx(6e-3)
+    friction = strength_for(CATALOGUE["stribeck"], lambda f: np.array([f.values["Fc"]]), 0.4, None,
+                            np.random.default_rng(1))  # fmt: skip
+    assert friction.values["Fs"] >= friction.values["Fc"] == pytest.approx(0.4)
+
+
+def test_another_machine_has_each_value_within_a_fifth_and_the_same_mass():
+    where = [c for c in free_parameters(AXIS) if c.effect]
+    truth = read(AXIS, where)
+    ratios = []
+    for seed in range(200):
+        other = other_machine(AXIS, np.random.default_rng(seed))
+        assert other.mass == AXIS.mass
+        assert other["lugre"].values["Fs"] >= other["lugre"].values["Fc"]
+        assert other["lugre"].values["n"] == AXIS["lugre"].values["n"]
+        ratios.append(read(other, where)[truth != 0.0] / truth[truth != 0.0])
+    free = np.array(ratios)[:, [c.parameter.name != "Fs" for c, v in zip(where, truth) if v]]  # noqa: B905
+    assert free.min() == pytest.approx(1.0 - SPREAD, abs=0.01)
+    assert free.max() == pytest.approx(1.0 + SPREAD, abs=0.01)
+    assert np.corrcoef(free[:, 0], free[:, 1])[0, 1] < 0.3
+    at_bound = AxisModel(1.7, effects=(effect("encoder_delay", {"tau": 5.9e-3}),))
+    taus = [
+        other_machine(at_bound, np.random.default_rng(s))["encoder_delay"].values["tau"]
+        for s in range(30)
+    ]
+    assert max(taus) == 6e-3
+
+
+def test_shapes_are_drawn_between_the_ends_of_a_scan_or_about_their_start():
+    rng = np.random.default_rng(6)
+    p = Parameter("a", "m", 1.0, -9.0, 9.0, "")
+
+    def draws(p, start=2.0):
+        return np.array([_drawn_shape(p, start, COVERED, rng) for _ in range(800)])
+
+    positive = draws(replace(p, scan=lambda e: (3.0, 0.03, 0.3)))
+    assert positive.min() == pytest.approx(0.03, rel=0.1)
+    assert positive.max() == pytest.approx(3.0, rel=0.1)
+    assert np.median(positive) == pytest.approx(0.3, rel=0.3)  # as many in each decade
+    signed = draws(replace(p, scan=lambda e: (e.position_low, e.position_high)))
+    assert signed.min() == pytest.approx(COVERED.position_low, abs=2e-3)
+    assert np.mean(signed) == pytest.approx(0.5 * (-0.031 + 0.083), abs=5e-3)
+    plain = np.log(draws(p) / 2.0)
+    assert plain.min() == pytest.approx(-SHAPE_SPREAD, abs=0.01)
+    assert plain.max() == pytest.approx(SHAPE_SPREAD, abs=0.01)
+    bounded = draws(replace(p, lower=1.9, upper=2.1))
+    assert (bounded.min(), bounded.max()) == (1.9, 2.1)
+
+
+# --- the free run -------------------------------------------------------------------------------
+
+RATE = 2000.0
+T = np.arange(round(1.7 * RATE)) / RATE
+PUSH = waves((1.3, 1.7, 0.3), (0.7, 6.3, 1.0))(T)
+
+
+def prepared(x, force, other=None, pushes=None) -> dict[str, PreparedLog]:
+    """The log prepared for its axes; readings may lack the last sample, of which no force is known.
+
+    pushes: of the other axis.
+    """
+    log = log_of(RATE, x, force, other)
+    if pushes is not None:
+        log.axes["y"].columns["force"][:] = pushes
+    return {a: windowed(motion_of(log, a, "log")) for a in log.axes if np.ptp(log.axes[a].position)}
+
+
+def test_the_exact_model_reproduces_the_motion_and_a_wrong_force_drifts_as_its_parabola():
+    x = held(PUSH, 1.7, 1.0 / RATE, 0.02, -0.1)
+    log = prepared(x, PUSH)
+    model = MachineModel("s", {"x": AxisModel(1.7)}, 999.0)
+    run = free_run(model, log)
+    assert run.window == WINDOW
+    assert rms_error(run, "x") < 1e-7
+    side = round(START_FIT * RATE)
+    known = np.isfinite(run.error["x"])
+    assert not known[:side].any()
+    assert known[side:-side].all()
+    n = side + 2 * 1000 + 7
+    short = prepared(x[:n], PUSH[:n])
+    assert np.isnan(free_run(model, short).error["x"][-5:]).all()  # no room for another start
+    pushed = MachineModel(
+        "s", {"x": AxisModel(1.7, effects=(effect("constant_force", {"F0": 0.34}),))}
+    )
+    error = free_run(pushed, log).error["x"]
+    count = round(WINDOW * RATE)
+    for start in (side, side + count, side + 2 * count):
+        t = np.arange(count) / RATE
+        np.testing.assert_allclose(error[start : start + count], 0.5 * 0.2 * t**2, atol=2e-6)
+    wanted = np.sqrt(np.nanmean(error**2))
+    assert rms_error(FreeRun({"x": error}, 0.5), "x") == pytest.approx(wanted)
+
+
+def test_two_axes_run_free_of_each_other():
+    x, y = held(PUSH, 1.7, 1.0 / RATE), held(2.0 * PUSH[::-1], 0.6, 1.0 / RATE)
+    log = prepared(x, PUSH, y, 2.0 * PUSH[::-1])
+    model = MachineModel("s", {"x": AxisModel(1.7), "y": AxisModel(0.6)})
+    run = free_run(model, log)
+    assert max(rms_error(run, "x"), rms_error(run, "y")) < 2e-6
+    alone = free_run(model, {"x": log["x"]})
+    assert list(alone.error) == ["x"]
+    assert rms_error(alone, "x") < 2e-6
+
+
+@pytest.mark.parametrize("simulator", [ReducedSimulator, MujocoSimulator])
+def test_an_axis_that_stands_still_is_seen_where_it_stands(simulator):
+    """A friction that grows with the place of the other axis: of 0.3 N at 0.1 m and 10/m, 0.6."""
+    brush = effect("dahl", {"Fc": 0.3, "sigma0": 4e3})
+    axis = AxisModel(1.7, effects=(brush, effect("load_dependent_friction", {"offset": 10.0})))
+    t = np.arange(len(T)) / RATE
+    x = 0.1 * np.sin(3.0 * t + 0.1)
+    middle = 0.1 * np.sin(3.0 * (t + 0.5 / RATE) + 0.1), 0.3 * np.cos(3.0 * (t + 0.5 / RATE) + 0.1)
+    force = -0.9 * 1.7 * 10.0 * middle[0] + 0.6 * np.sign(middle[1])
+    log = prepared(x, force, np.full(len(t), 0.1))
+    assert list(log) == ["x"]
+    model = MachineModel("s", {"x": axis, "y": AxisModel(2.0, effects=(effect("dahl"),))})
+    run = free_run(model, log, simulator)
+    blind = free_run(MachineModel("s", {"x": axis}), log, simulator)
+    first = round(START_FIT * RATE) + np.arange(round(0.3 * RATE))
+    assert np.abs(run.error["x"][first]).max() < 0.1 * np.abs(blind.error["x"][first]).max()
+
+
+def test_the_log_has_the_sensors_and_limits_in_it_already():
+    hardware = Hardware(force_limit=2.0, encoder_resolution=1e-4, force_constant=7.0)
+    model = MachineModel("s", {"x": AxisModel(1.7, hardware)}, 999.0)
+    found = _as_logged(model, prepared(T, T))
+    assert found.sample_rate == RATE
+    got = found.axes["x"].hardware
+    assert (got.force_limit, got.encoder_resolution, got.force_constant) == (np.inf, 0.0, 7.0)
+
+
+def test_a_cubic_has_its_own_value_and_slopes_in_the_middle():
+    t = (np.arange(21) - 10) * 1e-3
+    both = np.stack([0.3 + 0.7 * t - 5.0 * t**2 + 90.0 * t**3, 1.1 - 0.2 * t + 3.0 * t**2], axis=1)
+    x, v, a = _local_motion(both, 1e-3)
+    np.testing.assert_allclose(x, [0.3, 1.1])
+    np.testing.assert_allclose(v, [0.7, -0.2])
+    np.testing.assert_allclose(a, [-10.0, 6.0])
+
+
+def test_states_at_a_restart_are_those_of_the_motion_before_it():
+    """A lag is where its step response is; that of each axis in its own states."""
+    x = np.stack([0.1 * T, -0.2 * T[::-1]], axis=1)
+    command = np.stack([3.0 * (T >= 0.5), np.full(len(T), -5.0)], axis=1)
+    axis = AxisModel(1.0, effects=(effect("actuator_lag", {"tau": 0.03}),))
+    table = MachineModel("s", {"x": axis, "y": axis}).table()
+    starts = np.array([800, 1100, 1700])
+    states = _states_at(table, x, command, 1.0 / RATE, starts, 0.0)
+    own = states[:, table.entries[:, 3].astype(int)].T
+    since = starts / RATE - 0.5
+    wanted = np.where(since > 0.0, 3.0 * (1.0 - np.exp(-since / 0.03)), 0.0)
+    np.testing.assert_allclose(own[0], wanted, atol=1e-9)
+    np.testing.assert_allclose(own[1], -5.0)
+
+
+def test_a_coupled_axis_follows_the_others_motion_before_a_restart():
+    """A cable dragged by one axis alone is bent on it, and on no other."""
+    x = np.stack([0.1 * np.sin(9.0 * T), 0.03 + 0.0 * T], axis=1)
+    axis = AxisModel(1.0, effects=(effect("cable_hysteresis", {"f0": 0.4}),))
+    table = MachineModel("s", {"x": axis, "y": axis}).table()
+    states = _states_at(table, x, 0.0 * x, 1.0 / RATE, np.array([900, 1900]), 0.0)
+    first, second = (slice(int(e[3]), int(e[3]) + 4) for e in table.entries)
+    assert np.abs(states[:, first]).max() > 1e-4
+    assert not states[:, second].any()
+    swapped = _states_at(table, x[:, ::-1], 0.0 * x, 1.0 / RATE, np.array([900, 1900]), 0.0)
+    np.testing.assert_array_equal(swapped[:, second], states[:, first])
+
+
+def test_friction_before_a_restart_knows_the_place_and_the_other_axis():
+    """A dragged Dahl brush has the force that its modifiers leave there, to a thousandth."""
+    x = np.stack([0.1 * T, -0.05 + 0.2 * T], axis=1)
+    brush = effect("dahl", {"Fc": 0.4, "sigma0": 4e3})
+    place = effect("position_dependent_friction", {"c1": 0.3, "c2": 0.2})
+    load = effect("load_dependent_friction", {"motor": 0.0, "corner": 1.7, "offset": 0.9})
+    axis = AxisModel(1.0, effects=(brush, place, load))
+    table = MachineModel("s", {"x": axis, "y": axis}).table()
+    starts = np.array([900, 2100, 3000])
+    states = _states_at(table, x, 0.0 * x, 1.0 / RATE, starts, 0.0)
+    for a in (0, 1):
+        own = next(e for e, n in zip(table.entries, table.labels, strict=True)
+                   if n == ("xy"[a], "dahl"))  # fmt: skip
+        table_of_one = axis_table({"x": axis})
+        steady = []
+        for k in starts:
+            at = np.stack([np.full(200, 0.5 * (x[k, i] + x[k - 1, i])) for i in (a, 1 - a)])
+            motion = np.stack([at[0], np.full(200, (x[k, a] - x[k - 1, a]) * RATE), 0.0 * at[0]])
+            other = np.stack([at[1], 0.0 * at[1], 0.0 * at[1]])
+            memory = np.zeros(table_of_one.n_states)
+            first, last, begin, _, _ = table_of_one.axes[0]
+            rows = np.zeros((len(table_of_one.entries), 200))
+            walk(table_of_one.entries, first, last, table_of_one.parameters, memory, begin,
+                 motion, other, 1.0 / RATE, 0, rows)  # fmt: skip
+            steady.append(-rows.sum(axis=0)[-1])
+        np.testing.assert_allclose(states[:, int(own[3])], steady, rtol=5e-3)
+        assert np.ptp(steady) > 0.02

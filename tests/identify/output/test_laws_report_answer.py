@@ -1,0 +1,272 @@
+"""The report's answer, notes and units: each number beside its label."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import built_results as made
+import numpy as np
+import pytest
+from built_fits import built_fit
+from built_results import Page
+
+from identify.output import remarks as remarks_module
+from identify.output.report import (
+    answer,
+    growth,
+    maps,
+    notes,
+    parameters,
+    ranking,
+    regions,
+    render,
+    sections,
+)
+from identify.output.report.blocks import Heading, Picture, Table, Tone
+from identify.output.report.subject import Subject
+from identify.output.report.units import Scale, number, quantity, spaced, title_case
+from identify.output.text import advice
+from identify.selection.forward_selection import Verdict
+
+
+@pytest.fixture(autouse=True)
+def given_estimates(monkeypatch):
+    """Estimates by the fit's error; pictures and parameters that moved are other tests'."""
+    blank = Picture(None, "")
+    for module, name in (
+        (growth, "_picture"), (ranking, "_picture"), (maps, "picture"), (regions, "_picture"),
+    ):  # fmt: skip
+        monkeypatch.setattr(module, name, lambda *_: blank)
+    monkeypatch.setattr(remarks_module, "moved_parameters", lambda before, after: ())
+    known = {made.BEST.fit.error: made.estimates(0.0)}
+    monkeypatch.setattr(
+        parameters, "estimates", lambda fit: known.get(fit.error, made.estimates(0.5)[::2])
+    )
+
+
+def subject_of(diagnosis=None, *, history=made.STEPS, additions=(), **changes) -> Subject:
+    return Subject("The title", diagnosis, made.compared(), history, additions, **changes)
+
+
+def page_of(subject: Subject, *parts) -> Page:
+    """The page with some sections, their pictures left out."""
+    shown = [part.section(subject) for part in parts]
+    bare = [
+        replace(s, blocks=[b for b in s.blocks if not isinstance(b, Picture)]) for s in shown if s
+    ]
+    return Page(render(subject, bare))
+
+
+# --- the answer -----------------------------------------------------------------------------
+
+
+def cards(diagnosis=None, **changes):
+    return answer.section(subject_of(diagnosis, **changes)).blocks
+
+
+def test_the_answer_for_an_ambiguity():
+    first, second = cards(made.diagnosed())
+    assert first.headline == "Axis x: cogging or quadratic drag and lugre are missing"
+    assert (first.sentence, first.tone) == (Verdict.AMBIGUOUS.value, Tone.STRONG)
+    tiles = [(t.name, t.value, t.remark) for t in first.tiles]
+    ratio = f"{number(8.37 / 2.11)} → {number(1.19 / 1.03)}"
+    assert tiles == [
+        ("Force error on the fit logs", "8.37 → 1.19 N", "with cogging, RMS"),
+        ("Held-out force error", "7.13 → 2.17 N", "t = 9.10 over blocks"),
+        ("Error over noise floor", ratio, "floor 2.11 N RMS"),
+        ("Position, free run", "4.29 µm", "RMS of the worst log, without cogging"),
+    ]  # fmt: skip
+    assert first.remarks == [
+        "With cogging the force error is at its noise floor.",
+        "Runner-up: quadratic drag, ΔBIC 423, held-out error 7.34 → 2.38 N, supported.",
+        "The experiment that decides (8.30 s; twin plan writes it): passes: axis x, span 0.0831 m, "
+        "speed 0.0127 m/s, repeats 7. It leaves 41.2 mN RMS to the rival, where noise is 11.3 mN; "
+        f"{made.plan_of('a').gap.in_words()}.",
+    ]
+    assert second.headline == "Axis y: nothing is missing"
+    assert second.tone is Tone.PLAIN
+    words = made.refit_of(0.01).in_words()
+    assert second.remarks[-1] == f"{words[0].upper()}{words[1:]}."
+    assert second.remarks[0].startswith("Nearest candidate: constant force, ΔBIC 66.0")
+    assert second.remarks[0].endswith("not supported.")
+    assert [(t.name, t.value) for t in second.tiles] == [
+        ("Force error", "1.07 N"), ("Error over noise floor", number(1.07 / 0.97)),
+        ("Position, free run", "1.90 mm"),
+    ]  # fmt: skip
+
+
+def test_the_answer_for_what_nothing_explains():
+    lost = made.diagnosis_of(Verdict.UNEXPLAINED, unexplained=made.STRUCTURE)
+    card, _ = cards(made.diagnosed(lost))
+    assert card.headline == "Axis x: something outside the catalogue is missing"
+    assert card.sentence == (
+        f"{Verdict.UNEXPLAINED.value} It depends most on other axis position, which accounts for "
+        "63 % of the squared error, with a period of 27.3 mm."
+    )
+    assert f"{advice()}." in card.remarks
+    assert card.remarks[0].startswith("Nearest candidate: cogging")
+    aperiodic = replace(lost, unexplained=replace(made.STRUCTURE, period=None))
+    assert "period" not in cards(made.diagnosed(aperiodic))[0].sentence
+
+
+def test_the_answer_for_one_effect_that_leaves_more():
+    best = replace(made.BEST, fit=built_fit(3.1, 1.0, made.BEST.fit.axis))
+    steps = (replace(made.diagnosis_of().steps[0], candidate=best, tied=()),)
+    one = made.diagnosis_of(
+        Verdict.MISSING_EFFECT, steps=steps, dataset=replace(made.STUDY, holdout=())
+    )
+    found = made.diagnosed(one)
+    card, _ = cards(replace(found, next_experiments={"x": made.plan_of("a", "b", ranking=(
+        replace(made.TRIALS[0], gain=1.0),))}))  # fmt: skip
+    assert card.headline == "Axis x: cogging is missing"
+    assert "still stands 3.10 times above its noise floor" in card.remarks[0]
+    assert "cross-validated error" in card.remarks[1]
+    assert "comes nearest to deciding, but is too short" in card.remarks[2]
+    assert [t.name for t in card.tiles][1] == "Cross-validated force error"
+
+
+@pytest.mark.parametrize(("error", "tone"), [(1.29, Tone.PLAIN), (1.31, Tone.STRONG)])
+def test_a_comparison_alone_says_whether_the_error_is_noise(error, tone):
+    c = made.comparison_of()
+    c = replace(c, residual=c.residual * (error * c.floor / c.total_error))
+    card = answer._compared(c)
+    assert card.tone is tone
+    assert ("explains the measurement" in card.headline) is (tone is Tone.PLAIN)
+    assert ("at its noise floor" in card.sentence) is (tone is Tone.PLAIN)
+    assert card.tiles[0].value == quantity(error * c.floor, "N")
+    assert card.tiles[1].value == number(error)
+    assert (tone is Tone.PLAIN) or f"force error {number(error)} times" in card.headline
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
+    first, *rest = cards(additions=(replace(made.addition(), kept=True), made.addition(kept)))
+    assert len(rest) == 2
+    assert first.headline == "Axis x: cogging added"
+    assert [(t.name, t.value) for t in first.tiles] == [
+        ("Force error on the fit logs", "7.31 → 4.57 N"),
+        ("Held-out force error", "7.83 → 4.91 N"), ("Position, free run", "3.71 → 1.93 µm"),
+    ]  # fmt: skip
+    assert "1.97 µm replayed by MuJoCo" in first.tiles[2].remark
+    assert (first.tone is Tone.STRONG) is kept
+    assert ("earned its place" in first.sentence) is kept
+    assert len(cards(made.diagnosed(), additions=(made.addition(),))) == 2
+
+
+# --- regions, notes, facts ------------------------------------------------------------------
+
+
+def test_the_worst_regions_in_words():
+    near, back = made.comparison_of().worst
+    assert regions.in_words(near) == (
+        "Position between 12.3 and 25.7 mm: 121 mN RMS, 14.3 times the noise floor, 37 % of the "
+        "squared error."
+    )
+    assert regions.in_words(back).startswith("Moving backwards: 87.0 mN RMS, 7.70 times")
+    assert regions.in_words(replace(back, low=0.0, high=1.5)).startswith("Moving forwards")
+
+
+def test_a_narrow_region_has_the_digits_of_its_width():
+    near, _ = made.comparison_of().worst
+    narrow = regions.in_words(replace(near, low=0.01131, high=0.01157))
+    assert narrow.startswith("Position between 11.31 and 11.57 mm:")
+
+
+def test_regions_have_headings_only_among_several_axes():
+    quiet = replace(made.comparison_of("y"), residual=np.full(9, 0.001))
+    for axes, expected in (
+        ({"x": made.comparison_of(), "y": made.comparison_of("y")}, ["Axis x", "Axis y"]),
+        ({"x": made.comparison_of(), "y": quiet}, ["Axis x"]),
+        ({"x": made.comparison_of()}, []),
+    ):
+        subject = Subject("t", None, made.Comparison(made.MODEL, axes), (), ())
+        found = regions.section(subject)
+        assert [b.text for b in found.blocks if isinstance(b, Heading)] == expected
+        assert (found.anchor, found.title) == ("regions", "Where the error is")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (1.234e-4, "0.000123"),
+        (9.87e-5, "9.87×10⁻⁵"),
+        (-1.234e7, "−1.23×10⁷"),
+        (1234567.0, "1234567"),
+    ],
+)
+def test_very_large_and_small_numbers_have_a_power_of_ten(value, text):
+    assert number(value) == text
+
+
+@pytest.mark.parametrize(("ratio", "shown"), [(1.29, False), (1.31, True)])
+def test_regions_are_shown_above_the_noise(ratio, shown):
+    c = made.comparison_of()
+    c = replace(c, residual=c.residual * (ratio * c.floor / c.total_error))
+    subject = Subject("t", None, made.Comparison(made.MODEL, {"x": c}), (), ())
+    assert (regions.section(subject) is not None) is shown
+
+
+def test_notes_are_said_once():
+    subject = subject_of(made.diagnosed(), additions=(made.addition(),))
+    (listing,) = notes.section(subject).blocks
+    assert listing.items.count("Axis x, cogging added: mass moved.") == 1
+    told = [i for i in listing.items if i.startswith("Axis x: ")]
+    expected = remarks_module.remarks(made.diagnosis_of(), made.refit_of(0.0))
+    assert told == [f"Axis x: {r.removesuffix('.')}." for r in expected]
+    assert notes.section(subject_of(history=())) is None
+
+
+def test_the_line_under_the_title_and_the_order_of_axes():
+    found = made.diagnosed()
+    facts = page_of(subject_of(found)).facts
+    assert facts == {
+        "Model": "the stage", "Logs": "run 1, run 2", "Held out": "held 1",
+        "Test function": "40.0 ms",
+    }  # fmt: skip
+    assert "Held out" not in page_of(subject_of()).facts
+    y_first = replace(
+        found,
+        axes={
+            "x": replace(found.axes["y"], dataset=made.STUDY),
+            "y": replace(found.axes["x"], dataset=found.axes["y"].dataset),
+        },
+    )
+    assert [a.axis for a in subject_of(y_first).axes] == ["y", "x"]
+    assert [a.axis for a in subject_of(found).axes] == ["x", "y"]
+    quiet = replace(found, axes={"y": found.axes["y"]})
+    assert [a.axis for a in subject_of(quiet).axes] == ["x", "y"]
+
+
+def test_only_sections_with_something_to_show_are_made(monkeypatch):
+    def empty(subject):
+        return None
+
+    def one(subject):
+        return regions.Section("one", subject.title, [Table([], [])])
+
+    monkeypatch.setattr("identify.output.report.SECTIONS", (empty, one, empty))
+    assert [s.anchor for s in sections(subject_of())] == ["one"]
+
+
+# --- units ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("unit", ["N", "m", "kg"])
+def test_a_scale_keeps_the_value(unit):
+    for value in (3.21e-8, 4.9e-4, 5.1e-4, 0.49, 0.51, 23.0):
+        scale = Scale.of(unit, [value, -value / 3.0])
+        assert scale(value) * scale.size == pytest.approx(value)
+        prefixed = {1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}[scale.size]
+        assert scale.unit == prefixed + unit
+        assert unit == "kg" or scale(value) >= 0.5
+        assert unit == "kg" or scale.size == 1.0 or scale(value) < 500.0
+    assert Scale.of(unit, []).size == 1.0
+
+
+def test_an_interval_has_two_digits_of_its_half_width():
+    scale = Scale(1e-3, "mN")
+    assert scale.within(0.01, 0.05, -0.0314159) == ["−31"]
+    assert scale.within(0.01, 0.014, 0.0123456) == ["12.3"]
+    assert scale.within(0.0, 5.0, 1.2345) == ["1234"] or scale.within(0.0, 5.0, 1.2345) == ["1235"]
+    assert spaced("a_b_c") == "a b c"
+    assert title_case("a_b_c") == "A b c"

@@ -1,0 +1,289 @@
+"""The report's pictures of forces and residuals: lines hold the numbers that their labels name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import built_results as made
+import numpy as np
+import pytest
+from built_fits import CATALOGUE, PLAIN, axis_of, fitted
+
+from identify.estimation.fit import rms
+from identify.estimation.force_balance import residual
+from identify.output.report import overlay, residuals, shape, whiteness
+from identify.output.report.drawing import (
+    BLUE,
+    ORANGE,
+    binned_mean,
+    noise_band,
+    symmetric_limit,
+)
+from identify.output.report.subject import LogForces, Subject, log_forces, shown_residual
+from identify.output.report.units import Scale
+from twin.model.machine import Fitted
+
+RNG = np.random.default_rng(8)
+
+
+def lines_of(axes):
+    """Lines of axes by label."""
+    return {line.get_label(): line for line in axes.get_lines()}
+
+
+def subject_of(diagnosis=None, **changes) -> Subject:
+    return Subject("t", diagnosis, changes.get("comparison", made.compared()), made.STEPS, ())
+
+
+# --- forces ---------------------------------------------------------------------------------
+
+
+def test_forces_add_up_to_the_command_less_inertia():
+    log = made.STUDY.fit[0]
+    sliding = axis_of(mass=4.9).with_effect(fitted("lugre"))
+    richer = sliding.with_effect(fitted("constant_force", F0=0.7))
+    found = log_forces(log, sliding, richer)
+    np.testing.assert_allclose(found.explain, log.command - 4.9 * log.acceleration)
+    np.testing.assert_allclose(found.explain - found.model, residual(sliding, [log]))
+    np.testing.assert_allclose(found.model - found.named, 0.7, atol=1e-9)
+    assert (found.name, log_forces(log, sliding, None).named) == ("run 1", None)
+    np.testing.assert_array_equal(found.time, log.time)
+
+
+def test_a_friction_at_rest_is_not_shown():
+    log = made.STUDY.fit[0]
+    still = np.where(np.arange(len(log.motion.velocity)) < 600, 0.0, log.motion.velocity)
+    rest = replace(
+        log, motion=replace(log.motion, signals=np.stack([log.motion.position, still,
+                                                          log.motion.command])),
+    )  # fmt: skip
+    gone = np.isnan(shown_residual(PLAIN, rest))
+    assert gone[:10].all()
+    assert 0 < gone.sum() < len(gone)
+    assert not np.isnan(shown_residual(axis_of().with_effect(fitted("lugre")), rest)).any()
+
+
+TIME = np.arange(0.0, 20.0, 0.01)
+
+
+def forces_of(scale: float, named: bool = True) -> LogForces:
+    wave = np.sin(TIME)
+    explain = 3.0 * wave + scale * 0.1
+    return LogForces("log", TIME, explain, 3.0 * wave, 3.0 * wave + 0.03 if named else None)
+
+
+def test_measured_and_modelled_force_are_drawn_whole_and_in_part():
+    forces, span = forces_of(1.0), slice(300, 700)
+    figure = overlay._figure(forces, span, 0.02, "the effect")
+    whole, stretch, left = figure.axes
+    for axes, part in ((whole, slice(None)), (stretch, span)):
+        lines = lines_of(axes)
+        np.testing.assert_allclose(
+            lines["measured (command less inertia)"].get_ydata(), forces.explain[part]
+        )
+        np.testing.assert_allclose(lines["model"].get_ydata(), forces.model[part])
+        np.testing.assert_allclose(lines["model with the effect"].get_ydata(), forces.named[part])
+        np.testing.assert_allclose(lines["model"].get_xdata(), TIME[part])
+        wide = lines["measured (command less inertia)"].get_linewidth()
+        assert wide > lines["model"].get_linewidth()  # a model that hides it is seen to fit
+    own, named = left.get_lines()
+    assert (own.get_color(), named.get_color()) == (BLUE, ORANGE)
+    scale = Scale.of("N", [0.115])
+    np.testing.assert_allclose(own.get_ydata(), scale(0.1), rtol=1e-9)
+    np.testing.assert_allclose(named.get_ydata(), scale(0.07), rtol=1e-9)
+    limit = symmetric_limit(0.02, np.full(4, 0.1))
+    assert left.get_ylim() == pytest.approx((-scale(limit), scale(limit)))
+    band = left.patches[0]
+    assert band.get_y() == pytest.approx(-scale(0.02))
+    assert band.get_height() == pytest.approx(2 * scale(0.02))
+    shaded = whole.patches[0]
+    assert (shaded.get_x(), shaded.get_width()) == pytest.approx((TIME[300], TIME[699] - TIME[300]))
+    assert len(overlay._lines(forces_of(1.0, named=False), "")) == 2
+
+
+def test_the_log_shown_is_the_one_nearest_to_the_whole_error(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(overlay, "_figure", lambda *given: drawn.append(given))
+    made_of = {"run 1": 3.0, "run 2": 1.2}
+    monkeypatch.setattr(
+        overlay, "log_forces",
+        lambda log, model, named: replace(
+            forces_of(made_of[log.motion.name], named is not None), name=log.motion.name
+        ),
+    )  # fmt: skip
+    c = made.comparison_of()
+    c = replace(c, residual=0.11 * c.residual / rms(c.residual))
+    picture = overlay._picture(subject_of(), c)
+    assert "Log run 2:" in picture.caption
+    assert drawn[0][0].named is None
+    assert drawn[0][2:] == (c.floor, "")
+    overlay._picture(subject_of(made.diagnosed()), c)
+    assert drawn[1][0].named is not None
+    assert drawn[1][3] == "cogging"
+
+
+def test_the_residual_is_seen_against_time_speed_position_and_phase():
+    rolling = made.MODEL.with_axis("x", axis_of(fitted("roller_spikes")))
+    subject = subject_of(comparison=replace(made.compared(), model=rolling))
+    c = subject.axes[0]
+    kept = residuals._kept(subject, c)
+    c = replace(c, residual=c.residual[: kept.sum()])
+    views = residuals._views(subject, c)
+    assert [(v.quantity.split(",")[0], v.unit) for v in views] == [
+        ("Time", "s"), ("Speed", "m/s"), ("Position", "m"), ("Roller spikes phase", "m"),
+    ]  # fmt: skip
+    assert views[1].values is c.coordinates["velocity"]
+    assert views[2].values is c.coordinates["position"]
+    assert views[3].values is c.coordinates["roller_spikes_phase"]
+    first, second = c.logs
+    both = np.concatenate([first.time, second.time + first.motion.time[-1]])
+    np.testing.assert_allclose(views[0].values, both[kept])
+    short = replace(c, coordinates={**c.coordinates, "position": np.linspace(0.0, 0.0339, 9)})
+    assert len(residuals._views(subject, short)) == 3
+
+
+def test_dots_and_means_of_the_residual():
+    n = 4000
+    x = np.linspace(-0.08, 0.08, n)
+    left = residuals._Left(0.02 * np.sign(x), np.full(n, 0.007), "mean with it", 0.004)
+    figure = residuals._figure([residuals.View(x, "Position", "m")] * 3, left)
+    assert len(figure.axes) == 3
+    axes = figure.axes[0]
+    lines = lines_of(axes)
+    np.testing.assert_allclose(lines["single windows"].get_xdata(), 1e3 * x)
+    np.testing.assert_allclose(lines["single windows"].get_ydata(), 20.0 * np.sign(x))
+    mean = lines["mean"]
+    np.testing.assert_allclose(mean.get_ydata(), 20.0 * np.sign(mean.get_xdata()), atol=1e-9)
+    np.testing.assert_allclose(lines["mean with it"].get_ydata(), 7.0)
+    assert axes.get_ylim() == pytest.approx((-23.0, 23.0))
+    assert axes.patches[0].get_height() == pytest.approx(8.0)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("Position (mm)", "Unexplained force (mN)")
+    many = residuals._Left(RNG.standard_normal(25_000), None, "", 1.0)
+    wide = residuals.View(RNG.uniform(size=25_000), "Time", "s")
+    dots = lines_of(residuals._figure([wide], many).axes[0])["single windows"]
+    assert len(dots.get_xdata()) == -(-25_000 // 3)
+
+
+def test_the_residual_with_the_named_effect_is_on_the_same_windows(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(residuals, "_figure", lambda views, left: drawn.append(left))
+    subject = subject_of(made.diagnosed())
+    c = subject.axes[0]
+    residuals._picture(subject, c)
+    (left,) = drawn
+    kept = residuals._kept(subject, c)
+    every = np.concatenate([shown_residual(made.BEST.fit.axis, log) for log in c.logs])
+    np.testing.assert_array_equal(left.named, every[kept])
+    assert (left.label, left.floor) == ("mean with cogging", c.floor)
+    assert left.model is c.residual
+
+
+# --- whiteness and shape --------------------------------------------------------------------
+
+
+def test_the_histogram_and_correlations_have_their_bounds():
+    tests = made.whiteness_of()
+    figure = whiteness._figure(tests, "N")
+    bars, *rest = figure.axes
+    data = bars.patches[0].get_data()
+    scale = Scale.of("N", tests.edges)
+    np.testing.assert_allclose(data.edges, tests.edges / scale.size)
+    # The area of the bars is the same in any unit.
+    area = np.sum(data.values * np.diff(data.edges))
+    assert area == pytest.approx(np.sum(tests.density * np.diff(tests.edges)))
+    x, y = bars.get_lines()[0].get_data()
+    assert np.trapezoid(y, x) == pytest.approx(1.0, abs=1e-3)
+    sigma = np.sqrt(np.trapezoid(y * x**2, x)) * scale.size
+    assert sigma == pytest.approx(tests.floor, rel=1e-2)
+    for axes, test in zip(rest, tests.correlations, strict=True):
+        band = axes.patches[0]
+        assert (band.get_y(), band.get_height()) == pytest.approx((-test.bound, 2 * test.bound))
+        drawn = np.concatenate([[s[1][1] for s in c.get_segments()] for c in axes.collections])
+        order = np.concatenate([test.value[test.tested], test.value[~test.tested]])
+        np.testing.assert_allclose(drawn, order)
+        lags = np.concatenate([[s[0][0] for s in c.get_segments()] for c in axes.collections])
+        both = np.concatenate([test.lag[test.tested], test.lag[~test.tested]])
+        np.testing.assert_allclose(lags, both / Scale.of("s", test.lag).size)
+        reach = 1.15 * max(2 * test.bound, np.abs(test.value).max())
+        assert axes.get_ylim() == pytest.approx((-reach, reach))
+    assert rest[0].get_xlabel() == "Lag (ms)"
+    assert rest[1].get_xlabel() == "Lag, command first where positive (ms)"
+    assert rest[2].get_ylabel() == "Correlation with speed (1)"
+    assert rest[0].get_ylabel() == "Autocorrelation (1)"
+
+
+def test_the_tests_of_each_axis_are_in_words_and_their_reason_once(monkeypatch):
+    monkeypatch.setattr(whiteness, "_figure", lambda tests, unit: tests)
+    compared = made.compared()
+    *blocks, reason = whiteness.section(subject_of(comparison=compared)).blocks
+    assert reason.items == (made.whiteness_of().reason,)
+    for axis, (heading, picture, listing) in zip("xy", (blocks[:3], blocks[3:]), strict=True):
+        tests = compared.axes[axis].tests
+        assert heading.text == f"Axis {axis}"
+        assert picture.figure is tests
+        assert "The force residual on 387 windows" in picture.caption
+        words = [c.in_words() for c in tests.correlations]
+        assert listing.items == [f"F{w[1:]}." for w in words]
+
+
+def test_a_description_is_drawn_forwards_and_backwards():
+    effect = CATALOGUE["empirical_map"]
+    names = [p.name for part in effect.parts for p in effect.strengths if p.name in part.strengths]
+    values = dict(zip(names, RNG.uniform(0.05, 0.2, len(names)), strict=True))
+    description = Fitted.at_start(effect, values)
+    figure = shape._figure(made.comparison_of(), description)
+    left, right = figure.axes
+    assert (left.get_xlabel(), right.get_xlabel()) == ("Position (mm)", "Speed (m/s)") or (
+        right.get_xlabel() == "Speed (mm/s)"
+    )
+    forwards, backwards = (lines_of(right)[n].get_xdata() for n in ("forwards", "backwards"))
+    assert backwards.max() <= 0.0 <= forwards.min()
+    model = replace(made.MODEL, axes={"x": axis_of(description), "y": PLAIN})
+    subject = subject_of(comparison=replace(made.compared(), model=model))
+    blocks = shape.section(subject).blocks
+    assert len(blocks) == 3
+    assert blocks[0].text == "Empirical map on x"
+    assert shape.section(subject_of()) is None
+
+
+# --- drawing --------------------------------------------------------------------------------
+
+
+def test_a_mean_by_bins_is_the_mean_of_the_samples_there():
+    x = RNG.uniform(-2.0, 5.0, 1000)
+    y = x**2
+    centre, mean = binned_mean(x, y)
+    assert len(centre) == 40  # 25 a bin
+    edges = np.linspace(x.min(), x.max(), 41)
+    np.testing.assert_allclose(centre, 0.5 * (edges[1:] + edges[:-1]))
+    for i in range(40):
+        last = i == 39
+        inside = (x >= edges[i]) & ((x <= edges[i + 1]) if last else (x < edges[i + 1]))
+        assert mean[i] == pytest.approx(y[inside].mean())
+    assert [len(binned_mean(x[:n], y[:n])[0]) for n in (10, 499, 550)] == [20, 20, 22]
+    assert len(binned_mean(np.arange(9e3), np.arange(9e3))[0]) == 140
+    few = np.concatenate([np.zeros(100), [1.0, 1.0, 1.0]])
+    assert np.isnan(binned_mean(few, few)[1][-1])
+    assert binned_mean(np.append(few, 1.0), np.append(few, 1.0))[1][-1] == 1.0
+    assert len(binned_mean(few, np.full(103, np.nan))[0]) == 0
+
+
+def test_limits_show_the_noise_and_nearly_all_values():
+    values = np.concatenate([np.linspace(-1.0, 1.0, 999), [50.0]])
+    assert 1.1 < symmetric_limit(0.1, values, np.array([np.nan])) < 1.2
+    assert symmetric_limit(4.0, values) == pytest.approx(5.2)
+    assert symmetric_limit(0.0, np.full(5, np.nan)) > 0.0
+
+
+def test_a_noise_band_lies_about_zero():
+    from matplotlib.figure import Figure
+
+    axes = Figure().subplots()
+    noise_band(axes, 0.3)
+    assert (axes.patches[0].get_y(), axes.patches[0].get_height()) == pytest.approx((-0.3, 0.6))
+
+
+def test_a_stretch_at_rest_comes_last():
+    error = np.where(TIME < 10.0, np.nan, 1.0)
+    span = overlay.representative(LogForces("l", TIME, error, np.zeros_like(error), None), 4.0)
+    assert np.isfinite(error[span]).any()

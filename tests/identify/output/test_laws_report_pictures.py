@@ -1,0 +1,163 @@
+"""The report's pictures of results: lines and bars hold the numbers that their labels name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import built_results as made
+import numpy as np
+import pytest
+
+from identify.output.report import growth, maps, ranking, regions
+from identify.output.report.drawing import (
+    BLUE,
+    GREY,
+    ORANGE,
+    settle,
+)
+from identify.output.report.subject import Subject
+
+RNG = np.random.default_rng(8)
+
+
+def lines_of(axes):
+    """Lines of axes by label."""
+    return {line.get_label(): line for line in axes.get_lines()}
+
+
+def subject_of(diagnosis=None, **changes) -> Subject:
+    return Subject("t", diagnosis, changes.get("comparison", made.compared()), made.STEPS, ())
+
+
+# --- growth, ranking, structure -------------------------------------------------------------
+
+
+def test_the_growth_runs_from_the_first_error_to_the_last():
+    figure = growth._figure(made.STEPS[:2], 1.17)
+    (axes,) = figure.axes
+    lines = lines_of(axes)
+    np.testing.assert_allclose(lines["fit logs"].get_ydata(), [7.31, 4.57, 2.29])
+    np.testing.assert_allclose(lines["held out"].get_ydata(), [7.83, 4.91, 2.71])
+    np.testing.assert_allclose(lines["noise floor"].get_ydata(), 1.17)
+    assert [t.get_text() for t in axes.get_xticklabels()] == [
+        "at the start", "+ cogging", "+ lugre",
+    ]  # fmt: skip
+    assert axes.get_ylabel() == "Force error, RMS (N)"
+    assert axes.get_yscale() == "log"
+    notes = {t.get_text(): t.xy for t in axes.texts}
+    points = {"7.31": (0, 7.31), "4.57": (1, 4.57), "2.71": (2, 2.71), "7.83": (0, 7.83)}
+    assert points.items() <= notes.items()
+    above = {t.get_text(): t.xyann[1] > 0 for t in axes.texts}
+    assert above == {
+        "7.31": False, "7.83": True, "4.57": False, "4.91": True, "2.29": False, "2.71": True,
+    }  # fmt: skip
+
+
+def test_of_two_equal_errors_one_number_is_above_and_one_below():
+    alike = replace(made.STEPS[0], fit_error_before=3.0, holdout_error_before=3.0)
+    (axes,) = growth._figure([alike], None).axes
+    sides = [t.xyann[1] > 0 for t in axes.texts if t.get_text() == "3.00"]
+    assert sorted(sides) == [False, True]
+
+
+def test_without_held_out_errors_there_is_one_line():
+    small = replace(made.STEPS[2], fit_error_before=0.0341, fit_error_after=0.0313)
+    (axes,) = growth._figure([small], None).axes
+    lines = lines_of(axes)
+    assert list(lines) == ["fit logs"]
+    np.testing.assert_allclose(lines["fit logs"].get_ydata(), [34.1, 31.3])
+    assert axes.get_ylabel() == "Force error, RMS (mN)"
+    assert axes.get_xticklabels()[1].get_text() == "replace wear"
+    assert all(t.xyann[1] > 0 for t in axes.texts)
+
+
+def test_each_axis_has_the_floor_of_its_own_comparison(monkeypatch):
+    seen = []
+    monkeypatch.setattr(growth, "_figure", lambda steps, floor: seen.append((len(steps), floor)))
+    monkeypatch.setattr(growth, "Picture", lambda figure, caption: growth.Heading(""))
+    growth.section(subject_of())
+    axes = made.compared().axes
+    assert seen == [(2, axes["x"].floor), (1, axes["y"].floor)]
+
+
+def test_a_picture_is_laid_out_on_a_grid_once():
+    figure = ranking._figure(made.diagnosis_of())
+    settle(figure)
+    assert figure.get_layout_engine() is None
+    places = [axes.get_position().bounds for axes in figure.axes]
+    np.testing.assert_allclose(np.array(places) * 1e4, np.rint(np.array(places) * 1e4), atol=1e-7)
+
+
+def test_a_bar_for_each_candidate_ends_at_its_error():
+    worse = replace(made.WEAK, gain=replace(made.WEAK.gain, after=20.0))
+    x = made.diagnosis_of(ranking=(made.BEST, made.RIVAL, worse))
+    (axes,) = ranking._figure(x).axes
+    bars = axes.patches
+    end = 1.6 * 7.13
+    assert [b.get_width() for b in bars] == pytest.approx([2.17, 2.38, end])
+    assert [t.get_text() for t in axes.get_yticklabels()] == [
+        "cogging", "quadratic drag", "constant force",
+    ]  # fmt: skip
+    assert [t.get_text() for t in axes.texts] == ["2.17", "2.38", "bar cut, 20.0"]
+    assert [t.get_position() for t in axes.texts] == [(1.0, 0), (1.0, 1), (1.0, 2)]
+    from matplotlib.colors import to_rgba
+
+    assert [b.get_facecolor() for b in bars] == [to_rgba(c) for c in (ORANGE, BLUE, GREY)]
+    lines = lines_of(axes)
+    assert lines["before"].get_xdata() == pytest.approx([7.13, 7.13])
+    assert lines["noise floor"].get_xdata() == pytest.approx([2.11, 2.11])
+    assert axes.get_xlabel() == "Held-out force error, RMS (N)"
+    assert axes.get_xlim() == pytest.approx((0.0, 1.15 * end))
+    assert axes.yaxis_inverted()
+
+
+def test_the_longest_share_is_on_top_and_marked():
+    structure = replace(
+        made.STRUCTURE,
+        depends_on="position",
+        shares={"time": 0.117, "position": 0.631, "other_axis_velocity": 0.2},
+    )
+    (axes,) = regions._figure(structure).axes
+    assert [b.get_width() for b in axes.patches] == pytest.approx([63.1, 20.0, 11.7])
+    assert [t.get_text() for t in axes.get_yticklabels()] == [
+        "position", "other axis velocity", "time",
+    ]  # fmt: skip
+    assert len({b.get_facecolor() for b in axes.patches[1:]}) == 1
+    assert axes.patches[0].get_facecolor() != axes.patches[1].get_facecolor()
+    assert axes.get_xlim()[1] == pytest.approx(1.1 * 63.1)
+    assert axes.yaxis_inverted()
+
+
+# --- maps -----------------------------------------------------------------------------------
+
+
+def test_the_map_of_each_coordinate_has_its_error_above_its_noise():
+    c = made.comparison_of()
+    direction = replace(made.map_of("direction", "1", 0.2))
+    point = replace(made.map_of("time", "s", 0.3), low=np.full(3, 0.1))
+    spectrum = made.map_of("frequency", "Hz", 0.4)
+    figure = maps._figure(replace(c, maps=[*c.maps, direction, point, spectrum]))
+    first, second, third = figure.axes
+    labels = [a.get_xlabel() for a in figure.axes]
+    assert labels == ["Position (mm)", "Speed (mm/s)", "Frequency (Hz)"]
+    assert (first.get_xscale(), third.get_xscale()) == ("linear", "log")
+    for axes, found, size in ((first, c.maps[0], 1e-3), (second, c.maps[1], 1e-3)):
+        noise, error = (p.get_data() for p in axes.patches)
+        edges = np.append(found.low, found.high[-1])
+        np.testing.assert_allclose(noise.edges, edges / size)
+        np.testing.assert_allclose(noise.values, found.floor)
+        np.testing.assert_allclose(error.values, np.where(found.visited > 0, found.rms, np.nan))
+        assert axes.get_yscale() == "log"
+    heights = [round(a.get_subplotspec().rowspan.start) for a in figure.axes]
+    assert heights == [0, 0, 0]
+    # The last bin of the first map was never visited: its error sets no limit, its noise does.
+    lowest = min(m.floor.min() for m in c.maps)
+    assert first.get_ylim()[0] == pytest.approx(0.5 * lowest)
+    assert first.get_ylabel() == "RMS error (N)"
+
+
+def test_the_least_error_of_a_bin_that_was_visited_sets_the_limit():
+    low = replace(made.comparison_of().maps[0], rms=np.array([0.011, 0.5, 0.0013]))
+    picture = maps.picture(replace(made.comparison_of(), maps=[low]))
+    assert picture.figure.axes[0].get_ylim()[0] == pytest.approx(0.5 * 0.011)
+    assert picture.caption.startswith("RMS force error by region")

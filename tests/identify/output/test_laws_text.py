@@ -1,0 +1,274 @@
+"""The text for a terminal: each line holds the numbers that it names, in their order."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import built_results as made
+import pytest
+from built_fits import CATALOGUE, NOISE, built, built_fit, fitted
+
+from identify.estimation.fit import Outcome
+from identify.experiment_design.missing_excitation import Gap
+from identify.output import remarks as remarks_module
+from identify.output.remarks import remarks
+from identify.output.text import (
+    _step_line,
+    add_text,
+    advice,
+    check_text,
+    compare_text,
+    diagnose_text,
+    effect_text,
+    effects_text,
+    fit_text,
+    in_short,
+    plan_text,
+)
+from identify.selection.confounded import Change, Refit
+from identify.selection.forward_selection import Step, Verdict
+from twin.experiments.kinds import Rests
+from twin.log.check import CheckReport, Fault, Finding, Severity
+
+
+@pytest.fixture(autouse=True)
+def nothing_moved(monkeypatch):
+    monkeypatch.setattr(remarks_module, "moved_parameters", lambda before, after: ())
+
+
+def test_a_fit():
+    result = made.fit_result()
+    lines = fit_text(result).splitlines()
+    assert lines[0] == (
+        "axis x: force error 0.0513 N, held out 0.0611 N, noise floor 0.0127 N (ratio 4.04)"
+    )
+    second = lines.index("axis y: force error 0.0317 N, noise floor 0.0131 N (ratio 2.42)")
+    assert lines[1].strip() == Outcome.AT_BOUND.value
+    x, y = lines[:second], lines[second:]
+    assert any("acts 217 us (0.22 samples)" in line for line in x)
+    assert not any("samples)" in line for line in y)
+    assert sum(made.refit_of(0.0).in_words() in line for line in x) == 1
+    assert not any("as given" in line for line in y)
+    reason = [line for line in x if "stands 4.0 times above the noise floor 0.0127 N" in line]
+    assert len(reason) == 1
+    mass, hidden, held = (line.split() for line in y[-3:])
+    assert mass == ["mass", "5.33", "kg", "90", "%", "in", "[5.25,", "5.49]"]
+    assert hidden == ["cogging.p", "0.0441", "m", "no", "interval:", "not", "shown"]
+    assert held == ["coulomb_viscous.Fs", "0.357", "N", "fixed"]
+
+
+def test_a_reason_that_holds_for_all_is_said_once():
+    result = made.fit_result()
+    from identify.estimation.intervals import refusal
+
+    reason = refusal(result.fits["x"])
+    own = replace(made.estimates(0.0)[1], reason=reason)
+    again = replace(result, estimates={"x": (own,), "y": made.estimates(0.0)})
+    again.__dict__["refits"] = result.refits
+    text = fit_text(again)
+    assert text.count(reason) == 1
+    label = next(line for line in text.splitlines() if "cogging.p" in line)
+    assert label.split() == ["cogging.p", "0.0241", "m"]
+
+
+def test_the_strengths_of_a_description_are_one_sentence():
+    effect = CATALOGUE["empirical_map"]
+    axis = made.axis_of(fitted(effect.name))
+    result = made.fit_result()
+    strength = replace(made.estimates(0.0)[0], label=f"{effect.name}.{effect.strengths[0].name}")
+    again = replace(
+        result, fits={"x": built_fit(1.0, axis=axis)}, estimates={"x": (strength,)},
+    )  # fmt: skip
+    again.__dict__["refits"] = result.refits
+    lines = fit_text(again).splitlines()
+    told = [line.strip() for line in lines if "is a description" in line]
+    assert len(told) == 1
+    assert told[0].startswith("empirical_map")
+    assert not any(strength.label in line for line in lines)
+
+
+def test_a_comparison():
+    lines = compare_text(made.compared()).splitlines()
+    assert lines[0] == (
+        "axis x, run 1: force error 0.0517 N (4.6 x noise floor), free-running position error "
+        "3.17e-06 m"
+    )
+    assert lines[1].startswith("axis x, run 2: force error 0.0731 N (6.5 x noise floor)")
+    assert lines[1].endswith("4.29e-06 m")
+    assert lines[2].strip() == (
+        "worst: position between 0.0123 and 0.0257 m: 0.121 N RMS, 14.3 times the noise floor, "
+        "37 % of the squared error"
+    )
+    assert lines[3].strip().startswith("worst: moving backwards: 0.087 N RMS, 7.7 times")
+    tested = [line for line in lines if line.startswith("  force residual against")]
+    assert len(tested) == 6
+    assert lines[-1] == made.whiteness_of().reason
+    assert lines.count(lines[-1]) == 1
+    quiet = made.Comparison(made.MODEL, {"x": replace(made.comparison_of(), worst=[])})
+    assert "nowhere does the error stand above the noise" in compare_text(quiet)
+    assert "nowhere" not in compare_text(made.compared())
+
+
+def test_a_diagnosis():
+    x = made.diagnosis_of(Verdict.AMBIGUOUS, unexplained=made.STRUCTURE)
+    x.__dict__["repeat"] = made.REPEAT
+    result = made.diagnosed(x)
+    text = diagnose_text(result)
+    y, lines = text.split("axis x: ", 1)
+    lines = lines.splitlines()
+    assert lines[0] == f"{Verdict.AMBIGUOUS.value} cogging."
+    assert lines[1] == "  force error 8.37 N, noise floor 2.11 N (ratio 3.97)"
+    assert lines[2] == "  cannot be told apart from: quadratic_drag"
+    planned = [f"  {line}" for line in plan_text(result.next_experiments["x"]).splitlines()]
+    assert lines[3 : 3 + len(planned)] == planned
+    rest = [" ".join(line.split()) for line in lines[3 + len(planned) :]]
+    assert rest[:2] == [
+        "63 % of the squared error depends on other axis position, period 0.0273 m", advice(),
+    ]  # fmt: skip
+    assert rest[2:5] == [
+        "cogging evidence 510.0 held-out error 7.13 -> 2.17 N",
+        "quadratic_drag evidence 423.0 held-out error 7.34 -> 2.38 N",
+        "constant_force evidence 66.0 held-out error 7.46 -> 2.5 N not supported",
+    ]
+    assert rest[5:7] == [
+        "step 1: with cogging the held-out error falls from 7.13 to 2.17 N",
+        "step 2: with lugre beside cogging the held-out error falls from 7.57 to 2.61 N; needless "
+        "then: wear",
+    ]
+    assert rest[7:] == [f"note: {r}" for r in remarks(x, result.refits["x"])]
+    assert "axis y: Nothing is missing" in y
+    assert "cannot be told" not in y
+    assert "squared error" not in y
+
+
+def test_a_step_that_makes_the_rest_noise_has_no_errors():
+    line = _step_line(3, Step(built(NOISE), ()))
+    assert line.strip() == f"step 3: {NOISE.name} makes the rest of the error noise"
+
+
+def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
+    moved = ("a moved", "b moved")
+    asked = []
+    monkeypatch.setattr(
+        remarks_module, "moved_parameters", lambda *fits: asked.append(fits) or moved
+    )
+    x = made.diagnosis_of()
+    found = remarks(x, made.refit_of(0.0))
+    assert asked == [(x.base, made.BEST.fit)]
+    assert found[0] == made.refit_of(0.0).in_words()
+    assert "217 us" in found[1]
+    assert found[2:] == ("with cogging, a moved", "with cogging, b moved")
+    bad = built_fit(2.0, outcome=Outcome.NOT_CONVERGED)
+    best = replace(made.BEST, fit=replace(made.BEST.fit, outcome=Outcome.AT_BOUND))
+    steps = (Step(best, ()),)
+    loose = replace(
+        x, base=bad, steps=steps, dataset=replace(made.STUDY, channel_delay=0.0, holdout=())
+    )
+    loose.__dict__["repeat"] = made.REPEAT
+    found = remarks(loose, None)
+    assert found[:2] == (Outcome.NOT_CONVERGED.value, f"with cogging: {Outcome.AT_BOUND.value}")
+    assert found[-2] == made.REPEAT.in_words()
+    assert "no log was held out" in found[-1]
+    quiet = made.diagnosed().axes["y"]
+    assert remarks(quiet, None) == ()
+    assert remarks(quiet, Refit(1.0, 1.0, ())) == ()
+
+
+def test_a_change_has_its_values_and_force_in_place():
+    change = Change("mass", 15.1, 15.7, "kg", 0.572, ("payload_mass", "cogging"))
+    assert change.in_words() == (
+        "mass 15.1 -> 15.7 kg makes 0.572 N (payload_mass and cogging would be the same force)"
+    )
+    refit = Refit(0.913, 0.127, (change, replace(change, alike=())))
+    assert refit.in_words() == (
+        "as given the model misses by 0.913 N, refitted by 0.127 N: "
+        f"{change.in_words()}, mass 15.1 -> 15.7 kg makes 0.572 N"
+    )
+    assert Refit(0.913, 0.127, ()).in_words() is None
+
+
+def test_a_plan_between_two():
+    lines = plan_text(made.plan_of("cogging", "wear", favoured="wear", supposed=True)).splitlines()
+    assert lines[0] == "axis x: cogging or wear, decided by"
+    assert lines[1] == "  passes: axis x, span 0.0831 m, speed 0.0127 m/s, repeats 7"
+    assert lines[2] == "  missing motion: speed 0.0137 to 0.0591 m/s; 1.2 % of the data is there"
+    assert lines[3] == "  cogging shows in slow passes"
+    assert lines[4] == "  the logs at hand favour wear already"
+    assert lines[5] == "  without logs: effects at start values, 10 times the noise floor"
+    assert [" ".join(line.split()) for line in lines[6:]] == [
+        "passes 8.3 s 0.0412 N left to the rival (3.6 x noise floor), evidence 57.3",
+        "tracking 9.9 s 0.0287 N left to the rival (2.7 x noise floor), evidence 31.9",
+    ]
+    weak = replace(made.TRIALS[0], gain=10.0)
+    text = plan_text(made.plan_of("cogging", "wear", ranking=(weak,)))
+    assert "not decided by any experiment of this length" in text
+    many = plan_text(made.plan_of("cogging", "wear", ranking=made.TRIALS * 3))
+    assert len(many.splitlines()) == 4 + 4
+
+
+def test_a_plan_for_one_model():
+    lines = plan_text(made.plan_of("the stage", supposed=True)).splitlines()
+    assert lines[0] == "axis x: the parameters of the stage, best shown by"
+    assert [" ".join(line.split()) for line in lines[4:]] == [
+        "passes 8.3 s 57.3 nats on the parameters", "tracking 9.9 s 31.9 nats on the parameters",
+    ]  # fmt: skip
+
+
+def test_an_experiment_in_short_has_the_units_of_its_parameters():
+    rests = Rests("y", 0.0021, 0.0043, (0.1, 0.75), effort=0.25)
+    assert in_short(rests) == (
+        "rests: axis y, effort 0.25 1, span 0.0021 m, speed 0.0043 m/s, rests 0.1 0.75 s"
+    )
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [(None, "it shows most at"), (0.049, "missing motion: speed"), (0.051, "no motion is missing")],
+)
+def test_a_gap_is_missing_where_few_of_the_data_are(share, said):
+    assert Gap("speed", "m/s", 0.01, 0.05, share).in_words().startswith(said)
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_an_addition(kept):
+    lines = [" ".join(line.split()) for line in add_text(made.addition(kept)).splitlines()]
+    assert lines[:5] == [
+        "added cogging to axis x", "force error on the fit logs 7.31 -> 4.57 N",
+        "force error held out 7.83 -> 4.91 N",
+        "free-running position error 3.71e-06 -> 1.93e-06 m (MuJoCo: 1.97e-06 m)",
+        "a note of what moved",
+    ]  # fmt: skip
+    assert ("do not support" in lines[-1]) is not kept
+    assert len(lines) == (5 if kept else 6)
+    unheld = add_text(replace(made.addition(), step=made.STEPS[2]))
+    assert "held out" not in unheld
+    assert "added wear to axis y" in unheld
+
+
+def test_the_catalogue_and_one_effect():
+    effects = [CATALOGUE[n] for n in ("wear", "position_dependent_friction")]
+    first, second = effects_text(effects).splitlines()
+    assert first.split()[:2] == ["wear", "modifier"]
+    assert second.split()[0] == "position_dependent_friction"
+    assert first.index("modifier") == second.index("modifier")
+    text = effect_text(CATALOGUE["lugre"])
+    for p in CATALOGUE["lugre"].parameters:
+        row = next(line for line in text.splitlines() if line.split()[0] == p.name)
+        found = re.fullmatch(r"\s+\S+\s+(\S+) (.+?)\s+\[(\S+), (\S+)\]  (.*)", row)
+        start, unit, low, high, meaning = found.groups()
+        assert (f"{p.start:.4g}", p.unit, f"{p.lower:g}", f"{p.upper:g}", p.meaning) == (
+            start, unit, low, high, meaning,
+        )  # fmt: skip
+    for word in ("equation", "source", "fingerprint", "excited_by"):
+        label = word.replace("_", " ")
+        line = next(line for line in text.splitlines() if line.startswith(label))
+        assert line.removeprefix(label).strip() == getattr(CATALOGUE["lugre"], word).split("\n")[0]
+
+
+def test_a_check():
+    finding = Finding(Severity.WARNING, Fault.LAG, "y", "the what", "the where", "the remedy")
+    reports = {"a": CheckReport((finding,)), "b": CheckReport(())}
+    assert check_text(reports).splitlines() == [
+        "a: warning: axis y, the where: the what; the remedy", "b: fit for identification",
+    ]  # fmt: skip

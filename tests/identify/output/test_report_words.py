@@ -1,0 +1,179 @@
+"""The words and numbers of the report: every verdict, names that are not meant well, units."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from report_cases import (
+    Case,
+    Outline,
+    answers,
+    cogging_case,
+    made,
+    pictures_in,
+    without_drawing,
+)
+
+from identify import workflow
+from identify.output.report.blocks import Heading
+from identify.output.report.drawing import binned_mean
+from identify.output.report.overlay import representative
+from identify.output.report.subject import LogForces, Subject
+from identify.output.report.units import Scale, number, quantity
+from identify.output.results import Diagnosis
+from identify.selection.forward_selection import AxisDiagnosis, Verdict
+from identify.selection.residual_dependence import Dependence
+from twin.effects import Catalogue, load_catalogue
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return cogging_case()
+
+
+# --- other conclusions ----------------------------------------------------------------------
+
+
+def test_without_a_diagnosis(case: Case, tmp_path: Path) -> None:
+    with without_drawing():
+        text = case.write(tmp_path / "c.html", diagnosis=None, history=(), additions=())
+    assert re.findall(r'<section id="(\w+)">', text) == [
+        "answer", "force", "residual", "regions", "tests", "parameters", "logs",
+    ]  # fmt: skip
+    ratio = number(case.diagnosis.comparison.axes["x"].ratio)
+    assert f"Axis x: force error {ratio} times the noise floor" in text
+
+
+def test_an_addition_is_the_answer_where_nothing_was_diagnosed(case: Case) -> None:
+    first, *_ = answers(case.subject(None))
+    assert first.headline == "Axis x: cogging added"
+    values = " ".join(tile.value for tile in first.tiles)
+    assert quantity(case.addition.position_error[1], "m") in values
+
+
+def ambiguous(case: Case) -> AxisDiagnosis:
+    """The diagnosis of the case, had drag explained as much."""
+    first = replace(case.x.steps[0], tied=("quadratic_drag",))
+    return replace(case.x, verdict=Verdict.AMBIGUOUS, steps=(first,))
+
+
+def test_every_verdict_has_its_words(case: Case) -> None:
+    structure = Dependence(0.63, "position", 0.027, "m", {"position": 0.63})
+    tied = ambiguous(case)
+    lost = replace(case.x, verdict=Verdict.UNEXPLAINED, unexplained=structure)
+    done = replace(case.x, verdict=Verdict.NOTHING_MISSING)
+    expected = {
+        "Axis x: cogging or quadratic drag is missing": tied,
+        "Axis x: something outside the catalogue is missing": lost,
+        "Axis x: nothing is missing": done,
+    }
+    for headline, found in expected.items():
+        (card,) = answers(case.subject(case.concluding(found)))
+        assert card.headline == headline
+        assert card.sentence.startswith(found.verdict.value)
+        assert ("27.0 mm" in card.sentence) == (found is lost)
+        assert ("63 %" in card.sentence) == (found is lost)
+
+
+def test_only_named_effects_have_their_law_printed(case: Case) -> None:
+    tied = ambiguous(case)
+    blocks = made(case.subject(case.concluding(tied)))["equations"].blocks
+    assert [b.text for b in blocks if isinstance(b, Heading)] == [
+        "Cogging on x", "Quadratic drag on x",
+    ]  # fmt: skip
+    done = replace(case.x, verdict=Verdict.NOTHING_MISSING)
+    assert "equations" not in made(case.subject(case.concluding(done)))
+
+
+def test_the_axis_of_the_answer_comes_first(case: Case) -> None:
+    compared = case.diagnosis.comparison
+    quiet = replace(case.x, verdict=Verdict.NOTHING_MISSING)
+    both = replace(
+        compared,
+        model=replace(compared.model, axes=dict.fromkeys("ax", compared.model.axes["x"])),
+        axes={"a": replace(compared.axes["x"], axis="a"), "x": compared.axes["x"]},
+    )
+    diagnosis = Diagnosis(both.model, {"a": quiet, "x": case.x}, both)
+    cards = answers(Subject("Report", diagnosis, both, (), ()))
+    assert [card.headline[:7] for card in cards] == ["Axis x:", "Axis a:"]
+
+
+# --- names that are not meant well ----------------------------------------------------------
+
+
+def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
+    evil = '<script>alert(\'$1\')</script> & "x" onerror="y"'
+    own = replace(load_catalogue()["cogging"])
+    own.__dict__["name"] = "a$b^<i>$&c"  # what no file may be called
+    catalogue = Catalogue([own])
+    model = replace(case.model, name=evil)
+    logs = {evil: case.fit["run 1"]}
+    diagnosis = workflow.diagnose(model, logs, case.held, catalogue=catalogue)
+    step = replace(case.addition.step, effect=own.name, notes=(evil,))
+    page = case.write(
+        tmp_path / "evil.html", title=evil, diagnosis=diagnosis, comparison=diagnosis.comparison,
+        history=[step], additions=(),
+    )  # fmt: skip
+    outline = Outline(page)
+    assert not {"script", "i"} & set(outline.tags)
+    assert "onerror" not in {name for name, _ in outline.attributes}
+    assert outline.text.count(evil) >= 5  # title twice, model, log, note
+    assert f"Axis x: {own.name} is missing" in outline.text
+    names = ["".join(ElementTree.fromstring(picture).itertext()) for picture in pictures_in(page)]
+    assert any(own.name in name for name in names)
+
+
+# --- numbers --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.02, "N", "20.0 mN"),
+        (1.234, "N", "1.23 N"),
+        (-3.3e-4, "s", "−330 µs"),
+        (1e-9, "m", "1.00 nm"),
+        (0.018, "N s/m", "0.0180 N·s/m"),
+        (12345.0, "N/m^2", "12345 N/m²"),
+        (2.0, "1", "2.00"),
+        (0.0, "m", "0 m"),
+        (4e-17, "N s^2/m^2", "4.00×10⁻¹⁷ N·s²/m²"),
+        (None, "N", "–"),
+        (float("nan"), "N", "–"),
+        (float("inf"), "N", "∞ N"),
+    ],
+)
+def test_numbers_with_units(value: float | None, unit: str, text: str) -> None:
+    assert quantity(value, unit) == text
+
+
+def test_an_interval_sets_the_digits_of_its_value() -> None:
+    scale = Scale.of("m", [0.027])
+    assert scale.within(0.02698, 0.02702, 0.02698, 0.027, 0.02702) == ["26.980", "27.000", "27.020"]
+    assert Scale.of("N", [1.0]).within(-1.0, 1.0, -0.01) == ["0.0"]
+    assert Scale.of("N", [1.0]).within(1.0, 1.0, 1.0) == ["1.00"]
+
+
+def test_a_mean_is_drawn_only_where_samples_are() -> None:
+    x = np.concatenate([np.linspace(0.0, 1.0, 500), np.linspace(9.0, 10.0, 500)])
+    y = np.where(x < 5.0, 1.0, -1.0)
+    y[::7] = np.nan
+    centre, mean = binned_mean(x, y)
+    assert np.allclose(mean[centre < 0.9], 1.0)
+    assert np.allclose(mean[centre > 9.1], -1.0)
+    assert np.isnan(mean[(centre > 1.5) & (centre < 8.5)]).all()
+
+
+def test_the_stretch_shown_has_the_error_of_the_whole() -> None:
+    time = np.arange(0.0, 40.0, 0.01)
+    error = np.where(time < 20.0, 0.0, np.where(time < 30.0, 1.0, 3.0))
+    forces = LogForces("log", time, error, np.zeros_like(error), None)
+    span = representative(forces, 4.0)
+    whole = np.sqrt(np.mean(error**2))
+    assert abs(np.sqrt(np.mean(error[span] ** 2)) - whole) < 0.35 * whole
+    assert span.stop - span.start == 400

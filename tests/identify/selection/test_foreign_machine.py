@@ -1,0 +1,98 @@
+"""Logs of a second simulator, which shares no law with the product: the right name, or none."""
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from foreign_effects import INSIDE, OUTSIDE
+from foreign_kernel import SLIP_ELEMENTS
+from foreign_machine import AHEAD, BEHIND, FORCE, drawn, gaussian
+from foreign_study import CATALOGUE, STAGE, diagnosed, model_for
+
+from identify.selection.forward_selection import Verdict
+from twin.model.machine import Fitted
+
+SEED = 5
+RATE = 4e3  # Hz
+RIVALS = {
+    name: CATALOGUE[name]
+    for name in (
+        "actuator_delay", "asymmetric_friction", "base_vibration", "cable_hysteresis", "cogging",
+        "load_dependent_friction", "periodic_disturbance", "quadratic_drag", "thermal_drift",
+        "wear",
+    )
+}  # fmt: skip
+FEW = {name: CATALOGUE[name] for name in ("asymmetric_friction", "cogging", "quadratic_drag")}
+QUICK = (4.0, FEW)  # s of each log, and the effects tried
+FULL = (10.0, CATALOGUE)
+
+
+def found(planted, size, terms, seed=SEED):
+    """The diagnosis of a machine with that effect."""
+    base = drawn(np.random.default_rng(seed), RATE)
+    machine = planted.make(base, size, np.random.default_rng(seed))
+    return diagnosed(model_for(planted), machine, seed, *terms)
+
+
+NAMED = [("cogging", 0.01)]
+SLOWLY_NAMED = [
+    *NAMED, ("thermal_drift", 0.2),
+    ("quadratic_drag", 0.05), ("position_dependent_friction (slope)", 0.2),
+    ("asymmetric_friction", 0.1), ("cable_hysteresis", 0.1), ("force_constant_ripple", 0.01),
+    ("roller_spikes", 0.05),
+]  # fmt: skip
+OTHER = [("saturating drag", 0.1)]
+SLOWLY_OTHER = [*OTHER, ("random walk", 0.03), ("chirp", 0.03), ("growing mass", 0.03)]
+
+
+def cases(quick, slow):
+    """Quick cases, and the slow ones, which meet the whole catalogue."""
+    return [
+        *(pytest.param(*case, QUICK) for case in quick),
+        *(pytest.param(*case, FULL, marks=pytest.mark.slow) for case in slow),
+    ]
+
+
+@pytest.mark.parametrize(("effect", "size", "terms"), cases(NAMED, SLOWLY_NAMED))
+def test_an_effect_of_the_catalogue_is_named_whatever_its_form(effect, size, terms):
+    answer = found(INSIDE[effect], size, terms)
+    assert answer.best is not None
+    assert answer.best.effect.name in INSIDE[effect].right
+
+
+@pytest.mark.parametrize(("effect", "size", "terms"), cases(OTHER, SLOWLY_OTHER))
+def test_an_effect_of_no_catalogue_is_not_given_a_name(effect, size, terms, monkeypatch):
+    if terms is QUICK:  # pairs take most of the time
+        monkeypatch.setattr(sys.modules[Verdict.__module__], "search_pairs", lambda *_: [])
+    assert found(OUTSIDE[effect], size, terms).verdict is Verdict.UNEXPLAINED
+
+
+@pytest.mark.parametrize(
+    ("seed", "rate", "terms"),
+    cases([(1, RATE)], [(s, r) for s in (2, 3, 4) for r in (1e3, 4e3, 10e3)]),
+)
+def test_nothing_is_named_where_nothing_is_planted(seed, rate, terms):
+    machine = drawn(np.random.default_rng(seed), rate)
+    assert diagnosed(STAGE, machine, seed, *terms).verdict is Verdict.NOTHING_MISSING
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_bumps_of_another_form_are_no_reason_to_name_another_effect(seed):
+    machine = drawn(np.random.default_rng(seed), bump=gaussian)
+    assert diagnosed(STAGE, machine, seed).best is None
+
+
+@pytest.mark.slow
+def test_a_hysteresis_that_leaves_no_dry_friction_may_be_one():
+    """Slip elements of the friction are to the motion what those of a cable would be."""
+    machine = drawn(np.random.default_rng(1), 2e3)
+    machine.tables[[FORCE, AHEAD, BEHIND]] = 0.0
+    machine = machine.having(kind=SLIP_ELEMENTS, Fc=1.1, Fs=1.1, s2=1.1)
+    axis = STAGE.axes["x"]
+    friction = Fitted.at_start(CATALOGUE["coulomb_viscous"])
+    model = STAGE.with_axis("x", replace(axis, effects=(friction,)))
+    tried = RIVALS | {name: CATALOGUE[name] for name in ("gms", "stribeck")}
+    answer = diagnosed(model, machine, 1, 8.0, tried)
+    assert "gms" in answer.answers[0]

@@ -1,0 +1,77 @@
+"""A model that is wrong by its values alone: what refitting changed, and what it could be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from identify import workflow
+from identify.output.results import FitResult
+from identify.selection.confounded import Refit
+from twin.effects import load_catalogue
+from twin.experiments.named import simulate
+from twin.log import Log
+from twin.model.file import load_model
+from twin.model.machine import MachineModel, free_parameters, write
+
+CATALOGUE = load_catalogue()
+SAME_FORCE = {"mass": "payload_mass", "cable_slab.offset": "constant_force"}
+
+
+@cache
+def nominal() -> MachineModel:
+    return load_model("proton_xy", CATALOGUE)
+
+
+def machine(label: str, value: float) -> MachineModel:
+    """The stage with one number other than the model has it."""
+    axis = nominal().axes["x"]
+    (where,) = (c for c in free_parameters(axis) if c.label == label)
+    return nominal().with_axis("x", write(axis, [where], [value]))
+
+
+@cache
+def logged(label: str, value: float) -> Log:
+    return simulate(machine(label, value), "moves", seed=1, duration=6.0)
+
+
+@cache
+def fitted(label: str, value: float) -> FitResult:
+    return workflow.fit(nominal(), {"fit": logged(label, value)}, catalogue=CATALOGUE)
+
+
+def refit(label: str, value: float) -> Refit:
+    return fitted(label, value).refits["x"]
+
+
+@pytest.mark.parametrize(
+    ("label", "value"),
+    [("mass", 15.6), ("cable_slab.offset", 0.6), ("cable_slab.k1", 4.0), ("lugre.Fc", 0.26)],
+)
+def test_the_value_that_was_off_is_told_first(label: str, value: float) -> None:
+    found = refit(label, value)
+    first = found.changes[0]
+    assert first.label == label
+    assert first.after == pytest.approx(value, rel=0.02)
+    assert found.refitted < 0.2 * found.given
+    assert first.alike == ((SAME_FORCE[label],) if label in SAME_FORCE else ())
+    assert label in str(found.in_words())
+
+
+def test_a_model_with_the_machines_values_is_not_complained_of() -> None:
+    true = nominal().axes["x"]["cable_slab"].values["offset"]
+    found = refit("cable_slab.offset", true)
+    assert found.changes == ()
+    assert found.in_words() is None
+
+
+def test_what_is_said_to_be_the_same_force_is() -> None:
+    """With the mass held, that effect takes the error to where refitting the mass did."""
+    found = refit("mass", 15.6)
+    held = replace(nominal().axes["x"], mass_fixed=True)
+    model = nominal().with_axis("x", held)
+    effect = CATALOGUE[found.changes[0].alike[0]]
+    added = workflow.add(effect, model, {"fit": logged("mass", 15.6)}, axis="x")
+    assert added.step.fit_error_after == pytest.approx(found.refitted, rel=0.01)

@@ -1,0 +1,217 @@
+"""How far an effect is tried before it is scored: on both sides of what each look asks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from built_fits import (
+    CATALOGUE,
+    NOISE,
+    PLAIN,
+    axis_of,
+    built,
+    built_fit,
+    built_study,
+    fitted,
+    study_stub,
+)
+
+from identify.estimation.evidence import effective_samples
+from identify.estimation.fit import Outcome
+from identify.estimation.variable_projection import Start
+from identify.selection import candidates
+from identify.selection.candidates import (
+    _fitted_to_heads,
+    _one_linear_step,
+    _promising,
+    simplified,
+    try_effect,
+)
+
+# The rules as they were decided.
+LEAST_BIC, LEAST_T, PROMISE, SAME_ERROR, AT_FLOOR = 10.0, 3.0, 0.3, 1.01, 1.3
+RNG = np.random.default_rng(5)
+
+
+# --- how far an effect is tried -------------------------------------------------------------
+
+
+def test_a_first_look_must_show_a_part_of_the_evidence_asked_for():
+    noise = RNG.standard_normal(500)
+    base = built_fit(0, residual=noise)
+    n, before = effective_samples(noise), float(np.sum(noise**2))
+    for effect, free in (("constant_force", 1), ("cogging", 7)):
+        wanted = PROMISE * (LEAST_BIC + free * np.log(n))
+        for gain, promising in ((0.99 * wanted, False), (1.01 * wanted, True)):
+            left = before * np.exp(-gain / n)
+            assert _promising(base, Start(left, {}, fitted(effect))) is promising
+    held = replace(fitted("cogging"), fixed=frozenset({"p", "a1", "b1", "a2", "b2", "a3"}))
+    one = PROMISE * (LEAST_BIC + np.log(n))
+    assert _promising(base, Start(before * np.exp(-1.01 * one / n), {}, held))
+    assert not _promising(built_fit(0.0), Start(0.0, {}, fitted("cogging")))
+
+
+@pytest.mark.parametrize(("error", "kept"), [(1.9, True), (2.0, True), (2.1, False)])
+def test_a_step_that_does_harm_leaves_the_effect_without_strength(monkeypatch, error, kept):
+    base, effect = built_fit(2.0), fitted("cogging", a1=0.7, b2=0.2, p=0.03)
+    moved = axis_of(fitted("constant_force"), effect)
+
+    def stepped(*given):
+        assert given == (base, effect, ("log",))
+        return moved
+
+    monkeypatch.setattr(candidates, "stepped", stepped)
+
+    def finished(axis, begun, logs, outcome):
+        assert (begun, logs, outcome) == (base.begun, ("log",), Outcome.NOT_CONVERGED)
+        return built_fit(error if axis is moved else 2.0, axis=axis, outcome=outcome)
+
+    monkeypatch.setattr(candidates, "finished", finished)
+    found = _one_linear_step(base, study_stub(fit=("log",)), effect)
+    values = found.axis["cogging"].values
+    assert (found.axis is moved) is kept
+    assert values["p"] == 0.03
+    assert (values["a1"], values["b2"]) == ((0.7, 0.2) if kept else (0.0, 0.0))
+
+
+@pytest.mark.parametrize(("error", "simpler"), [(0.99, True), (1.01, False)])
+def test_simpler_values_may_cost_a_hundredth(monkeypatch, error, simpler):
+    multiple = fitted("cogging", p=0.06, a2=0.5)
+    fit = built_fit(2.0, axis=axis_of(multiple))
+    again = {}
+
+    def refit(axis, logs):
+        again.update(axis["cogging"].values)
+        return built_fit(2.0 * (1.0 + (SAME_ERROR - 1.0) * error), axis=axis)
+
+    monkeypatch.setattr(candidates, "fit_axis", refit)
+    found = simplified(fit, study_stub(), CATALOGUE["cogging"])
+    assert (again["p"], again["a1"]) == (0.03, 0.5)
+    assert (found is not fit) is simpler
+    plain = built_fit(2.0, axis=axis_of(fitted("cogging", p=0.06, a1=0.5)))
+    assert simplified(plain, study_stub(), CATALOGUE["cogging"]) is plain
+    other = built_fit(2.0, axis=axis_of(fitted("wear")))
+    assert simplified(other, study_stub(), CATALOGUE["wear"]) is other
+
+
+def tried(monkeypatch, effect, *, promising=True, looked=None, errors=(0.5, 0.4, 0.3), bic=90.0):
+    """try_effect with every part given; the axis each fit began from, and what was scored."""
+    begun, left = [], list(errors)
+    starts = [Start(float(i), {}, fitted(effect)) for i in (1, 2)]
+    other = axis_of(mass=9.9)
+    base, dataset = built_fit(2.0, 0.1, begun=other), study_stub()
+
+    def given(fit):
+        """A part that is asked about this base, dataset and start, in that order."""
+
+        def part(*asked):
+            wanted = (base, dataset, starts[0].fitted)
+            assert all(a is w for a, w in zip(asked, wanted, strict=True))
+            return fit
+
+        return part
+
+    def simplest(fit, where, what):
+        assert (where, what) == (dataset, CATALOGUE[effect])
+        return fit
+
+    def promises(asked, start):
+        assert (asked, start) == (base, starts[0])
+        return promising
+
+    def begin(*asked):
+        assert asked == (base, dataset, CATALOGUE[effect])
+        return starts
+
+    def scored(asked, fit, where, what):
+        assert (asked, where, what) == (base, dataset, CATALOGUE[effect])
+        return built(what, bic=bic, fit=fit)
+
+    def fit_axis(axis, logs):
+        begun.append((axis.mass, axis[effect] is starts[1].fitted))
+        return built_fit(left.pop(0), 0.1, axis)
+
+    monkeypatch.setattr(candidates, "starts", begin)
+    monkeypatch.setattr(candidates, "fit_axis", fit_axis)
+    monkeypatch.setattr(candidates, "fit_thoroughly", lambda axis, s: built_fit(0.2, 0.1, axis))
+    monkeypatch.setattr(candidates, "simplified", simplest)
+    monkeypatch.setattr(candidates, "_promising", promises)
+    monkeypatch.setattr(candidates, "_one_linear_step", given(built_fit(1.7, 0.1)))
+    monkeypatch.setattr(candidates, "_fitted_to_heads", given(looked))
+    monkeypatch.setattr(candidates, "score", scored)
+    return try_effect(base, dataset, CATALOGUE[effect]).fit.error, begun
+
+
+def test_an_effect_is_tried_as_far_as_it_promises(monkeypatch):
+    assert tried(monkeypatch, "cogging", promising=False) == (pytest.approx(1.7), [])
+    looked = built_fit(1.5, 0.1)
+    assert tried(monkeypatch, "lugre", looked=looked) == (pytest.approx(1.5), [])
+    first = [(5.3, False)]
+    assert tried(monkeypatch, "cogging", errors=[0.12]) == (pytest.approx(0.12), first)
+    assert tried(monkeypatch, "cogging", bic=9.0) == (pytest.approx(0.5), first)
+    every = [(5.3, False), (9.9, False), (5.3, True)]
+    assert tried(monkeypatch, "cogging") == (pytest.approx(0.2), every)
+    assert tried(monkeypatch, "lugre", promising=False) == (pytest.approx(0.2), every)
+    floor = tried(monkeypatch, "cogging", errors=(0.5, 0.11, 0.3))
+    assert floor == (pytest.approx(0.11), every)
+
+
+def test_a_noise_is_scored_without_a_refit(monkeypatch):
+
+    def finished(axis, begun, logs, outcome):
+        assert (begun.mass, logs, outcome) == (9.9, (), Outcome.CONVERGED)
+        return built_fit(1.4, axis=axis)
+
+    monkeypatch.setattr(candidates, "finished", finished)
+    assert tried(monkeypatch, NOISE.name) == (pytest.approx(1.4), [])
+
+
+def auditioned(monkeypatch, *, after, head=40, whole=100):
+    noise = RNG.standard_normal(400)
+    dataset = study_stub(fit=[range(whole)])
+    dataset.heads = [range(head)]
+    new_axis = axis_of(mass=7.7).with_effect(fitted("dahl"))
+
+    def fit_axis(axis, logs, most):
+        assert logs is dataset.heads
+        assert axis.names == ("dahl",)
+        return built_fit(1.0, axis=new_axis)
+
+    def on_heads(given, where):
+        assert (given, where) == (base, dataset)
+        return built_fit(1.0)
+
+    base = built_fit(2.0)
+    monkeypatch.setattr(candidates, "_on_heads", on_heads)
+    monkeypatch.setattr(candidates, "fit_axis", fit_axis)
+    monkeypatch.setattr(candidates, "moving", lambda logs, either: np.full(400, either))
+    monkeypatch.setattr(
+        candidates, "residual",
+        lambda axis, logs: noise if axis is PLAIN else after(noise),
+    )  # fmt: skip
+    monkeypatch.setattr(candidates, "finished", lambda axis, *_: built_fit(0.5, axis=axis))
+    return _fitted_to_heads(base, dataset, fitted("dahl")), noise, new_axis
+
+
+@pytest.mark.parametrize(("part", "passed"), [(0.9, False), (1.1, True)])
+def test_a_friction_passes_where_the_heads_show_it_better(monkeypatch, part, passed):
+    def after(noise):
+        gain = part * PROMISE * LEAST_BIC / effective_samples(noise)
+        return noise * np.exp(-0.5 * gain)
+
+    found, _, axis = auditioned(monkeypatch, after=after)
+    assert (found is None) is passed
+    assert passed or found.axis is axis
+    assert auditioned(monkeypatch, after=after, head=50)[0] is None or not passed
+    assert auditioned(monkeypatch, after=after, head=51)[0] is None
+
+
+def test_the_heads_are_fitted_once_for_all_frictions(monkeypatch):
+    fitted_on = []
+    monkeypatch.setattr(candidates, "fit_axis", lambda axis, logs: fitted_on.append((axis, logs)))
+    base, dataset = built_fit(1.0), built_study("fit")
+    for _ in range(2):
+        candidates._on_heads(base, dataset)
+    assert fitted_on == [(PLAIN, dataset.heads)]

@@ -1,0 +1,215 @@
+"""What refitting changed, explanations without data, and what a demonstration hides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import built_results as made
+import numpy as np
+import pytest
+from built_fits import CATALOGUE, PLAIN, axis_of, built_fit, built_study, fitted
+
+from identify import demo
+from identify.estimation.fit import Outcome, finished, rms
+from identify.estimation.force_balance import residual
+from identify.experiment_design import rival_hypotheses as explanations
+from identify.experiment_design.discrimination import Explanation
+from identify.experiment_design.rival_hypotheses import differing_axis, explained, require_different
+from identify.output.signature import FORCE, draw, exemplary_motion, signature
+from identify.selection import confounded as given
+from twin.effects import Catalogue
+from twin.errors import InputError
+from twin.model.machine import MachineModel
+
+# The rules as they were decided.
+LEAST_FORCE, AT_FLOOR, MOST_TOLD = 0.1, 1.3, 3
+
+
+# --- what refitting changed -----------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    return built_study("run")
+
+
+def refit_of(monkeypatch, dataset, given_axis, widths=1e-9, floor=1e-3, catalogue=()):
+    fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
+    fit.__dict__["floor"] = floor
+    monkeypatch.setattr(given, "half_widths", lambda f: np.full(len(f.scaling.where), widths))
+    return given.refit(given_axis, fit, Catalogue([CATALOGUE[n] for n in catalogue])), fit
+
+
+def test_a_change_is_told_with_the_force_that_it_makes(monkeypatch, dataset):
+    off = replace(PLAIN, mass=5.8)
+    found, fit = refit_of(monkeypatch, dataset, off, catalogue=("payload_mass", "constant_force"))
+    error = rms(residual(off, dataset.fit)[fit.kept])
+    assert (found.given, found.refitted) == (pytest.approx(error), pytest.approx(fit.error))
+    (change,) = found.changes
+    force = 0.5 * np.concatenate([w.acceleration for w in dataset.fit])[fit.kept]
+    assert change.force == pytest.approx(rms(force), rel=1e-9)
+    assert (change.label, change.before, change.after, change.unit) == ("mass", 5.8, 5.3, "kg")
+    assert change.alike == ("payload_mass",)
+    assert refit_of(monkeypatch, dataset, off, widths=0.49)[0].changes != ()
+    assert refit_of(monkeypatch, dataset, off, widths=0.51)[0].changes == ()
+
+
+def test_only_effects_without_a_shape_can_be_a_parameter_by_another_name(dataset):
+    fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
+    names = ("payload_mass", "axis_coupling", "cogging", "lugre", "coulomb_viscous")
+    found = given._bases(fit, Catalogue([CATALOGUE[n] for n in names]))
+    assert {n: b.shape[1] for n, b in found.items()} == {"axis_coupling": 2, "payload_mass": 1}
+    for basis in found.values():
+        assert given._within(basis @ np.arange(1.0, 1.0 + basis.shape[1]), basis)
+        inside = basis[:, 0]
+        other = np.roll(inside, 7) - basis @ (basis.T @ np.roll(inside, 7))
+        size = rms(inside) / rms(other)
+        assert given._within(inside + 0.0099 * size * other, basis)
+        assert not given._within(inside + 0.0101 * size * other, basis)
+
+
+@pytest.mark.parametrize(("part", "told"), [(0.99, False), (1.01, True)])
+def test_only_an_error_above_the_floor_is_complained_of(monkeypatch, dataset, part, told):
+    off = replace(PLAIN, mass=5.8)
+    _, fit = refit_of(monkeypatch, dataset, off)
+    error = rms(residual(off, dataset.fit)[fit.kept])
+    found, _ = refit_of(monkeypatch, dataset, off, floor=error / AT_FLOOR / part)
+    assert bool(found.changes) is told
+    assert (found.given, found.refitted) == pytest.approx((error, fit.error))
+
+
+def test_the_changes_that_make_most_force_are_told_first(monkeypatch, dataset):
+    friction = replace(PLAIN.effects[0], values={"Fc": 0.5, "Fs": 0.5, "sigma2": 0.9})
+    off = replace(PLAIN, mass=5.8, effects=(friction,))
+    found, _ = refit_of(monkeypatch, dataset, off)
+    forces = [c.force for c in found.changes]
+    assert forces == sorted(forces, reverse=True)
+    assert len(forces) <= MOST_TOLD
+    assert all(f > LEAST_FORCE * found.given for f in forces)
+    assert found.changes[0].label == "mass"
+
+
+# --- explanations ---------------------------------------------------------------------------
+
+
+def test_an_effect_or_a_model_is_an_explanation(monkeypatch, dataset):
+    own = axis_of(fitted("wear"), fitted("cogging", a1=0.7))
+    stage = MachineModel("stage", {"x": own})
+    other = MachineModel(
+        "other", {"x": replace(axis_of(mass=6.0), hardware=replace(own.hardware, force_limit=7.0))}
+    )
+    monkeypatch.setattr(
+        explanations, "_supposed", lambda effect, axis, dataset: (effect.name, axis.names)
+    )
+    rivals = [CATALOGUE["cogging"], CATALOGUE["constant_force"], other]
+    first, second, third = explained(rivals, stage, dataset, False)
+    assert first == Explanation("cogging", own)
+    base = ("coulomb_viscous", "wear")
+    assert second == Explanation("constant_force", ("constant_force", base))
+    assert third == Explanation("other", replace(other.axes["x"], hardware=own.hardware))
+    monkeypatch.setattr(explanations, "fit_thoroughly", lambda axis, s: built_fit(1.0, axis=axis))
+    monkeypatch.setattr(
+        explanations, "try_effect", lambda fit, s, e: SimpleNamespace(
+            fit=SimpleNamespace(axis=(fit.axis.names, e.name)))
+    )  # fmt: skip
+    first, second, third = explained(rivals, stage, dataset, True)
+    assert (first.axis, second.axis) == ((base, "cogging"), (base, "constant_force"))
+    assert third.axis.mass == 6.0
+
+
+def test_an_effect_without_data_is_ten_floors_strong(monkeypatch, dataset):
+    found = explanations._supposed(CATALOGUE["constant_force"], PLAIN, dataset)
+    floor = explanations.floor_of(PLAIN, dataset.fit)
+    added = residual(found, dataset.fit) - residual(PLAIN, dataset.fit)
+    assert rms(added) == pytest.approx(10.0 * floor, rel=1e-6)
+
+
+def test_models_differ_on_the_axis_where_they_do():
+    a = MachineModel("a", {"x": PLAIN, "y": PLAIN})
+    b = MachineModel("b", {"x": PLAIN, "y": replace(PLAIN, mass=6.0)})
+    c = MachineModel("c", {"x": PLAIN, "y": axis_of(fitted("wear"))})
+    assert differing_axis([a, b], a) == "y"
+    assert differing_axis([a, c], a) == "y"
+    assert differing_axis([a, replace(a, name="d")], a) == "x"
+    assert differing_axis([CATALOGUE["wear"]], a) == "x"
+    require_different([a, b, CATALOGUE["wear"]])
+    with pytest.raises(InputError, match="a against itself"):
+        require_different([a, b, a])
+
+
+# --- signature and demonstration ------------------------------------------------------------
+
+
+def test_the_signature_of_an_effect_is_drawn_at_its_force(tmp_path):
+    motion, force = signature(CATALOGUE["constant_force"], CATALOGUE)
+    assert rms(force) == pytest.approx(FORCE, rel=1e-6)
+    assert np.ptp(force) == pytest.approx(0.0, abs=1e-12)
+    again = exemplary_motion()
+    np.testing.assert_array_equal(motion.position, again.position)
+    assert again.others.shape == again.signals.shape
+    np.testing.assert_allclose(np.gradient(again.position, 1e-3), again.velocity)
+    assert np.abs(again.position).max() == pytest.approx(0.15)
+    assert len(again.position) == 21_000
+    rest = again.command - 10.0 * np.gradient(again.velocity, 1e-3)
+    np.testing.assert_allclose(rest, 0.3 * np.sign(again.velocity), atol=1e-12)
+    np.testing.assert_array_equal(again.raw, [again.velocity, again.command])
+    np.testing.assert_allclose(np.gradient(again.others[0], 1e-3), again.others[1])
+    np.testing.assert_allclose(np.gradient(again.others[1], 1e-3), again.others[2])
+    peaks = [np.abs(again.velocity[a:b]).max() for a, b in ((0, 3000), (3000, 9000), (9000, 21000))]
+    np.testing.assert_allclose(peaks, 0.15 * np.pi / np.array([1.5, 3.0, 6.0]), rtol=1e-2)
+    with pytest.raises(InputError, match="end the name"):
+        draw(CATALOGUE["constant_force"], CATALOGUE, tmp_path / "f.txt")
+
+
+def test_the_signature_of_a_friction_is_its_own_and_of_others_is_beside_one():
+    motion, force = signature(CATALOGUE["coulomb_viscous"], CATALOGUE)
+    fast = np.abs(motion.velocity) > 0.01
+    assert np.abs(force[fast]).min() > 0.0
+    assert (np.sign(force[fast]) == -np.sign(motion.velocity[fast])).all()
+    _, modified = signature(CATALOGUE["asymmetric_friction"], CATALOGUE)
+    assert rms(modified) == pytest.approx(FORCE, rel=1e-6)  # of a friction that it modifies
+
+
+def test_the_picture_of_an_effect_is_over_time_position_and_speed(monkeypatch, tmp_path):
+    import matplotlib.pyplot as plt
+
+    shown = []
+    monkeypatch.setattr(plt, "close", shown.append)
+    draw(CATALOGUE["constant_force"], CATALOGUE, tmp_path / "f.svg")
+    motion, force = signature(CATALOGUE["constant_force"], CATALOGUE)
+    (figure,) = shown
+    across = {
+        "Time (s)": motion.time, "Position (mm)": 1e3 * motion.position,
+        "Speed (mm/s)": 1e3 * motion.velocity,
+    }  # fmt: skip
+    assert [a.get_xlabel() for a in figure.axes] == list(across)
+    assert len({round(a.get_position().y0, 3) for a in figure.axes}) == 1  # side by side
+    for axes, values in zip(figure.axes, across.values(), strict=True):
+        x, y = axes.get_lines()[0].get_data()
+        np.testing.assert_allclose(x, values)
+        np.testing.assert_allclose(y, force)
+    assert figure.axes[0].get_ylabel() == "Added force (N)"
+    assert "<svg" in (tmp_path / "f.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("part", "seen"), [(0.49, True), (0.51, False)])
+def test_a_hidden_effect_shows_where_half_of_it_cannot_be_absorbed(monkeypatch, part, seen):
+    monkeypatch.setattr(demo, "hidden_part", lambda hidden, base, dataset: part)
+    assert demo.shows(None, None, None) is seen
+
+
+def test_what_is_hidden_in_a_demonstration_is_physics_that_is_absent():
+    machine = MachineModel("m", {"x": axis_of(fitted("wear"))})
+    hidden = {n for n, e in CATALOGUE.items() if demo._can_hide(e, machine)}
+    assert hidden == {
+        n
+        for n, e in CATALOGUE.items()
+        if e.kind.name in ("FORCE", "MODIFIER", "ACTUATION")
+        and n not in ("wear", "empirical_map", "learned_residual")
+    }
+
+
+def test_the_fall_of_the_error_is_told_in_its_order():
+    found = demo._fallen(made.addition())
+    assert "from 7830.00 mN to 4910.00 mN, 2 times; the noise floor is 1030.00 mN" in found

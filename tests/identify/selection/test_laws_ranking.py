@@ -1,0 +1,235 @@
+"""The order of candidates, and ties between them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from built_fits import (
+    CATALOGUE,
+    NOISE,
+    PLAIN,
+    axis_of,
+    built,
+    built_fit,
+    fitted,
+    study_stub,
+)
+
+from identify.estimation.evidence import Evidence, effective_samples, held_out_gain
+from identify.selection import ranking
+from identify.selection.ranking import _ranked, less, rank, tie, took_friction
+from twin.effects import Catalogue
+from twin.model.machine import Fitted
+
+# The rules as they were decided.
+AT_FLOOR, COLLAPSE, SETTLED, FIRSTS, LEAST_PART = 1.3, 0.3, 0.999, 3, 0.1
+STUDY = study_stub()
+NAMES = ("cogging", "end_stop", "gms", "quadratic_drag", "wear")
+
+
+def names(found) -> list[str]:
+    return [c.effect.name for c in found]
+
+
+# --- order ----------------------------------------------------------------------------------
+
+
+def test_candidates_come_by_falling_evidence_supported_first():
+    made = [built(n, bic=b, t=t) for n, b, t in zip(NAMES, (90, 300, 900, 40, 700),
+                                                    (9, 9, 1, 9, 1), strict=True)]  # fmt: skip
+    expected = ["end_stop", "cogging", "quadratic_drag", "gms", "wear"]
+    for seed in range(5):
+        order = np.random.default_rng(seed).permutation(len(made))
+        assert names(_ranked([made[i] for i in order])) == expected
+
+
+@pytest.mark.parametrize(("behind", "level"), [(1.9, True), (2.1, False)])
+def test_within_no_evidence_of_the_best_the_catalogue_decides(behind, level):
+    made = [built("wear", bic=90.0), built("cogging", bic=90.0 - behind), built("gms", bic=50.0)]
+    first = ["cogging", "wear"] if level else ["wear", "cogging"]
+    assert names(_ranked(made)) == [*first, "gms"]
+    unsupported = [replace(c, gain=replace(c.gain, t=0.0)) for c in made]
+    assert names(_ranked(unsupported)) == ["wear", "cogging", "gms"]
+    mixed = [made[0], unsupported[1], made[2]]
+    assert names(_ranked(mixed)) == ["wear", "gms", "cogging"]
+
+
+def test_a_noise_comes_after_what_lowers_the_error_if_both_are_supported():
+    noise, weak = built(NOISE, bic=900.0), built("wear", bic=20.0)
+    assert names(_ranked([noise, weak])) == ["wear", NOISE.name]
+    assert names(_ranked([weak, noise])) == ["wear", NOISE.name]
+    unsupported = built("wear", bic=20.0, t=1.0)
+    assert names(_ranked([unsupported, noise])) == [NOISE.name, "wear"]
+
+
+def ranked(monkeypatch, ratio, t=9.0):
+    """rank among two effects, where a refit of the base gives that ratio of its error."""
+    base, again = built_fit(4.0), built_fit(4.0 * ratio)
+    bics = {"cogging": 40.0, "wear": 90.0}
+    asked, bars = [], []
+
+    def less_of(effect, fit, base, dataset):
+        asked.append((effect.name, fit))
+        return again
+
+    def try_effect(given, dataset, effect):
+        assert (given, dataset) == (base, STUDY)
+        return built(effect, bic=bics[effect.name], t=t)
+
+    monkeypatch.setattr(ranking, "try_effect", try_effect)
+    monkeypatch.setattr(ranking, "less", less_of)
+
+    def score(given, fit, dataset, effect):
+        assert (dataset, fit.axis.names[-1]) == (STUDY, effect.name)
+        return built(effect, bic=1e3 * given.error, fit=fit)
+
+    monkeypatch.setattr(ranking, "score", score)
+    catalogue = Catalogue([CATALOGUE[n] for n in bics])
+    found = rank(base, STUDY, catalogue, lambda *done: bars.append(done), workers=1)
+    assert bars == [(1, 2), (2, 2)]
+    return found, base, again, asked
+
+
+@pytest.mark.parametrize(("ratio", "settled"), [(SETTLED + 1e-4, True), (SETTLED - 1e-4, False)])
+def test_a_base_short_of_its_optimum_is_exchanged_and_all_scored_anew(monkeypatch, ratio, settled):
+    (base, found), old, again, asked = ranked(monkeypatch, ratio)
+    assert base is (old if settled else again)
+    assert [name for name, _ in asked] == ["wear"]
+    expected = [90.0, 40.0] if settled else [1e3 * again.error] * 2
+    assert [c.delta_bic for c in found] == pytest.approx(expected)
+
+
+def test_without_support_the_base_stays(monkeypatch):
+    (base, found), old, _, asked = ranked(monkeypatch, 0.5, t=1.0)
+    assert (base, asked) == (old, [])
+    assert names(found) == ["wear", "cogging"]
+
+
+def test_less_an_effect_the_friction_that_it_replaced_is_back(monkeypatch):
+    monkeypatch.setattr(ranking, "fit_axis", lambda axis, logs: (axis, logs))
+    dataset = study_stub(fit=("log",))
+    rich = axis_of(fitted("cogging")).with_effect(fitted("lugre"))
+    axis, logs = less(CATALOGUE["lugre"], built_fit(1.0, axis=rich), built_fit(1.0), dataset)
+    assert axis.names == ("cogging", "coulomb_viscous")
+    assert axis["coulomb_viscous"] is PLAIN["coulomb_viscous"]
+    assert logs == ("log",)
+    bare = built_fit(1.0, axis=replace(PLAIN, effects=()))
+    assert less(CATALOGUE["lugre"], built_fit(1.0, axis=rich), bare, dataset)[0].names == (
+        "cogging",
+    )
+    axis, _ = less(CATALOGUE["cogging"], built_fit(1.0, axis=rich), built_fit(1.0), dataset)
+    assert axis.names == ("lugre",)
+
+
+# --- ties -----------------------------------------------------------------------------------
+
+
+NOISY = 1e-3 * np.random.default_rng(7).standard_normal(3000)
+
+
+SAMPLES = effective_samples(NOISY)
+
+
+def tied(monkeypatch, best_scale, other_scale, gains=(1.0, 1.0), logs=("held out",), **parts):
+    best = built("cogging", fit=built_fit(1.0, 1e-3, axis_of(mass=1.0)))
+    other = built("wear", fit=built_fit(1.0, 1e-3, axis_of(mass=2.0)))
+    best, other = (
+        replace(c, evidence=Evidence(g, 1, 1000.0))
+        for c, g in zip((best, other), gains, strict=True)
+    )
+    scales, seen = {1.0: best_scale, 2.0: other_scale}, []
+
+    def residual(axis, given):
+        seen.append(given)
+        return scales[axis.mass] * NOISY
+
+    monkeypatch.setattr(ranking, "residual", residual)
+    monkeypatch.setattr(ranking, "moving", lambda given, either: np.ones(len(NOISY), dtype=bool))
+    dataset = study_stub(holdout=logs, fit=("fit",))
+    return tie(dataset, best, other), seen
+
+
+def test_a_tie_ends_where_the_best_gains_more_than_next_to_nothing(monkeypatch):
+    t = held_out_gain(1.003 * NOISY, NOISY, 1e-3).t
+    assert tied(monkeypatch, 1.0, np.exp(0.5 * 1.9 / SAMPLES))[0] is True
+    assert tied(monkeypatch, 1.0, np.exp(0.5 * 2.1 / SAMPLES))[0] is False
+    assert t > 10.0  # in every block
+    assert tied(monkeypatch, 1.0, 1.0003)[0] is True
+    assert tied(monkeypatch, 1.0, 1.003)[0] is False
+    assert tied(monkeypatch, 1.003, 1.0)[0] is True  # the other is better: no reason to part
+
+
+@pytest.mark.parametrize(
+    ("t", "bic", "alike"), [(1.9, 50.0, True), (2.1, 50.0, False), (2.1, 2.1, False),
+                            (2.1, 1.9, True), (9.0, 1.9, True), (-9.0, 50.0, True)],
+)  # fmt: skip
+def test_a_tie_is_parted_by_t_above_two_and_evidence_above_two(monkeypatch, t, bic, alike):
+    found = type("Found", (), {"t": t, "delta_bic": bic})
+    monkeypatch.setattr(ranking, "held_out_gain", lambda other, best, floor: found)
+    monkeypatch.setattr(ranking, "evidence", lambda other, best, parameters: found)
+    assert tied(monkeypatch, 1.0, 1.0)[0] is alike
+
+
+def test_the_evidence_parts_two_candidates_by_more_than_ten(monkeypatch):
+    assert tied(monkeypatch, 1.0, 1.0, (1.0101, 1.0))[0] is False
+    assert tied(monkeypatch, 1.0, 1.0, (1.0099, 1.0))[0] is True
+    assert tied(monkeypatch, 1.0, 1.0, (1.0, 1.5))[0] is True
+
+
+def test_a_tie_is_judged_on_the_held_out_logs_where_there_are_any(monkeypatch):
+    assert tied(monkeypatch, 1.0, 1.0)[1] == [("held out",)] * 2
+    assert tied(monkeypatch, 1.0, 1.0, logs=())[1] == [("fit",)] * 2
+
+
+def test_windows_at_rest_are_left_out_where_either_sticks(monkeypatch):
+    asked = []
+    monkeypatch.setattr(ranking, "residual", lambda axis, logs: NOISY)
+
+    def moving(logs, either):
+        asked.append(either)
+        return np.ones(len(NOISY), dtype=bool)
+
+    monkeypatch.setattr(ranking, "moving", moving)
+    sliding = axis_of().with_effect(fitted("lugre"))
+    pairs = [(PLAIN, sliding), (sliding, PLAIN), (sliding, sliding)]
+    for one, two in pairs:
+        made = [built("wear", fit=built_fit(1.0, axis=axis)) for axis in (one, two)]
+        tie(study_stub(holdout=(1,)), *made)
+    assert asked == [True, True, False]
+
+
+def test_what_only_makes_noise_ties_with_nothing(monkeypatch):
+    monkeypatch.setattr(ranking, "residual", lambda *_: pytest.fail("compared"))
+    assert not tie(STUDY, built(NOISE), built("wear"))
+    assert not tie(STUDY, built("wear"), built(NOISE))
+
+
+# --- friction -------------------------------------------------------------------------------
+
+
+def friction(**values: float) -> Fitted:
+    own = PLAIN.effects[0]
+    return replace(own, values={**own.values, **values})
+
+
+@pytest.mark.parametrize(
+    ("after", "taken"),
+    [
+        (friction(Fc=0.31 * COLLAPSE + 1e-4), False),
+        (friction(Fc=0.31 * COLLAPSE - 1e-4), True),
+        (friction(sigma2=0.001), False),
+        (friction(Fs=0.001), False),  # held by the fit
+    ],
+)
+def test_a_friction_is_taken_where_its_dry_part_collapses(after, taken):
+    assert took_friction(PLAIN, PLAIN.with_effect(after)) is taken
+
+
+def test_a_friction_that_was_replaced_was_not_taken_over():
+    assert not took_friction(PLAIN, PLAIN.with_effect(fitted("lugre")))
+    assert not took_friction(replace(PLAIN, effects=()), PLAIN)
+    other = fitted("constant_force", F0=2.0)
+    gone = fitted("constant_force", F0=1e-3)
+    assert not took_friction(axis_of(other), axis_of(gone))

@@ -1,0 +1,145 @@
+"""Each rule of a verdict's evidence on both sides of its threshold, on fits as given."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from built_fits import NOISE, PLAIN, built, built_fit, stage, step, study_stub
+
+from identify.selection.forward_selection import (
+    _asked_for,
+    _convincing,
+    _friction_instead,
+    _gone,
+    _near,
+    _part,
+)
+
+module = importlib.import_module("identify.selection.forward_selection")
+# The rules as they were decided.
+BEYOND_DOUBT, FLOOR_SURE, MOST_STEPS = 100.0, (0.85, 1.15), 5
+STUDY = study_stub()
+HIGH, LOW = built_fit(8.0), built_fit(1.1)  # over a floor of 1 N
+
+
+def fit_with_part(part: float, base_error: float = 5.0, base_floor: float = 3.0):
+    """A fit that leaves all but that part of what stood above the floor of (5, 3)."""
+    floor = 0.7
+    excess = base_error**2 - base_floor**2
+    return built_fit(np.sqrt(floor**2 + (1.0 - part) * excess), floor)
+
+
+# --- evidence -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("part", [-0.5, 0.0, 0.3, 0.95, 1.0])
+def test_the_part_explained_is_counted_above_the_floor_of_each_fit(part):
+    assert _part(built_fit(5.0, 3.0), fit_with_part(part)) == pytest.approx(part, abs=1e-12)
+
+
+def test_no_part_is_explained_of_an_error_within_its_floor():
+    assert _part(built_fit(2.0, 2.0), built_fit(0.5, 0.4)) == 0.0
+    assert _part(built_fit(1.0, 2.0), built_fit(0.5, 0.4)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("bic", "t", "base", "asked"),
+    [
+        (40.0, 9.0, HIGH, True),
+        (40.0, 2.0, HIGH, False),
+        (40.0, 9.0, LOW, False),
+        (BEYOND_DOUBT, 9.0, LOW, False),
+        (BEYOND_DOUBT + 0.1, 9.0, LOW, True),
+        (BEYOND_DOUBT + 0.1, 2.0, LOW, False),
+    ],
+)
+def test_at_the_floor_only_much_evidence_asks_for_an_effect(bic, t, base, asked):
+    assert _asked_for(built(bic=bic, t=t), base) is asked
+
+
+def test_a_rival_gains_more_than_four_fifths_of_the_best():
+    best = built(gain=5.0)
+    assert _near(best, built(gain=4.01))
+    assert not _near(best, built(gain=4.0))
+    assert not _near(best, built(gain=3.9))
+    assert not _near(best, built(NOISE, gain=4.5))
+    assert _near(built(gain=1.0), built(gain=5.0))  # the larger is always near
+
+
+# --- what stands in for a friction ----------------------------------------------------------
+
+
+def test_a_friction_that_explains_nearly_all_is_named_where_the_best_took_the_dry_friction():
+    weak = PLAIN.with_effect(replace(PLAIN.effects[0], values={"Fc": 0.01, "Fs": 0.3, "sigma2": 1}))
+    base = built_fit(5.0, 3.0)
+    best = built("cable_hysteresis", fit=built_fit(1.0, axis=weak))
+    ranking = [
+        best,
+        built("cogging", fit=fit_with_part(0.99)),
+        built("dahl", fit=fit_with_part(0.99), t=1.0),
+        built("gms", fit=fit_with_part(0.94)),
+        built("lugre", fit=fit_with_part(0.96)),
+        built("leuven", fit=fit_with_part(0.98)),
+    ]
+    assert _friction_instead(base, best, ranking) == ("lugre",)
+    assert _friction_instead(base, best, ranking[:4]) == ()
+    kept = built("cable_hysteresis", fit=built_fit(1.0, axis=PLAIN))
+    assert _friction_instead(base, kept, ranking) == ()
+
+
+# --- what a step convinces of ---------------------------------------------------------------
+
+
+def told(monkeypatch, *, held=False, explains=False):
+    """The two rules that read logs, as given; the pairs of fits they were asked about."""
+    asked = []
+
+    def explained(before, after, dataset):
+        asked.append((before, after))
+        return explains
+
+    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held)
+    monkeypatch.setattr(module, "explains", explained)
+    return asked
+
+
+BASE = built_fit(5.0, 3.0)
+ONE = step("cogging", bic=50.1)
+
+
+NEAR_FLOOR = built_fit(2.5)  # from which the floor is less than nearly all
+
+
+@pytest.mark.parametrize(
+    ("base", "after", "held", "explains", "convinced"),
+    [
+        (NEAR_FLOOR, built_fit(1.29), False, False, True),
+        (NEAR_FLOOR, built_fit(1.31), False, False, False),
+        (NEAR_FLOOR, built_fit(2.4), True, False, True),
+        (BASE, fit_with_part(0.951), False, False, True),
+        (BASE, fit_with_part(0.949), False, False, False),
+        (BASE, fit_with_part(0.41), False, True, True),
+        (BASE, fit_with_part(0.39), False, True, False),
+        (BASE, fit_with_part(0.41), False, False, False),
+    ],
+)
+def test_the_floor_or_nearly_all_or_the_foremost_convinces(
+    monkeypatch, base, after, held, explains, convinced
+):
+    told(monkeypatch, held=held, explains=explains)
+    assert _convincing(stage(base), stage(after, ONE), STUDY) is convinced
+
+
+def test_only_the_first_effect_that_was_added_must_be_proven(monkeypatch):
+    asked = told(monkeypatch, explains=True)
+    after = fit_with_part(0.6)
+    weak, strong = step("cogging", bic=50.0), step("wear", bic=50.1)
+    assert _gone(BASE, after, [strong, weak], STUDY)
+    assert asked == [(BASE, after)]
+    assert not _gone(BASE, after, [weak, strong], STUDY)
+    earlier = stage(BASE, weak)
+    assert _convincing(earlier, stage(after, weak, strong), STUDY)
+    assert not _convincing(stage(BASE), stage(after, weak, strong), STUDY)

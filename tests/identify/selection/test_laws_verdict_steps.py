@@ -1,0 +1,220 @@
+"""Which steps are kept and taken back, and the verdict on them."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from built_fits import axis_of, built, built_fit, fitted, stage, step, study_stub
+
+from identify.selection.forward_selection import (
+    AxisDiagnosis,
+    Verdict,
+    _compared_again,
+    _decided,
+    _eliminated_backwards,
+    _kept,
+)
+from identify.selection.residual_dependence import Dependence
+
+module = importlib.import_module("identify.selection.forward_selection")
+# The rules as they were decided.
+BEYOND_DOUBT, FLOOR_SURE, MOST_STEPS = 100.0, (0.85, 1.15), 5
+STUDY = study_stub()
+HIGH, LOW = built_fit(8.0), built_fit(1.1)  # over a floor of 1 N
+
+
+def fit_with_part(part: float, base_error: float = 5.0, base_floor: float = 3.0):
+    """A fit that leaves all but that part of what stood above the floor of (5, 3)."""
+    floor = 0.7
+    excess = base_error**2 - base_floor**2
+    return built_fit(np.sqrt(floor**2 + (1.0 - part) * excess), floor)
+
+
+# --- which steps stay -----------------------------------------------------------------------
+
+
+def diagnosis(verdict: Verdict, *steps, ranking=()) -> AxisDiagnosis:
+    return AxisDiagnosis(STUDY, HIGH, tuple(ranking), steps, LOW, verdict, None)
+
+
+def test_what_a_later_step_made_needless_is_not_an_answer():
+    steps = (
+        step("cogging", ("wear",)),
+        step("quadratic_drag", ("payload_mass", "constant_force")),
+        step("lugre", dropped=("cogging",)),
+    )
+    assert [s.candidate.effect.name for s in _kept(steps)] == ["quadratic_drag", "lugre"]
+    for verdict in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS):
+        found = diagnosis(verdict, *steps)
+        expected = (("quadratic_drag", "payload_mass", "constant_force"), ("lugre",))
+        assert found.answers == expected
+        assert found.named == ("quadratic_drag", "lugre")
+        assert found.best is steps[1].candidate
+        assert found.ambiguous_with == ("payload_mass", "constant_force")
+
+
+@pytest.mark.parametrize("verdict", [Verdict.UNEXPLAINED, Verdict.NOTHING_MISSING])
+def test_without_a_convincing_effect_none_is_named(verdict):
+    found = diagnosis(verdict, step("cogging", ("wear",)))
+    assert (found.named, found.best, found.ambiguous_with) == ((), None, ())
+
+
+def test_a_force_that_repeats_is_only_sought_where_error_is_left(monkeypatch):
+    seen = []
+    monkeypatch.setattr(
+        module, "not_general", lambda fit, dataset: seen.append((fit, dataset)) or 7
+    )
+    assert diagnosis(Verdict.UNEXPLAINED).repeat is None
+    assert replace(diagnosis(Verdict.UNEXPLAINED), final=HIGH).repeat == 7
+    assert seen == [(HIGH, STUDY)]
+
+
+def looked_back(monkeypatch, needed):
+    """_eliminated_backwards on a fit with two earlier effects; needed: verdicts as asked."""
+    full = built_fit(1.0, axis=axis_of(fitted("cogging"), fitted("wear"), fitted("end_stop")))
+    answers, scored = iter(needed), []
+
+    def less(effect, fit, base, dataset):
+        return built_fit(2.0, axis=fit.axis.without(effect.name))
+
+    def score(smaller, larger, dataset, effect):
+        scored.append((smaller.axis.names[1:], larger.axis.names[1:], effect.name))
+        return built(effect, t=9.0 if next(answers) else 1.0)
+
+    monkeypatch.setattr(module, "less", less)
+    monkeypatch.setattr(module, "score", score)
+    monkeypatch.setattr(module, "fit_thoroughly", lambda axis, dataset: built_fit(3.0, axis=axis))
+    earlier = [built("cogging"), built("wear")]
+    fit, dropped = _eliminated_backwards(HIGH, full, STUDY, earlier)
+    return fit, dropped, scored, full
+
+
+def test_an_earlier_effect_stays_where_the_fit_without_it_is_worse_twice(monkeypatch):
+    fit, dropped, scored, full = looked_back(monkeypatch, [True, True, True, True])
+    assert (fit, dropped) == (full, ())
+    every = ("cogging", "wear", "end_stop")
+    without = (("wear", "end_stop"), every, "cogging")
+    assert scored == [without, without, *[(("cogging", "end_stop"), every, "wear")] * 2]
+
+
+@pytest.mark.parametrize(("needed", "error"), [([False], 2.0), ([True, False], 3.0)])
+def test_an_earlier_effect_goes_where_the_fit_without_it_is_as_good(monkeypatch, needed, error):
+    fit, dropped, scored, _ = looked_back(monkeypatch, [*needed, True, True])
+    assert dropped == ("cogging",)
+    assert fit.error == pytest.approx(error)
+    assert fit.axis.names[1:] == ("wear", "end_stop")
+    assert scored[-1] == (("end_stop",), ("wear", "end_stop"), "wear")
+
+
+# --- ties told again beside all that was added ----------------------------------------------
+
+
+def test_ties_are_told_again_only_beside_several_effects(monkeypatch):
+    fits, ties = [], []
+    final = built_fit(1.0, axis=axis_of(fitted("cogging"), fitted("wear"), fitted("end_stop")))
+
+    def refitted(axis, logs):
+        fits.append(axis.names[1:])
+        return built_fit(1.0, axis=axis)
+
+    def score(base, fit, dataset, effect):
+        assert base is HIGH
+        return built(effect, fit=fit)
+
+    def tie(dataset, own, rival):
+        ties.append((own.effect.name, own.fit is final, rival.effect.name))
+        return rival.effect.name == "constant_force"
+
+    monkeypatch.setattr(module, "fit_axis", refitted)
+    monkeypatch.setattr(module, "score", score)
+    monkeypatch.setattr(module, "tie", tie)
+    rivals = (built("constant_force"), built("wear"), built("quadratic_drag"))
+    steps = (
+        step("cogging", ("quadratic_drag",), rivals=rivals),
+        step("wear", ("payload_mass",)),
+        step("end_stop", ("payload_mass",), beside="wear"),
+        step("lugre", ("dahl",)),
+        step("gms", (), dropped=("lugre",)),
+    )
+    again = _compared_again([stage(HIGH), stage(final, *steps)], STUDY)
+    assert [s.tied for s in again] == [("constant_force",), (), ("payload_mass",), ("dahl",), ()]
+    assert ties == [("cogging", True, "constant_force"), ("cogging", True, "quadratic_drag")]
+    assert fits == [("wear", "end_stop", r) for r in ("constant_force", "quadratic_drag")]
+    alone = (steps[0],)
+    assert _compared_again([stage(HIGH), stage(final, *alone)], STUDY) == alone
+
+
+# --- the verdict ----------------------------------------------------------------------------
+
+STRUCTURE = Dependence(0.5, "position", None, "m", {"position": 0.5})
+
+
+def decided(monkeypatch, stages, convinced, held=False):
+    """_decided with convinced(number of steps before, after); what structure was sought in."""
+    sought = []
+
+    def structure(fit, dataset):
+        sought.append(fit)
+        return STRUCTURE
+
+    monkeypatch.setattr(
+        module, "_convincing", lambda a, b, dataset: convinced(len(a.steps), len(b.steps))
+    )
+    monkeypatch.setattr(module, "_compared_again", lambda stages, dataset: stages[-1].steps)
+    monkeypatch.setattr(module, "find_dependence", structure)
+    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held)
+    found = _decided(STUDY, (built("wear"),), stages)
+    return found, sought
+
+
+FIRST, SECOND = step("cogging"), step("wear", ("end_stop",))
+STAGES = [stage(HIGH), stage(built_fit(5.0), FIRST), stage(built_fit(4.0), FIRST, SECOND)]
+
+
+def test_stages_that_do_not_convince_are_taken_back_one_by_one(monkeypatch):
+    found, sought = decided(monkeypatch, STAGES, lambda a, b: b == 1)
+    assert found.verdict is Verdict.MISSING_EFFECT
+    assert (found.base, found.final, found.steps) == (HIGH, STAGES[1].fit, (FIRST,))
+    assert found.unexplained is STRUCTURE
+    assert sought == [STAGES[1].fit]
+
+
+def test_the_whole_must_convince_against_the_base(monkeypatch):
+    found, sought = decided(monkeypatch, STAGES, lambda a, b: (a, b) == (1, 2))
+    assert found.verdict is Verdict.UNEXPLAINED
+    assert (found.final, found.steps) == (STAGES[2].fit, (FIRST, SECOND))
+    assert sought == [HIGH]
+
+
+@pytest.mark.parametrize(
+    ("first", "verdict"), [(FIRST, Verdict.MISSING_EFFECT), (SECOND, Verdict.AMBIGUOUS)]
+)
+def test_a_tie_of_the_first_effect_that_stays_is_an_ambiguity(monkeypatch, first, verdict):
+    second = FIRST if first is SECOND else SECOND
+    stages = [stage(HIGH), stage(LOW, first), stage(LOW, first, second)]
+    found, sought = decided(monkeypatch, stages, lambda a, b: True)
+    assert found.verdict is verdict
+    assert (found.unexplained, sought) == (None, [])
+
+
+def test_structure_is_not_sought_where_the_held_out_logs_are_explained(monkeypatch):
+    found, sought = decided(monkeypatch, STAGES, lambda a, b: True, held=True)
+    assert (found.unexplained, sought) == (None, [])
+
+
+@pytest.mark.parametrize(
+    ("stages", "verdict"),
+    [
+        ([stage(LOW)], Verdict.NOTHING_MISSING),
+        ([stage(HIGH)], Verdict.UNEXPLAINED),
+        ([stage(LOW), stage(LOW, FIRST)], Verdict.UNEXPLAINED),
+    ],
+)
+def test_nothing_is_missing_only_at_the_floor_with_nothing_added(monkeypatch, stages, verdict):
+    found, _ = decided(monkeypatch, stages, lambda a, b: False)
+    assert found.verdict is verdict
+    assert (found.unexplained is None) is (verdict is Verdict.NOTHING_MISSING)
+    assert found.ranking[0].effect.name == "wear"

@@ -1,0 +1,88 @@
+"""The command line: every failure is one line on standard error and exit code 2."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from stubbed_cli import stubbed
+
+from identify import workflow
+from identify.cli import machine, main
+from identify.cli.shared import catalogue_with, machine_model, read_logs, require_folder, say
+from twin.errors import InputError
+
+
+@pytest.fixture
+def cli(monkeypatch, capsys, tmp_path):
+    """Runs `twin` with all input stubbed: exit code, standard output and standard error."""
+    return stubbed(monkeypatch, capsys, tmp_path)
+
+
+# --- errors ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (InputError("two\nlines"), "twin: two lines"),
+        (KeyboardInterrupt(), "twin: interrupted"),
+        (PermissionError(13, "Permission denied", "f.x"), "twin: f.x: Permission denied; check"),
+        (ValueError("odd"), "twin: this is a fault of the program: ValueError: odd; please"),
+    ],
+)
+def test_every_failure_is_one_line_and_exit_code_two(monkeypatch, cli, error, said):
+    def fails(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.delenv("TWIN_TRACEBACK", raising=False)
+    monkeypatch.setattr(workflow, "compare", fails)
+    code, out, err = cli("compare", "m.toml", "a.mcap", "--json")
+    assert (code, out) == (2, "")
+    assert err.startswith(said)
+    assert err.count("\n") == 1
+
+
+def test_a_traceback_is_shown_where_it_is_asked_for(monkeypatch):
+    monkeypatch.setenv("TWIN_TRACEBACK", "1")
+    monkeypatch.setattr(sys, "argv", ["twin", "effects"])
+    monkeypatch.setattr(machine, "catalogue_with", lambda files: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        main()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("fit", "m", "a"), ("compare", "m", "a"), ("diagnose", "m", "a"), ("add", "wear", "m", "a"),
+        ("simulate", "moves"), ("recover", "a"), ("plan", "m"), ("selftest",),
+    ],
+)  # fmt: skip
+def test_a_missing_folder_is_said_before_the_work(cli, command):
+    code, out, err = cli(*command, "-o", "no/where.toml")
+    assert (code, out) == (2, "")
+    assert "no/where.toml: its folder does not exist" in err
+
+
+def test_what_is_said_goes_to_its_own_stream(capsys, tmp_path):
+    say("text", {"a": 1.5, "b": float("inf")}, True, ["w1", "w2"])
+    out, err = capsys.readouterr()
+    assert (json.loads(out), err) == ({"a": 1.5, "b": None}, "twin: w1\ntwin: w2\n")
+    say("text", {"a": 1}, False)
+    assert capsys.readouterr() == ("text\n", "")
+    require_folder(tmp_path / "new.toml")
+    with pytest.raises(InputError):
+        require_folder(tmp_path / "no" / "new.toml")
+
+
+def test_files_are_read_by_the_names_they_were_given(monkeypatch):
+    monkeypatch.setattr("twin.log.read_log", lambda path: f"log {path}")
+    monkeypatch.setattr("twin.effects.load_catalogue", lambda files: files)
+    monkeypatch.setattr("twin.model.file.load_model", lambda *given: given)
+    paths = [Path("b.mcap"), Path("a.mcap")]
+    assert list(read_logs(paths).items()) == [(str(p), f"log {p}") for p in paths]
+    assert read_logs(None) == {}
+    assert (catalogue_with(paths), catalogue_with(None)) == (paths, ())
+    assert machine_model("name", "catalogue") == ("name", "catalogue")

@@ -1,0 +1,275 @@
+"""What a loop's functions hand on, and which parameters are said to have moved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import built_results as made
+import numpy as np
+import pytest
+from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, fitted
+
+from identify import workflow
+from identify.output import results
+from identify.selection import confounded
+from identify.selection.confounded import moved_parameters
+from identify.selection.forward_selection import Verdict
+from identify.workflow import _addition, add
+from twin.errors import InputError
+from twin.model.machine import MachineModel
+
+# The rules as they were decided.
+LEAST_FORCE, AT_FLOOR, MOST_TOLD = 0.1, 1.3, 3
+
+
+# --- the axis of the answer -----------------------------------------------------------------
+
+
+def axis_with(verdict: Verdict, bic: float = 1.0, ratio: float = 2.0):
+    steps = made.diagnosis_of().steps[:1] if verdict.name in ("MISSING_EFFECT", "AMBIGUOUS") else ()
+    ranking = (built("wear", bic=bic),)
+    return made.diagnosis_of(verdict, steps=steps, ranking=ranking, base=built_fit(ratio, 1.0))
+
+
+def leading(**axes) -> str:
+    found = workflow.Diagnosis(made.MODEL, axes, made.Comparison(made.MODEL, {}))
+    return next(name for name, d in axes.items() if d is found.leading)
+
+
+def test_the_answer_is_about_the_axis_with_the_strongest_verdict():
+    order = [
+        Verdict.NOTHING_MISSING,
+        Verdict.UNEXPLAINED,
+        Verdict.AMBIGUOUS,
+        Verdict.MISSING_EFFECT,
+    ]
+    for i, weak in enumerate(order):
+        for strong in order[i + 1 :]:
+            axes = {"a": axis_with(weak, bic=900.0, ratio=9.0), "b": axis_with(strong)}
+            assert leading(**axes) == "b"
+            assert leading(**dict(reversed(axes.items()))) == "b"
+
+
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_of_like_verdicts_evidence_or_else_the_error_decides(verdict):
+    named = verdict in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS)
+    a = axis_with(verdict, bic=90.0, ratio=2.0)
+    b = axis_with(verdict, bic=80.0, ratio=3.0)
+    assert leading(a=a, b=b) == ("a" if named else "b")
+    assert leading(a=a, b=replace(b, ranking=())) == ("a" if named else "b")
+
+
+# --- parameters that moved ------------------------------------------------------------------
+
+
+def moved(monkeypatch, old: dict, new: dict, width: float = 0.03):
+    before = built_fit(1.0, axis=axis_of(fitted("constant_force", **old)))
+    after = built_fit(1.0, axis=axis_of(fitted("wear"), fitted("constant_force", **new)))
+    widths = {before: 0.04, after: width}
+    monkeypatch.setattr(
+        confounded, "half_widths", lambda fit: np.full(len(fit.scaling.where), widths[fit])
+    )
+    return moved_parameters(before, after)
+
+
+@pytest.mark.parametrize(("f0", "told"), [(1.049, False), (1.051, True), (0.949, True)])
+def test_a_parameter_moved_where_it_leaves_both_intervals(monkeypatch, f0, told):
+    found = moved(monkeypatch, {"F0": 1.0}, {"F0": f0})
+    assert bool(found) is told
+    if told:
+        assert found == (
+            f"constant_force.F0 moved from 1 to {f0:.4g} N: more than its interval",
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize(("f0", "said"), [(0.29, "collapsed"), (0.31, "moved")])
+def test_a_strength_collapsed_where_less_than_a_third_is_left(monkeypatch, f0, said):
+    (found,) = moved(monkeypatch, {"F0": 1.0}, {"F0": f0})
+    assert found.startswith(f"constant_force.F0 {said} from 1 to {f0} N")
+    assert ("stood in for" in found) is (said == "collapsed")
+    wide = moved(monkeypatch, {"F0": 1.0}, {"F0": f0}, width=5.0)
+    assert bool(wide) is (said == "collapsed")
+    assert moved(monkeypatch, {"F0": 0.039}, {"F0": 0.0}) == ()
+
+
+# --- fit, compare, diagnose -----------------------------------------------------------------
+
+
+def handed(monkeypatch):
+    """The loop's parts stubbed: each says what it was given."""
+    datasets = {a: replace(made.STUDY, axis=a) for a in ("x", "y")}
+    seen = {}
+
+    def read(*asked):
+        seen["datasets"] = asked
+        return dict(datasets)
+
+    def aligned(axis, dataset):
+        aligned_study = replace(dataset, channel_delay=axis.mass / 1e4)
+        return aligned_study, built_fit(axis.mass, axis=replace(axis, mass=2 * axis.mass))
+
+    monkeypatch.setattr(workflow, "datasets", read)
+    monkeypatch.setattr(workflow, "fit_aligned", aligned)
+    monkeypatch.setattr(workflow, "estimates", lambda fit: ("estimates", fit))
+    monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
+    monkeypatch.setattr(workflow, "error_on", lambda axis, logs: np.full(5, axis.mass * len(logs)))
+    monkeypatch.setattr(results, "refit", lambda *given: given)
+    monkeypatch.setattr(workflow, "require_residual", lambda axis, dataset: None)
+    return seen
+
+
+def test_a_fit_takes_over_the_values_and_the_shift_of_each_axis(monkeypatch):
+    seen, bars = handed(monkeypatch), []
+    found = workflow.fit(
+        made.MODEL, "logs", "held", catalogue="known", window=0.07,
+        progress=lambda *done: bars.append(done),
+    )  # fmt: skip
+    assert seen["datasets"] == (made.MODEL, "logs", "held", 0.07)
+    assert bars == [("fitting", 1, 2), ("fitting", 2, 2)]
+    assert {a: m.mass for a, m in found.model.axes.items()} == {"x": 10.6, "y": 15.8}
+    assert {a: s.channel_delay for a, s in found.datasets.items()} == {"x": 5.3e-4, "y": 7.9e-4}
+    assert found.holdout_error == pytest.approx({"x": 10.6, "y": 15.8})
+    assert all(found.estimates[a] == ("estimates", found.fits[a]) for a in "xy")
+    assert found.refits == {a: (made.MODEL.axes[a], found.fits[a], "known") for a in "xy"}
+    bare = replace(made.STUDY, holdout=())
+    assert workflow.holdout_error(found.fits["x"], bare) is None
+    assert len(workflow.fit(made.MODEL, "logs").catalogue) == 0
+    assert seen["datasets"][2] == {}
+
+
+def test_a_comparison_is_of_the_axes_that_move(monkeypatch):
+    moving = {"y": "dataset y"}
+    monkeypatch.setattr(workflow, "datasets", lambda *given: moving if given[1:] == (
+        "logs", {}, 0.07) else None)  # fmt: skip
+    monkeypatch.setattr(workflow, "require_residual", lambda axis, dataset: None)
+    monkeypatch.setattr(workflow, "aligned", lambda axis, dataset: (axis.mass, dataset))
+    asked = []
+
+    def errors(model, found, progress):
+        progress(3, 4)
+        asked.append((model, dict(found)))
+        return {"y": "errors of y"}, {"y": "floors of y"}
+
+    monkeypatch.setattr(workflow, "position_errors", errors)
+    monkeypatch.setattr(workflow, "compare_axis", lambda *given: given)
+    bars = []
+    found = workflow.compare(
+        made.MODEL, "logs", window=0.07, progress=lambda *done: bars.append(done)
+    )
+    prepared = (7.9, "dataset y")
+    assert found.axes == {"y": (made.MODEL, prepared, "errors of y", "floors of y")}
+    assert (asked, bars) == ([(made.MODEL, {"y": prepared})], [("comparing", 3, 4)])
+    assert found.model is made.MODEL
+
+
+def test_a_diagnosis_hands_each_axis_its_own_fit_and_study(monkeypatch):
+    described = made.MODEL.with_axis("x", axis_of(fitted("empirical_map")))
+    result = made.fit_result()
+    asked, plans = {}, {"x": None, "y": "plan y"}
+
+    def fit(*given, **named):
+        asked.update(given=given, named=named)
+        return result
+
+    def diagnose_axis(fit, dataset, catalogue, progress):
+        progress(1, 2)
+        return SimpleNamespace(axis=dataset.axis, fit=fit, catalogue=catalogue)
+
+    bars = []
+    monkeypatch.setattr(workflow, "fit", fit)
+    monkeypatch.setattr(workflow, "diagnose_axis", diagnose_axis)
+    monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
+    monkeypatch.setattr(
+        workflow, "next_experiment", lambda d, model, window: plans[d.axis] and (d, model, window)
+    )
+    monkeypatch.setattr(workflow, "_compared", lambda *given: given)
+    progress = lambda *done: bars.append(done)  # noqa: E731
+    found = workflow.diagnose(
+        described, "logs", "held", catalogue="known", window=0.07, progress=progress
+    )
+    assert asked["given"] == (made.MODEL, "logs", "held")
+    assert asked["named"] == {"catalogue": "known", "window": 0.07, "progress": progress}
+    for axis in "xy":
+        d = found.axes[axis]
+        assert (d.axis, d.fit, d.catalogue) == (axis, result.fits[axis], "known")
+    assert bars == [(f"trying effects on {a}", 1, 2) for a in "xy"]
+    assert found.next_experiments == {"y": (found.axes["y"], result.model, 0.07)}
+    assert found.comparison == (result.model, result.datasets, progress)
+    assert found.refits is result.refits
+
+
+# --- add ------------------------------------------------------------------------------------
+
+
+def test_an_effect_is_added_where_it_helps_most(monkeypatch):
+    both = SimpleNamespace(
+        fits={"x": built_fit(3.0), "y": built_fit(4.0)}, datasets={"x": "sx", "y": "sy"}
+    )
+    tried = []
+
+    def attempt(fit, dataset, effect):
+        tried.append((fit, dataset, effect.name))
+        return built(effect, bic={"sx": 40.0, "sy": 70.0}[dataset], axis=dataset[1])
+
+    seen = []
+    monkeypatch.setattr(workflow, "fit", lambda *a, **k: seen.append((a, k)) or both)
+    monkeypatch.setattr(workflow, "try_effect", attempt)
+    monkeypatch.setattr(workflow, "_addition", lambda best, before, given: (best, given))
+    wear = CATALOGUE["wear"]
+    best, _ = add(wear, made.MODEL, "logs", "held", window=0.07)
+    assert best.axis == "y"
+    assert [t[1:] for t in tried] == [("sx", "wear"), ("sy", "wear")]
+    assert [t[0] for t in tried] == list(both.fits.values())
+    assert seen[0][0][1:] == ("logs", "held")
+    assert seen[0][1]["window"] == 0.07
+    bars = []
+    found = add(wear, made.MODEL, "logs", axis="x", progress=lambda *done: bars.append(done))
+    assert (found[0].axis, bars) == ("x", [("adding", 1, 1)])
+    with pytest.raises(InputError, match="already"):
+        add(CATALOGUE["coulomb_viscous"], made.MODEL, "logs")
+    with pytest.raises(InputError, match="no axis"):
+        add(wear, made.MODEL, "logs", axis="z")
+    both.fits.pop("y")
+    with pytest.raises(InputError, match="does not move"):
+        add(wear, made.MODEL, "logs", axis="y")
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
+    base = built_fit(7.3)
+    best = built("cogging", fit=built_fit(2.9, axis=axis_of(fitted("cogging"))), t=9 if kept else 1)
+    dataset = replace(made.STUDY, holdout=("held",))
+    before = SimpleNamespace(
+        fits={"x": base}, datasets={"x": dataset},
+        model=MachineModel("m", {"x": PLAIN, "y": replace(PLAIN, mass=3.0)}),
+    )  # fmt: skip
+    runs = []
+
+    def run(model, logs, simulator="reduced"):
+        effects = len(model.axes["x"].effects)
+        runs.append((effects, logs, getattr(simulator, "__name__", simulator)))
+        return effects, simulator
+
+    errors = {(1, "reduced"): 5.1, (2, "reduced"): 1.7}
+    monkeypatch.setattr(workflow, "free_run", run)
+    monkeypatch.setattr(workflow, "rms_error", lambda r, axis: errors.get(r, 1.9))
+    monkeypatch.setattr(
+        workflow, "holdout_error", lambda fit, s: {7.3: 8.1, 2.9: 3.3}[round(fit.error, 9)]
+    )
+    monkeypatch.setattr(workflow, "moved_parameters", lambda a, b: (f"{a.error > b.error}",))
+    whole = before.model.with_axis("x", axis_of(fitted("empirical_map")))
+    found = _addition(best, before, whole)
+    step = found.step
+    assert (step.action, step.effect, step.axis) == ("add", "cogging", "x")
+    assert (step.fit_error_before, step.fit_error_after) == pytest.approx((7.3, 2.9))
+    assert (step.holdout_error_before, step.holdout_error_after) == (8.1, 3.3)
+    assert (found.position_error, found.replayed) == ((5.1, 1.7), 1.9)
+    assert all(r[1] == {"x": dataset.fit[0]} for r in runs)
+    assert [r[2] for r in runs].count("MujocoSimulator") == 1
+    assert next(r[0] for r in runs if r[2] == "MujocoSimulator") == 2
+    assert found.notes[0] == "True"
+    assert "empirical_map made way" in found.notes[1]
+    assert found.model.axes["x"] is best.fit.axis
+    assert found.model.history == (step,)
+    assert found.kept is kept

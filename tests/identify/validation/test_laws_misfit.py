@@ -1,0 +1,223 @@
+"""Laws of where and how a model misses: maps, dependences, whiteness; each against a plain loop."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from constructed import SHORT, dataset_of, effect, moved, windowed
+
+from identify.dataset.noise_floor import floor_of
+from identify.dataset.prepared_log import moving, sticks
+from identify.estimation.evidence import effective_samples
+from identify.estimation.fit import rms
+from identify.estimation.force_balance import residual
+from identify.selection.residual_dependence import (
+    UNITS,
+    coordinates_of,
+    gathered,
+    since_reversal,
+)
+from identify.validation.error_spectrum import bands
+from identify.validation.misfit_maps import (
+    ABOVE_FLOOR,
+    LEAST_SHARE,
+    MisfitMap,
+    compare_axis,
+    misfit_by_frequency,
+    misfit_map,
+    periods,
+    phase_name,
+    worst_regions,
+)
+from identify.validation.whiteness import Loop
+from twin.model.machine import AxisModel, MachineModel
+
+LOG = windowed(SHORT)
+RNG = np.random.default_rng(41)
+MANY = 1e9  # values, of which chance makes nothing
+
+
+# --- coordinates --------------------------------------------------------------------------------
+
+
+def test_the_distance_since_a_reversal_is_that_of_a_loop():
+    v = RNG.normal(size=300) + 1.5 * np.sin(np.arange(300) / 25.0)
+    v[40:60] = 0.0  # a rest is no reversal
+    v[100:110] = 9e-4 * np.abs(v).max() * -np.sign(v[99])  # nor is a creep
+    v[:7] = 0.0
+    period, travelled, last, way, wanted = 2e-3, 0.0, 0.0, 0.0, []
+    for speed in v:
+        if abs(speed) > 1e-3 * np.abs(v).max() and np.sign(speed) != way:
+            turned, way = True, np.sign(speed)
+        else:
+            turned = False
+        travelled += abs(speed) * period
+        last = travelled if turned else last
+        wanted.append(travelled - last)
+    np.testing.assert_allclose(since_reversal(v, period), wanted, atol=1e-12)
+
+
+def test_coordinates_are_windowed_means_in_their_units():
+    found, m, w = coordinates_of(LOG), SHORT, LOG.window
+    assert list(found) == list(UNITS)
+    for name, wanted in {
+        "position": w.mean(m.position),
+        "velocity": w.mean(m.velocity),
+        "direction": np.sign(w.mean(m.velocity)),
+        "acceleration": LOG.acceleration,
+        "time": LOG.time,
+        "distance_since_reversal": w.mean(since_reversal(m.velocity, m.period)),
+        "other_axis_position": w.mean(m.others[0]),
+        "other_axis_velocity": w.mean(m.others[1]),
+        "other_axis_acceleration": w.mean(m.others[2]),
+    }.items():
+        np.testing.assert_array_equal(found[name], wanted)
+    alone = replace(LOG, motion=replace(SHORT, others=0.0 * SHORT.others))
+    both = gathered([LOG, alone])
+    assert list(both) == [n for n in UNITS if not n.startswith("other")]
+    np.testing.assert_array_equal(both["time"], np.tile(LOG.time, 2))
+
+
+# --- maps ---------------------------------------------------------------------------------------
+
+
+def test_a_map_is_the_plain_sum_over_its_bins():
+    x, r = RNG.uniform(-0.03, 0.12, 2000), RNG.normal(0.1, 1.0, 2000)
+    found = misfit_map("position", r, x, 0.07)
+    edges = np.linspace(x.min(), x.max(), 25)
+    for i in range(24):
+        last = x <= edges[i + 1] if i == 23 else x < edges[i + 1]
+        inside = (x >= edges[i]) & last
+        assert found.mean[i] == pytest.approx(r[inside].mean())
+        assert found.rms[i] == pytest.approx(np.sqrt(np.mean(r[inside] ** 2)))
+        assert found.share[i] == pytest.approx(np.sum(r[inside] ** 2) / np.sum(r**2))
+        assert found.visited[i] == pytest.approx(inside.mean())
+        assert (found.low[i], found.high[i]) == pytest.approx((edges[i], edges[i + 1]))
+    assert found.share.sum() == pytest.approx(1.0)
+    assert found.visited.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(found.centre, 0.5 * (edges[1:] + edges[:-1]))
+    assert (found.floor == 0.07).all()
+    assert found.coordinate == "position"
+    assert (found.unit, misfit_map("roller_phase", r, x, 0.1).unit) == ("m", "m")
+    assert misfit_map("velocity", r, x, 0.1).unit == "m/s"
+    empty = misfit_map("time", 0.0 * r, np.where(x > 0.0, 1.0, 2.0), 0.1)
+    assert empty.share.sum() == 0.0
+
+
+def test_a_direction_has_two_bins():
+    v, r = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 0.0]), np.array([3.0, 1.0, 5.0, 6.0, 7.0, 2.0])
+    found = misfit_map("direction", r, v, 0.1)
+    np.testing.assert_allclose(found.mean, [2.0, 5.0])
+    np.testing.assert_allclose(found.visited, [2.0 / 6.0, 4.0 / 6.0])
+    words = [r.in_words() for r in worst_regions([found], MANY)]
+    assert words[0].startswith("moving forwards: 5.34 N RMS, 53.4 times the noise floor, 92 %")
+    turned = misfit_map("direction", r[::-1] * [9, 9, 1, 1, 1, 1], -v[::-1], 0.1)
+    behind = worst_regions([turned], MANY)
+    assert behind[0].in_words().startswith("moving")
+    turned = misfit_map("direction", np.array([9.0, 8.0, 1, 1, 1, 1]), v, 0.1)
+    swapped = worst_regions([turned], MANY)
+    assert swapped[0].in_words().startswith("moving backwards")
+
+
+def test_an_error_planted_in_a_bin_is_the_worst_region():
+    x = RNG.uniform(0.0, 0.24, 4000)
+    inside = (x >= 0.05) & (x < 0.06)
+    r = RNG.normal(0.0, 0.01, 4000) + 0.5 * inside
+    y = RNG.uniform(-1.0, 1.0, 4000)
+    maps = [misfit_map("velocity", r, y, 0.01), misfit_map("position", r, x, 0.01)]
+    found = worst_regions(maps, MANY)[0]
+    assert found.coordinate == "position"
+    assert (found.low, found.high) == pytest.approx((0.05, 0.06), abs=2e-4)
+    assert found.rms == pytest.approx(0.5, rel=0.05)
+    assert found.ratio == pytest.approx(found.rms / 0.01)
+    assert found.share > 0.9
+    assert found.unit == "m"
+    assert "position between 0.05" in found.in_words()
+    assert f"{100 * found.share:.0f} % of the squared error" in found.in_words()
+
+
+def bare_map(name, rms_, share_, visited, floor=1.0) -> MisfitMap:
+    low = np.arange(len(rms_)) * 1.0
+    return MisfitMap(name, "m", low + 0.5, low, low + 1.0, low, np.array(rms_, float),
+                     np.array(share_), np.array(visited), np.full(len(rms_), floor))  # fmt: skip
+
+
+def test_regions_are_told_above_floor_and_share_the_largest_excess_first():
+    above, below = 1.01 * ABOVE_FLOOR, 0.99 * ABOVE_FLOOR
+    assert worst_regions([bare_map("a", [below, 0.1], [0.9, 0.1], [0.1, 0.9])], MANY) == []
+    assert len(worst_regions([bare_map("a", [above, 0.1], [0.9, 0.1], [0.1, 0.9])], MANY)) == 1
+    for excess, told in ((1.05 * LEAST_SHARE, 1), (0.95 * LEAST_SHARE, 0)):
+        parts = [0.5 + excess, 0.5 - excess]
+        assert len(worst_regions([bare_map("a", [9.0, 9.0], parts, [0.5, 0.5])], MANY)) == told
+    maps = [
+        bare_map(n, [9.0, 9.0], [0.5 - e, 0.5 + e], [0.5, 0.5])
+        for n, e in (("a", 0.1), ("b", 0.3), ("c", 0.2), ("d", 0.25))
+    ]
+    found = worst_regions(maps, MANY)
+    assert [r.coordinate for r in found] == ["b", "d", "c"]
+    assert [r.low for r in found] == [1.0, 1.0, 1.0]
+    assert found[0].share == pytest.approx(0.8)
+    assert [r.coordinate for r in worst_regions(maps, MANY, 1)] == ["b"]
+
+
+def test_a_comparison_gathers_what_the_residual_says():
+    rng = np.random.default_rng(42)
+    logs = [windowed(replace(moved(rng, 1.5, 1000.0), name=n, position_noise=s))
+            for n, s in (("a", 1e-7), ("b", 4e-7))]  # fmt: skip
+    friction = effect("coulomb_viscous", {"Fc": 0.4, "Fs": 0.4})
+    axis = AxisModel(1.7, effects=(friction, effect("roller_spikes", {"pitch": 0.021})))
+    dataset = dataset_of(*logs)
+    found = compare_axis(MachineModel("s", {"x": axis}), dataset, {"a": 1e-6}, {"a": 2e-7})
+    kept = moving(logs, True)
+    np.testing.assert_array_equal(found.residual, residual(axis, logs)[kept])
+    for log in logs:
+        own = residual(axis, [log])[moving([log], sticks(axis))]
+        assert found.force_error[log.motion.name] == pytest.approx(rms(own))
+    assert found.floor == floor_of(axis, logs)
+    assert found.total_error == pytest.approx(rms(found.residual))
+    assert found.ratio == pytest.approx(found.total_error / found.floor)
+    assert (found.position_error, found.position_floor) == ({"a": 1e-6}, {"a": 2e-7})
+    names = [*UNITS, "command", "standstill", "roller_spikes_phase", "frequency"]
+    assert [m.coordinate for m in found.maps] == names
+    where = found.coordinates
+    np.testing.assert_allclose(where["roller_spikes_phase"], np.mod(where["position"], 0.021))
+    command = np.concatenate([log.command for log in logs])
+    np.testing.assert_array_equal(where["command"], command[kept])
+    assert all(len(v) == kept.sum() for v in where.values())
+    np.testing.assert_allclose(found.maps[0].low[0], where["position"].min())
+    worst = worst_regions(found.maps, effective_samples(found.residual))
+    assert [r.coordinate for r in found.worst] == [r.coordinate for r in worst]
+    assert found.tests.loop is Loop.UNKNOWN
+
+
+def test_standstill_is_where_the_speed_is_below_a_thousandth_of_the_highest():
+    slow = replace(SHORT, signals=SHORT.signals * np.array([[1.0], [0.0], [1.0]]))
+    logs = [LOG, windowed(slow)]
+    found = compare_axis(MachineModel("s", {"x": AxisModel(1.7)}), dataset_of(*logs), {}, {})
+    np.testing.assert_array_equal(found.coordinates["standstill"][len(LOG) :], 1.0)
+    assert found.coordinates["standstill"][: len(LOG)].mean() < 0.2
+    told = next(m for m in found.maps if m.coordinate == "standstill")
+    assert len(told.rms) == 2
+
+
+def test_a_phase_is_shown_of_every_effect_that_repeats_along_the_track():
+    spikes = effect("roller_spikes", {"pitch": 0.021})
+    axis = AxisModel(1.0, effects=(effect("coulomb_viscous"), spikes, effect("cogging")))
+    wanted = {"roller_spikes": 0.021, "cogging": axis["cogging"].values["p"]}
+    assert periods(axis) == wanted
+    assert phase_name("cogging") == "cogging_phase"
+    assert periods(AxisModel(1.0, effects=(effect("periodic_disturbance"),))) == {}
+
+
+def test_the_map_by_frequency_is_that_of_the_bands():
+    log = windowed(moved(np.random.default_rng(43), 3.0, 1000.0))
+    axis = AxisModel(1.7, effects=(effect("cable_slab", {"k1": 9.0}),))
+    found, wanted = misfit_by_frequency(axis, [log]), bands(axis, [log])
+    np.testing.assert_array_equal(found.rms, wanted.error)
+    np.testing.assert_array_equal(found.floor, wanted.noise)
+    np.testing.assert_allclose(found.share, wanted.error**2 / np.sum(wanted.error**2))
+    np.testing.assert_allclose(found.visited, wanted.to_explain**2 / np.sum(wanted.to_explain**2))
+    np.testing.assert_array_equal([found.low, found.high], [wanted.low, wanted.high])
+    np.testing.assert_allclose(found.centre**2, wanted.low * wanted.high)
+    assert np.isnan(found.mean).all()
+    assert (found.coordinate, found.unit) == ("frequency", "Hz")

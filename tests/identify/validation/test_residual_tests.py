@@ -1,0 +1,152 @@
+"""Residual tests: white stays within the bounds, what is coloured or knows the input does not."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from machines import one_axis
+from scipy.signal import lfilter
+
+from identify.dataset.dataset import datasets
+from identify.estimation.force_balance import residual
+from identify.output import as_json
+from identify.output import text as as_text
+from identify.output.results import Comparison
+from identify.validation.whiteness import Loop, correlation, loop_of, residual_tests
+from identify.workflow import compare, fit
+from twin.effects import load_catalogue
+from twin.experiments.named import simulate
+from twin.log import AxisLog, Log
+from twin.model.file import load_model
+
+CATALOGUE = load_catalogue()
+STAGE = one_axis(load_model("proton_xy", CATALOGUE))
+SPACING = 0.02  # s
+N = 1500
+
+
+def drawn(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """White noise, and a smooth command that knows nothing of it."""
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=N), lfilter([1.0], [1.0, -0.95], rng.normal(size=N))
+
+
+def test_of_a_white_residual_a_tenth_leaves_the_bounds_and_nearly_all_pass():
+    found = []
+    for seed in range(60):
+        white, command = drawn(seed)
+        found.append(
+            [
+                correlation("residual", [white], [white], SPACING, Loop.CLOSED),
+                correlation("command", [white], [command], SPACING, Loop.CLOSED),
+            ]
+        )
+    for tests in zip(*found, strict=True):
+        assert np.mean([t.outside for t in tests]) == pytest.approx(0.1, abs=0.03)
+        assert np.mean([t.passes for t in tests]) > 0.94
+    assert found[0][0].bound == pytest.approx(1.645 / np.sqrt(N), rel=1e-3)
+
+
+@pytest.mark.parametrize("pole", [0.3, 0.9])
+def test_a_coloured_residual_leaves_the_bounds(pole):
+    coloured = lfilter([1.0], [1.0, -pole], drawn(1)[0])
+    test = correlation("residual", [coloured], [coloured], SPACING, Loop.OPEN)
+    assert not test.passes
+    assert test.value[0] == pytest.approx(pole, abs=0.08)
+    assert test.lag[0] == SPACING
+
+
+def test_a_residual_that_knows_the_command_shows_at_its_lag():
+    white, command = drawn(2)
+    left = white + 0.4 * np.roll(lfilter([1.0, -0.95], [1.0], command), 3)
+    pure = lfilter([1.0, -0.95], [1.0], command)
+    test = correlation("command", [left], [pure], SPACING, Loop.CLOSED)
+    assert not test.passes
+    assert test.lag[np.argmax(np.abs(test.value))] == pytest.approx(3 * SPACING)
+
+
+def test_what_feedback_does_to_the_command_is_no_fault_of_the_model():
+    """A command that answers the residual comes after it: not tested where the loop is closed."""
+    white, _ = drawn(3)
+    answer = -0.5 * np.roll(white, 4) + drawn(4)[0]
+    closed, opened = (
+        correlation("command", [white], [answer], SPACING, loop)
+        for loop in (Loop.CLOSED, Loop.OPEN)
+    )
+    assert closed.passes
+    assert not opened.passes
+    assert opened.lag[np.argmax(np.abs(opened.value))] == pytest.approx(-4 * SPACING)
+
+
+def test_gaps_and_the_seams_between_logs_do_not_count():
+    white, command = drawn(5)
+    holed = white.copy()
+    holed[200:700] = np.nan
+    test = correlation(
+        "command", [holed, white[:300]], [command, command[:300]], SPACING, Loop.OPEN
+    )
+    assert np.isfinite(test.value).all()
+    assert test.passes
+    assert test.bound == pytest.approx(1.645 / np.sqrt(N - 500 + 300), rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def logs() -> dict[str, Log]:
+    return {"run": simulate(STAGE, "tracking", seed=3, duration=20.0)}
+
+
+def fitted_and_tested(stage, logs):
+    result = fit(stage, logs)
+    found, dataset = result.fits["x"], result.datasets["x"]
+    force = residual(found.axis, dataset.fit)
+    return residual_tests(dataset.fit, force, found.kept, found.floor, loop_of(dataset.fit))
+
+
+def test_the_twins_own_log_passes_and_fits_the_normal_of_the_floor(logs):
+    found = fitted_and_tested(STAGE, logs)
+    assert found.passes
+    assert found.loop is Loop.CLOSED
+    assert found.within == pytest.approx(0.9, abs=0.06)
+    assert np.sum(found.density * np.diff(found.edges)) == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_model_that_lacks_an_effect_fails(logs):
+    poor = STAGE.with_axis("x", STAGE.axes["x"].without("cable_slab"))
+    found = fitted_and_tested(poor, logs)
+    assert not any(c.passes for c in found.correlations)
+    assert found.within < 0.3
+
+
+def told(log: Log) -> Loop:
+    return loop_of(datasets(STAGE, {"log": log}, {})["x"].fit)
+
+
+def test_the_loop_is_told_from_the_log(logs):
+    assert told(logs["run"]) is Loop.CLOSED
+    assert told(simulate(STAGE, "open_loop_sine", seed=1, duration=6.0)) is Loop.OPEN
+    columns = {k: v for k, v in logs["run"].axes["x"].columns.items() if "setpoint" not in k}
+    bare = replace(logs["run"], axes={"x": AxisLog(columns)})
+    assert told(bare) is Loop.UNKNOWN
+    for loop in Loop:
+        assert "coloured" in loop.value
+
+
+@pytest.fixture(scope="module")
+def compared(logs) -> Comparison:
+    return compare(STAGE, logs)
+
+
+def test_the_reason_and_the_bounds_are_said(compared):
+    found = json.loads(json.dumps(as_json.plain(as_json.compare_json(compared))))
+    tests = found["axes"]["x"]["residual_tests"]
+    assert tests["loop"] == "closed"
+    assert tests["tested"] == "force residual"
+    assert tests["reason"] == Loop.CLOSED.value
+    assert set(tests["correlations"]) == {"residual", "command", "velocity"}
+    for part in tests["correlations"].values():
+        assert len(part["lag"]) == len(part["value"]) == len(part["tested"])
+        assert part["bound_90"] == pytest.approx(1.645 / np.sqrt(tests["samples"]), rel=1e-3)
+    text = as_text.compare_text(compared)
+    assert Loop.CLOSED.value in text
+    assert "beyond the 90 % bounds" in text

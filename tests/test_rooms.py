@@ -1,0 +1,124 @@
+"""The house keeps its order: who may import whom, and what only an effect's own file may know."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import identify
+import twin
+from twin.effects import load_catalogue
+
+IDENTIFY, TWIN = (Path(package.__file__).parent for package in (identify, twin))
+# In the order in which data pass them: a room imports only from those before it.
+ROOMS = (
+    "dataset", "estimation", "selection", "validation", "experiment_design", "selftest",
+    "output", "workflow", "demo", "cli",
+)  # fmt: skip
+MOST_FLOORS = 10
+UNIT_SELECTORS = re.compile(r"""\bunit\s*(==|!=|in|not in)\s*[(\[{]?["'](?!1["'])""")
+
+
+def modules(package: Path) -> dict[str, Path]:
+    """Every module of a package by its dotted name."""
+    names = {}
+    for path in sorted(package.rglob("*.py")):
+        parts = path.relative_to(package.parent).with_suffix("").parts
+        names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return names
+
+
+def imports(path: Path, known: dict[str, Path]) -> Iterator[str]:
+    """Modules of the package that a file imports, inside its functions too, but for types alone."""
+    tree = ast.parse(path.read_text())
+    tree.body = [n for n in tree.body if not (isinstance(n, ast.If) and "CHECKING" in ast.dump(n))]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            for alias in node.names:
+                name = f"{node.module}.{alias.name}"
+                yield from [n for n in (name, node.module) if n in known][:1]
+        elif isinstance(node, ast.Import):
+            yield from (a.name for a in node.names if a.name in known)
+
+
+def room(module: str) -> str:
+    return module.split(".")[1] if "." in module else ""
+
+
+@pytest.fixture(scope="module")
+def arrows() -> dict[str, set[str]]:
+    """identify's modules -> those that they import, its own front door apart."""
+    known = modules(IDENTIFY)
+    return {n: set(imports(p, known)) - {"identify"} for n, p in known.items() if n != "identify"}
+
+
+def test_a_room_imports_only_from_those_before_it(arrows) -> None:
+    assert {room(n) for n in arrows} == set(ROOMS)
+    for name, used in arrows.items():
+        later = [u for u in used if ROOMS.index(room(u)) > ROOMS.index(room(name))]
+        assert not later, f"{name} imports {', '.join(later)}"
+
+
+def test_no_module_of_the_machine_imports_identify() -> None:
+    for name, path in modules(TWIN).items():
+        assert "identify" not in {
+            (n.module or "").split(".")[0]
+            for n in ast.walk(ast.parse(path.read_text()))
+            if isinstance(n, ast.ImportFrom)
+        }, name
+
+
+@pytest.mark.parametrize("package", [IDENTIFY, TWIN], ids=lambda p: p.name)
+def test_imports_have_no_circle(package: Path) -> None:
+    known = modules(package)
+    used = {n: set(imports(p, known)) - {n, package.name} for n, p in known.items()}
+    done: set[str] = set()
+
+    def visit(name: str, path: tuple[str, ...]) -> None:
+        assert name not in path, " -> ".join((*path, name))
+        if name not in done:
+            for other in used[name]:
+                visit(other, (*path, name))
+            done.add(name)
+
+    for name in used:
+        visit(name, ())
+
+
+def test_the_house_has_few_floors(arrows) -> None:
+    """A room's floor is one above the highest of the rooms that it imports from."""
+    below: dict[str, set[str]] = {r: set() for r in ROOMS}
+    for name, used in arrows.items():
+        below[room(name)] |= {room(u) for u in used}
+    floors: dict[str, int] = {}
+    for r in ROOMS:
+        floors[r] = 1 + max((floors[b] for b in below[r] if b != r), default=0)
+    assert max(floors.values()) <= MOST_FLOORS, floors
+
+
+def test_each_room_says_what_it_is_for() -> None:
+    for package in (IDENTIFY, TWIN):
+        for path in package.rglob("__init__.py"):
+            if path.parent != package:
+                assert ast.get_docstring(ast.parse(path.read_text())), f"{path} says nothing"
+
+
+def test_only_effects_know_a_pitch_a_unit_or_another_number_of_the_stage() -> None:
+    for path in [*IDENTIFY.rglob("*.py"), *TWIN.rglob("*.py")]:
+        if path.parent == TWIN / "effects" and path.name != "__init__.py":
+            continue
+        text = path.read_text()
+        assert "0.034" not in text, f"{path} knows the rollers' pitch"
+        assert not UNIT_SELECTORS.search(text), f"{path} selects by a unit"
+
+
+def test_only_its_own_file_names_an_effect() -> None:
+    names = set(load_catalogue())
+    for path in [*IDENTIFY.rglob("*.py"), *TWIN.rglob("*.py")]:
+        nodes = ast.walk(ast.parse(path.read_text()))
+        named = {str(n.value) for n in nodes if isinstance(n, ast.Constant)} & names
+        assert not named or path.stem in named, f"{path} names {', '.join(named)}"

@@ -1,0 +1,264 @@
+"""The controller and the loop against plain Python written from their docstrings.
+
+A PID with filtered derivative and mass feedforward, whose integral waits while the force is
+saturated; and two axes stepped by v += dt a, x += dt v, logged as the docstring of the loop says.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from axis_runs import effect
+from effect_runs import Array
+
+from twin.core.control import (
+    INTEGRAL,
+    KD,
+    KI,
+    KP,
+    LIMIT,
+    MASS_FF,
+    PREVIOUS,
+    RESOLUTION,
+    SMOOTHING,
+    SPEED,
+    Controller,
+    command,
+    gain_table,
+    measure,
+)
+from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
+from twin.errors import InputError
+from twin.experiments.trajectory import Setpoint
+from twin.model.machine import AxisModel, Hardware, MachineModel
+from twin.simulator import FineSimulator, MujocoSimulator, ReducedSimulator, run
+
+H = 5e-4  # s
+LOOP = Controller(proportional=310.0, integral=2900.0, derivative=21.0, filter_bandwidth=83.0,
+                  mass=2.3)  # fmt: skip
+
+
+class Pid:
+    """The controller of one axis, from the docstring of twin.core.control.Controller."""
+
+    def __init__(self, c: Controller, limit: float, dt: float) -> None:
+        self.c, self.limit, self.dt = c, limit, dt
+        # a first-order filter of that bandwidth, sampled: what is left of a step after dt
+        self.keeps = math.exp(-2.0 * math.pi * c.filter_bandwidth * dt)
+        self.integral, self.before, self.speed = 0.0, None, 0.0
+
+    def force(self, x: float, v: float, a: float, force: float, reading: float) -> float:
+        if self.before is None:
+            self.before, self.speed = reading, v
+        raw = (reading - self.before) / self.dt
+        self.before = reading
+        self.speed = self.keeps * self.speed + (1.0 - self.keeps) * raw
+        asked = force + self.c.mass * a + self.c.proportional * (x - reading)
+        asked += self.c.derivative * (v - self.speed) + self.c.integral * self.integral
+        if -self.limit <= asked <= self.limit:
+            self.integral += (x - reading) * self.dt
+        return min(max(asked, -self.limit), self.limit)
+
+
+def axes(limit: float, resolution: float = 0.0) -> dict[str, AxisModel]:
+    return {"x": AxisModel(1.7, Hardware(force_limit=limit, encoder_resolution=resolution))}
+
+
+@pytest.mark.parametrize("limit", [math.inf, 9.0])
+@pytest.mark.parametrize("compiled", [True, False])
+def test_the_command_is_that_of_a_pid(limit: float, compiled: bool) -> None:
+    rng = np.random.default_rng(81)
+    gains = gain_table({"x": LOOP}, axes(limit), H)[0]
+    step = command if compiled else command.py_func
+    pid, state = Pid(LOOP, limit, H), np.zeros(3)
+    for k in range(60):
+        setpoint = rng.normal(size=4) * [0.02, 0.1, 1.0, 2.0]
+        reading = 0.02 * rng.normal()
+        found = step(gains, state, setpoint, reading, H, k == 0)
+        assert found == pytest.approx(pid.force(*setpoint, reading), rel=1e-11, abs=1e-11)
+    assert state[INTEGRAL] == pytest.approx(pid.integral)
+    assert state[PREVIOUS] == pid.before
+    assert state[SPEED] == pytest.approx(pid.speed)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_the_integral_waits_beyond_the_limit_and_goes_on_at_it(side: float) -> None:
+    gains = np.zeros(7)
+    gains[[KP, LIMIT]] = 2.0, 6.0
+    for error, waits in ((3.0, False), (3.0001, True)):
+        state = np.zeros(3)
+        force = command.py_func(gains, state, (side * error, 0.0, 0.0, 0.0), 0.0, H, False)
+        assert force == side * 6.0
+        assert state[INTEGRAL] == (0.0 if waits else side * error * H)
+
+
+def test_gains_are_those_of_the_controllers_and_the_hardware_by_name() -> None:
+    other = Controller(1.0, 2.0, 3.0, 4.0, 5.0)
+    both = {**axes(9.0, 1e-6), "y": AxisModel(2.9, Hardware(force_limit=7.0))}
+    table = gain_table({"y": other, "x": LOOP}, both, H)
+    for row, c, limit, step in ((table[0], LOOP, 9.0, 1e-6), (table[1], other, 7.0, 0.0)):
+        assert [row[KP], row[KI], row[KD], row[MASS_FF]] == [
+            c.proportional, c.integral, c.derivative, c.mass,
+        ]  # fmt: skip
+        assert [row[LIMIT], row[RESOLUTION]] == [limit, step]
+        assert 1.0 - row[SMOOTHING] == pytest.approx(np.exp(-2 * np.pi * c.filter_bandwidth * H))
+
+
+@pytest.mark.parametrize("bandwidth", [5.0, 30.0, 80.0])
+@pytest.mark.parametrize("mass", [0.3, 17.0])
+def test_a_loop_made_for_an_axis_crosses_over_near_its_bandwidth(
+    bandwidth: float, mass: float
+) -> None:
+    """Of mass 1/(m s^2): gain 1 within a fifth of the bandwidth, a phase margin above 40 degrees;
+    gains in proportion to the mass, rates to the bandwidth.
+    """
+    axis = AxisModel(mass, Hardware(bandwidth=bandwidth))
+    c = Controller.for_axis(axis)
+    unit = Controller.for_axis(AxisModel(1.0, Hardware(bandwidth=1.0)))
+    for name, power in (("proportional", 2), ("integral", 3), ("derivative", 1), ("mass", 0)):
+        wanted = mass * bandwidth**power * getattr(unit, name)
+        assert getattr(c, name) == pytest.approx(wanted, rel=1e-12)
+    assert c.filter_bandwidth == pytest.approx(bandwidth * unit.filter_bandwidth)
+    assert c.mass == mass
+
+    f = bandwidth * np.geomspace(0.3, 3.0, 2000)
+    s = 2j * np.pi * f
+    speed = s / (1.0 + s / (2.0 * np.pi * c.filter_bandwidth))
+    loop = (c.proportional + c.integral / s + c.derivative * speed) / (mass * s**2)
+    at = np.argmin(np.abs(np.log(np.abs(loop))))
+    assert f[at] == pytest.approx(bandwidth, rel=0.2)
+    assert 180.0 + np.degrees(np.angle(loop[at])) > 40.0
+    # integral and proportional parts take over a decade and a third of it lower
+    assert c.integral / c.proportional == pytest.approx(2 * np.pi * bandwidth / 10.0)
+    assert c.proportional / c.derivative == pytest.approx(2 * np.pi * bandwidth / 3.0)
+    assert Controller() == Controller(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def test_a_reading_is_the_nearest_step_to_position_and_noise() -> None:
+    rng = np.random.default_rng(82)
+    for position, noise in 1e-3 * rng.normal(size=(40, 2)):
+        found = measure(position, noise, 3e-5)
+        assert abs(found - (position + noise)) <= 1.5e-5 * (1 + 1e-9)
+        assert found / 3e-5 == pytest.approx(round(found / 3e-5), abs=1e-9)
+        assert measure(position, noise, 0.0) == position + noise
+
+
+# --- the loop -------------------------------------------------------------------------------------
+
+COUPLED = {
+    "x": (effect("cable_slab", k1=40.0, offset=0.3),
+          effect("axis_coupling", mass=0.4, damping=2.0)),
+    "y": (effect("cable_slab", k1=-25.0), effect("axis_coupling", mass=-0.3, damping=5.0),
+          effect("encoder_ripple", period=0.004, a1=2e-5)),
+}  # fmt: skip
+MASSES = {"x": 1.7, "y": 2.9}
+LIMITS = {"x": 6.0, "y": 4.0}
+
+
+def machine_model() -> MachineModel:
+    return MachineModel(
+        "two",
+        {
+            a: AxisModel(
+                MASSES[a],
+                Hardware(force_limit=LIMITS[a], encoder_resolution={"x": 1e-6, "y": 0.0}[a]),
+                COUPLED[a],
+            )
+            for a in "xy"
+        },
+        sample_rate=1.0 / H,
+    )
+
+
+def asked(n: int) -> Setpoint:
+    t = H * np.arange(n)
+    w = np.array([11.0, 17.0])
+    size = np.array([0.02, -0.012])
+    force = np.stack([0.3 * np.sin(70.0 * t), -0.2 * np.cos(50.0 * t)], 1)
+    angle = w * t[:, None]
+    return Setpoint(
+        size * np.cos(angle), -size * w * np.sin(angle), -size * w**2 * np.cos(angle), force, 1 / H
+    )
+
+
+def plain(setpoint: Setpoint, substeps: int) -> Array:
+    """Reading, command, true position and velocity of both axes, (n, 2, 4)."""
+    n, h = len(setpoint.position), H / substeps
+    loops = {"x": LOOP, "y": replace(LOOP, proportional=450.0, mass=3.1)}
+    pids = [Pid(loops[a], LIMITS[a], H) for a in "xy"]
+    x, v = setpoint.position[0].copy(), np.zeros(2)
+    known, last = np.zeros(2), np.zeros(2)  # acceleration, from the speeds of two steps
+    masses = np.array([MASSES[a] for a in "xy"])
+    slab = [(0.3, 40.0), (0.0, -25.0)]
+    coupling = [(0.4, 2.0), (-0.3, 5.0)]
+    out = np.empty((n, 2, 4))
+    for k in range(n):
+        u = np.empty(2)
+        for a in range(2):
+            true = x[a] - 0.5 * h * v[a]
+            reading = true + (2e-5 * np.sin(2 * np.pi * true / 0.004) if a else 0.0)
+            reading = reading if a else round(reading / 1e-6) * 1e-6
+            wanted = [s[k, a] for s in (setpoint.position, setpoint.velocity,
+                                        setpoint.acceleration, setpoint.force)]  # fmt: skip
+            u[a] = pids[a].force(*wanted, reading)
+            out[k, a] = reading, u[a], true, v[a]
+        for _ in range(substeps):
+            force = [
+                u[a] - slab[a][0] - slab[a][1] * x[a]
+                - coupling[a][0] * known[1 - a] - coupling[a][1] * v[1 - a]
+                for a in range(2)
+            ]  # fmt: skip
+            known, last = (v - last) / h, v.copy()
+            v = v + h * np.array(force) / masses
+            x = x + h * v
+    return out
+
+
+STAGES = [(ReducedSimulator, 1), (FineSimulator, 10), (MujocoSimulator, 1)]
+
+
+@pytest.mark.parametrize(("stage", "substeps"), STAGES, ids=[s.__name__ for s, _ in STAGES])
+def test_the_loop_is_that_of_plain_python(stage: type, substeps: int) -> None:
+    setpoint = asked(500)
+    found = run(
+        machine_model(), setpoint, np.random.default_rng(0), simulator=stage,
+        controllers={"x": LOOP, "y": replace(LOOP, proportional=450.0, mass=3.1)},
+    )  # fmt: skip
+    wanted = plain(setpoint, substeps)
+    assert (READING_COLUMN, COMMAND_COLUMN, POSITION_COLUMN, VELOCITY_COLUMN) == (0, 1, 2, 3)
+    saturated = np.abs(wanted[:, :, COMMAND_COLUMN]) >= [6.0, 4.0]
+    assert 0.02 < saturated.mean() < 0.9
+    # a reading on the border between two steps of the encoder may fall either way
+    size = np.array([1e-9, 1e-4, 1e-9, 1e-6])
+    assert np.all(np.abs(found.signals - wanted) <= size * np.abs(wanted).max(axis=0))
+    for i, (axis, name) in enumerate(found.table.labels):
+        if name == "cable_slab":
+            a = "xy".index(axis)
+            x = wanted[:, a, POSITION_COLUMN] + 0.5 * H / substeps * wanted[:, a, VELOCITY_COLUMN]
+            slab = {"x": -0.3 - 40.0 * x, "y": 25.0 * x}[axis]
+            if substeps == 1:
+                np.testing.assert_allclose(found.forces[:, i], slab, rtol=0, atol=1e-7)
+
+
+def test_noise_of_the_encoder_is_that_of_each_axis_and_reported_progress_ends() -> None:
+    model = machine_model()
+    for axis, noise in (("x", 3e-6), ("y", 7e-6)):
+        hardware = replace(model.axes[axis].hardware, encoder_noise=noise, encoder_resolution=0.0)
+        bare = replace(model.axes[axis], hardware=hardware, effects=())
+        model = model.with_axis(axis, bare)
+    told: list[tuple[int, int]] = []
+    done = run(
+        model, asked(4000), np.random.default_rng(83), simulator=ReducedSimulator,
+        progress=lambda k, n: told.append((k, n)),
+    )  # fmt: skip
+    error = done.signals[..., READING_COLUMN] - done.signals[..., POSITION_COLUMN]
+    np.testing.assert_allclose(error.std(axis=0), [3e-6, 7e-6], rtol=0.06)
+    assert abs(np.corrcoef(error.T)[0, 1]) < 0.06
+    assert told == [(4000, 4000)]
+
+
+def test_a_setpoint_of_other_axes_is_refused() -> None:
+    one = MachineModel("one", {"x": AxisModel(1.0)}, sample_rate=1.0 / H)
+    with pytest.raises(InputError, match="2 axes"):
+        run(one, asked(10), np.random.default_rng(0), simulator=ReducedSimulator)

@@ -1,0 +1,286 @@
+"""Attached masses and their axis: Newton's second law, for all and for each part.
+
+Where a friction holds the axis, it is at rest after the sample whatever is attached. A payload is
+mass. The momentum of all parts is the impulse of what pushes from outside. The way back, from a
+motion to the forces along it, gives the forces of the way there.
+"""
+
+import numpy as np
+import pytest
+from axis_runs import BOTH, RATE, Stepper, effect, pushed, shoves
+from effect_runs import CATALOGUE, Array
+
+from twin.core.attached_masses import slope
+from twin.core.native import walk
+from twin.model.machine import AxisModel, Fitted, axis_table
+from twin.simulator import MujocoSimulator, ReducedSimulator
+
+EACH = pytest.mark.parametrize("stage", BOTH)
+MASS = 3.7  # kg
+H = 1.0 / RATE
+N = 1800
+STICKS = effect("stribeck", Fc=2.0, Fs=2.7, v0=0.02, sigma2=1.3)
+COULOMB = effect("coulomb_viscous", Fc=2.0, Fs=2.7, sigma2=1.3)
+ASYMMETRY = effect("asymmetric_friction", coulomb=0.2, viscous=-0.3)
+CABLE = effect("cable_slab", offset=0.6, k1=7.0, k2=-3.0)
+DEADBAND = effect("actuator_deadband", width=0.35)
+PARTS = {
+    "payload_mass": effect("payload_mass", ratio=0.43),
+    "flexible_mode": effect("flexible_mode", load=0.23, frequency=31.0, damping=0.07),
+    "backlash": effect("backlash", load=0.17, play=4e-5, frequency=83.0, damping=0.2),
+    "base_vibration": effect("base_vibration", recoil=0.29, frequency=6.1, damping=0.11),
+}
+TOGETHER = {
+    "payload": ("payload_mass",),
+    "light": ("payload_mass", "flexible_mode"),
+    "base": ("base_vibration",),
+    "base and payload": ("payload_mass", "base_vibration"),
+    "base and load": ("flexible_mode", "base_vibration"),
+    "hung twice": ("flexible_mode", "backlash"),
+    "all": tuple(PARTS),
+}
+SETS = pytest.mark.parametrize("names", TOGETHER.values(), ids=TOGETHER)
+AROUND = (STICKS, ASYMMETRY, CABLE, DEADBAND)
+
+
+def attached(names: tuple[str, ...]) -> tuple[Fitted, ...]:
+    return tuple(PARTS[n] for n in names)
+
+
+# --- a payload is mass ----------------------------------------------------------------------------
+
+
+@EACH
+@pytest.mark.parametrize("ratio", [-0.4, 0.37, 3.0])
+@pytest.mark.parametrize("friction", [STICKS, COULOMB], ids=["stribeck", "coulomb"])
+def test_a_payload_is_mass_also_where_friction_holds(
+    ratio: float, friction: Fitted, stage: Stepper
+) -> None:
+    around = (friction, ASYMMETRY, CABLE, DEADBAND, effect("cable_hysteresis", reach=3e-4, f1=0.7))
+    force = shoves(N, 3.0)
+    found = pushed(MASS, (*around, effect("payload_mass", ratio=ratio)), force, stage)
+    wanted = pushed(MASS * (1.0 + ratio), around, force, stage)
+    assert 0.1 < np.mean(wanted.v == 0.0) + np.mean(np.abs(wanted.v) < 1e-12) < 0.9
+    np.testing.assert_allclose(found.x, wanted.x, rtol=0, atol=1e-11 * np.ptp(wanted.x))
+    np.testing.assert_allclose(found.v, wanted.v, rtol=0, atol=1e-11 * np.ptp(wanted.v))
+    name = friction.effect.name
+    size = 1e-9 * np.abs(wanted.rows[name]).max()
+    np.testing.assert_allclose(found.rows[name], wanted.rows[name], rtol=0, atol=size)
+
+
+@EACH
+@pytest.mark.parametrize("ratio", [-0.45, 0.8])
+def test_a_payload_is_mass_at_an_end_stop(ratio: float, stage: Stepper) -> None:
+    stop = effect("end_stop", low=-1.1e-3, high=2e-3, stiffness=1e6, relaxation=1e-4)
+    force = shoves(600, 20.0)
+    found = pushed(MASS, (stop, effect("payload_mass", ratio=ratio)), force, stage)
+    wanted = pushed(MASS * (1.0 + ratio), (stop,), force, stage)
+    assert np.abs(wanted.rows["end_stop"]).max() > 20.0
+    np.testing.assert_allclose(found.x, wanted.x, rtol=0, atol=1e-9 * np.ptp(wanted.x))
+
+
+@EACH
+@pytest.mark.parametrize("name", ["flexible_mode", "base_vibration"])
+@pytest.mark.parametrize("stiffness", [1e5, 1e9])
+def test_an_end_stop_of_any_stiffness_is_stable_whatever_is_attached(
+    name: str, stiffness: float, stage: Stepper
+) -> None:
+    """It stops what it stops: no deeper than a step of the fastest motion."""
+    share = {"flexible_mode": "load", "base_vibration": "recoil"}[name]
+    part = effect(name, frequency=20.0, **{share: 0.9})
+    stop = effect("end_stop", low=-1.1e-3, high=2e-3, stiffness=stiffness, relaxation=0.0)
+    run = pushed(MASS, (stop, part), shoves(600, 20.0), stage)
+    assert np.abs(run.v).max() < 1.5
+    assert run.x.max() < 2e-3 + 1.5 * H + 60.0 / 1e5
+
+
+# --- Newton's second law --------------------------------------------------------------------------
+
+
+@EACH
+@SETS
+def test_logged_forces_and_command_are_mass_times_acceleration(
+    names: tuple[str, ...], stage: Stepper
+) -> None:
+    """Of the nominal mass: what the attached parts take or give is among the forces."""
+    force = shoves(N, 3.0)
+    run = pushed(MASS, (*AROUND, *attached(names)), force, stage)
+    total = force + run.of(*run.rows)
+    wanted = MASS * np.diff(run.v) / H
+    np.testing.assert_allclose(total[:-1], wanted, rtol=0, atol=1e-8 * np.abs(wanted).max())
+    assert all(np.ptp(run.rows[n]) > 0.01 for n in names), "blind"
+
+
+@EACH
+@SETS
+def test_what_friction_holds_is_at_rest(names: tuple[str, ...], stage: Stepper) -> None:
+    run = pushed(MASS, (*AROUND, *attached(names)), shoves(N, 3.0), stage)
+    held = run.states["stribeck_at_rest"][:-1] > 0.5
+    assert 0.1 < held.mean() < 0.9
+    fast = np.abs(run.v).max()
+    assert np.abs(run.v[1:][held]).max() < 1e-12 * fast
+    assert np.median(np.abs(run.v[1:][~held])) > 1e-3 * fast, "blind"
+
+
+@EACH
+@SETS
+def test_momentum_of_all_parts_is_the_impulse_from_outside(
+    names: tuple[str, ...], stage: Stepper
+) -> None:
+    """Parts on the axis are pushed by it alone: m v + loads' own momentum, in space."""
+    force = shoves(N, 3.0)
+    run = pushed(MASS, (*AROUND, *attached(names)), force, stage)
+    outside = force + run.of("stribeck", "cable_slab", "actuator_deadband")
+    base = np.r_[0.0, run.states.get("base_vibration_speed", np.zeros(N))[:-1]]
+    momentum = MASS * (run.v + base)
+    for name in names:
+        values = PARTS[name].values
+        if name == "payload_mass":
+            momentum += values["ratio"] * MASS * (run.v + base)
+        elif name != "base_vibration":  # its own part of the mass moves with the axis and swings
+            momentum += values["load"] * MASS * np.r_[0.0, run.states[f"{name}_speed"][:-1]]
+    impulse = np.r_[0.0, np.cumsum(outside)[:-1]] * H
+    np.testing.assert_allclose(momentum, impulse, rtol=0, atol=1e-9 * np.abs(impulse).max())
+
+
+@EACH
+def test_a_base_recoils_from_the_force_and_swings_back(stage: Stepper) -> None:
+    """(M + m)(b'' + c b' + k b) = -m q'' in every sample, M + m = m/recoil."""
+    run = pushed(MASS, (STICKS, PARTS["base_vibration"]), shoves(N, 3.0), stage)
+    p = PARTS["base_vibration"].values
+    w = 2.0 * np.pi * p["frequency"]
+    b, speed = (np.r_[0.0, run.states[f"base_vibration_{n}"]] for n in ("displacement", "speed"))
+    np.testing.assert_allclose(np.diff(b), H * speed[1:], rtol=0, atol=1e-12 * np.ptp(b))
+    swing = np.diff(speed) / H + 2.0 * p["damping"] * w * speed[1:] + w**2 * b[:-1]
+    wanted = -p["recoil"] * np.diff(run.v) / H
+    # the step has the poles of the exact motion: its spring and damper differ by some w h
+    np.testing.assert_allclose(swing[:-1], wanted, rtol=0, atol=3.0 * w * H * w**2 * np.ptp(b))
+    assert 3.0 * w * H * w**2 * np.ptp(b) < 0.1 * np.abs(wanted).max()
+
+
+FREE = [("flexible_mode", "load"), ("base_vibration", "recoil")]
+
+
+@EACH
+@pytest.mark.parametrize(("name", "share"), FREE, ids=[n for n, _ in FREE])
+@pytest.mark.parametrize("part", [0.2, 0.6])
+def test_a_free_axis_swings_at_the_frequency_and_damping_of_two_masses(
+    name: str, share: str, part: float, stage: Stepper
+) -> None:
+    """w/sqrt(1 - share), ratio/sqrt(1 - share): the poles of the free motion."""
+    frequency, ratio = 23.0, 0.06
+    force = np.zeros(900)
+    force[:25] = 4.0
+    run = pushed(
+        MASS, (effect(name, frequency=frequency, damping=ratio, **{share: part}),), force, stage
+    )
+    s = run.states[f"{name}_displacement"][40:]
+    step = 20
+    now, after, later = s[: -2 * step], s[step:-step], s[2 * step :]
+    (trace, minus), *_ = np.linalg.lstsq(np.stack([after, now], 1), later, rcond=None)
+    pole = np.log(complex(np.roots([1.0, -trace, -minus])[0])) / (step * H)
+    w = 2.0 * np.pi * frequency / np.sqrt(1.0 - part)
+    # explicit in the spring: relative error of the order of (w h)^2 and ratio w h
+    assert np.abs(pole) == pytest.approx(w, rel=2.0 * ratio * w * H)
+    assert -pole.real / np.abs(pole) == pytest.approx(ratio / np.sqrt(1.0 - part), rel=0.05)
+
+
+@pytest.mark.parametrize("frequency", [1700.0, 2000.0])
+@pytest.mark.parametrize("load", [0.05, 0.5, 0.9])
+def test_a_mode_beyond_the_sampling_rate_stays_stable(frequency: float, load: float) -> None:
+    part = effect("flexible_mode", load=load, frequency=frequency, damping=1e-4)
+    runs = [pushed(MASS, (part,), shoves(N, 3.0), stage) for stage in BOTH]
+    sizes = [np.abs(run.x).max() for run in runs]
+    rigid = np.abs(pushed(MASS, (), shoves(N, 3.0)).x).max()
+    assert max(sizes) < 1.5 * rigid
+    np.testing.assert_allclose(runs[0].x, runs[1].x, rtol=0, atol=1e-9 * rigid)
+
+
+# --- along a measured motion ----------------------------------------------------------------------
+
+
+def walked(effects: tuple[Fitted, ...], v: Array, u: Array, dt: float, mass: float) -> dict:
+    """Force of each effect along a motion, N."""
+    table = axis_table({"x": AxisModel(mass, effects=effects)})
+    first, last, at, _, _ = table.axes[0]
+    rows = np.zeros((len(table.entries), len(v)))
+    motion = np.stack([np.cumsum(v) * dt, v, u])
+    walk(
+        table.entries, first, last, table.parameters, np.zeros(table.n_states), at, motion,
+        np.zeros_like(motion), dt, 0, rows, mass,
+    )  # fmt: skip
+    return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
+
+
+@SETS
+def test_the_way_back_gives_the_forces_of_the_way_there(names: tuple[str, ...]) -> None:
+    """Blocks of eight samples of a smooth run: their mean speeds tell the mean forces."""
+    t = np.arange(4000) * H
+    force = 9.0 * np.sin(2.0 * np.pi * 9.0 * t) * np.sin(2.0 * np.pi * 0.7 * t) ** 2
+    parts = tuple(p for n, p in PARTS.items() if n in names and n != "backlash")
+    run = pushed(MASS, parts, force)
+    block = 8
+    mean = 0.5 * (run.v[1:] + run.v[:-1])[:3992].reshape(-1, block).mean(axis=1)
+    back = walked(parts, mean, np.zeros(len(mean)), block * H, MASS)
+    for name in (p.effect.name for p in parts):
+        wanted = run.rows[name][:3992].reshape(-1, block).mean(axis=1)
+        error = np.abs(back[name] - wanted)[2:-2]
+        # a base is stepped once a block: first order in its w h; what rides is of higher order
+        assert error.max() < (0.015 if "base_vibration" in names else 2e-4) * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("dt", [1e-4, 3e-4, 1e-3])
+def test_a_payload_along_a_motion_takes_its_mass_times_the_acceleration(dt: float) -> None:
+    """Exactly, for means of a speed that is a cubic of time."""
+    speed = np.polynomial.Polynomial([0.3, -1.1, 4.0, 2.7])
+    edges = dt * np.arange(61)
+    v = np.diff(speed.integ()(edges)) / dt
+    back = walked((effect("payload_mass", ratio=0.43),), v, np.zeros(60), dt, MASS)["payload_mass"]
+    wanted = -0.43 * MASS * np.diff(speed(edges)) / dt
+    np.testing.assert_allclose(back[3:-3], wanted[3:-3], rtol=1e-9)
+
+
+def test_a_payload_on_a_base_feels_the_acceleration_in_space() -> None:
+    """Together along a motion, the payload's force is -ratio m (q'' + b'')."""
+    t = np.arange(900) * 1e-3
+    v = 0.1 * np.sin(2.0 * np.pi * 4.0 * t)
+    parts = (PARTS["payload_mass"], PARTS["base_vibration"])
+    back = walked(parts, v, np.zeros(900), 1e-3, MASS)
+    a = np.gradient(v, 1e-3)
+    recoil = back["base_vibration"]  # -m b''
+    wanted = -0.43 * (MASS * a - recoil)
+    np.testing.assert_allclose(
+        back["payload_mass"][3:-3], wanted[3:-3], rtol=0, atol=2e-3 * np.abs(wanted).max()
+    )
+    assert np.abs(recoil).max() > 0.05 * np.abs(MASS * a).max()
+
+
+def test_friction_along_a_motion_slides_wherever_it_moves() -> None:
+    """An infinite mass cannot be held, however small its speed, whatever is attached."""
+    v = np.array([1e-9, -1e-9, 0.2, -0.2, 1e-9])
+    for parts in ((), tuple(PARTS.values())):
+        level = effect("stribeck", Fc=2.0, Fs=2.0, v0=0.02)
+        row = walked((level, *parts), v, np.array([7.0, -9.0, 1.0, 30.0, -50.0]), H, MASS)
+        np.testing.assert_allclose(row["stribeck"], -2.0 * np.sign(v), rtol=1e-12)
+
+
+@pytest.mark.parametrize("degree", range(5))
+@pytest.mark.parametrize("dt", [0.1, 0.7])
+def test_the_slope_of_block_means_is_exact_for_polynomials(degree: int, dt: float) -> None:
+    """Of the fourth degree where two blocks lie on each side, of the first at the ends."""
+    rng = np.random.default_rng(71 + degree)
+    curve = np.polynomial.Polynomial(rng.normal(size=degree + 1))
+    edges = dt * (np.arange(9) - 3.0)
+    means = np.diff(curve.integ()(edges)) / dt
+    # means differ from values: the mean's own slope, which the exact slope's mean is
+    wanted = np.diff(curve(edges)) / dt
+    exact = range(8) if degree <= 1 else range(1, 7) if degree == 2 else range(2, 6)
+    for k in exact:
+        assert slope.py_func(means, k, dt) == pytest.approx(wanted[k], rel=1e-9, abs=1e-9)
+
+
+def test_no_attached_part_is_left_out_of_the_tests() -> None:
+    structures = {e.name for e in CATALOGUE.values() if e.attach or e.added_mass}
+    assert structures == set(PARTS)
+    assert MujocoSimulator in BOTH
+    assert ReducedSimulator in BOTH

@@ -1,0 +1,261 @@
+"""Every effect of the catalogue obeys the laws of tests/laws.py, and broken effects do not.
+
+No effect is named here: one that is added later is held to the same laws.
+"""
+
+import ast
+from collections.abc import Callable
+from functools import cache
+from math import copysign, sin
+from pathlib import Path
+
+import laws
+import mujoco
+import numpy as np
+import pytest
+from effect_runs import CATALOGUE, FRICTIONS, MODIFIERS, absent, moderate
+
+from twin import effects
+from twin.effect import DRY, OUT, TIME, VISCOUS, Effect, Kind, Parameter, V, X
+from twin.experiments.named import simulate
+from twin.log import Log
+from twin.model.file import load_model
+from twin.model.machine import Fitted, MachineModel
+from twin.mujoco.callback import passive_callback
+from twin.simulator import MujocoSimulator, ReducedSimulator
+
+STAGE = load_model("proton_xy", CATALOGUE)
+SOURCES = Path(effects.__file__).parent.parent
+PER_EFFECT = (
+    laws.check_zero_is_absent,
+    laws.check_acts,
+    laws.check_finite,
+    laws.check_compiled_equals_python,
+    laws.check_writes_only_its_result,
+)
+EVERY = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda e: e.name)
+
+
+def label(item: object) -> str:
+    return getattr(item, "name", None) or getattr(item, "__name__", "none")
+
+
+@EVERY
+@pytest.mark.parametrize("check", PER_EFFECT, ids=label)
+def test_law(check: Callable[[Effect], None], effect: Effect) -> None:
+    check(effect)
+
+
+@pytest.mark.parametrize("modifier", [None, *MODIFIERS], ids=label)
+@pytest.mark.parametrize("friction", FRICTIONS, ids=label)
+def test_friction_takes_energy_with_every_modifier(
+    friction: Effect, modifier: Effect | None
+) -> None:
+    laws.check_dissipative(friction, modifier)
+
+
+def test_forces_of_position_alone_are_conservative() -> None:
+    rng = np.random.default_rng(31)
+    found = 0
+    for effect in CATALOGUE.values():
+        values = moderate(effect, rng)
+        if laws.depends_on_position_alone(effect, values):
+            laws.check_conservative(effect, values)
+            found += 1
+    assert found > 0
+
+
+def with_x(fitted: Fitted) -> MachineModel:
+    return STAGE.with_axis("x", STAGE.axes["x"].with_effect(fitted))
+
+
+def replaced(effect: Effect) -> tuple[str, ...]:
+    """Names of what that effect would replace on x: itself, or the friction."""
+    return tuple(
+        f.effect.name
+        for f in STAGE.axes["x"].effects
+        if f.effect.name == effect.name or effect.kind is f.effect.kind is Kind.FRICTION
+    )
+
+
+@cache
+def logged_without(
+    names: tuple[str, ...], stage: type[MujocoSimulator] | type[ReducedSimulator]
+) -> Log:
+    """A log of the stage without those effects on x."""
+    axis = STAGE.axes["x"]
+    for name in names:
+        axis = axis.without(name)
+    return logged(STAGE.with_axis("x", axis), stage)
+
+
+def logged(model: MachineModel, stage: type[MujocoSimulator] | type[ReducedSimulator]) -> Log:
+    return simulate(model, "moves", seed=3, duration=0.1, simulator=stage)
+
+
+@EVERY
+@pytest.mark.parametrize("stage", [MujocoSimulator, ReducedSimulator])
+def test_simulation_with_zero_strength_is_that_without(
+    effect: Effect, stage: type[MujocoSimulator] | type[ReducedSimulator]
+) -> None:
+    zero = logged(with_x(Fitted.at_start(effect, absent(effect))), stage)
+    without = logged_without(replaced(effect), stage)
+    assert len(zero) > 500
+    for axis in STAGE.axes:
+        for name in ("position", "force"):
+            one, other = zero.axes[axis].columns[name], without.axes[axis].columns[name]
+            np.testing.assert_array_equal(one, other, f"{axis} {name}")
+
+
+@EVERY
+def test_state_saved_and_restored_continues_to_the_bit(effect: Effect) -> None:
+    model = with_x(Fitted.at_start(effect, moderate(effect, np.random.default_rng(32))))
+    spec = mujoco.mjtState.mjSTATE_INTEGRATION
+    with passive_callback():
+        stage = MujocoSimulator(model, model.table())
+        saved, first, second = np.empty((3, mujoco.mj_stateSize(stage.model, spec)))
+
+        def step(begin: int, end: int) -> None:
+            for k in range(begin, end):
+                stage.data.ctrl[:] = 3.0 * sin(0.05 * k), 2.0 * sin(0.03 * k)
+                mujoco.mj_step(stage.model, stage.data)
+
+        step(0, 150)
+        mujoco.mj_getState(stage.model, stage.data, saved, spec)
+        step(150, 300)
+        mujoco.mj_getState(stage.model, stage.data, first, spec)
+        mujoco.mj_setState(stage.model, stage.data, saved, spec)
+        step(150, 300)
+        mujoco.mj_getState(stage.model, stage.data, second, spec)
+    np.testing.assert_array_equal(first, second)
+    assert not np.array_equal(first, saved)
+
+
+@EVERY
+def test_no_other_file_of_the_product_names_an_effect(effect: Effect) -> None:
+    """Adding or removing one file is all it takes."""
+    own = SOURCES / "effects" / f"{effect.name}.py"
+    naming = [path for path, words in words_of_the_product().items() if effect.name in words]
+    assert set(naming) <= {own}
+
+
+@cache
+def words_of_the_product() -> dict[Path, set[object]]:
+    """Constants and imported names of every file of the product."""
+    found = {}
+    for path in [*SOURCES.rglob("*.py"), *(SOURCES.parent / "identify").rglob("*.py")]:
+        nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+        words = {n.value for n in nodes if isinstance(n, ast.Constant)}
+        words |= {n.name.split(".")[-1] for n in nodes if isinstance(n, ast.alias)}
+        words |= {(n.module or "").split(".")[-1] for n in nodes if isinstance(n, ast.ImportFrom)}
+        found[path] = words
+    return found
+
+
+# --- planted faults: each law must fail on the effect that breaks it ------------------------------
+
+GAIN = 1.0
+
+
+def broken(kind: Kind, law: Callable, states: tuple[str, ...] = ()) -> Effect:
+    return Effect(
+        kind=kind, summary="broken", equation="F = c", source="none", law=law, fingerprint="none",
+        excited_by="none", states=states,
+        parameters=(Parameter("c", "N", 0.1, 0.0, 1e3, "strength", strength=True),),
+    )  # fmt: skip
+
+
+def left_over(p, s, io):
+    io[OUT] = -p[0] * io[V] - 1e-12
+
+
+def idle(p, s, io):
+    io[OUT] = 0.0
+
+
+def halving(p, s, io):
+    io[DRY] *= 0.5
+
+
+def singular(p, s, io):
+    io[OUT] = p[0] / io[V]
+
+
+def frozen_global(p, s, io):
+    io[OUT] = p[0] * io[X] * GAIN
+
+
+def drifting(p, s, io):
+    io[OUT] = p[0] * io[X]
+    p[0] += 1e-9
+
+
+def spilling(p, s, io):
+    s[1] = io[X]
+    io[OUT] = p[0] * s[0]
+
+
+def pushing(p, s, io):
+    io[X] = p[0]
+
+
+def driving(p, s, io):
+    io[OUT] = copysign(p[0], -io[V])
+
+
+def reversing(p, s, io):
+    io[VISCOUS] *= -10.0 * p[0]
+
+
+def damped_spring(p, s, io):
+    io[OUT] = -p[0] * (io[X] + 0.01 * io[V])
+
+
+def timed(p, s, io):
+    io[OUT] = p[0] * sin(100.0 * io[TIME])
+
+
+FAULTS = [
+    (laws.check_zero_is_absent, broken(Kind.FORCE, left_over), "left at zero strength"),
+    (laws.check_zero_is_absent, broken(Kind.FRICTION, left_over), "left at zero strength"),
+    (laws.check_zero_is_absent, broken(Kind.MODIFIER, halving), "changes the friction"),
+    (laws.check_acts, broken(Kind.FORCE, idle), "does nothing"),
+    (laws.check_acts, broken(Kind.MODIFIER, idle), "does nothing"),
+    (laws.check_finite, broken(Kind.FORCE, singular), "not finite"),
+    (laws.check_writes_only_its_result, broken(Kind.FORCE, drifting), "its parameters"),
+    (laws.check_writes_only_its_result, broken(Kind.FORCE, spilling, ("own",)), "behind"),
+    (laws.check_writes_only_its_result, broken(Kind.ACTUATION, pushing), "io slots"),
+    (laws.check_dissipative, broken(Kind.FRICTION, driving), "gives"),
+]
+
+
+@pytest.mark.parametrize(
+    ("check", "effect", "fault"),
+    FAULTS,
+    ids=[f"{c.__name__}-{e.law.__name__}" for c, e, _ in FAULTS],
+)
+def test_a_broken_effect_fails(check: Callable[[Effect], None], effect: Effect, fault: str) -> None:
+    with pytest.raises(AssertionError, match=fault):
+        check(effect)
+
+
+@pytest.mark.parametrize("friction", FRICTIONS, ids=label)
+def test_a_modifier_that_turns_friction_round_fails(friction: Effect) -> None:
+    with pytest.raises(AssertionError, match="gives"):
+        laws.check_dissipative(friction, broken(Kind.MODIFIER, reversing))
+
+
+def test_a_law_that_reads_a_changing_global_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    effect = broken(Kind.FORCE, frozen_global)
+    laws.check_compiled_equals_python(effect)
+    monkeypatch.setitem(globals(), "GAIN", 2.0)
+    with pytest.raises(AssertionError, match="differ"):
+        laws.check_compiled_equals_python(effect)
+
+
+def test_a_damped_spring_is_not_conservative() -> None:
+    effect = broken(Kind.FORCE, damped_spring)
+    assert not laws.depends_on_position_alone(effect, {"c": 1.0})
+    assert not laws.depends_on_position_alone(broken(Kind.FORCE, timed), {"c": 1.0})
+    with pytest.raises(AssertionError, match="loop"):
+        laws.check_conservative(effect, {"c": 1.0})

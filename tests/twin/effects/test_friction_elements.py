@@ -1,0 +1,100 @@
+"""Frictions of any number of elements, given in the model file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from effect_runs import CATALOGUE, FRICTIONS
+
+from twin.effect import ELEMENTS, Effect
+from twin.errors import InputError
+from twin.experiments.named import simulate
+from twin.model.file import load_model, save_model
+from twin.model.machine import Fitted, MachineModel, free_parameters
+from twin.simulator import MujocoSimulator, ReducedSimulator
+
+SIZED = [e for e in FRICTIONS if e.of_size is not None]
+EVERY = pytest.mark.parametrize("effect", SIZED, ids=lambda e: e.name)
+FILE = """
+name = "one axis"
+[axes.x]
+mass = 2.0\ntravel = [-0.1, 0.1]
+[axes.x.effects.{name}]
+{lines}
+"""
+
+
+def loaded(folder: Path, name: str, lines: str) -> MachineModel:
+    path = folder / "stage.toml"
+    path.write_text(FILE.format(name=name, lines=lines))
+    return load_model(path, CATALOGUE)
+
+
+def test_two_models_have_elements() -> None:
+    assert len(SIZED) == 2
+
+
+@EVERY
+@pytest.mark.parametrize("count", [1, 3, 4, 30])
+def test_the_model_file_says_how_many_elements(effect: Effect, count: int, tmp_path: Path) -> None:
+    fitted = loaded(tmp_path, effect.name, f"elements = {count}").axes["x"][effect.name]
+    assert fitted.effect.name == effect.name
+    assert fitted.values[ELEMENTS] == count
+    assert fitted.values[f"share_{count}"] == 1.0
+    assert len(fitted.effect.states) in (count, 2 * count)
+    assert f"share_{count + 1}" not in fitted.values
+
+
+@EVERY
+def test_elements_and_their_own_values_survive_saving(effect: Effect, tmp_path: Path) -> None:
+    lines = "elements = 7\nFc = 0.2\nFs = 0.25\nstiff_7 = 0.125\nshare_2 = 3.0\nfixed = []"
+    model = loaded(tmp_path, effect.name, lines)
+    save_model(model, tmp_path / "again.toml")
+    again = load_model(tmp_path / "again.toml", CATALOGUE)
+    assert again.axes["x"][effect.name].values == model.axes["x"][effect.name].values
+    assert again.axes["x"][effect.name].effect is model.axes["x"][effect.name].effect
+
+
+@EVERY
+def test_their_number_is_never_fitted(effect: Effect, tmp_path: Path) -> None:
+    free = free_parameters(loaded(tmp_path, effect.name, "elements = 2\nfixed = []").axes["x"])
+    names = [c.parameter.name for c in free]
+    assert ELEMENTS not in names
+    assert "stiff_2" in names
+
+
+@EVERY
+def test_few_numbers_are_fitted_unless_asked(effect: Effect) -> None:
+    plain = [p.name for p in effect.parameters if not p.fixed and p.lower < p.upper]
+    assert {"Fc", "Fs", "v0", "sigma2", "sigma0", "spread"} <= set(plain)
+    assert len(plain) <= 7
+
+
+@EVERY
+@pytest.mark.parametrize("count", ["0", "2.5", "-3", "1001", "nan", '"six"'])
+def test_a_bad_number_of_elements_is_refused(effect: Effect, count: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"whole number of elements from 1 to 1000"):
+        loaded(tmp_path, effect.name, f"elements = {count}")
+
+
+@EVERY
+def test_values_of_an_element_that_is_not_there_are_refused(effect: Effect, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no parameter 'share_4'"):
+        loaded(tmp_path, effect.name, "elements = 3\nshare_4 = 1.0")
+
+
+def test_other_effects_know_no_elements() -> None:
+    with pytest.raises(InputError, match="no parameter 'elements'"):
+        Fitted.at_start(CATALOGUE["lugre"], {ELEMENTS: 3})
+
+
+@EVERY
+@pytest.mark.parametrize("stage", [MujocoSimulator, ReducedSimulator])
+def test_many_elements_run(
+    effect: Effect, stage: type[MujocoSimulator] | type[ReducedSimulator], tmp_path: Path
+) -> None:
+    lines = "elements = 30\nFc = 0.3\nFs = 0.4\nsigma0 = 1e4"
+    log = simulate(
+        loaded(tmp_path, effect.name, lines), "moves", seed=1, duration=0.2, simulator=stage
+    )
+    assert np.isfinite(log.axes["x"].columns["force"]).all()

@@ -1,0 +1,68 @@
+"""Mistakes in a user's own effect: exit code 2, one line that says what to try, no traceback."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from identify.cli import main
+
+SOURCE = Path(__file__).parents[3] / "examples" / "my_effect.py"
+LAW_END = "io[OUT] = -p[0] * distance * exp(-ratio * ratio)"
+STRENGTH = '"N/m", 0.0, -1e5, 1e5, "stiffness at the place"'
+FAULTS = {
+    "unit left empty": (STRENGTH, STRENGTH.replace("N/m", ""), "has no unit"),
+    "unit forgotten": (STRENGTH, STRENGTH.replace('"N/m", ', ""), "name, unit, start, lower"),
+    "unit is a number": ('"N/m"', "3.0", "give a text such as 'N'"),
+    "bound forgotten": (STRENGTH, STRENGTH.replace(", 1e5", ""), "name, unit, start, lower"),
+    "start outside": (STRENGTH, STRENGTH.replace("0.0", "2e5"), "outside its bounds"),
+    "bounds swapped": (STRENGTH, STRENGTH.replace("-1e5, 1e5", "1e5, -1e5"), "outside its bounds"),
+    "state not declared": (LAW_END, f"s[0] = distance\n    {LAW_END}", "s[0], but 0 states"),
+    "one state too few": (
+        "    law=law,", '    law=law,\n    states=("own",),', "s[1], but 1 states",
+    ),
+    "negative index": (LAW_END, LAW_END.replace("p[0]", "p[-1]"), "p[-1], but 3 parameters"),
+    "io too far": (LAW_END, LAW_END.replace("io[OUT]", "io[99]"), "io[99], but it has"),
+    "nothing at v = 0": (LAW_END, "io[OUT] = p[0] / io[V]", "no finite number at v = 0 m/s"),
+    "nan at v = 0": (LAW_END, "io[OUT] = io[V] * 1e400 - p[0]", "no finite number at v = 0 m/s"),
+    "domain": (LAW_END, "io[OUT] = p[0] * sqrt(io[V])", "no finite number at v = -1e-06 m/s"),
+    "no result": (LAW_END, "distance = ratio", "its law writes no result; a force effect writes"),
+    "not compiled": (LAW_END, 'io[OUT] = float("%g" % p[0])', "cannot be compiled"),
+    "unknown name": (LAW_END, "io[OUT] = missing", "name 'missing' is not defined"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_mistake_is_said_in_one_line(
+    fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    good, bad, message = FAULTS[fault]
+    text = SOURCE.read_text(encoding="utf-8")
+    assert good in text
+    text = text.replace(good, bad).replace("import exp", "import exp, sqrt")
+    text = text.replace("OUT, Effect", "OUT, V, Effect")
+    if fault == "one state too few":
+        text = text.replace(LAW_END, f"s[1] = distance\n    {LAW_END}")
+    path = tmp_path / "bad.py"
+    path.write_text(text, encoding="utf-8")
+    monkeypatch.setattr(sys, "argv", ["twin", "effects", "bad", "--effects", str(path)])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    told = capsys.readouterr()
+    assert stopped.value.code == 2
+    assert told.out == ""
+    assert told.err.count("\n") == 1, told.err
+    assert message in told.err
+    assert "bad" in told.err
+    assert "Traceback" not in told.err
+
+
+def test_the_example_itself_is_sound(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    command = ["twin", "effects", SOURCE.stem, "--effects", str(SOURCE)]
+    monkeypatch.setattr(sys, "argv", command)
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert stopped.value.code in (0, None)
+    assert "magnetic detent" in capsys.readouterr().out

@@ -1,0 +1,108 @@
+"""Experiment files, and the command that plans one and simulates it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from cli_runs import in_small, refusal, twin
+
+from identify.cli.shared import app
+from twin.effects import load_catalogue
+from twin.errors import InputError
+from twin.experiments.file import format_experiment, load_experiment, parameters, save_experiment
+from twin.experiments.kinds import Passes, Rests, Steps, Sweep
+from twin.experiments.named import simulate
+from twin.log import read_log
+from twin.model.file import load_model
+from twin.simulator import ReducedSimulator
+
+CATALOGUE = load_catalogue()
+PROTON = load_model("proton_xy", CATALOGUE)
+
+EXPERIMENTS = (
+    Passes("x", span=0.1, speed=0.05, repeats=2, at=(0.01, -0.02), other=0.1),
+    Rests("y", span=1e-3, speed=1e-3, rests=(0.1, 2.0)),
+    Steps("x", span=0.1, step=0.02, efforts=(1.0, 0.2)),
+    Sweep("x", 0.1, 0.02, 1, amplitude=0.5, lowest=2.0, highest=60.0, effort=0.5),
+)
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda e: type(e).__name__)
+def test_an_experiment_file_says_the_same_when_it_is_read_again(experiment, tmp_path):
+    save_experiment(experiment, tmp_path / "e.toml", "why")
+    assert load_experiment(tmp_path / "e.toml") == experiment
+    assert [f.name for f in tmp_path.iterdir()] == ["e.toml"]
+    text = format_experiment(experiment)
+    assert all(f"{name} = " in text for name in parameters(experiment))
+
+
+PASSES = '[experiment]\nkind = "passes"\naxis = "x"\nspan = 0.1\nspeed = 0.05\nrepeats = 1\n'
+FAULTS = {
+    "unknown kind": (PASSES.replace("passes", "pases"), "'passes'"),
+    "unknown entry": (PASSES.replace("speed", "sped"), "'speed'"),
+    "missing entry": (PASSES.replace("speed = 0.05", ""), "m/s"),
+    "text for a number": (PASSES.replace("0.05", "'fast'"), "m/s"),
+    "negative": (PASSES.replace("0.05", "-0.05"), "m/s"),
+    "not finite": (PASSES.replace("0.05", "inf"), "m/s"),
+    "a list": (PASSES.replace("0.05", "[0.05]"), "m/s"),
+    "half a repeat": (PASSES.replace("repeats = 1", "repeats = 1.5"), "whole number"),
+    "beyond the speed": (PASSES.replace("0.05", "0.5"), "0.25 m/s"),
+    "beyond the travel": (PASSES.replace("0.1", "0.5"), "0.17 m"),
+    "unknown axis": (PASSES.replace('"x"', '"z"'), "x, y"),
+    "no table": ("kind = 1\n", "[experiment]"),
+    "no TOML": ("kind = = 1\n", "TOML"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_bad_experiment_file_is_refused_in_one_line(fault, tmp_path):
+    text, said = FAULTS[fault]
+    (tmp_path / "e.toml").write_text(text)
+    with pytest.raises(InputError) as refused:
+        simulate(PROTON, load_experiment(tmp_path / "e.toml"), simulator=ReducedSimulator)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value) or "TOML" in said
+
+
+def test_the_command_writes_an_experiment_that_simulate_runs(tmp_path):
+    rivals = ("cogging", "force_constant_ripple")
+    with in_small(*rivals, proposed=2):
+        answer = twin(
+            "plan", "proton_xy", "--between", *rivals, "--duration", "4", "-o", "next.toml",
+            "--json", folder=tmp_path,
+        )  # fmt: skip
+        ran = twin("simulate", "next.toml", "--model", "proton_xy", "-o", "l.mcap", folder=tmp_path)
+    assert answer.returncode == 0, answer.stderr
+    result = json.loads(answer.stdout)
+    assert result["between"] == list(rivals)
+    assert result["expected_difference"] > result["noise_floor"]
+    assert result["file"] == "next.toml"
+    assert ran.returncode == 0, ran.stderr
+    assert read_log(tmp_path / "l.mcap").attachments["experiment.toml"]
+
+
+BAD_INPUT = (
+    (("plan", "proton_xy", "--between", "coging", "lugre"), "'cogging'"),
+    (("plan", "proton_xy", "--between", "cogging", "cogging"), "different"),
+    (("plan", "proton_xy", "--axis", "z"), "x, y"),
+    (("plan", "proton_xy", "--duration", "-1"), "0 s"),
+    (("plan", "proton_xy", "-o", "next.mcap"), ".toml"),
+    (("plan", "proton_xy", "-o", "no/where.toml"), "no/where.toml"),
+    (("simulate", "nowhere.toml"), "twin plan"),
+    (("simulate", "next.toml", "--duration", "3"), "duration"),
+)
+
+
+@pytest.mark.parametrize(("arguments", "said"), BAD_INPUT)
+def test_bad_input_of_the_commands_is_refused(arguments, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    save_experiment(EXPERIMENTS[0], "next.toml")
+    with pytest.raises(InputError) as refused:
+        app(list(arguments), standalone_mode=False)
+    assert said in str(refused.value)
+    assert [f.name for f in tmp_path.iterdir()] == ["next.toml"], "something was written"
+
+
+def test_a_refusal_is_one_line_with_exit_code_two(tmp_path):
+    assert "s" in refusal("plan", "proton_xy", "--duration", "0", folder=tmp_path)

@@ -1,0 +1,458 @@
+"""Any machine: one axis or three, linear or rotary, goes round the whole loop in its own units."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import tomllib
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from identify import workflow
+from identify.dataset.dataset import datasets
+from identify.output import as_json, text
+from identify.output.report import write_report
+from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+from identify.selection.residual_dependence import coordinates_of, unit_of
+from twin.effects import Catalogue, load_catalogue
+from twin.errors import InputError
+from twin.experiments.experiment import driven_units
+from twin.experiments.file import format_experiment
+from twin.experiments.kinds import Passes
+from twin.experiments.named import outside_travel, simulate
+from twin.log import Log, read_log, write_log
+from twin.log.check import check_log
+from twin.model.file import format_model, parse_model
+from twin.model.machine import MachineModel
+from twin.model.units import LINEAR, ROTARY, AxisUnits, rotary_unit
+from twin.mujoco.mjcf import machine_spec
+from twin.simulator import ReducedSimulator
+
+CATALOGUE = load_catalogue()
+TRIED = ("cogging", "constant_force", "quadratic_drag", "axis_coupling")
+DURATION = 4.0  # s of each log
+ROUNDING = 1e-13  # of the travel, over a log
+
+LINEAR_AXIS = """
+[axes.{name}]
+mass = {mass}
+travel = [-0.2, 0.2]
+force_limit = 400.0
+encoder_noise = 2e-8
+current_noise = 2e-4
+velocity = 0.4
+acceleration = 4.0
+jerk = 200.0
+[axes.{name}.effects.coulomb_viscous]
+Fc = {dry}
+sigma2 = 2.0
+"""
+ROTARY_AXIS = """
+[axes.c]
+inertia = 0.02
+travel = [-2.0, 2.0]
+force_limit = 5.0
+encoder_noise = 1e-6
+current_noise = 2e-4
+velocity = 3.0
+acceleration = 40.0
+jerk = 2000.0
+[axes.c.effects.coulomb_viscous]
+Fc = 0.05
+sigma2 = 0.01
+"""
+RATE = "sample_rate = 1000.0\n"
+THREE = [("x", 3.0, 1.0), ("y", 5.0, 2.0), ("z", 2.0, 0.5)]
+SLIDE = LINEAR_AXIS.format(name="x", mass=3.0, dry=1.0)
+MACHINES = {
+    "linear": (SLIDE, "x", "[axes.x.effects.cogging]\np = 0.04\na1 = 0.5\n"),
+    "rotary": (ROTARY_AXIS, "c", "[axes.c.effects.cogging]\np = 0.7\na1 = 0.02\n"),
+    "three": (
+        "".join(LINEAR_AXIS.format(name=n, mass=m, dry=f) for n, m, f in THREE),
+        "y",
+        "[axes.y.effects.quadratic_drag]\nc = 20.0\n",
+    ),
+}
+
+
+def machine(toml: str) -> MachineModel:
+    return parse_model(tomllib.loads(RATE + toml), CATALOGUE, None, "machine.toml")
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """What the loop made of a machine with one effect that its model lacks."""
+
+    kind: str
+    axis: str
+    model: MachineModel
+    truth: MachineModel
+    logs: dict[str, Log]
+    fitted: FitResult
+    compared: Comparison
+    found: Diagnosis
+    added: Addition
+    page: str
+
+    @property
+    def units(self) -> AxisUnits:
+        return self.model.axes[self.axis].units
+
+
+def labels_alone(figure: Figure) -> str:
+    """A picture with the words of a figure and nothing else."""
+    words = "".join(f"<text>{t.get_text()}</text>" for t in figure.findobj(Text))
+    return f"data:image/svg+xml;base64,{base64.b64encode(words.encode()).decode()}"
+
+
+@pytest.fixture(scope="module", params=MACHINES)
+def gone_round(request, tmp_path_factory) -> Round:
+    toml, axis, hidden = MACHINES[request.param]
+    folder = tmp_path_factory.mktemp(request.param)
+    model, truth = machine(toml), machine(toml + hidden)
+    logs = {}
+    for seed in (1, 2):
+        write_log(simulate(truth, "tracking", seed=seed, duration=DURATION), folder / "log.mcap")
+        logs[f"log {seed}"] = read_log(folder / "log.mcap")
+    held = {"log 2": logs.pop("log 2")}
+    tried = Catalogue([CATALOGUE[n] for n in TRIED])
+    found = workflow.diagnose(model, logs, held, catalogue=tried)
+    assert found.effect is not None
+    added = workflow.add(found.effect, model, logs, held)
+    with pytest.MonkeyPatch.context() as patch:
+        # Drawing takes most of the time, and tests/test_report.py sees to it.
+        patch.setattr("identify.output.report.data_uri", labels_alone)
+        write_report(
+            folder / "report.html", title="machine", diagnosis=found, comparison=found.comparison,
+            history=added.model.history, additions=[added],
+        )  # fmt: skip
+    return Round(
+        request.param, axis, model, truth, logs, workflow.fit(truth, logs), found.comparison,
+        found, added, (folder / "report.html").read_text(),
+    )  # fmt: skip
+
+
+def words(page: str) -> str:
+    """All that a reader of the page sees, in its pictures too."""
+    pictures = re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)
+    assert pictures
+    shown = "\n".join(base64.b64decode(p).decode() for p in pictures)
+    shown = "\n".join(re.findall(r"<text[^>]*>(.*?)</text>", shown, re.DOTALL))
+    plain = re.sub(r"<style.*?</style>|data:image[^\"]+", "", page, flags=re.DOTALL)
+    return re.sub(r"<[^>]+>", " ", plain + shown)
+
+
+def texts(r: Round) -> str:
+    return "\n".join(
+        [
+            text.fit_text(r.fitted), text.compare_text(r.compared), text.diagnose_text(r.found),
+            text.add_text(r.added), format_model(r.added.model),
+        ]
+    )  # fmt: skip
+
+
+def stated_units(value: Any) -> set[str]:
+    """Every unit that a JSON object states."""
+    if isinstance(value, dict):
+        own = {v for k, v in value.items() if k.endswith("unit") and isinstance(v, str)}
+        return own.union(*map(stated_units, value.values()))
+    return set().union(*map(stated_units, value)) if isinstance(value, list) else set()
+
+
+def test_both_simulations_agree_to_rounding(gone_round: Round) -> None:
+    reduced = simulate(
+        gone_round.truth, "tracking", seed=1, duration=DURATION, simulator=ReducedSimulator
+    )
+    logged = gone_round.logs["log 1"]
+    for name, axis in gone_round.model.axes.items():
+        travel = np.ptp(axis.hardware.travel)
+        own = logged.truth[name]["position"]
+        assert np.abs(own - reduced.truth[name]["position"]).max() < ROUNDING * travel
+        assert np.ptp(own) > 0.3 * travel
+        assert not outside_travel(gone_round.model, logged)
+
+
+def test_the_log_states_its_units_and_is_fit(gone_round: Round) -> None:
+    log = gone_round.logs["log 1"]
+    assert check_log(log).ok
+    assert set(log.axes) == set(gone_round.model.axes)
+    for name, axis in gone_round.model.axes.items():
+        units = log.axes[name].units
+        assert log.axes[name].kind == axis.units
+        assert (units["position"], units["force"]) == (axis.units.position, axis.units.force)
+
+
+def test_a_fit_recovers_what_was_planted(gone_round: Round) -> None:
+    for name, planted in gone_round.truth.axes.items():
+        found = gone_round.fitted.model.axes[name]
+        assert found.mass == pytest.approx(planted.mass, rel=0.01)
+        for f in planted.effects:
+            for p in ("Fc", "sigma2", "a1", "p", "c"):
+                if f.values.get(p):
+                    value = found[f.effect.name].values[p]
+                    assert value == pytest.approx(f.values[p], rel=0.03), (name, p)
+        label = planted.units.mass_name
+        own = {e.label: e for e in gone_round.fitted.estimates[name]}
+        assert own[label].unit == planted.units.mass
+        assert own["coulomb_viscous.sigma2"].unit == planted.units("N s/m")
+
+
+def test_the_hidden_effect_is_named_and_added(gone_round: Round) -> None:
+    hidden = gone_round.truth.axes[gone_round.axis].names[-1]
+    assert gone_round.found.effect is not None
+    assert gone_round.found.effect.name == hidden
+    assert gone_round.found.leading.dataset.axis == gone_round.axis
+    assert gone_round.added.kept
+    assert gone_round.added.step.unit == gone_round.units.force
+    before, after = gone_round.added.position_error
+    assert after < 0.5 * before
+    assert gone_round.added.replayed == pytest.approx(after, rel=1e-6)
+    again = parse_model(
+        tomllib.loads(format_model(gone_round.added.model)), CATALOGUE, None, "again.toml"
+    )
+    assert again.axes[gone_round.axis] == gone_round.added.model.axes[gone_round.axis]
+    assert again.history == gone_round.added.model.history
+
+
+# A number, a label or a comment in metres, newtons or kilograms.
+OF_A_SLIDE = re.compile(
+    r"(?:[\d)] ?|\(|# |\b1/)[mµn]?"
+    r"(?:N(?! ?[·m]|\w)|kg(?! ?[·m]|\w)|m(?:/s(?:\^?[23²³])?)?(?![\w·/]))"
+)
+OF_A_HINGE = re.compile(r"\b[mµn]?rad\b|N·m|N m\b|kg·m|kg m\^")
+
+
+def test_texts_model_file_and_report_are_in_units_of_the_axis(gone_round: Round) -> None:
+    wrong, right = OF_A_SLIDE, OF_A_HINGE
+    if not gone_round.units.rotary:
+        wrong, right = right, wrong
+    for shown in (texts(gone_round), words(gone_round.page)):
+        assert not (found := wrong.search(shown)), shown[found.start() - 80 : found.end() + 20]
+        assert right.search(shown)
+    assert gone_round.units.mass_name in words(gone_round.page)
+
+
+def test_json_is_in_units_of_the_axis(gone_round: Round) -> None:
+    objects = [
+        as_json.fit_json(gone_round.fitted), as_json.compare_json(gone_round.compared),
+        as_json.diagnose_json(gone_round.found), as_json.add_json(gone_round.added),
+    ]  # fmt: skip
+    units = set().union(*(stated_units(json.loads(json.dumps(as_json.plain(o)))) for o in objects))
+    kind = gone_round.units
+    other = LINEAR if kind.rotary else ROTARY
+    known = ("m", "m/s", "m/s^2", "N", "kg", "N s/m", "1/N")
+    assert {kind(u) for u in known} <= units
+    assert not {other(u) for u in known} & units
+
+
+def test_an_effect_of_the_other_axis_is_no_candidate_where_there_are_several(
+    gone_round: Round,
+) -> None:
+    left_out = ("axis_coupling",) if gone_round.kind == "three" else ()
+    assert gone_round.found.not_tried == left_out
+    told = as_json.diagnose_json(gone_round.found)
+    assert told["not_tried"] == list(left_out)
+    notes = [n for n in told["notes"] if "not tried" in n]
+    assert bool(notes) == bool(left_out)
+    assert ("not tried: axis_coupling" in text.diagnose_text(gone_round.found)) == bool(left_out)
+    assert ("not tried: axis_coupling" in words(gone_round.page)) == bool(left_out)
+    tried = {c.effect.name for c in gone_round.found.leading.ranking}
+    assert ("axis_coupling" in tried) == (not left_out)
+
+
+def test_a_machine_with_several_other_axes_refuses_an_effect_of_the_other_one() -> None:
+    toml, axis, _ = MACHINES["three"]
+    for effect in ("axis_coupling", "load_dependent_friction"):
+        with pytest.raises(InputError, match=f"axis y: {effect} depends on the other axis") as told:
+            machine(f"{toml}[axes.{axis}.effects.{effect}]\n")
+        assert "remove it" in str(told.value)
+        assert "\n" not in str(told.value)
+    with pytest.raises(InputError, match="axis y: axis_coupling depends on the other axis"):
+        workflow.add(CATALOGUE["axis_coupling"], machine(toml), {}, axis="y")
+    with pytest.raises(InputError, match="axis z: axis_coupling depends on the other axis"):
+        workflow.plan(
+            machine(toml), catalogue=CATALOGUE, axis="z",
+            between=(CATALOGUE["axis_coupling"], CATALOGUE["cogging"]),
+        )  # fmt: skip
+    pair = "".join(LINEAR_AXIS.format(name=n, mass=m, dry=f) for n, m, f in THREE[:2])
+    assert machine(f"{pair}[axes.y.effects.axis_coupling]\n").axes["y"].names[-1] == "axis_coupling"
+
+
+def test_each_other_axis_has_its_own_name_in_the_residual(gone_round: Round) -> None:
+    log = datasets(gone_round.model, gone_round.logs, {})[gone_round.axis].fit[0]
+    where = coordinates_of(log)
+    assert not [name for name in where if name.startswith("other_axis")]
+    named = {name for name in where if name.startswith("axis_")}
+    if gone_round.kind != "three":
+        assert not named
+        return
+    assert named == {
+        f"axis_{a}_{q}" for a in "xz" for q in ("position", "velocity", "acceleration")
+    }
+    truth = gone_round.logs["log 1"].truth["z"]["velocity"]
+    assert np.std(where["axis_z_velocity"]) == pytest.approx(np.std(truth), rel=0.1)
+    assert unit_of("axis_z_velocity", log.motion) == "m/s"
+    assert not log.motion.others.any()
+
+
+def test_one_axis_moves_while_two_rest() -> None:
+    model = machine(MACHINES["three"][0])
+    log = simulate(model, Passes("z", span=0.3, speed=0.2, repeats=1))
+    assert {a for a in log.axes if np.ptp(log.axes[a].position) > 0.1} == {"z"}
+    found = workflow.fit(model, {"passes": log})
+    assert set(found.fits) == {"z"}
+    assert found.fits["z"].ratio < 1.5
+    compared = workflow.compare(model, {"passes": log}).axes["z"]
+    assert compared.position_error["passes"] < 1e-3
+    with pytest.raises(InputError, match="has 3 axes, not two"):
+        simulate(model, Passes("z", span=0.3, speed=0.2, repeats=1, other=0.1))
+
+
+def test_a_plan_is_in_units_of_the_axis() -> None:
+    model = machine(ROTARY_AXIS)
+    chosen = workflow.plan(
+        model, catalogue=CATALOGUE, duration=2.0, axis="c",
+        between=(CATALOGUE["cogging"], CATALOGUE["quadratic_drag"]),
+    )  # fmt: skip
+    shown = text.plan_text(chosen)
+    assert not (wrong := OF_A_SLIDE.search(shown)), wrong
+    assert "N m left to the rival" in shown
+    assert stated_units(as_json.plan_json(chosen)) == {"N m", "s"}
+    planned = Passes("c", span=0.3, speed=0.2, repeats=1)
+    file = format_experiment(planned, units=driven_units(planned, model))
+    assert "# rad, length of a pass" in file
+    assert "# rad/s, held" in file
+
+
+@pytest.mark.parametrize(
+    ("log_of", "model_of", "message"),
+    [
+        ("rotary", SLIDE.replace("axes.x", "axes.c"), r"is rotary \(position in rad\), .* in m\)"),
+        ("linear", ROTARY_AXIS.replace("axes.c", "axes.x"), r"is linear \(position in m\), .* rad"),
+    ],
+)  # fmt: skip
+def test_a_log_of_the_other_kind_is_refused(log_of: str, model_of: str, message: str) -> None:
+    log = simulate(machine(MACHINES[log_of][0]), "tracking", duration=1.0)
+    for act in (workflow.fit, workflow.compare):
+        with pytest.raises(InputError, match=message) as told:
+            act(machine(model_of), {"run": log})
+        assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("toml", "message"),
+    [
+        (ROTARY_AXIS.replace("inertia", "mass = 1.0\ninertia"), "both mass and inertia"),
+        (ROTARY_AXIS.replace("inertia = 0.02", ""), "no mass; .* kg m.2 for a rotary axis"),
+        (ROTARY_AXIS.replace("0.02", "-1.0"), "inertia = -1.0 kg m.2: must be a positive number"),
+        (ROTARY_AXIS.replace("0.02", "'big'"), "inertia = big: must be a number in kg m.2"),
+        (ROTARY_AXIS.replace("5.0", "'big'"), "force_limit = big: must be a number in N m"),
+        (ROTARY_AXIS.replace("= 0.01\n", "= -1.0\n"), r"sigma2 = -1 N m s/rad: outside"),
+        (ROTARY_AXIS.replace("inertia", "inertja"), "did you mean 'inertia'"),
+    ],
+)
+def test_a_wrong_rotary_axis_is_refused_in_its_units(toml: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as told:
+        machine(toml)
+    assert "\n" not in str(told.value)
+
+
+def test_a_held_inertia_is_said_and_kept() -> None:
+    model = machine(ROTARY_AXIS.replace("0.02", "0.02\nfixed = ['inertia']"))
+    assert model.axes["c"].mass_fixed
+    assert "inertia = 0.02 # kg m^2" in format_model(model)
+    assert machine(format_model(model).partition("Hz\n")[2]).axes == model.axes
+
+
+def test_a_stage_mounts_on_slides_and_hinges_of_its_own() -> None:
+    mixed = machine(SLIDE + ROTARY_AXIS)
+    spec = machine_spec(mixed)
+    assert spec.joint("x").type == mujoco.mjtJoint.mjJNT_SLIDE
+    assert spec.joint("c").type == mujoco.mjtJoint.mjJNT_HINGE
+    log = simulate(mixed, "tracking", duration=1.0)
+    assert (log.axes["x"].kind, log.axes["c"].kind) == (LINEAR, ROTARY)
+    reduced = simulate(mixed, "tracking", duration=1.0, simulator=ReducedSimulator)
+    for axis in "xc":
+        gone = log.truth[axis]["position"] - reduced.truth[axis]["position"]
+        assert np.abs(gone).max() < ROUNDING
+    motion = datasets(mixed, {"run": log}, {})["x"].fit[0].motion
+    assert unit_of("other_axis_velocity", motion) == "rad/s"
+    assert unit_of("velocity", motion) == "m/s"
+
+
+def test_what_repeats_may_repeat_once_a_turn() -> None:
+    for effect in CATALOGUE.values():
+        for p in effect.parameters:
+            assert not p.period or p.upper > 2.0 * np.pi, f"{effect.name}.{p.name}"
+
+
+@pytest.mark.parametrize("effect", ["flexible_mode", "base_vibration", "backlash", "payload_mass"])
+def test_attached_inertias_agree_on_a_hinge(effect: str) -> None:
+    values = {"flexible_mode": "load = 0.3", "base_vibration": "recoil = 0.2",
+              "backlash": "load = 0.3\nplay = 1e-3", "payload_mass": "ratio = 0.3"}  # fmt: skip
+    model = machine(f"{ROTARY_AXIS}[axes.c.effects.{effect}]\n{values[effect]}\n")
+    runs = [
+        simulate(model, "tracking", duration=1.0, **more).truth["c"]["position"]
+        for more in ({}, {"simulator": ReducedSimulator})
+    ]
+    assert np.abs(runs[0] - runs[1]).max() < 1e-12
+
+
+def test_a_joint_of_the_other_kind_is_refused() -> None:
+    spec = machine_spec(machine(ROTARY_AXIS))
+    spec.compile()
+    slide = replace(
+        machine(SLIDE.replace("axes.x", "axes.c")), mjcf=spec.to_xml(), mjcf_name="c.xml"
+    )
+    with pytest.raises(InputError, match=r"joint 'c' is not a slide, but the axis is linear"):
+        machine_spec(slide)
+
+
+@pytest.mark.parametrize(
+    ("linear", "rotary"),
+    [
+        ("m", "rad"),
+        ("m/s", "rad/s"),
+        ("m/s^2", "rad/s^2"),
+        ("m/s^3", "rad/s^3"),
+        ("N", "N m"),
+        ("kg", "kg m^2"),
+        ("N s/m", "N m s/rad"),
+        ("N/m", "N m/rad"),
+        ("N/m^2", "N m/rad^2"),
+        ("N/m^3", "N m/rad^3"),
+        ("N s^2/m^2", "N m s^2/rad^2"),
+        ("N/A", "N m/A"),
+        ("N/s", "N m/s"),
+        ("N/(m s)", "N m/(rad s)"),
+        ("1/m", "1/rad"),
+        ("1/N", "1/(N m)"),
+        ("s^2/m", "s^2/rad"),
+        ("N^2", "(N m)^2"),
+        ("m rms", "rad rms"),
+        ("A rms", "A rms"),
+        ("1", "1"),
+        ("s", "s"),
+        ("Hz", "Hz"),
+        ("1/J", "1/J"),
+        ("", ""),
+    ],
+)
+def test_a_linear_unit_has_a_rotary_counterpart(linear: str, rotary: str) -> None:
+    assert rotary_unit(linear) == rotary
+    assert (LINEAR(linear), ROTARY(linear)) == (linear, rotary)
+
+
+def test_no_unit_of_the_catalogue_keeps_a_length_a_force_or_a_mass() -> None:
+    for effect in CATALOGUE.values():
+        for p in effect.parameters:
+            told = rotary_unit(p.unit)
+            rest = told.replace("N m", "").replace("kg m^2", "")
+            assert not set(re.findall(r"[A-Za-z]+", rest)) & {"m", "N", "kg"}, (effect.name, told)

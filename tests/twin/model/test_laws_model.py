@@ -1,0 +1,264 @@
+"""Laws of the stage model: bounds, one friction, history, and coordinates read as written."""
+
+import math
+
+import numpy as np
+import pytest
+
+from twin.effect import Effect, Kind, Parameter
+from twin.effects import load_catalogue
+from twin.errors import InputError
+from twin.model.machine import (
+    MASS,
+    AxisModel,
+    Fitted,
+    Hardware,
+    HistoryStep,
+    MachineModel,
+    free_parameters,
+    read,
+    write,
+)
+
+CATALOGUE = load_catalogue()
+
+
+def law(p, s, io):  # never run here
+    io[16] = p[0]
+
+
+def effect_of(name: str, kind: Kind, *parameters: Parameter) -> Effect:
+    made = Effect(kind, "s", "e", "s", parameters, law, "f", "e")
+    made.__dict__["name"] = name
+    return made
+
+
+LOW = Parameter("low", "N", 2.0, 1.0, 9.0, "the lower")
+HIGH = Parameter("high", "N", 4.0, 0.5, 20.0, "the higher", at_least="low")
+HELD = Parameter("held", "m", 5.0, -7.0, 30.0, "held by design", fixed=True)
+STUCK = Parameter("stuck", "1", 3.0, 3.0, 3.0, "one value only")
+PAIR = effect_of("pair", Kind.FORCE, LOW, HIGH, HELD, STUCK)
+FRICTION = effect_of("slide", Kind.FRICTION, Parameter("Fc", "N", 1.5, 0.0, 50.0, "level"))
+OTHER = effect_of("glide", Kind.FRICTION, Parameter("Fc", "N", 2.5, 0.0, 50.0, "level"))
+SPRING = effect_of(
+    "spring",
+    Kind.FORCE,
+    Parameter("k", "N/m", 11.0, 0.0, 1e4, "stiffness"),
+    Parameter("x0", "m", -0.25, -1.0, 1.0, "rest"),
+)
+
+
+def axis() -> AxisModel:
+    effects = tuple(Fitted.at_start(e) for e in (PAIR, FRICTION, SPRING))
+    return AxisModel(6.25, Hardware(travel=(-0.1, 0.3), jerk=77.0), effects)
+
+
+# Bounds
+
+
+@pytest.mark.parametrize("parameter", [LOW, HIGH, HELD])
+def test_a_value_is_allowed_up_to_its_bounds_and_no_further(parameter):
+    for good in (parameter.lower, parameter.upper):
+        assert Fitted.at_start(PAIR, {parameter.name: good}).values[parameter.name] == good
+    for bad in (np.nextafter(parameter.lower, -np.inf), np.nextafter(parameter.upper, np.inf)):
+        with pytest.raises(InputError) as caught:
+            Fitted.at_start(PAIR, {parameter.name: float(bad)})
+        text = f"outside [{parameter.lower:g}, {parameter.upper:g}] {parameter.unit} ("
+        assert str(caught.value).startswith(f"pair.{parameter.name} = ")
+        assert text in str(caught.value)
+
+
+def test_every_bound_of_the_catalogue_is_kept_on_both_sides():
+    """All parameters of an effect at once within; the first ones and the last beyond."""
+    for name in CATALOGUE:
+        effect = CATALOGUE[name]
+        own = [p for p in effect.parameters if effect.of_size is None or p.name != "elements"]
+        for side, outward in (("lower", -math.inf), ("upper", math.inf)):
+            bounds = {p.name: getattr(p, side) for p in own if math.isfinite(getattr(p, side))}
+            assert bounds.items() <= dict(Fitted.at_start(effect, bounds).values).items()
+            for p in [q for q in (*own[:4], own[-1]) if q.name in bounds]:
+                beyond = math.nextafter(bounds[p.name], outward)
+                with pytest.raises(InputError, match=f"{name}.{p.name} = "):
+                    Fitted.at_start(effect, {p.name: beyond})
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, "2", None, [2.0]])
+def test_what_is_no_finite_number_is_refused(value):
+    with pytest.raises(InputError, match=r"pair.low = .*: is not a finite number; give it in N"):
+        Fitted.at_start(PAIR, {"low": value})
+
+
+def test_an_unknown_parameter_is_answered_with_those_there_are():
+    with pytest.raises(InputError, match=r"'pair' has no parameter 'Low'; it has low, high, held,"):
+        Fitted.at_start(PAIR, {"Low": 2.0})
+
+
+def test_values_not_given_are_start_values_in_the_effects_order():
+    fitted = Fitted.at_start(PAIR, {"held": 6.5, "low": 1.5})
+    assert fitted.vector() == [1.5, 4.0, 6.5, 3.0]
+    assert fitted.fixed == {"held"}
+    assert Fitted.at_start(PAIR).vector() == [2.0, 4.0, 5.0, 3.0]
+
+
+SIZED = next(n for n in CATALOGUE if CATALOGUE[n].of_size is not None)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7.0])
+def test_an_effect_of_any_size_has_as_many_elements_as_asked(count):
+    fitted = Fitted.at_start(CATALOGUE[SIZED], {"elements": count})
+    assert fitted.values["elements"] == count
+    same = CATALOGUE[SIZED].of_size(int(count))
+    assert [p.name for p in fitted.effect.parameters] == [p.name for p in same.parameters]
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.5, 1001, math.nan, math.inf, "2"])
+def test_a_count_of_elements_is_whole_and_from_one_to_a_thousand(count):
+    with pytest.raises(InputError, match=f"{SIZED}.elements = {count}: .* from 1 to 1000"):
+        Fitted.at_start(CATALOGUE[SIZED], {"elements": count})
+
+
+def test_the_most_elements_are_allowed_and_one_more_is_not(monkeypatch):
+    monkeypatch.setattr("twin.model.machine.MOST_ELEMENTS", 3)
+    assert Fitted.at_start(CATALOGUE[SIZED], {"elements": 3}).values["elements"] == 3
+    with pytest.raises(InputError, match="from 1 to 3"):
+        Fitted.at_start(CATALOGUE[SIZED], {"elements": 4})
+
+
+@pytest.mark.parametrize("mass", [0.0, -1.0, math.nan, math.inf])
+def test_a_mass_is_positive_and_finite(mass):
+    with pytest.raises(InputError, match="must be a positive number of kg"):
+        AxisModel(mass)
+    assert AxisModel(5e-324).mass > 0.0
+
+
+# Effects of an axis
+
+
+def test_an_effect_is_added_behind_the_others_or_exchanged():
+    first = AxisModel(2.0).with_effect(Fitted.at_start(PAIR)).with_effect(Fitted.at_start(SPRING))
+    assert first.names == ("pair", "spring")
+    again = first.with_effect(Fitted.at_start(PAIR, {"low": 7.5}))
+    assert again.names == ("spring", "pair")
+    assert again["pair"].values["low"] == 7.5
+    assert again["spring"] is first["spring"]
+    assert (again.mass, again.hardware, again.mass_fixed) == (2.0, first.hardware, False)
+    assert first["pair"].values["low"] == 2.0
+
+
+def test_a_friction_takes_the_place_of_the_friction_that_was_there_and_of_nothing_else():
+    swapped = axis().with_effect(Fitted.at_start(OTHER))
+    assert swapped.names == ("pair", "spring", "glide")
+    with pytest.raises(InputError, match="one friction model, given slide and glide"):
+        AxisModel(1.0, effects=(Fitted.at_start(FRICTION), Fitted.at_start(OTHER)))
+    assert axis().with_effect(Fitted.at_start(SPRING, {"k": 5.0})).names[1] == "slide"
+
+
+@pytest.mark.parametrize("name", ["pair", "slide", "spring"])
+def test_without_takes_away_one_effect_and_undoes_with_effect(name):
+    model = axis()
+    less = model.without(name)
+    assert less.names == tuple(n for n in model.names if n != name)
+    assert all(less[n] is model[n] for n in less.names)
+    assert less.with_effect(model[name]).names == (*less.names, name)
+    assert less.with_effect(model[name]).without(name) == less
+    with pytest.raises(InputError, match=f"no effect '{name}' to remove; it has "):
+        less.without(name)
+
+
+# Coordinates
+
+
+def test_coordinates_are_the_mass_and_what_is_free_in_order():
+    assert [c.label for c in free_parameters(axis())] == [
+        "mass", "pair.low", "pair.high", "slide.Fc", "spring.k", "spring.x0",
+    ]  # fmt: skip
+    assert free_parameters(axis())[0].parameter is MASS
+    held = AxisModel(6.25, effects=axis().effects, mass_fixed=True)
+    assert next(c.label for c in free_parameters(held)) == "pair.low"
+
+
+def test_reading_is_the_inverse_of_writing_in_any_order():
+    rng = np.random.default_rng(3)
+    where = free_parameters(axis())
+    values = np.array([3.5, 1.25, 6.5, 8.75, 123.0, 0.5])
+    for _ in range(5):
+        order = rng.permutation(len(where))
+        picked = [where[k] for k in order]
+        written = write(axis(), picked, values[order])
+        np.testing.assert_array_equal(read(written, picked), values[order])
+        np.testing.assert_array_equal(read(written, where), values)
+        assert written["pair"].vector() == [1.25, 6.5, 5.0, 3.0]
+        assert written.hardware == axis().hardware
+        assert [f.fixed for f in written.effects] == [f.fixed for f in axis().effects]
+    np.testing.assert_array_equal(read(axis(), where), [6.25, 2.0, 4.0, 1.5, 11.0, -0.25])
+    same = write(axis(), where, read(axis(), where))
+    assert same == axis()
+
+
+def test_writing_some_coordinates_leaves_the_others():
+    where = free_parameters(axis())
+    for k, c in enumerate(where):
+        start = read(axis(), where)
+        value = 0.5 * start[k] + 0.6 * (start[k] + 1.0)
+        if c.label == "pair.low":
+            value = 3.75
+        changed = read(write(axis(), [c], [value]), where)
+        start[k] = value
+        np.testing.assert_array_equal(changed, start)
+    with pytest.raises(ValueError, match=r"shorter|longer"):
+        write(axis(), where, [1.0])
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "kept"), [(3.0, 5.0, 5.0), (5.0, 3.0, 5.0), (5.0, 5.0, 5.0)]
+)
+def test_a_value_may_not_fall_below_the_one_it_is_tied_to(low, high, kept):
+    """The one it is tied to stays as it is written."""
+    where = [c for c in free_parameters(axis()) if c.effect == "pair"]
+    written = write(axis(), where, [low, high])
+    assert (written["pair"].values["low"], written["pair"].values["high"]) == (
+        low,
+        max(low, high),
+    )
+    raised = write(axis(), where[:1], [6.0])  # the start value of the higher is 4
+    assert (raised["pair"].values["low"], raised["pair"].values["high"]) == (6.0, 6.0)
+
+
+def test_every_tie_of_the_catalogue_is_kept_by_writing():
+    ties = 0
+    for name in CATALOGUE:
+        for p in CATALOGUE[name].parameters:
+            if not p.at_least:
+                continue
+            ties += 1
+            model = AxisModel(1.0, effects=(Fitted.at_start(CATALOGUE[name]),))
+            floor = CATALOGUE[name].parameter(p.at_least)
+            top = min(0.5 * (floor.lower + min(floor.upper, 100.0)) + 1.0, floor.upper)
+            where = [c for c in free_parameters(model) if c.parameter.name in (p.name, p.at_least)]
+            values = [top if c.parameter.name == p.at_least else p.lower for c in where]
+            written = write(model, where, values)[name].values
+            assert written[p.name] == written[p.at_least] == top
+    assert ties
+
+
+# The stage
+
+
+def step(number: int) -> HistoryStep:
+    return HistoryStep("add", f"effect{number}", "x", 5.0 + number, 4.0, None, 2.0)
+
+
+def test_history_grows_at_its_end_and_nothing_else_changes():
+    stage = MachineModel("s", {"x": axis(), "y": AxisModel(3.0)}, 2500.0, "<x/>", "x.xml")
+    grown = stage.with_history(step(1)).with_history(step(2))
+    assert grown.history == (step(1), step(2))
+    assert stage.history == ()
+    assert grown.with_axis("y", AxisModel(4.0)).history == grown.history
+    exchanged = grown.with_axis("y", AxisModel(4.0))
+    assert list(exchanged.axes) == ["x", "y"]
+    assert exchanged.axes["x"] is stage.axes["x"]
+    assert (exchanged.axis("y").mass, stage.axis("y").mass) == (4.0, 3.0)
+    assert (exchanged.name, exchanged.sample_rate, exchanged.mjcf) == ("s", 2500.0, "<x/>")
+    assert stage.period == 1.0 / 2500.0
+    with pytest.raises(InputError, match="no axis 'z'; it has x, y"):
+        stage.axis("z")

@@ -1,0 +1,149 @@
+"""The stage's MJCF: what it promises to the simulator, and nothing hidden in it."""
+
+from itertools import product
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+STAGE_XML = Path(__file__).resolve().parents[3] / "models" / "proton_xy.xml"
+TRAVEL = 0.17  # m, joint limit on either side
+MOVED_MASS = {"x": 15.0, "y": 6.0}  # kg
+
+
+@pytest.fixture(scope="module")
+def model() -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_path(str(STAGE_XML))
+
+
+def test_two_slides_hang_on_a_fixed_base(model: mujoco.MjModel) -> None:
+    names = [model.body(i).name for i in range(model.nbody)]
+    assert names == ["world", "base", "beam", "carriage"]
+    assert list(model.body_parentid) == [0, 0, 1, 2]
+    assert [model.joint(i).name for i in range(model.njnt)] == ["x", "y"]
+    assert np.all(model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE)
+    assert list(model.jnt_bodyid) == [2, 3]
+    np.testing.assert_array_equal(model.jnt_axis, [[1, 0, 0], [0, 1, 0]])
+    assert np.all(model.jnt_limited)
+    np.testing.assert_array_equal(model.jnt_range, [[-TRAVEL, TRAVEL]] * 2)
+
+
+def test_masses_come_from_the_inertials_alone(model: mujoco.MjModel) -> None:
+    np.testing.assert_array_equal(model.body_mass, [0, 120, 9, 6])
+    spec = mujoco.MjSpec.from_file(str(STAGE_XML))
+    assert all(body.explicitinertial for body in spec.bodies[1:])
+    assert all(geom.mass == 0 for geom in spec.geoms)
+
+
+def test_motors_take_newtons_and_sensors_read_the_joints(model: mujoco.MjModel) -> None:
+    assert [model.actuator(i).name for i in range(model.nu)] == ["motor_x", "motor_y"]
+    np.testing.assert_array_equal(model.actuator_gear[:, 0], 1)
+    np.testing.assert_array_equal(model.actuator_gainprm[:, 0], 1)
+    assert not np.any(model.actuator_biasprm)
+    assert np.all(model.actuator_ctrllimited)
+    np.testing.assert_array_equal(model.actuator_ctrlrange, [[-200, 200]] * 2)
+
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = [0.01, -0.02], [0.3, -0.4]
+    mujoco.mj_forward(model, data)
+    readings = {model.sensor(i).name: data.sensor(i).data.item() for i in range(model.nsensor)}
+    expected = {"position_x": 0.01, "velocity_x": 0.3, "position_y": -0.02, "velocity_y": -0.4}
+    assert readings == expected
+
+
+def test_no_effect_hides_in_the_model(model: mujoco.MjModel) -> None:
+    for number in (
+        "dof_damping", "dof_dampingpoly", "dof_frictionloss", "dof_armature",
+        "jnt_stiffness", "jnt_stiffnesspoly", "actuator_damping", "actuator_armature",
+    ):  # fmt: skip
+        assert not np.any(getattr(model, number)), number
+    assert model.ntendon == model.neq == model.na == 0
+    assert model.opt.viscosity == model.opt.density == 0
+
+
+def test_steps_at_the_control_rate_and_lets_passive_forces_in(model: mujoco.MjModel) -> None:
+    assert model.opt.timestep == 1e-4
+    assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER
+    disabled = mujoco.mjtDisableBit
+    assert model.opt.disableflags & disabled.mjDSBL_CONTACT
+    # With springs and dampers both off MuJoCo skips the passive callback; limits need constraints.
+    needed = (
+        disabled.mjDSBL_SPRING | disabled.mjDSBL_DAMPER | disabled.mjDSBL_ACTUATION
+        | disabled.mjDSBL_SENSOR | disabled.mjDSBL_CONSTRAINT | disabled.mjDSBL_LIMIT
+        | disabled.mjDSBL_CLAMPCTRL
+    )  # fmt: skip
+    assert not model.opt.disableflags & needed
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize("pose", [(0.0, 0.0), (0.16, -0.16)])
+def test_force_moves_one_axis_by_newtons_law(
+    model: mujoco.MjModel, axis: str, pose: tuple[float, float]
+) -> None:
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose
+    force, steps = -3.0, 200
+    data.actuator(f"motor_{axis}").ctrl[:] = force
+    mujoco.mj_step(model, data, nstep=steps)
+    mujoco.mj_forward(model, data)
+
+    moved, still = ("x", "y") if axis == "x" else ("y", "x")
+    acceleration = force / MOVED_MASS[axis]
+    dt = model.opt.timestep
+    assert data.joint(moved).qacc.item() == pytest.approx(acceleration, rel=1e-12)
+    assert data.joint(moved).qvel.item() == pytest.approx(acceleration * steps * dt, rel=1e-12)
+    travelled = data.joint(moved).qpos.item() - pose["xy".index(moved)]
+    # semi-implicit Euler: the sum of k dt^2 for k = 1..n
+    assert travelled == pytest.approx(acceleration * dt**2 * steps * (steps + 1) / 2, rel=1e-9)
+    assert data.joint(still).qvel.item() == 0.0
+
+
+def test_gravity_does_not_reach_the_axes(model: mujoco.MjModel) -> None:
+    data = mujoco.MjData(model)
+    data.qvel[:] = [0.2, -0.1]
+    mujoco.mj_step(model, data, nstep=1000)
+    np.testing.assert_array_equal(data.qvel, [0.2, -0.1])
+
+
+def test_force_limit_clamps_the_command(model: mujoco.MjModel) -> None:
+    data = mujoco.MjData(model)
+    data.ctrl[:] = [1e4, -1e4]
+    mujoco.mj_forward(model, data)
+    np.testing.assert_array_equal(data.actuator_force, [200, -200])
+
+
+def test_joint_limits_stop_the_axes(model: mujoco.MjModel) -> None:
+    data = mujoco.MjData(model)
+    data.ctrl[:] = [20.0, -20.0]
+    mujoco.mj_step(model, data, nstep=20_000)
+    np.testing.assert_allclose(data.qpos, [TRAVEL, -TRAVEL], atol=2e-3)
+    assert data.ncon == 0
+
+
+def test_moving_parts_clear_each_other_over_the_whole_travel(model: mujoco.MjModel) -> None:
+    """No visible part cuts into a part of another body, anywhere on a grid over the travel."""
+    assert not np.any(model.geom_contype)
+    assert not np.any(model.geom_conaffinity)
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    solids = [i for i in range(model.ngeom) if model.geom_type[i] != plane]
+    pairs = [
+        (a, b)
+        for a, b in product(solids, repeat=2)
+        if model.body(model.geom_bodyid[b]).name in ("beam", "carriage")
+        and model.geom_bodyid[a] < model.geom_bodyid[b]
+    ]
+    data = mujoco.MjData(model)
+    margin = 1e-3
+    for pose in product(np.linspace(-TRAVEL, TRAVEL, 5), repeat=2):
+        data.qpos[:] = pose
+        mujoco.mj_forward(model, data)
+        assert data.ncon == 0
+        for a, b in pairs:
+            gap = mujoco.mj_geomDistance(model, data, a, b, margin, None)
+            assert gap > 0, f"geoms {a} and {b} overlap at x, y = {pose}"
+
+
+def test_every_shape_is_modest_in_number_and_both_cameras_exist(model: mujoco.MjModel) -> None:
+    assert model.ngeom < 60  # each costs about 8 ns in every step
+    assert {model.camera(i).name for i in range(model.ncam)} == {"overview", "top"}

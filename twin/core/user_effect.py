@@ -1,0 +1,131 @@
+"""A user's own effect is tried before it is used: its mistakes are said in one line.
+
+Compiled code does not look where it writes, so the plain Python law runs first, on guarded arrays.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from twin.core.calling import law_address
+from twin.effect import (
+    ACC,
+    DRY,
+    DT,
+    HOLD,
+    IO_SIZE,
+    MASS,
+    MOVED,
+    NET,
+    READING,
+    STATIC,
+    VISCOUS,
+    WHEN,
+    Effect,
+    Kind,
+    U,
+    V,
+    X,
+)
+from twin.errors import InputError
+
+RESULT = {
+    Kind.SENSING: "io[READING]",
+    Kind.ACTUATION: "io[U]",
+    Kind.FORCE: "io[OUT]",
+    Kind.MODIFIER: "io[DRY], io[STATIC] or io[VISCOUS]",
+    Kind.FRICTION: "io[OUT]",
+    Kind.STRUCTURE: "io[OUT]",
+}
+SPEEDS = (0.0, 0.1, 1e-6, -1e-6, -0.1, 0.0)  # m/s, one sample each
+PERIOD = 1e-4  # s
+
+
+class _Outside(Exception):
+    """An index that an array does not have."""
+
+
+class _Guarded(list):
+    """An array of doubles that refuses an index it does not have."""
+
+    def __init__(self, name: str, values: list[float]) -> None:
+        super().__init__(values)
+        self.name = name
+
+    def __getitem__(self, index):
+        return super().__getitem__(self._inside(index))
+
+    def __setitem__(self, index, value):
+        super().__setitem__(self._inside(index), float(value))
+
+    def _inside(self, index):
+        if not 0 <= index < len(self):
+            raise _Outside(f"{self.name}[{index}]")
+        return index
+
+
+def require_sound(effect: Effect, path: Path) -> None:
+    """Raise InputError, in one line, where the law of a user's file cannot work."""
+    values = [_tried(p.start, p.lower, p.upper, p.strength) for p in effect.parameters]
+    p, s = _Guarded("p", values), _Guarded("s", [0.0] * len(effect.states))
+    acted = False
+    for speed in SPEEDS:
+        io = _Guarded("io", _sample(speed))
+        before = list(io)
+        try:
+            effect.law(p, s, io)
+        except _Outside as touched:
+            raise InputError(f"{path}: {_outside(effect, str(touched))}") from None
+        except (ArithmeticError, ValueError) as error:
+            raise InputError(f"{path}: {_not_finite(speed, str(error))}") from error
+        except Exception as error:
+            raise InputError(
+                f"{path}: its law fails at v = {speed:g} m/s: {_told(error)}; use only numbers, "
+                "math functions and the arrays p, s, io"
+            ) from error
+        if not all(map(math.isfinite, [*io, *s])):
+            raise InputError(f"{path}: {_not_finite(speed, 'the result is not a finite number')}")
+        acted = acted or before != list(io)
+    if not acted:
+        raise InputError(
+            f"{path}: its law writes no result; a {effect.kind.name.lower()} effect writes "
+            f"{RESULT[effect.kind]}"
+        )
+    law_address(effect)
+
+
+def _told(error: Exception) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+def _tried(start: float, lower: float, upper: float, strength: bool) -> float:
+    """The start, or a small strength where the start is absence."""
+    return start if start or not strength else min(max(0.1, lower), upper)
+
+
+def _sample(speed: float) -> list[float]:
+    io = [0.0] * IO_SIZE
+    io[DT], io[MASS], io[MOVED], io[WHEN] = PERIOD, 1.0, 1.0, 1.0
+    io[X], io[V], io[U] = 0.0123, speed, 1.0
+    io[READING] = io[X]
+    io[DRY] = io[STATIC] = io[VISCOUS] = 1.0
+    io[HOLD] = speed / PERIOD + 1.0
+    io[NET] = io[ACC] = 1.0
+    return io
+
+
+def _outside(effect: Effect, touched: str) -> str:
+    has = {
+        "p": f"{len(effect.parameters)} parameters are declared; add a Parameter",
+        "s": f"{len(effect.states)} states are declared; add a name to states=(...)",
+        "io": f"it has {IO_SIZE} slots; use the names of twin.effect, such as io[X]",
+    }
+    return f"its law uses {touched}, but {has[touched.split('[')[0]]}"
+
+
+def _not_finite(speed: float, reason: str) -> str:
+    return (
+        f"its law gives no finite number at v = {speed:g} m/s ({reason}); it must for every speed, "
+        "also 0: treat that case apart"
+    )

@@ -1,0 +1,168 @@
+"""What an experiment is: a setpoint made from a few parameters in SI units.
+
+Kinds of experiment are in twin.experiments.kinds, named ones in twin.experiments.named.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from twin.errors import CannotRun, InputError
+from twin.experiments import trajectory
+from twin.experiments.trajectory import Limits
+from twin.experiments.trajectory.limits import require_count
+from twin.experiments.trajectory.setpoint import Setpoint
+from twin.model.machine import MachineModel
+from twin.model.units import AxisUnits, rotary_unit
+
+
+def given(unit: str, meaning: str, default: Any = ..., *, zero: bool = False) -> Any:
+    """A parameter with its unit; positive, or where ``zero`` also zero."""
+    metadata = {"unit": unit, "meaning": meaning, "zero": zero}
+    return field(metadata=metadata) if default is ... else field(default=default, metadata=metadata)
+
+
+def counted(meaning: str) -> Any:
+    """A whole number of at least 1."""
+    return field(metadata={"unit": "", "meaning": meaning})
+
+
+@dataclass(frozen=True)
+class Experiment(ABC):
+    """One experiment. Its fields are its parameters; their units are in the fields' metadata.
+
+    closed_loop: whether the position loop is closed while it runs. Raises InputError for a
+    parameter that is not a number of the allowed sign.
+    """
+
+    summary: ClassVar[str]
+    closed_loop: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            if "zero" in f.metadata:
+                _require(f.name, getattr(self, f.name), f.metadata["unit"], f.metadata["zero"])
+            elif f.metadata.get("unit") == "":
+                require_count(f.name, getattr(self, f.name))
+
+    @abstractmethod
+    def setpoint(self, model: MachineModel, rng: np.random.Generator) -> Setpoint:
+        """The setpoint for this stage; CannotRun where it goes beyond the stage's limits."""
+
+
+def _require(name: str, value: Any, unit: str, zero: bool) -> None:
+    values = value if isinstance(value, tuple) else (value,)
+    for v in values:
+        number = isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v)
+        if not (number and (v > 0 or (zero and v == 0))):
+            allowed = "0 or more" if zero else "a number above 0"
+            turned = rotary_unit(unit)
+            also = "" if turned == unit else f" ({turned} on a rotary axis)"
+            raise InputError(f"{name} = {v} {unit}: is not allowed; give {allowed} {unit}{also}")
+    if not values:
+        raise InputError(f"{name}: is empty; give at least one number in {unit}")
+
+
+def driven_units(experiment: Experiment, model: MachineModel) -> AxisUnits:
+    """Units of the axis that an experiment drives, of the first where it drives all."""
+    name = experiment.axis if isinstance(experiment, OneAxis) else next(iter(model.axes))
+    return model.axis(name).units
+
+
+def machine_limits(model: MachineModel) -> list[Limits]:
+    """Motion limits of every axis of the model; CannotRun where its travel is not known."""
+    limits = []
+    for name, axis in model.axes.items():
+        h = axis.hardware
+        if h.travel is None:
+            unit = axis.units.position
+            raise CannotRun(f"axis {name} has no travel; give travel = [low, high] in {unit}")
+        limits.append(Limits(h.travel, h.velocity, h.acceleration, h.jerk, axis.units))
+    return limits
+
+
+@dataclass(frozen=True)
+class OneAxis(Experiment):
+    """An experiment on one axis.
+
+    at: place of the experiment on every axis, m, in the model's order; the middle of the travel
+    where None. effort: part of the acceleration and jerk limits that its moves use. other: span (m)
+    over which the other axis goes back and forth at its limits meanwhile; it rests where 0.
+    """
+
+    axis: str
+    at: tuple[float, ...] | None = field(
+        default=None, kw_only=True, metadata={"unit": "m", "meaning": "place, one for each axis"}
+    )
+    effort: float = field(
+        default=1.0, kw_only=True,
+        metadata={"unit": "1", "meaning": "part of the acceleration limit", "zero": False},
+    )  # fmt: skip
+    other: float = field(
+        default=0.0, kw_only=True,
+        metadata={"unit": "m", "meaning": "span of the other axis meanwhile", "zero": True},
+    )  # fmt: skip
+
+    def setpoint(self, model: MachineModel, rng: np.random.Generator) -> Setpoint:
+        """See Experiment."""
+        model.axis(self.axis)
+        if self.effort > 1.0:
+            raise InputError(f"effort = {self.effort:g}: give a part of the limit, above 0 up to 1")
+        place = self.at
+        if place is None:
+            place = tuple(sum(limit.travel) / 2.0 for limit in machine_limits(model))
+        limits = [gentle(limit, self.effort) for limit in machine_limits(model)]
+        alone = self.on(limits, list(model.axes).index(self.axis), place, model)
+        if not self.other:
+            return alone
+        return _with_other(alone, model, self.axis, place, self.other)
+
+    @abstractmethod
+    def on(
+        self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
+    ) -> Setpoint:
+        """The setpoint with the other axis at rest. axis: index; place: m, one per axis."""
+
+
+def gentle(limit: Limits, effort: float) -> Limits:
+    """The limits with a part of the acceleration and jerk."""
+    return replace(limit, acceleration=effort * limit.acceleration, jerk=effort * limit.jerk)
+
+
+def _with_other(
+    alone: Setpoint, model: MachineModel, axis: str, place: tuple[float, ...], span: float
+) -> Setpoint:
+    """The setpoint with the other axis going back and forth over the span (m) about its place."""
+    names = list(model.axes)
+    if len(names) != 2:
+        which = "has no second axis" if len(names) < 2 else f"has {len(names)} axes, not two"
+        raise CannotRun(f"other = {span:g}: the stage {which}; leave it out")
+    index = 1 - names.index(axis)
+    unit = model.axes[names[index]].units.position
+    ends = np.tile(place, (4, 1))
+    ends[1:3, index] += 0.5 * span, -0.5 * span
+    cycle = trajectory.point_to_point(machine_limits(model), ends, sample_rate=model.sample_rate)
+    samples = len(cycle.position)
+    count = len(alone.position) // samples
+    if count == 0:
+        raise CannotRun(
+            f"other = {span:g} {unit}: one round takes {cycle.duration:.3g} s, the experiment "
+            f"lasts {alone.duration:.3g} s; give a smaller span or a longer experiment"
+        )
+    parts = []
+    for own, added in zip(_columns(alone), _columns(cycle), strict=True):
+        column = own.copy()
+        column[: count * samples, index] = np.tile(added[:, index], count)
+        parts.append(column)
+    position, velocity, acceleration = parts
+    return replace(alone, position=position, velocity=velocity, acceleration=acceleration)
+
+
+def _columns(setpoint: Setpoint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return setpoint.position, setpoint.velocity, setpoint.acceleration

@@ -1,0 +1,134 @@
+"""Experiments as TOML files: one table, each parameter with its unit in a comment."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, fields
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from twin.errors import InputError
+from twin.experiments.experiment import Experiment
+from twin.experiments.kinds import KINDS, kind_of
+from twin.model.file import write_atomically
+from twin.model.units import LINEAR, AxisUnits
+
+SUFFIX = ".toml"
+
+
+def format_experiment(experiment: Experiment, *comments: str, units: AxisUnits = LINEAR) -> str:
+    """The experiment as TOML text, below the comments; units: of the axis that it drives."""
+    document = tomlkit.document()
+    for comment in comments:
+        document.add(tomlkit.comment(comment))
+    table = tomlkit.table()
+    table["kind"] = tomlkit.item(kind_of(experiment)).comment(experiment.summary)
+    for name, value in parameters(experiment).items():
+        about = _about(experiment, name, units)
+        item = tomlkit.item(list(value) if isinstance(value, tuple) else value)
+        table[name] = item.comment(about) if about else item
+    document["experiment"] = table
+    return tomlkit.dumps(document)
+
+
+def parameters(experiment: Experiment) -> dict[str, Any]:
+    """Name -> value of the parameters that are not at their default, SI units."""
+    values = {f.name: getattr(experiment, f.name) for f in fields(experiment)}
+    defaults = {f.name: f.default for f in fields(experiment)}
+    return {n: v for n, v in values.items() if defaults[n] is MISSING or v != defaults[n]}
+
+
+def _about(experiment: Experiment, name: str, units: AxisUnits) -> str:
+    metadata = next(f.metadata for f in fields(experiment) if f.name == name)
+    about = (units(metadata.get("unit", "")), metadata.get("meaning"))
+    return ", ".join(part for part in about if part)
+
+
+def save_experiment(
+    experiment: Experiment, path: str | Path, *comments: str, units: AxisUnits = LINEAR
+) -> None:
+    """Write the experiment, whole or not at all. Raises InputError where the folder is missing."""
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
+    write_atomically(path, format_experiment(experiment, *comments, units=units).encode())
+
+
+def load_experiment(path: str | Path) -> Experiment:
+    """Read an experiment. Raises InputError naming the file, the entry and what is allowed."""
+    path = Path(path)
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise InputError(
+            f"{path}: no such experiment file; `twin plan` writes one, or give a name"
+        ) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is not a TOML file: {error}") from error
+    table = document.get("experiment")
+    if not isinstance(table, dict):
+        raise InputError(f"{path}: has no [experiment] table; `twin plan` writes one")
+    try:
+        return parse_experiment(table)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def parse_experiment(table: Mapping[str, Any]) -> Experiment:
+    """An experiment from its table. Raises InputError for an unknown kind or entry."""
+    name = table.get("kind")
+    if not isinstance(name, str) or name not in KINDS:
+        raise InputError(f"unknown kind {name!r} of experiment{_near(name, KINDS)}")
+    known = {f.name: f for f in fields(KINDS[name])}
+    given = {key: value for key, value in table.items() if key != "kind"}
+    for key, value in given.items():
+        if key not in known:
+            raise InputError(f"unknown entry '{key}' of kind {name}{_near(key, known)}")
+        _require_form(known[key], value)
+    for key, f in known.items():
+        if f.default is MISSING and key not in given:
+            raise InputError(f"{key} is missing for kind {name}; give {_wanted(f)}")
+    return KINDS[name](**{k: tuple(v) if isinstance(v, list) else v for k, v in given.items()})
+
+
+def _require_form(f: Field[Any], value: Any) -> None:
+    form = list if _several(f) else int | float if "unit" in f.metadata else str
+    numbers = value if isinstance(value, list) else [value] if "unit" in f.metadata else []
+    if not isinstance(value, form) or not all(isinstance(v, int | float) for v in numbers):
+        raise InputError(f"{f.name} = {value!r}: give {_wanted(f)}")
+
+
+def _several(f: Field[Any]) -> bool:
+    return "tuple" in str(f.type)
+
+
+def _wanted(f: Field[Any]) -> str:
+    if "unit" not in f.metadata:
+        return "a name in quotes"
+    unit = f.metadata["unit"]
+    if not unit:
+        return "a whole number"
+    return f"a list of numbers in {unit}" if _several(f) else f"a number in {unit}"
+
+
+def _near(key: Any, known: Mapping[str, Any]) -> str:
+    near = difflib.get_close_matches(str(key), known, n=1, cutoff=0.4)
+    hint = f"; did you mean '{near[0]}'?" if near else ";"
+    return f"{hint} there are {', '.join(known)}"
+
+
+def in_short(experiment: Experiment, units_of: AxisUnits = LINEAR) -> str:
+    """Kind and parameters with the units of the axis that it drives, on one line."""
+    units = {f.name: units_of(f.metadata.get("unit", "")) for f in fields(experiment)}
+    values = (f"{k} {_plain(v)} {units[k]}".strip() for k, v in parameters(experiment).items())
+    return f"{kind_of(experiment)}: {', '.join(values)}"
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, tuple):
+        return " ".join(f"{v:g}" for v in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)

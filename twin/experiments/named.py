@@ -1,0 +1,221 @@
+"""The named experiments, run on the twin and logged.
+
+Setpoints follow the experiments of L. Jia (2023): cable pass, velocity map, reversals, open-loop
+sine; tracking is the rich motion on which models are fitted and held out.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib.metadata
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from twin.core.control import Controller
+from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
+from twin.errors import InputError
+from twin.experiments.experiment import Experiment, driven_units, machine_limits
+from twin.experiments.file import format_experiment
+from twin.experiments.kinds import (
+    Moves,
+    OpenLoopSine,
+    Passes,
+    Reversals,
+    Staircase,
+    Tracking,
+    kind_of,
+)
+from twin.experiments.trajectory import Limits
+from twin.experiments.trajectory.setpoint import Setpoint
+from twin.log import AxisLog, Log
+from twin.log.log import LINEAR_UNITS, ROTARY_UNITS
+from twin.model.file import format_model
+from twin.model.machine import MachineModel
+from twin.simulator import MujocoSimulator, Progress, ReducedSimulator, Run, run
+
+MAP_SPEEDS = (0.0005, 0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.02, 0.04, 0.08)  # m/s
+MAP_SPAN = 0.02  # m
+PASS_SPEED = 0.1  # m/s
+PASS_PART = 0.88  # of the travel
+DURATION = 20.0  # s
+
+
+@dataclass(frozen=True)
+class Named:
+    """A named experiment. make: (model, name of the axis, duration s) -> Experiment."""
+
+    summary: str
+    make: Callable[[MachineModel, str, float], Experiment]
+
+
+def _limit(model: MachineModel, axis: str) -> Limits:
+    return machine_limits(model)[list(model.axes).index(axis)]
+
+
+def _moves(model: MachineModel, axis: str, duration: float) -> Experiment:
+    return Moves(count=max(int(duration / 1.5), 2))
+
+
+def _cable_pass(model: MachineModel, axis: str, duration: float) -> Experiment:
+    limit = _limit(model, axis)
+    low, high = limit.travel
+    span = PASS_PART * (high - low)
+    speed = min(PASS_SPEED, limit.fastest_plateau(span))
+    repeats = max(int(duration * speed / span / 2), 1)
+    return Passes(axis, span=span, speed=speed, repeats=repeats)
+
+
+def _velocity_map(model: MachineModel, axis: str, duration: float) -> Experiment:
+    fastest = _limit(model, axis).fastest_plateau(MAP_SPAN)
+    speeds = tuple(s for s in MAP_SPEEDS if s <= fastest)
+    longest = duration / 4.0 / len(speeds)
+    return Staircase(axis, speeds=speeds, span=MAP_SPAN, longest_plateau=longest)
+
+
+def _reversals(model: MachineModel, axis: str, duration: float) -> Experiment:
+    return Reversals(axis, repeats=max(int(duration / 0.25), 1))
+
+
+EXPERIMENTS: Mapping[str, Named] = {
+    "tracking": Named(Tracking.summary, lambda model, axis, duration: Tracking(duration)),
+    "moves": Named(Moves.summary, _moves),
+    "cable_pass": Named("one axis back and forth at 0.1 m/s over the travel", _cable_pass),
+    "velocity_map": Named(Staircase.summary, _velocity_map),
+    "reversals": Named("one axis 4 um back and forth", _reversals),
+    "open_loop_sine": Named(
+        "sinusoidal force of 0.21 N and 3 s on one axis, no feedback",
+        lambda model, axis, duration: OpenLoopSine(axis, duration),
+    ),
+}
+
+
+def find_experiment(
+    name: str, model: MachineModel, axis: str | None = None, duration: float = DURATION
+) -> Experiment:
+    """The experiment of that name for this stage, on its first axis where None is given.
+
+    duration: s. InputError names the nearest where there is none, and for an axis that is not
+    there.
+    """
+    if name not in EXPERIMENTS:
+        near = difflib.get_close_matches(name, EXPERIMENTS, n=1, cutoff=0.4)
+        hint = f"did you mean '{near[0]}'? " if near else ""
+        raise InputError(f"unknown experiment '{name}'; {hint}there are {', '.join(EXPERIMENTS)}")
+    if axis is not None:
+        model.axis(axis)
+    return EXPERIMENTS[name].make(model, axis or next(iter(model.axes)), duration)
+
+
+def simulate(
+    model: MachineModel,
+    experiment: str | Experiment,
+    *,
+    seed: int = 0,
+    duration: float | None = None,
+    axis: str | None = None,
+    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    progress: Progress | None = None,
+) -> Log:
+    """Run an experiment on the twin and return its log, with the truth topics.
+
+    experiment: a name, or an experiment with its own parameters. Of a named one: duration in s (20
+    where None), exact for tracking and open_loop_sine, about right for the others; axis, the one
+    that moves where the experiment moves one, the first where None. The same seed gives the same
+    log. Raises InputError for an unknown experiment or axis, and for a setpoint outside the travel.
+    """
+    motion_rng, noise_rng, current_rng = np.random.default_rng(seed).spawn(3)
+    if isinstance(experiment, str):
+        name = experiment
+        attached: dict[str, bytes] = {}
+        seconds = DURATION if duration is None else duration
+        chosen = find_experiment(experiment, model, axis, seconds)
+    else:
+        if duration is not None or axis is not None:
+            raise InputError("an experiment has its own duration and axis; leave them out")
+        name, chosen = kind_of(experiment), experiment
+        attached = {
+            "experiment.toml": format_experiment(
+                experiment, units=driven_units(experiment, model)
+            ).encode()
+        }
+    setpoint = chosen.setpoint(model, motion_rng)
+    controllers = None if chosen.closed_loop else {a: Controller() for a in model.axes}
+    result = run(
+        model, setpoint, noise_rng, simulator=simulator, controllers=controllers, progress=progress
+    )
+    log = _log(model, name, seed, setpoint, result, current_rng)
+    return replace(log, attachments={**log.attachments, **attached})
+
+
+def outside_travel(model: MachineModel, log: Log) -> tuple[str, ...]:
+    """A sentence for each axis of the model that left its travel in a log of the twin."""
+    told = []
+    for name, axis in model.axes.items():
+        if axis.hardware.travel is None:
+            continue
+        units, (low, high) = axis.units, axis.hardware.travel
+        position = log.truth[name]["position"]
+        farthest = position[np.argmax(np.maximum(low - position, position - high))]
+        if not low <= farthest <= high:
+            told.append(
+                f"axis {name} went to {farthest:.4g} {units.position}, outside its travel of "
+                f"{low:g} to {high:g} {units.position}: the drive does not hold it; move more "
+                f"gently, or check force_limit ({axis.hardware.force_limit:g} {units.force}), "
+                "bandwidth and the effects"
+            )
+    return tuple(told)
+
+
+def _log(
+    model: MachineModel,
+    experiment: str,
+    seed: int,
+    setpoint: Setpoint,
+    result: Run,
+    rng: np.random.Generator,
+) -> Log:
+    axes, truth = {}, {}
+    for i, (name, axis) in enumerate(model.axes.items()):
+        signals = result.signals[:, i]
+        constant = axis.hardware.force_constant
+        noise = axis.hardware.current_noise * rng.standard_normal(len(signals))
+        current = signals[:, COMMAND_COLUMN] / constant + noise
+        axes[name] = AxisLog(
+            columns={
+                "setpoint_position": setpoint.position[:, i].copy(),
+                "setpoint_velocity": setpoint.velocity[:, i].copy(),
+                "setpoint_acceleration": setpoint.acceleration[:, i].copy(),
+                "position": signals[:, READING_COLUMN].copy(),
+                "current": current,
+                "force": constant * current,
+            },
+            units=ROTARY_UNITS if axis.rotary else LINEAR_UNITS,
+            force_constant=constant,
+        )
+        truth[name] = {
+            "position": signals[:, POSITION_COLUMN].copy(),
+            "velocity": signals[:, VELOCITY_COLUMN].copy(),
+            **_of_axis(name, result.table.labels, result.forces),
+            **_of_axis(name, result.state_names, result.states),
+        }
+    text = format_model(model)
+    metadata = {
+        "source": "simulation",
+        "experiment": experiment,
+        "seed": str(seed),
+        "software": f"proton-twin {importlib.metadata.version('proton-twin')}",
+        "mujoco": mujoco.__version__,
+    }
+    attachments = {"model.toml": text.encode()}
+    if model.mjcf:
+        attachments["model.xml"] = model.mjcf.encode()
+    return Log(model.sample_rate, axes, metadata, truth, attachments)
+
+
+def _of_axis(
+    axis: str, names: tuple[tuple[str, str], ...], columns: np.ndarray
+) -> dict[str, np.ndarray]:
+    return {n: columns[:, i].copy() for i, (a, n) in enumerate(names) if a == axis}

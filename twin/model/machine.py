@@ -1,0 +1,307 @@
+"""The stage model: for each axis its mass, its hardware, its effects and their values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.core.native import Table, build_table
+from twin.effect import ELEMENTS, Effect, Kind, Parameter
+from twin.errors import InputError
+from twin.model.units import LINEAR, ROTARY, AxisUnits
+
+MASS = Parameter(LINEAR.mass_name, LINEAR.mass, 1.0, 1e-6, 1e6, "moved mass")
+# Declared linear as all parameters are; a small motor has a millionth of a kg m^2.
+INERTIA = Parameter(ROTARY.mass_name, LINEAR.mass, 1.0, 1e-12, 1e6, "moment of inertia")
+MOST_ELEMENTS = 1000
+MOST_AXES_OF_A_PAIR = 2  # with more, which is the other axis?
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """What surrounds an axis' mechanics.
+
+    In the units of a linear axis; a rotary one has their counterparts (see twin.model.units).
+    travel (m, low and high; None where it is not known), force_constant (N/A), force_limit (N),
+    encoder_resolution (m), encoder_noise (m rms), current_noise (A rms), velocity (m/s),
+    acceleration (m/s^2) and jerk (m/s^3) limits of its moves, bandwidth (Hz) of its position loop.
+    """
+
+    travel: tuple[float, float] | None = None
+    force_constant: float = 1.0
+    force_limit: float = math.inf
+    encoder_resolution: float = 0.0
+    encoder_noise: float = 0.0
+    current_noise: float = 0.0
+    velocity: float = 0.25
+    acceleration: float = 2.0
+    jerk: float = 200.0
+    bandwidth: float = 30.0
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """An effect with its parameter values (name -> SI value); ``fixed`` are held by a fit."""
+
+    effect: Effect
+    values: Mapping[str, float]
+    fixed: frozenset[str]
+
+    @classmethod
+    def at_start(
+        cls, effect: Effect, values: Mapping[str, float] | None = None, units: AxisUnits = LINEAR
+    ) -> Fitted:
+        """The effect at its start values, or those given; checks names and bounds (InputError).
+
+        units: of the axis, for messages.
+        """
+        effect = _sized(effect, values or {})
+        merged = {**effect.starts(), **(values or {})}
+        for name, value in merged.items():
+            _check_value(effect, name, value, units)
+        fixed = frozenset(p.name for p in effect.parameters if p.fixed)
+        return cls(effect, merged, fixed)
+
+    def vector(self) -> list[float]:
+        """Values in the order of the effect's parameters."""
+        return [self.values[p.name] for p in self.effect.parameters]
+
+
+def _sized(effect: Effect, values: Mapping[str, float]) -> Effect:
+    """The effect with as many elements as its values ask for."""
+    count = values.get(ELEMENTS)
+    if effect.of_size is None or count is None:
+        return effect
+    whole = isinstance(count, int | float) and float(count).is_integer()
+    if not (whole and 1 <= count <= MOST_ELEMENTS):
+        raise InputError(
+            f"{effect.name}.{ELEMENTS} = {count}: give a whole number of elements from 1 to "
+            f"{MOST_ELEMENTS}"
+        )
+    return effect.of_size(int(count))
+
+
+def _check_value(effect: Effect, name: str, value: float, units: AxisUnits) -> None:
+    known = [p.name for p in effect.parameters]
+    if name not in known:
+        raise InputError(
+            f"effect '{effect.name}' has no parameter '{name}'; it has {', '.join(known)}"
+        )
+    p = effect.parameter(name)
+    unit = units(p.unit)
+    if not (isinstance(value, int | float) and math.isfinite(value)):
+        raise InputError(
+            f"{effect.name}.{name} = {value}: is not a finite number; give it in {unit}"
+        )
+    if not p.lower <= value <= p.upper:
+        raise InputError(
+            f"{effect.name}.{name} = {value:g} {unit}: outside [{p.lower:g}, {p.upper:g}] "
+            f"{unit} ({p.meaning})"
+        )
+
+
+@dataclass(frozen=True)
+class AxisModel:
+    """One axis: moved mass (kg), hardware, and its effects in the order they were added.
+
+    rotary: whether it turns; then ``mass`` is the moment of inertia (kg m^2) and all lengths are
+    angles. mass_fixed: whether a fit holds the mass.
+    """
+
+    mass: float
+    hardware: Hardware = Hardware()
+    effects: tuple[Fitted, ...] = ()
+    mass_fixed: bool = False
+    rotary: bool = False
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.mass) and self.mass > 0):
+            name, unit = self.units.mass_name, self.units.mass
+            raise InputError(f"{name} = {self.mass} {unit}: must be a positive number of {unit}")
+        frictions = [f.effect.name for f in self.effects if f.effect.kind is Kind.FRICTION]
+        if len(frictions) > 1:
+            raise InputError(
+                f"an axis has one friction model, given {' and '.join(frictions)}; remove one"
+            )
+
+    @property
+    def units(self) -> AxisUnits:
+        """What the axis' quantities are given in."""
+        return ROTARY if self.rotary else LINEAR
+
+    @property
+    def mass_parameter(self) -> Parameter:
+        """The moved mass, or moment of inertia, as a parameter."""
+        return INERTIA if self.rotary else MASS
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the axis' effects."""
+        return tuple(f.effect.name for f in self.effects)
+
+    def __getitem__(self, effect: str) -> Fitted:
+        return next(f for f in self.effects if f.effect.name == effect)
+
+    def with_effect(self, new: Fitted) -> AxisModel:
+        """This axis with the effect added, or exchanged where it is there already.
+
+        A friction takes the place of the friction that was there.
+        """
+        friction = new.effect.kind is Kind.FRICTION
+        kept = tuple(
+            f
+            for f in self.effects
+            if f.effect.name != new.effect.name
+            and not (friction and f.effect.kind is Kind.FRICTION)
+        )
+        return replace(self, effects=(*kept, new))
+
+    def without(self, effect: str) -> AxisModel:
+        """This axis less one effect; InputError where it has no such effect."""
+        if effect not in self.names:
+            raise InputError(
+                f"the axis has no effect '{effect}' to remove; it has {', '.join(self.names)}"
+            )
+        return replace(self, effects=tuple(f for f in self.effects if f.effect.name != effect))
+
+
+@dataclass(frozen=True)
+class HistoryStep:
+    """One step of the model's growth.
+
+    Errors are RMS force errors in ``unit``; None where not measured.
+    """
+
+    action: str
+    effect: str
+    axis: str
+    fit_error_before: float
+    fit_error_after: float
+    holdout_error_before: float | None
+    holdout_error_after: float | None
+    unit: str = LINEAR.force
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class MachineModel:
+    """A stage: axes by name, the rate it is sampled at (Hz), its MuJoCo file and its history.
+
+    Raises InputError where it has more than two axes and an effect that depends on the other one.
+
+    mjcf: MJCF text of the stage, or None for plain slides and hinges, one for each axis.
+    """
+
+    name: str
+    axes: Mapping[str, AxisModel]
+    sample_rate: float = 10_000.0
+    mjcf: str | None = None
+    mjcf_name: str | None = None
+    history: tuple[HistoryStep, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        for name, axis in self.axes.items():
+            for f in axis.effects:
+                self.require_usable(f.effect, name)
+
+    def can_use(self, effect: Effect) -> bool:
+        """Whether "the other axis" that the effect may depend on is one axis of this machine."""
+        return len(self.axes) <= MOST_AXES_OF_A_PAIR or not effect.reads_other_axis
+
+    def require_usable(self, effect: Effect, axis: str) -> None:
+        """Raise InputError for an effect that this machine cannot have."""
+        if not self.can_use(effect):
+            raise InputError(
+                f"axis {axis}: {effect.name} depends on the other axis, and a machine with "
+                f"{len(self.axes)} axes has several; remove it, or give a model of the two axes "
+                "alone"
+            )
+
+    @property
+    def period(self) -> float:
+        """Sample period in s."""
+        return 1.0 / self.sample_rate
+
+    def axis(self, name: str) -> AxisModel:
+        """The axis of that name; InputError where there is none."""
+        if name not in self.axes:
+            raise InputError(f"the model has no axis '{name}'; it has {', '.join(self.axes)}")
+        return self.axes[name]
+
+    def with_axis(self, name: str, axis: AxisModel) -> MachineModel:
+        """This stage with one axis exchanged."""
+        return replace(self, axes={**self.axes, name: axis})
+
+    def with_history(self, step: HistoryStep) -> MachineModel:
+        """This stage with one more step of history."""
+        return replace(self, history=(*self.history, step))
+
+    def table(self) -> Table:
+        """The native table of all axes."""
+        return axis_table(self.axes)
+
+
+def axis_table(axes: Mapping[str, AxisModel]) -> Table:
+    """Native table of some axes."""
+    return build_table(
+        {name: [(f.effect, f.vector()) for f in axis.effects] for name, axis in axes.items()},
+        [axis.mass for axis in axes.values()],
+    )
+
+
+@dataclass(frozen=True)
+class ParameterReference:
+    """One number of an axis model that a fit may change; effect "" is the axis' own mass."""
+
+    effect: str
+    parameter: Parameter
+
+    @property
+    def label(self) -> str:
+        """E.g. ``lugre.Fc``, ``mass`` or ``inertia``."""
+        return f"{self.effect}.{self.parameter.name}" if self.effect else self.parameter.name
+
+
+def free_parameters(axis: AxisModel) -> tuple[ParameterReference, ...]:
+    """The free numbers of an axis: its mass unless fixed, then those of its effects."""
+    mass = () if axis.mass_fixed else (ParameterReference("", axis.mass_parameter),)
+    return mass + tuple(
+        ParameterReference(f.effect.name, p)
+        for f in axis.effects
+        for p in f.effect.parameters
+        if p.name not in f.fixed and p.lower < p.upper
+    )
+
+
+def read(axis: AxisModel, where: Iterable[ParameterReference]) -> NDArray[np.float64]:
+    """Values of those coordinates, in SI units."""
+    return np.array(
+        [axis[c.effect].values[c.parameter.name] if c.effect else axis.mass for c in where]
+    )
+
+
+def write(
+    axis: AxisModel, where: Iterable[ParameterReference], values: Iterable[float]
+) -> AxisModel:
+    """The axis with those coordinates set."""
+    by_effect: dict[str, dict[str, float]] = {}
+    for c, value in zip(where, values, strict=True):
+        by_effect.setdefault(c.effect, {})[c.parameter.name] = float(value)
+    mass = by_effect.pop("", {}).get(axis.mass_parameter.name, axis.mass)
+    effects = tuple(
+        replace(f, values=_ordered(f.effect, {**f.values, **by_effect[f.effect.name]}))
+        if f.effect.name in by_effect
+        else f
+        for f in axis.effects
+    )
+    return replace(axis, mass=mass, effects=effects)
+
+
+def _ordered(effect: Effect, values: dict[str, float]) -> dict[str, float]:
+    """The values with each held one raised to the one it may not fall below (Fs >= Fc)."""
+    floors = {p.name: values[p.at_least] for p in effect.parameters if p.at_least}
+    return {name: max(value, floors.get(name, value)) for name, value in values.items()}

@@ -1,0 +1,81 @@
+"""The units of an axis: of a linear one as they are declared, of a rotary one their counterparts.
+
+Laws, parameters and hardware are declared for a linear axis. On a rotary axis a length is an angle,
+a force a torque and a mass a moment of inertia: m -> rad, N -> N m, kg -> kg m^2.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+
+_COUNTERPARTS = {"m": "rad", "N": "N m", "kg": "kg m^2"}
+_FACTOR = re.compile(r"(?P<symbol>[^\s^]+)(\^(?P<power>\d+))?")
+
+
+@cache
+def rotary_unit(linear: str) -> str:
+    """The unit on a rotary axis of what has this SI unit on a linear one: "N s/m" -> "N m s/rad".
+
+    What has no length, force or mass in it stays as it is.
+    """
+    over, *under = linear.split("/")
+    parts = [_product(over), *(_product(part.strip("()")) for part in under)]
+    return "/".join(
+        f"({part})" if i and " " in part else part for i, part in enumerate(parts) if part
+    )
+
+
+def _product(text: str) -> str:
+    """A product of units, factor by factor."""
+    return " ".join(_factor(m["symbol"], m["power"]) for m in _FACTOR.finditer(text))
+
+
+def _factor(symbol: str, power: str | None) -> str:
+    other = _COUNTERPARTS.get(symbol, symbol)
+    if power is None:
+        return other
+    return f"{other}^{power}" if " " not in other else f"({other})^{power}"
+
+
+@dataclass(frozen=True)
+class AxisUnits:
+    """What the quantities of one axis are given in; call it with any other linear unit.
+
+    mass: unit of what a force moves; mass_name: its name in files and tables.
+    """
+
+    rotary: bool
+    position: str
+    velocity: str
+    acceleration: str
+    force: str
+    mass: str
+    mass_name: str
+
+    def __call__(self, linear: str) -> str:
+        """The unit on this axis of what has the SI unit ``linear`` on a linear axis."""
+        return rotary_unit(linear) if self.rotary else linear
+
+    @property
+    def kind(self) -> str:
+        """What such an axis is called."""
+        return "rotary" if self.rotary else "linear"
+
+
+LINEAR = AxisUnits(False, "m", "m/s", "m/s^2", "N", "kg", "mass")
+ROTARY = AxisUnits(
+    rotary=True,
+    position=rotary_unit(LINEAR.position),
+    velocity=rotary_unit(LINEAR.velocity),
+    acceleration=rotary_unit(LINEAR.acceleration),
+    force=rotary_unit(LINEAR.force),
+    mass=rotary_unit(LINEAR.mass),
+    mass_name="inertia",
+)
+
+
+def units_of(position: str | None) -> AxisUnits:
+    """The units of an axis whose position is in this unit; linear where it is not known."""
+    return ROTARY if position == ROTARY.position else LINEAR

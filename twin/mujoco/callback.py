@@ -1,0 +1,282 @@
+"""MuJoCo's side of the native core: the passive-force callback and how it finds its model.
+
+The table of a stage travels inside the mjModel itself, as the last custom numeric, so model copies
+and worker threads need nothing else. Its last number is a magic value; the callback
+returns at once for any other model. The states live in userdata: those at the start of the
+sample and those after it. The callback commits the second to the first when time has moved on,
+so a sample counts once however often MuJoCo evaluates its forces.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numba import carray, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from twin.core.calling import doubles_at
+from twin.core.compiled import callback, compiled
+from twin.core.native import LAST_ACCELERATION, Table, axis_force
+from twin.effect import (
+    A_OTHER,
+    DT,
+    INDEX,
+    IO_SIZE,
+    MASS,
+    MOVED,
+    TIME,
+    V_OTHER,
+    WHEN,
+    X_OTHER,
+    U,
+    V,
+    X,
+)
+
+UNKNOWN_LAYOUT = "this MuJoCo lays out its structs in an unknown way; report its version"
+NUMERIC = "proton_twin_table"
+MAGIC = 0.3401950653e77  # no model holds this by chance
+HEADER = 6  # period, axes, states, entries, parameters, first userdata
+AXIS_COLUMNS = 7  # first entry, last entry, first state, mass, qpos, dof, actuator
+
+
+class Offsets(NamedTuple):
+    """Byte offsets of fields in mjModel (first two) and mjData."""
+
+    n_numeric_data: int
+    numeric_data: int
+    time: int
+    userdata: int
+    qpos: int
+    qvel: int
+    ctrl: int
+    qfrc_passive: int
+
+
+def library() -> ctypes.CDLL:
+    """The MuJoCo library that the Python package has loaded."""
+    folder = Path(mujoco.__file__).parent
+    names = [p for p in folder.iterdir() if p.name.startswith(("libmujoco", "mujoco.dll"))]
+    return ctypes.CDLL(str(names[0]))
+
+
+def step_address() -> int:
+    """Address of mj_step, for compiled loops."""
+    address = ctypes.cast(library().mj_step, ctypes.c_void_p).value
+    assert address is not None
+    return address
+
+
+def _probe(numeric: int, userdata: int, neighbours: bool) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """A small model; with neighbours, the arrays beside those sought are not empty."""
+    spec = mujoco.MjSpec()
+    body = spec.worldbody.add_body()
+    body.add_joint(name="q", type=mujoco.mjtJoint.mjJNT_SLIDE)
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.1, 0, 0])
+    actuator = spec.add_actuator(name="u", target="q", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    if neighbours:
+        actuator.dyntype = mujoco.mjtDyn.mjDYN_INTEGRATOR
+        spec.worldbody.add_body(mocap=True)
+    spec.add_numeric(name="probe", data=[1.0] * numeric, size=numeric)
+    spec.nuserdata = userdata
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.time = 1234.5678 + numeric
+    return model, data
+
+
+def _word_at(address: int, offset: int) -> int:
+    return ctypes.c_uint64.from_address(address + offset).value
+
+
+def _find(address: int, wanted: int, limit: int = 1 << 19) -> int:
+    """Offset of a word; an empty array before the one sought has the same address, so the last."""
+    for offset in range(0, limit, 8):
+        if _word_at(address, offset) == wanted:
+            return max(o for o in range(offset, offset + 64, 8) if _word_at(address, o) == wanted)
+    raise RuntimeError(UNKNOWN_LAYOUT)
+
+
+def _words(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[int], list[int]]:
+    """What the fields of Offsets hold in this model and data, as 8-byte words."""
+    time = int(np.float64(data.time).view(np.uint64))
+    arrays = (data.userdata, data.qpos, data.qvel, data.ctrl, data.qfrc_passive)
+    return (
+        [model.nnumericdata, model.numeric_data.ctypes.data],
+        [time, *(a.ctypes.data for a in arrays)],
+    )
+
+
+@cache
+def offsets() -> Offsets:
+    """Struct offsets, found in one live object and verified in another."""
+    model, data = _probe(numeric=977, userdata=3, neighbours=False)
+    in_model, in_data = _words(model, data)
+    found = Offsets(
+        *(_find(model._address, w) for w in in_model), *(_find(data._address, w) for w in in_data)
+    )
+    model, data = _probe(numeric=1013, userdata=5, neighbours=True)
+    in_model, in_data = _words(model, data)
+    seen_model = [_word_at(model._address, o) for o in found[:2]]
+    seen_data = [_word_at(data._address, o) for o in found[2:]]
+    if (seen_model, seen_data) != (in_model, in_data):
+        raise RuntimeError(UNKNOWN_LAYOUT)
+    return found
+
+
+@intrinsic
+def word_at(typingctx, address):
+    """The 8-byte word at an address."""
+
+    def codegen(context, builder, signature, args):
+        word = context.get_value_type(types.int64).as_pointer()
+        return builder.load(builder.inttoptr(args[0], word))
+
+    return types.int64(types.int64), codegen
+
+
+@intrinsic
+def call_step(typingctx, step, model, data):
+    """Call mj_step(model, data) by addresses."""
+
+    def codegen(context, builder, signature, args):
+        pointer = context.get_value_type(types.voidptr)
+        fnty = cgutils.ir.FunctionType(context.get_value_type(types.void), [pointer] * 2)
+        fn = builder.inttoptr(args[0], fnty.as_pointer())
+        builder.call(fn, [builder.inttoptr(a, pointer) for a in args[1:]])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64), codegen
+
+
+@compiled(inline=True)
+def view(address, shape):
+    """Array of the doubles at an address, which MuJoCo owns."""
+    return carray(doubles_at(address), shape)
+
+
+@compiled(inline=True)
+def begin_sample(time, committed, start, after):
+    """Make ``start`` the states at the start of this sample, and ``after`` a copy of them.
+
+    committed[0]: time of the last call. Forwards, what came after that sample is what this one
+    starts from; backwards, the simulation begins anew from zero.
+    """
+    forwards = time > committed[0]
+    backwards = time < committed[0]
+    committed[0] = time
+    for i in range(start.shape[0]):
+        if forwards:
+            start[i] = after[i]
+        elif backwards:
+            start[i] = 0.0
+        after[i] = start[i]
+
+
+@compiled(inline=True)
+def passive_forces(block, data, off):
+    """Add the effects' forces of every axis to qfrc_passive (see the module's docstring).
+
+    block: address of the table's numbers, in the order of ``attach``.
+    """
+    header = doubles_at(block)
+    dt = header[0]
+    n_axes = int(header[1])
+    n_states = int(header[2])
+    n_entries = int(header[3])
+    table = HEADER + AXIS_COLUMNS * n_axes
+    axes = view(block + 8 * HEADER, (n_axes, AXIS_COLUMNS))
+    entries = view(block + 8 * table, (n_entries, 4))
+    parameters = view(block + 8 * (table + 4 * n_entries), int(header[4]))
+    user = word_at(data + off[1]) + 8 * int(header[5])
+    start = view(user + 8, n_states)
+    after = view(user + 8 * (1 + n_states), n_states)
+    rows = view(user + 8 * (1 + 2 * n_states), (1, n_entries))
+    io = view(user + 8 * (1 + 2 * n_states + n_entries), IO_SIZE)
+    qpos = doubles_at(word_at(data + off[2]))
+    qvel = doubles_at(word_at(data + off[3]))
+    ctrl = doubles_at(word_at(data + off[4]))
+    passive = doubles_at(word_at(data + off[5]))
+    time = doubles_at(data + off[0])[0]
+    begin_sample(time, doubles_at(user), start, after)
+    io[INDEX] = np.rint(time / dt)
+    io[TIME] = time
+    io[DT] = dt
+    io[WHEN] = 1.0
+    for a in range(n_axes):
+        io[X] = qpos[int(axes[a, 4])]
+        io[V] = qvel[int(axes[a, 5])]
+        io[U] = ctrl[int(axes[a, 6])]
+        io[MASS] = axes[a, 3]
+        io[MOVED] = axes[a, 3]
+        if n_axes == 2:  # no law of a larger machine reads them (MachineModel)
+            b = 1 - a
+            io[X_OTHER] = qpos[int(axes[b, 4])]
+            io[V_OTHER] = qvel[int(axes[b, 5])]
+            io[A_OTHER] = start[int(axes[b, 2]) + LAST_ACCELERATION]
+        # What the structure adds is known for the log; MuJoCo's own bodies put it on the axis.
+        force, _ = axis_force(
+            entries, int(axes[a, 0]), int(axes[a, 1]), parameters, after, int(axes[a, 2]), io,
+            rows, 0,
+        )  # fmt: skip
+        passive[int(axes[a, 5])] += force - ctrl[int(axes[a, 6])]  # MuJoCo adds the command
+
+
+@cache
+def _callback(off: Offsets) -> Any:
+    # The offsets are a closure variable because numba keys its disk cache on those: another
+    # MuJoCo version compiles anew instead of reading the wrong fields.
+    model_offsets, data_offsets = tuple(off[:2]), tuple(off[2:])
+
+    def passive(model, data):
+        size = word_at(model + model_offsets[0])
+        if size < HEADER + AXIS_COLUMNS:
+            return
+        numbers = doubles_at(word_at(model + model_offsets[1]))
+        if numbers[size - 1] != MAGIC:
+            return
+        length = int(numbers[size - 2])
+        block = word_at(model + model_offsets[1]) + 8 * (size - length)
+        passive_forces(block, data, data_offsets)
+
+    return callback(passive, types.void(types.int64, types.int64))
+
+
+def attach(spec: mujoco.MjSpec, table: Table, period: float, axes: tuple[str, ...]) -> int:
+    """Write the table into the spec; returns where its userdata begins.
+
+    axes: names of the slide joints, in the table's order; each has a motor ``motor_<axis>``.
+    """
+    model = spec.compile()
+    user_at = model.nuserdata
+    spans = []
+    for axis, (first, last, state, _, _), mass in zip(axes, table.axes, table.masses, strict=True):
+        joint, motor = model.joint(axis), model.actuator(f"motor_{axis}")
+        spans.append((first, last, state, mass, joint.qposadr[0], joint.dofadr[0], motor.id))
+    numbers = [
+        period, len(axes), table.n_states, len(table.entries), len(table.parameters), user_at,
+        *np.ravel(spans), *table.entries.ravel(), *table.parameters,
+    ]  # fmt: skip
+    numbers += [len(numbers) + 2, MAGIC]
+    spec.add_numeric(name=NUMERIC, data=numbers, size=len(numbers))
+    spec.nuserdata = user_at + 1 + 2 * table.n_states + len(table.entries) + IO_SIZE
+    return user_at
+
+
+@contextmanager
+def passive_callback() -> Iterator[None]:
+    """Install the native callback, and restore what was there before on leaving."""
+    before = mujoco.get_mjcb_passive()
+    mujoco.set_mjcb_passive(_callback(offsets()).ctypes)
+    try:
+        yield
+    finally:
+        mujoco.set_mjcb_passive(before)
