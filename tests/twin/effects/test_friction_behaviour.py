@@ -33,7 +33,7 @@ BOTH = pytest.mark.parametrize("stage", [MujocoSimulator, ReducedSimulator])
 def test_a_static_model_does_not_creep_below_breakaway(
     name: str, share: float, stage: type[MujocoSimulator] | type[ReducedSimulator]
 ) -> None:
-    x, v, held = pushed([friction(name)], np.full(5000, share * 1.5), stage=stage)
+    x, v, held = pushed([friction(name)], np.full(5000, share * 1.5), simulator=stage)
     assert np.abs(x).max() < 1e-15
     assert np.abs(v).max() < 1e-15
     np.testing.assert_allclose(held, share * 1.5, rtol=1e-12)
