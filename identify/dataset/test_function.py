@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from twin.errors import InputError
@@ -82,8 +81,20 @@ class TestFunction:
         return -self._apply(velocity, self.slope)
 
     def _apply(self, signals: Array, kernel: Array) -> Array:
-        views = sliding_window_view(signals, len(kernel), axis=-1)
-        return views[..., :: self.stride, :] @ kernel
+        # In pieces as long as the stride each sample meets every piece of the kernel once, in one
+        # product of matrices; windows that overlap in memory would be multiplied one by one.
+        count = max((signals.shape[-1] - len(kernel)) // self.stride + 1, 0)
+        pieces = -(-len(kernel) // self.stride)
+        needed = (count + pieces - 1) * self.stride
+        lacking = max(needed - signals.shape[-1], 0)
+        if lacking:  # beyond the kernel's end, where it is zero
+            more = np.zeros((*signals.shape[:-1], lacking))
+            signals = np.concatenate([signals, more], axis=-1)
+        blocks = signals[..., :needed].reshape(*signals.shape[:-1], -1, self.stride)
+        padded = np.zeros(pieces * self.stride)
+        padded[: len(kernel)] = kernel
+        products = blocks @ padded.reshape(pieces, self.stride).T
+        return np.asarray(sum(products[..., j : j + count, j] for j in range(pieces)))
 
     def response(self, period: float, segment: int) -> Array:
         """Squared magnitude of the mean's frequency response for samples of ``period`` (s).

@@ -165,6 +165,7 @@ class _Problem:
         # A description is linear in its strengths: their columns are taken once.
         self.constant = np.array([_describes(axis, c) for c in self.scaling.where], dtype=bool)
         self.described = jacobian(axis, logs, self._where(self.constant))
+        self._last: tuple[bytes, Array] = b"", np.zeros((0, 0))
 
     def set_priors(self, internal: Array) -> None:
         """Weigh the priors by the residual's size, its colour, and the force to be explained."""
@@ -191,8 +192,15 @@ class _Problem:
         return columns
 
     def columns(self, internal: Array) -> Array:
-        axis = self.scaling.outside(self.axis, internal)
-        return self.scaling.chain(axis, self.jacobian(axis))[self.kept]
+        """Derivative of the kept residual by the internal variables, (n, k) N per unit.
+
+        Those of the last place are kept: the priors and the search that follows ask for the same.
+        """
+        place = internal.tobytes()
+        if self._last[0] != place:
+            axis = self.scaling.outside(self.axis, internal)
+            self._last = place, self.scaling.chain(axis, self.jacobian(axis))[self.kept]
+        return self._last[1]
 
     def rows(self, internal: Array) -> Array:
         force = residual(self.scaling.outside(self.axis, internal), self.logs)[self.kept]

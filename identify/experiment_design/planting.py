@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise, reading_error
@@ -21,6 +22,7 @@ Array = NDArray[np.float64]
 
 SPREAD = 0.2  # relative spread of a machine's values about the model's
 SHAPE_SPREAD = 0.3  # of the logarithm of shape parameters that nothing scans
+TINY = 1e-300
 
 
 def other_machine(axis: AxisModel, rng: np.random.Generator) -> AxisModel:
@@ -109,7 +111,7 @@ def strength_for(
             drawn[least], drawn[name] = sorted((drawn[least], drawn[name]))
         return Fitted.at_start(effect, drawn)
 
-    return at(_root(lambda scale: rms(added(at(scale))) - force))
+    return at(_scale(lambda scale: rms(added(at(scale))), force))
 
 
 def _direction(lower: float, rng: np.random.Generator | None) -> float:
@@ -119,13 +121,21 @@ def _direction(lower: float, rng: np.random.Generator | None) -> float:
     return float(size if lower >= 0 else size * rng.choice((-1.0, 1.0)))
 
 
-def _root(error: Callable[[float], float]) -> float:
-    """Scale at which a growing error crosses zero, by bisection on the logarithm."""
-    low, high = 1e-9, 1e9
-    for _ in range(60):
-        middle = np.sqrt(low * high)
-        low, high = (middle, high) if error(middle) < 0 else (low, middle)
-    return float(low)
+def _scale(size: Callable[[float], float], wanted: float) -> float:
+    """Scale at which a growing size is the wanted one; the nearer end where none within 1e+-9 is.
+
+    On logarithms, on which a force in proportion to its strengths is a straight line.
+    """
+
+    def error(log_scale: float) -> float:
+        return float(np.log(max(size(float(np.exp(log_scale))), TINY) / max(wanted, TINY)))
+
+    low, high = np.log(1e-9), np.log(1e9)
+    if error(low) > 0.0:
+        return 1e-9
+    if error(high) < 0.0:
+        return 1e9
+    return float(np.exp(brentq(error, low, high, xtol=1e-12)))
 
 
 def visible_force(fitted: Fitted, base: Fit, dataset: Dataset) -> float:
