@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from identify.dataset.drive import parts_of
 from identify.dataset.motion import Motion
 from identify.dataset.test_function import TestFunction
-from twin.core.native import Table, walk
+from twin.core.native import Table, walk_sets
 from twin.effect import Kind
 from twin.model.machine import AxisModel, axis_table
 
@@ -60,16 +60,19 @@ class PreparedLog:
 
 def total_force(table: Table, motion: Motion) -> Array:
     """Sum of the forces of a table's first axis along a measured motion, (n,) N, less command."""
-    rows = np.zeros((len(table.entries), motion.signals.shape[1]))
-    if not len(rows):
-        return np.zeros(motion.signals.shape[1])
-    first, last, state, _, _ = table.axes[0]
-    walk(
-        table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
-        motion.signals, motion.others, motion.period, 0, rows, table.masses[0],
-        motion.time_origin,
-    )  # fmt: skip
-    return np.asarray(rows.sum(axis=0))
+    return total_forces(table, table.parameters[None], motion)[0]
+
+
+def total_forces(table: Table, sets: Array, motion: Motion) -> Array:
+    """The same for several sets of the table's parameters (m, n_p), SI units: (m, n) N."""
+    totals = np.zeros((len(sets), motion.signals.shape[1]))
+    first, last, _, _, _ = table.axes[0]
+    if first < last:
+        walk_sets(
+            table.entries, first, last, sets, table.n_states, motion.signals, motion.others,
+            motion.period, 0, totals, table.masses[0], motion.time_origin,
+        )  # fmt: skip
+    return totals
 
 
 def on_blocks(axis: AxisModel) -> Table:

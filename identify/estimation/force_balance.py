@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.drive import actual_force, parts_of, true_motion
-from identify.dataset.prepared_log import PreparedLog, total_force
+from identify.dataset.motion import Motion
+from identify.dataset.prepared_log import PreparedLog, total_force, total_forces
+from twin.core.calling import P_AT
+from twin.core.native import Table
 from twin.effect import Kind
 from twin.model.machine import AxisModel, ParameterReference, axis_table, read, write
 
@@ -22,21 +25,36 @@ def averaged_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
     A sensing effect adds the force that the reading's error pretends, mass x its acceleration, and
     the other effects act along the motion behind the readings, under the actual force.
     """
-    # An actuation with memory needs the log's own rate.
-    fine = any(f.effect.kind is Kind.ACTUATION and f.effect.states for f in axis.effects)
-    apart = {Kind.SENSING, *((Kind.ACTUATION,) if fine else ())}
-    table = axis_table({"": parts_of(axis, *(set(Kind) - apart))})
+    table = _between(axis)
     parts = []
     for log in logs:
-        motion, error_rate = true_motion(axis, log.motion)
-        driven = motion.with_force(actual_force(axis, motion)) if fine else motion
-        out = log.window.mean(total_force(table, driven))
-        if fine:
-            out += log.fine.mean(driven.raw[1]) - log.command
-        if motion is not log.motion:
-            out += axis.mass * log.fine.acceleration(error_rate)
-        parts.append(out)
+        driven, added = _driven(axis, log)
+        parts.append(log.window.mean(total_force(table, driven)) + added)
     return np.concatenate(parts)
+
+
+def _is_stepped_finely(axis: AxisModel) -> bool:
+    """Whether an actuation with memory asks for the log's own rate."""
+    return any(f.effect.kind is Kind.ACTUATION and f.effect.states for f in axis.effects)
+
+
+def _between(axis: AxisModel) -> Table:
+    """Table of the effects that act along the motion and force of ``_driven``."""
+    apart = {Kind.SENSING, *((Kind.ACTUATION,) if _is_stepped_finely(axis) else ())}
+    return axis_table({"": parts_of(axis, *(set(Kind) - apart))})
+
+
+def _driven(axis: AxisModel, log: PreparedLog) -> tuple[Motion, Array | float]:
+    """The motion behind the readings under the actual force, and what both add (n,) N."""
+    motion, error_rate = true_motion(axis, log.motion)
+    added: Array | float = 0.0
+    driven = motion
+    if _is_stepped_finely(axis):
+        driven = motion.with_force(actual_force(axis, motion))
+        added = log.fine.mean(driven.raw[1]) - log.command
+    if motion is not log.motion:
+        added = added + axis.mass * log.fine.acceleration(error_rate)
+    return driven, added
 
 
 def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
@@ -68,20 +86,42 @@ def jacobian(
 ) -> Array:
     """Derivative of the residual by those coordinates, (n, n_coordinates), N per unit."""
     columns = np.empty((sum(map(len, logs)), len(where)))
-    bases: dict[str, tuple[AxisModel, Array]] = {}
+    by_effect: dict[str, list[int]] = {}
     for j, c in enumerate(where):
-        if not c.effect:
-            columns[:, j] = _by_mass(axis, logs)
+        by_effect.setdefault(c.effect, []).append(j)
+    for effect, index in by_effect.items():
+        if not effect:
+            columns[:, index[0]] = _by_mass(axis, logs)
             continue
-        if c.effect not in bases:
-            group = group_of(axis, c.effect)
-            bases[c.effect] = group, averaged_force(group, logs)
-        group, base = bases[c.effect]
-        value = read(group, [c])[0]
-        step = difference_step(c, value)
-        moved = write(group, [c], [value + step])
-        columns[:, j] = (averaged_force(moved, logs) - base) / step
+        group = group_of(axis, effect)
+        own = [where[j] for j in index]
+        steps = np.array([difference_step(c, read(group, [c])[0]) for c in own])
+        moved = [write(group, [c], read(group, [c]) + h) for c, h in zip(own, steps, strict=True)]
+        columns[:, index] = (_differences(group, moved, effect, logs) / steps[:, None]).T
     return columns
+
+
+def _differences(
+    group: AxisModel, moved: Sequence[AxisModel], effect: str, logs: Sequence[PreparedLog]
+) -> Array:
+    """Change (m, n) N of the averaged force when one effect's values move from those of a group."""
+    kind = group[effect].effect.kind
+    if kind is Kind.SENSING or (kind is Kind.ACTUATION and _is_stepped_finely(group)):
+        base = averaged_force(group, logs)
+        return np.stack([averaged_force(axis, logs) - base for axis in moved])
+    # The motion and the force behind it stay; all sets of values go along it in one walk.
+    table = _between(group)
+    at = table.labels.index(("", effect))
+    first = int(table.entries[at, P_AT])
+    sets = np.tile(table.parameters, (len(moved) + 1, 1))
+    for row, axis in zip(sets[1:], moved, strict=True):
+        vector = axis[effect].vector()
+        row[first : first + len(vector)] = vector
+    parts = []
+    for log in logs:
+        forces = total_forces(table, sets, _driven(group, log)[0])
+        parts.append(log.window.mean(forces[1:] - forces[0]))
+    return np.concatenate(parts, axis=1)
 
 
 def _by_mass(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:

@@ -78,23 +78,37 @@ class _Linear:
         return used, penalty
 
     @cached_property
-    def blocks(self) -> list[tuple[slice, Array, Array]]:
-        """Of each block its samples, columns' products (k, k) and products with the force (k,)."""
+    def blocks(self) -> tuple[list[slice], Array, Array]:
+        """Samples of each block, products of its columns (b, k, k) and with its force (b, k)."""
         edges = np.linspace(0, len(self.force), BLOCKS + 1).astype(int)
         spans = [slice(a, b) for a, b in pairwise(edges)]
-        rows = [(self.columns[span], self.force[span]) for span in spans]
-        return [(s, c.T @ c, c.T @ f) for s, (c, f) in zip(spans, rows, strict=True)]
+        columns = [self.columns[span] for span in spans]
+        grams = np.stack([c.T @ c for c in columns])
+        pulls = np.stack([c.T @ self.force[s] for s, c in zip(spans, columns, strict=True)])
+        return spans, grams, pulls
+
+    def _without(self, stiffness: Mapping[str, float]) -> tuple[NDArray[np.bool_], Array]:
+        """Which columns take part, and the changes (b, k_used) when each block is left out."""
+        used, penalty = self._chosen(stiffness)
+        _, grams, pulls = self.blocks
+        rest = (grams.sum(axis=0) + penalty - grams)[:, used][:, :, used]
+        return used, _solve(rest, (pulls.sum(axis=0) - pulls)[:, used, None])[..., 0]
 
     def left_out(self, stiffness: Mapping[str, float]) -> Array:
         """Residual (n,) N of every block when the others alone were fitted."""
-        used, penalty = self._chosen(stiffness)
-        gram = sum(g for _, g, _ in self.blocks) + penalty
-        gradient = sum(g for _, _, g in self.blocks)
+        used, changes = self._without(stiffness)
         out = self.force.copy()
-        for span, own, pull in self.blocks:
-            rest = (gram - own)[np.ix_(used, used)]
-            out[span] -= self.columns[span][:, used] @ _solve(rest, (gradient - pull)[used])
+        for span, change in zip(self.blocks[0], changes, strict=True):
+            out[span] -= self.columns[span][:, used] @ change
         return out
+
+    def left_out_error(self, stiffness: Mapping[str, float]) -> float:
+        """Sum of its squares, N^2."""
+        used, changes = self._without(stiffness)
+        _, grams, pulls = self.blocks
+        square = np.einsum("bi,bij,bj->", changes, grams[:, used][:, :, used], changes)
+        crossed = np.einsum("bi,bi->", changes, pulls[:, used])
+        return float(self.force @ self.force - 2.0 * crossed + square)
 
     def solution(self, stiffness: Mapping[str, float]) -> tuple[Array, float]:
         """Change (k,) of all coordinates that fits best, and the degrees of freedom it takes."""
@@ -103,7 +117,7 @@ class _Linear:
         gram = columns.T @ columns
         full = gram + penalty[np.ix_(used, used)]
         out = np.zeros(len(self.where))
-        out[used] = -_solve(full, columns.T @ self.force)
+        out[used] = -_solve(full, (columns.T @ self.force)[:, None])[:, 0]
         return out, float(np.trace(_solve(full, gram)))
 
 
@@ -116,10 +130,13 @@ def _penalty(
 
 
 def _solve(matrix: Array, right: Array) -> Array:
-    """Solution of a symmetric, positive system whose unknowns have units of their own."""
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix / np.outer(size, size) + ROUNDING * np.eye(len(size))
-    return np.asarray((np.linalg.solve(scaled, (right.T / size).T).T / size).T)
+    """Solution (..., k, m) of symmetric, positive systems whose unknowns have units of their own.
+
+    matrix (..., k, k), right (..., k, m).
+    """
+    size = np.sqrt(np.maximum(np.diagonal(matrix, axis1=-2, axis2=-1), 1e-300))[..., None]
+    scaled = matrix / size / np.swapaxes(size, -1, -2) + ROUNDING * np.eye(matrix.shape[-1])
+    return np.asarray(np.linalg.solve(scaled, right / size) / size)
 
 
 def choose_stiffness(linear: _Linear) -> dict[str, float]:
@@ -128,7 +145,7 @@ def choose_stiffness(linear: _Linear) -> dict[str, float]:
     The part that helps most comes first; then those before are tuned again.
     """
     chosen: dict[str, float] = {}
-    error = float(np.sum(linear.left_out(chosen) ** 2))
+    error = linear.left_out_error(chosen)
     while len(chosen) < len(linear.parts):
         found = [_best(linear, chosen, name) for name in linear.parts if name not in chosen]
         further, name, value = min(found)
@@ -143,7 +160,7 @@ def choose_stiffness(linear: _Linear) -> dict[str, float]:
 
 def _best(linear: _Linear, chosen: Mapping[str, float], name: str) -> tuple[float, str, float]:
     """Squared left-out error, name and stiffness of a part at its best beside the others."""
-    errors = [float(np.sum(linear.left_out({**chosen, name: v}) ** 2)) for v in STIFFNESS]
+    errors = [linear.left_out_error({**chosen, name: v}) for v in STIFFNESS]
     least = int(np.argmin(errors))
     return errors[least], name, float(STIFFNESS[least])
 

@@ -163,6 +163,62 @@ def walk(
             rows[i, k] = row[0, i]
 
 
+@compiled(nogil=True)
+def walk_sets(
+    entries, first, last, sets, states_needed, motion, others, dt, begin, totals, mass, time_origin
+):
+    """Force of all effects together along a measured motion, for several sets of parameters.
+
+    As ``walk``, from fresh states, less the force of each effect by itself, which costs a third of
+    a walk. sets (m, n_p); totals (m, n): N.
+    """
+    io = np.zeros(IO_SIZE)
+    w = io.ctypes.data
+    structure = last
+    while structure > first and int(entries[structure - 1, KIND]) == _STRUCTURE:
+        structure -= 1
+    laws = structure - first
+    addresses, kinds, p_at, s_at = entries[first:structure].astype(np.int64).T.copy()
+    row = np.zeros((2, entries.shape[0]))
+    io[DT] = dt
+    io[WHEN] = 0.5
+    io[MASS] = 1e300
+    io[MOVED] = mass
+    stiff = 1e300 / dt
+    for j in range(sets.shape[0]):
+        states = np.zeros(states_needed)
+        p, s = sets[j].ctypes.data, states.ctypes.data
+        own, friction = totals[j], 0.0
+        for k in range(motion.shape[1]):
+            io[INDEX] = begin + k
+            io[TIME] = time_origin + (begin + k) * dt
+            io[X] = motion[0, k]
+            io[V] = motion[1, k]
+            io[U] = motion[2, k]
+            io[X_OTHER] = others[0, k]
+            io[V_OTHER] = others[1, k]
+            io[A_OTHER] = others[2, k]
+            io[DRY] = 1.0
+            io[STATIC] = 1.0
+            io[VISCOUS] = 1.0
+            io[FRICTION] = friction
+            stop = stiff * motion[1, k]
+            total = 0.0
+            for i in range(laws):
+                io[HOLD] = stop + io[U] + total
+                io[OUT] = 0.0
+                call_law(addresses[i], p + 8 * p_at[i], s + 8 * s_at[i], w)
+                if kinds[i] == _FORCE:
+                    total += io[OUT]
+                elif kinds[i] == _FRICTION:
+                    friction = io[OUT]
+            own[k] = total - friction + (io[U] - motion[2, k])
+            if structure < last:
+                along(entries, structure, last, p, s, borrow(io), motion[1], k, borrow(row))
+                for i in range(structure, last):
+                    own[k] += row[0, i]
+
+
 @compiled(inline=True)
 def sense(entries, first, last, parameters, states, io, position):
     """Encoder reading of a true position: the sensing effects in order."""

@@ -102,11 +102,21 @@ def test_stiffer_parts_have_less_freedom():
 def test_a_system_of_unlike_units_is_solved():
     size = np.array([1e-6, 1.0, 1e5])
     matrix = np.array([[2.0, 0.3, 0.1], [0.3, 1.0, -0.2], [0.1, -0.2, 3.0]]) * np.outer(size, size)
-    for own in (np.array([1.0, 2.0, 3.0]), RNG.standard_normal((3, 4))):
-        wanted = (own.T / size).T
-        np.testing.assert_allclose(_solve(matrix, matrix @ wanted), wanted, rtol=1e-8)
-    singular = _solve(np.diag([1.0, 0.0]), np.array([2.0, 0.0]))
-    np.testing.assert_allclose(singular, [2.0 / (1.0 + ROUNDING), 0.0])
+    several = np.stack([matrix, 2.0 * matrix, matrix + np.diag(size**2)])
+    wanted = RNG.standard_normal((3, 4)) / size[:, None]
+    np.testing.assert_allclose(_solve(matrix, matrix @ wanted), wanted, rtol=1e-8)
+    for system, found in zip(several, _solve(several, several @ wanted), strict=True):
+        np.testing.assert_allclose(found, _solve(system, system @ wanted), rtol=1e-12)
+        np.testing.assert_allclose(found, wanted, rtol=1e-8)
+    singular = _solve(np.diag([1.0, 0.0]), np.array([[2.0], [0.0]]))
+    np.testing.assert_allclose(singular, [[2.0 / (1.0 + ROUNDING)], [0.0]])
+
+
+def test_the_squared_left_out_error_is_that_of_the_left_out_residual():
+    found = linear()
+    for stiffness in ({}, {"a": STIFFNESS[2]}, {"a": STIFFNESS[0], "b": STIFFNESS[3]}):
+        expected = np.sum(found.left_out(stiffness) ** 2)
+        assert found.left_out_error(stiffness) == pytest.approx(expected, rel=1e-9)
 
 
 # --- what is chosen -------------------------------------------------------------------------
@@ -127,8 +137,8 @@ class Table:
     def __init__(self, error) -> None:
         self.parts, self.error = dict.fromkeys("ab"), error
 
-    def left_out(self, stiffness):
-        return np.array([np.sqrt(self.error(dict(stiffness)))])
+    def left_out_error(self, stiffness):
+        return self.error(dict(stiffness))
 
 
 @pytest.mark.parametrize(("gain", "chosen"), [(WORTH + 0.001, []), (WORTH - 0.001, ["a"])])
