@@ -113,14 +113,17 @@ def _differences(
     table = _between(group)
     at = table.labels.index(("", effect))
     first = int(table.entries[at, P_AT])
-    sets = np.tile(table.parameters, (len(moved) + 1, 1))
-    for row, axis in zip(sets[1:], moved, strict=True):
+    # An effect alone of no strength gives no force, which need not be walked for.
+    absent = len(table.entries) == 1 and not group[effect].effect.is_present(group[effect].values)
+    bases = 0 if absent else 1
+    sets = np.tile(table.parameters, (len(moved) + bases, 1))
+    for row, axis in zip(sets[bases:], moved, strict=True):
         vector = axis[effect].vector()
         row[first : first + len(vector)] = vector
     parts = []
     for log in logs:
         forces = total_forces(table, sets, _driven(group, log)[0])
-        parts.append(log.window.mean(forces[1:] - forces[0]))
+        parts.append(log.window.mean(forces if absent else forces[1:] - forces[0]))
     return np.concatenate(parts, axis=1)
 
 

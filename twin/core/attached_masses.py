@@ -66,13 +66,20 @@ def settle(entries, first, last, p, s, io, net, answered, rows, k):
     return total
 
 
+@compiled(inline=True)
+def stands(entries, first, last, p, s, io):
+    """Whether the axis stands on any of the structure effects, which yield to its net force."""
+    return answers(entries, first, last, p, s, io)[3] != 0.0
+
+
 @compiled()
-def along(entries, first, last, p, s, io, velocity, k, rows):
+def along(entries, first, last, p, s, io, velocity, k, standing, rows):
     """Force (N) of structure effects along block k of a measured motion; their states advance.
 
-    velocity (n,) m/s: means of blocks of DT s. A block is walked in steps short enough for a
-    contact, with the acceleration a parabola that has the means of the blocks around it. rows
-    (2, n_entries): the first receives the block's mean, the second is overwritten.
+    velocity (n,) m/s: means of blocks of DT s. standing: as ``stands`` says of them. A block is
+    walked in steps short enough for a contact, with the acceleration a parabola that has the means
+    of the blocks around it. rows (2, n_entries): the first receives the block's mean, the second is
+    overwritten.
     """
     block, ended = io[DT], velocity.shape[0] - 1
     steps = int(np.ceil(block / LONGEST_STEP - 1e-9))
@@ -80,17 +87,17 @@ def along(entries, first, last, p, s, io, velocity, k, rows):
     before, after = slope(velocity, max(k - 1, 0), block), slope(velocity, min(k + 1, ended), block)
     rise, bend = 0.5 * (after - before), 0.5 * (after - 2.0 * now + before)
     rows[0, first:last] = 0.0
-    answered = answers(entries, first, last, p, s, io)
-    stands = answered[3] != 0.0
-    if stands:  # what an axis stands on is slow
+    answered = (0.0, 0.0, 0.0, 0.0)
+    if standing:  # what an axis stands on is slow
         steps = 1
+        answered = answers(entries, first, last, p, s, io)
     else:
         io[DT] = block / steps
     for j in range(steps):
         at = (j + 0.5) / steps - 0.5
         measured = now + rise * at + bend * (at * at + (1.0 / steps**2 - 1.0) / 12.0)
         net, ridden = 0.0, measured
-        if stands:
+        if standing:
             net, ridden = shared(answered, io[MOVED], measured)
         for i in range(first, last):
             rows[0, i] += answer(entries[i], p, s, io, net, ridden) / steps

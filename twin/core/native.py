@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.core.attached_masses import along, answers, settle
+from twin.core.attached_masses import along, answers, settle, stands
 from twin.core.calling import ADDRESS, KIND, P_AT, S_AT, borrow, call_law, law_address
 from twin.core.compiled import compiled
 from twin.effect import (
@@ -146,6 +146,7 @@ def walk(
     while others_end > first and int(entries[others_end - 1, KIND]) == _STRUCTURE:
         others_end -= 1
     p, s = parameters.ctypes.data, states.ctypes.data
+    standing = others_end < last and stands(entries, others_end, last, p, s, borrow(io))
     for k in range(motion.shape[1]):
         io[INDEX] = begin + k
         io[TIME] = time_origin + (begin + k) * dt
@@ -158,7 +159,7 @@ def walk(
         lent = borrow(row)
         axis_force(entries, first, others_end, parameters, states, at, borrow(io), lent, 0)
         if others_end < last:
-            along(entries, others_end, last, p, s, borrow(io), motion[1], k, lent)
+            along(entries, others_end, last, p, s, borrow(io), motion[1], k, standing, lent)
         for i in range(first, last):
             rows[i, k] = row[0, i]
 
@@ -189,6 +190,7 @@ def walk_sets(
         states = np.zeros(states_needed)
         p, s = sets[j].ctypes.data, states.ctypes.data
         own, friction = totals[j], 0.0
+        standing = structure < last and stands(entries, structure, last, p, s, borrow(io))
         for k in range(motion.shape[1]):
             io[INDEX] = begin + k
             io[TIME] = time_origin + (begin + k) * dt
@@ -214,7 +216,8 @@ def walk_sets(
                     friction = io[OUT]
             own[k] = total - friction + (io[U] - motion[2, k])
             if structure < last:
-                along(entries, structure, last, p, s, borrow(io), motion[1], k, borrow(row))
+                lent = borrow(row)
+                along(entries, structure, last, p, s, borrow(io), motion[1], k, standing, lent)
                 for i in range(structure, last):
                     own[k] += row[0, i]
 
