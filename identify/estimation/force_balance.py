@@ -114,7 +114,8 @@ def _differences(
     at = table.labels.index(("", effect))
     first = int(table.entries[at, P_AT])
     # An effect alone of no strength gives no force, which need not be walked for.
-    absent = len(table.entries) == 1 and not group[effect].effect.is_present(group[effect].values)
+    strengths = [group[effect].values[p.name] for p in group[effect].effect.strengths]
+    absent = len(table.entries) == 1 and bool(strengths) and not any(strengths)
     bases = 0 if absent else 1
     sets = np.tile(table.parameters, (len(moved) + bases, 1))
     for row, axis in zip(sets[bases:], moved, strict=True):
