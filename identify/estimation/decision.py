@@ -39,6 +39,9 @@ class DecisionRule:
     of the share of time from which another coordinate is preferred. left_over: part of a dependence
     that an explanation may leave.
 
+    line_chance: false-alarm probability below which a spectral line is told. line_share: part of
+    the residual's square from which it is the period of a dependence.
+
     least_fall: part of the squared error that a channel delay must take away. least_shift,
     most_shift: samples; less is no delay, more is a fault that the log's check finds.
     """
@@ -69,6 +72,9 @@ class DecisionRule:
     least_share: float = 0.1
     rather: float = 0.8
     left_over: float = 0.5
+
+    line_chance: float = 1e-3
+    line_share: float = 0.2
 
     least_fall: float = 0.1
     least_shift: float = 0.05

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
-from identify.dataset.spectral_lines import lines_of
+from identify.dataset.spectral_lines import lines_in_time
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit
@@ -25,7 +25,6 @@ from twin.model.machine import AxisModel
 Array = NDArray[np.float64]
 
 TRIED = 6  # frequencies at which the residual repeats
-FINE = np.linspace(-0.5, 0.5, 41)  # of the resolution, about each of them
 LATER = 1e-3  # s, by which a clock is moved to see what reads it
 SAME = 0.02  # of a period, within which clocks agree
 
@@ -107,7 +106,7 @@ def _own_line(axis: AxisModel, rest: AxisModel, log: PreparedLog) -> tuple[float
     """Frequency (Hz) and phase (rad) of the forces of an axis that read the clock, if any."""
     own = replace(axis, effects=tuple(f for f in axis.effects if f.effect.name not in rest.names))
     force = averaged_force(own, [_set(log, 0.0)]) if own.effects else np.zeros(0)
-    tried = lines_of([(force, log.window.stride * log.window.period)]) if force.any() else ()
+    tried = lines_in_time([(force, log.window.stride * log.window.period)], most=1)
     if not tried:
         return None
     # A residual is what the model's force is to cancel.
@@ -120,10 +119,9 @@ def _common_line(logs: Sequence[PreparedLog], left: Sequence[Array]) -> tuple[fl
     None where it may be chance.
     """
     steps = [log.window.stride * log.window.period for log in logs]
-    tried = lines_of(list(zip(left, steps, strict=True)))[:TRIED]
+    tried = lines_in_time(list(zip(left, steps, strict=True)), most=TRIED)
     if not tried:
         return None
-    width = 1.0 / max(len(part) * step for part, step in zip(left, steps, strict=True))
 
     def explained(frequency: float) -> float:
         pairs = zip(logs, left, strict=True)
@@ -131,8 +129,7 @@ def _common_line(logs: Sequence[PreparedLog], left: Sequence[Array]) -> tuple[fl
             0.5 * len(part) * abs(_amplitude(log.time, part, frequency)) ** 2 for log, part in pairs
         )
 
-    about = [f + width * d for f in tried for d in FINE if f + width * d > 0.0]
-    best = max(about, key=explained)
+    best = max(tried, key=explained)
     every = np.concatenate(left)
     gain = -np.log(max(1.0 - explained(best) / float(np.sum(every**2)), 1e-12))
     samples = effective_samples(every)

@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.dataset.spectral_lines import lines_of
+from identify.dataset.spectral_lines import lines_in_time
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.force_balance import jacobian, residual
@@ -123,8 +123,9 @@ def _with_lines_left(base: Fit, dataset: Dataset) -> Excitation:
     every[base.kept] = base.residual
     ends = np.cumsum([len(w) for w in dataset.fit])[:-1]
     parts = zip(np.split(every, ends), dataset.fit, strict=True)
-    left = lines_of([(part, w.window.stride * w.window.period) for part, w in parts])
-    return replace(dataset.excitation, lines=(*left[:RESIDUAL_LINES], *dataset.excitation.lines))
+    forces = [(part, w.window.stride * w.window.period) for part, w in parts]
+    left = lines_in_time(forces, most=RESIDUAL_LINES)
+    return replace(dataset.excitation, lines=(*left, *dataset.excitation.lines))
 
 
 def tried_shapes(effect: Effect, excitation: Excitation) -> Iterator[dict[str, float]]:

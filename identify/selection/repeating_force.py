@@ -6,31 +6,30 @@ function of position holds for both, and a model with it would not generalise. T
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, on_blocks, total_force
+from identify.dataset.spectral_lines import Record, SpectralLine, find_lines
+from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
 from twin.model.units import LINEAR, AxisUnits
 
 Array = NDArray[np.float64]
 
-CELLS = 1 << 14  # along the travel
 FEWEST_CYCLES = 10  # over the travel
-AROUND = 61  # half cycles that are taken for what surrounds a line
-PROMINENT = 5.0  # amplitude of a line over that around it
+MOST_CYCLES = 4096  # over the travel
 SHARED = 0.02  # relative difference of two periods that are one
 SAME = 0.5  # difference of two terms over the larger, below which they are one
 
 
 @dataclass(frozen=True)
 class Repeat:
-    """A force of one period in position: amplitude (N) and phase (rad, at x = 0) in each log.
+    """A force of one period in position: amplitude (N) and phase (rad, at one place) in each log.
 
     units: of the axis, by which N and m are to be read.
     """
@@ -63,15 +62,20 @@ def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:
     logs = (*dataset.fit, *dataset.holdout)
     if len(logs) < 2:
         return None
-    forces = [_left(fit, log) for log in logs]
-    lines = [_line(f, log.motion.position) for f, log in zip(forces, logs, strict=True)]
-    periods = [p for p in lines if p is not None]
+    records = [Record(log.motion.position, _left(fit, log)) for log in logs]
+    lines = [_strongest([record]) for record in records]
+    periods = [line.period for line in lines if line is not None]
     if len(periods) < len(logs) or np.ptp(periods) > SHARED * periods[0]:
         return None
+    common = _strongest(records)
     period = float(np.median(periods))
+    if common is not None and abs(common.period - period) <= SHARED * period:
+        period = common.period
+    # Far from the data a phase would hold the error of the period, times the periods between.
+    middle = float(np.mean(np.concatenate([r.coordinate for r in records])))
     terms = {
-        log.motion.name: _term(force, log.motion.position, period)
-        for force, log in zip(forces, logs, strict=True)
+        log.motion.name: _term(record.values, record.coordinate - middle, period)
+        for record, log in zip(records, logs, strict=True)
     }
     found = Repeat(
         period,
@@ -89,20 +93,13 @@ def _left(fit: Fit, log: PreparedLog) -> Array:
     return np.asarray(m.command + total_force(on_blocks(fit.axis), m) - inertia)
 
 
-def _line(force: Array, position: Array) -> float | None:
-    """Period (m) of the strongest line in position, if one stands out."""
-    low, span = float(position.min()), float(np.ptp(position))
+def _strongest(records: Sequence[Record]) -> SpectralLine | None:
+    """The strongest line in position that all the records share, if one stands out."""
+    span = max(r.span for r in records)
     if span <= 0.0:
         return None
-    place = np.rint((position - low) / span * (CELLS - 1)).astype(int)
-    spectrum = np.abs(np.fft.rfft(np.bincount(place, force, CELLS), 2 * CELLS))
-    around = median_filter(spectrum, AROUND, mode="nearest")
-    first = 2 * FEWEST_CYCLES
-    prominence = spectrum[first : CELLS // 4] / np.maximum(around[first : CELLS // 4], 1e-300)
-    best = int(np.argmax(prominence))
-    if prominence[best] < PROMINENT:
-        return None
-    return 2.0 * span * CELLS / (CELLS - 1) / (first + best)
+    lowest, highest = FEWEST_CYCLES / span, MOST_CYCLES / span
+    return next(iter(find_lines(records, lowest, highest, most=1, chance=RULE.line_chance)), None)
 
 
 def _term(force: Array, position: Array, period: float) -> complex:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog
+from identify.dataset.spectral_lines import Record, find_lines
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit
@@ -19,7 +20,9 @@ from twin.model.units import LINEAR
 Array = NDArray[np.float64]
 
 BINS = (24, 96, 384)  # numbers of bins along a coordinate
-PROMINENT = 0.2  # share of the residual's square from which a line is a period
+FEWEST_CYCLES = 2  # over the span, below which a repetition is not one
+WINDOWS_A_PERIOD = 4
+TRIED = 6  # least likely by chance, of which the strongest counts
 
 
 @dataclass(frozen=True)
@@ -211,18 +214,13 @@ def line(
     span = float(np.ptp(coordinate))
     if span == 0.0:
         return None
-    place = (coordinate - coordinate.min()) / span * (GRID - 1)
-    cells = np.split(np.rint(place).astype(int), runs)
-    power = np.zeros(2 * GRID + 1)  # in quarters of a cycle over the span
-    for cell, part in zip(cells, np.split(residual, runs), strict=True):
-        power += np.abs(np.fft.rfft(np.bincount(cell, part, GRID), 4 * GRID)) ** 2 / len(part)
-    power /= np.sum(residual**2) / 2.0
-    last = int(4 * min(len(residual) / 4.0, GRID / 8.0))
-    best = FEWEST + int(np.argmax(power[FEWEST:last]))
-    strength = float(min(power[best], 1.0))
-    period = span * GRID / (GRID - 1) / best * 4.0
-    return (period, strength) if strength > PROMINENT else None
-
-
-GRID = 8192  # cells along a coordinate
-FEWEST = 8  # quarters of a cycle over the span, below which a repetition is not one
+    parts = zip(np.split(coordinate, runs), np.split(residual, runs), strict=True)
+    found = find_lines(
+        [Record(*part) for part in parts],
+        FEWEST_CYCLES / span,
+        len(residual) / (WINDOWS_A_PERIOD * span),
+        most=TRIED,
+        chance=RULE.line_chance,
+    )
+    best = max(found, key=lambda f: f.share, default=None)
+    return (best.period, best.share) if best and best.share > RULE.line_share else None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from constructed import dataset_of, effect, fit_of, moved, windowed
 
-from identify.dataset.spectral_lines import lines_of
+from identify.dataset.spectral_lines import lines_in_time
 from identify.estimation.decision import RULE
 from identify.estimation.force_balance import residual
 from identify.estimation.time_origin import _common_line, synchronised, time_origins
@@ -36,7 +36,7 @@ def test_a_line_of_less_evidence_than_its_phases_cost_is_chance():
     """Samples x gain must exceed two numbers a log: in all logs it does, in one it does not."""
     height = 11.5 / np.sqrt(N)
     alone = left([height, 0.0, 0.0, 0.0])
-    assert any(abs(f - F) < 0.1 for f in lines_of([(alone[0], STEP)]))
+    assert any(abs(f - F) < 0.1 for f in lines_in_time([(alone[0], STEP)]))
     needed = 2 * 4 * np.log(4 * N) + RULE.least_bic
     assert 0.5 * height**2 * N < needed < 4.0 * 0.5 * height**2 * N
     assert _common_line(LOGS, alone) is None

@@ -13,7 +13,6 @@ from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
 from identify.selection.residual_dependence import (
     BINS,
-    PROMINENT,
     _foremost,
     _share,
     _shares,
@@ -80,7 +79,7 @@ def test_a_line_of_the_residual_has_its_period_and_share(period):
     assert (moved_, again) == pytest.approx((3.0 * found, strength), rel=1e-6)
     assert line(RNG.normal(size=3000), x) is None
     assert line(r, 0.0 * x) is None
-    assert PROMINENT < 0.5
+    assert RULE.line_share < 0.5
 
 
 def test_a_line_in_several_runs_keeps_its_period_but_not_its_phase():
