@@ -85,7 +85,7 @@ def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:
 def _left(fit: Fit, log: PreparedLog) -> Array:
     """Force (n,) N that the model leaves in each block."""
     m = log.motion
-    inertia = fit.axis.mass * np.gradient(m.velocity, m.period)
+    inertia = fit.axis.mass * m.acceleration
     return np.asarray(m.command + total_force(on_blocks(fit.axis), m) - inertia)
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from twin.signals import Array, rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +31,7 @@ class Motion:
         phase = 2.0 * np.pi * dt * np.arange(cycles * samples)
         bent = phase + 0.4 * np.sin(2.0 * phase + 0.5)
         v = 2.0 * np.pi * amplitude * np.cos(bent) * (1.0 + 0.8 * np.cos(2.0 * phase + 0.5))
-        return cls(dt, amplitude * np.sin(bent), v, np.gradient(v, dt))
+        return cls(dt, amplitude * np.sin(bent), v, rate(v, dt))
 
     @classmethod
     def random(cls, rng: np.random.Generator, samples: int = 400, dt: float = 1e-4) -> Motion:
