@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from identify.dataset.drive import actual_force, parts_of, true_motion
 from identify.dataset.prepared_log import PreparedLog, total_force
 from twin.effect import Kind
-from twin.model.machine import AxisModel, ParameterReference, axis_table, read, write
+from twin.model.machine import AxisModel, axis_table
+from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]
 

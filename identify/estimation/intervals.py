@@ -18,7 +18,7 @@ from scipy.stats import t as student
 from identify.estimation.evidence import left_out
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
-from twin.model.machine import ParameterReference, read, write
+from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]
 

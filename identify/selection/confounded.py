@@ -19,7 +19,8 @@ from identify.estimation.subspace import orthonormal, unabsorbed
 from identify.selection.candidates import absent_effects
 from twin.effect import Kind
 from twin.effects import Catalogue
-from twin.model.machine import AxisModel, Fitted, ParameterReference, read, write
+from twin.model.machine import AxisModel, Fitted
+from twin.model.parameters import ParameterReference, read, write
 from twin.model.units import LINEAR
 
 Array = NDArray[np.float64]

@@ -39,7 +39,8 @@ from identify.estimation.force_balance import (
 )
 from twin.effect import Kind, Parameter
 from twin.laws.values import legal
-from twin.model.machine import AxisModel, Fitted, ParameterReference, free_parameters, read, write
+from twin.model.machine import AxisModel, Fitted
+from twin.model.parameters import ParameterReference, free_parameters, read, write
 
 H = np.array([[-1e-4], [0.0], [1e-4]])  # s
 LOGS = [windowed(SHORT)]

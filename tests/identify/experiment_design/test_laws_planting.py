@@ -45,7 +45,8 @@ from identify.validation.free_run import (
 )
 from twin.core.native import walk
 from twin.effect import Parameter
-from twin.model.machine import AxisModel, Hardware, MachineModel, axis_table, free_parameters, read
+from twin.model.machine import AxisModel, Hardware, MachineModel, axis_table
+from twin.model.parameters import free_parameters, read
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
 LOGS = [
