@@ -9,7 +9,7 @@ from typing import Any
 from identify.estimation.intervals import Estimate
 from identify.experiment_design.discrimination import Trial
 from identify.experiment_design.plan import Plan
-from identify.output.remarks import remarks
+from identify.output.remarks import remarks_on
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
@@ -182,8 +182,9 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         },
         "refit": _refit(result.refits.get(axis)),
         "not_tried": list(result.not_tried),
-        "notes": list(remarks(d, result.refits.get(axis), result.not_tried)),
+        "notes": list(remarks_on(result, axis)),
         "next_experiment": following and plan_json(following),
+        "next_experiment_refused": result.not_planned.get(axis),
     }
 
 

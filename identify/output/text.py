@@ -10,7 +10,7 @@ from identify.estimation.intervals import Estimate, refusal
 from identify.experiment_design.discrimination import Trial
 from identify.experiment_design.plan import Plan
 from identify.experiment_design.rival_hypotheses import STRENGTH
-from identify.output.remarks import remarks
+from identify.output.remarks import remarks_on
 from identify.selection.candidates import Candidate
 from identify.selection.forward_selection import Step
 from identify.selection.nonparametric import described_labels, in_words
@@ -111,9 +111,7 @@ def diagnose_text(result: Diagnosis) -> str:
             lines.append(f"  {advice()}")
         lines += [_ranking_line(c) for c in d.ranking[:4]]
         lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
-        lines += [
-            f"  note: {remark}" for remark in remarks(d, result.refits.get(axis), result.not_tried)
-        ]
+        lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]
     return "\n".join(lines)
 
 
