@@ -110,10 +110,11 @@ def refusal(fit: Fit) -> str | None:
         return "no interval: the axis comes to rest within every window of these logs"
     if fit.ratio <= LARGEST_RATIO:
         return None
-    unit = fit.axis.units.force
+    units, unit = fit.axis.units, fit.axis.units.force
     return (
-        f"no interval: the force error {fit.error:.3g} {unit} stands {fit.ratio:.1f} times above "
-        f"the noise floor {fit.floor:.3g} {unit}, so the model is wrong by more than noise"
+        f"no interval: the {units.words('force error')} {fit.error:.3g} {unit} stands "
+        f"{fit.ratio:.1f} times above the noise floor {fit.floor:.3g} {unit}, so the "
+        "model is wrong by more than noise"
     )
 
 

@@ -39,7 +39,7 @@ def fit_json(result: FitResult) -> dict[str, Any]:
     return {
         "axes": {
             axis: {
-                "outcome": fit.ended.value,
+                "outcome": fit.axis.units.words(fit.ended.value),
                 "converged": fit.ended.name != "NOT_CONVERGED",
                 "at_bound": list(fit.at_bound),
                 "force_error": fit.error,
@@ -118,9 +118,9 @@ def _axis_comparison(c: AxisComparison) -> dict[str, Any]:
 
 def _residual_tests(t: ResidualTests, units: AxisUnits) -> dict[str, Any]:
     return {
-        "tested": "force residual",
+        "tested": units.words("force residual"),
         "loop": t.loop.name.lower(),
-        "reason": t.reason,
+        "reason": units.words(t.reason),
         "samples": t.samples,
         "passed": t.passes,
         "histogram": {
@@ -152,7 +152,7 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
     following = result.next_experiments.get(axis)
     return {
         "verdict": d.verdict.name.lower(),
-        "explanation": d.verdict.value,
+        "explanation": units.words(d.verdict.value),
         "axis": axis,
         "effect": d.best.effect.name if d.best else None,
         "ranking": [_candidate(c) for c in d.ranking],

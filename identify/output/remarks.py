@@ -32,17 +32,18 @@ def remarks(
     not_tried: effects that depend on the other axis, where there are several. not_planned: why no
     experiment is proposed that would tell an ambiguous answer apart.
     """
+    words = found.base.axis.units.words
     out = []
     if refit and (changed := refit.in_words()):
         out.append(changed)
     if shifted := shift_in_words(found.dataset):
         out.append(shifted)
     if found.base.ended is not Outcome.CONVERGED:
-        out.append(found.base.ended.value)
+        out.append(words(found.base.ended.value))
     if found.best is not None:
         name = found.best.effect.name
         if found.best.fit.ended is not Outcome.CONVERGED:
-            out.append(f"with {name}: {found.best.fit.ended.value}")
+            out.append(f"with {name}: {words(found.best.fit.ended.value)}")
         out += [f"with {name}, {m}" for m in moved_parameters(found.base, found.best.fit)]
     if found.repeat is not None:
         out.append(found.repeat.in_words())
