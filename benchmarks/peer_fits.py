@@ -14,7 +14,7 @@ from benchmarks.slides import DURATION, Recording, Slide, damped_slide, lugre_sl
 from benchmarks.sysid_fit import DEFAULT, SCALED, Peer, fit_with_sysid
 from benchmarks.timing import Array, interleaved
 from identify import workflow
-from twin.model.machine import read
+from twin.model.parameters import read
 
 TITLE = f"Fits against mujoco.sysid: {DURATION:g} s at 10 kHz, start 50 % off"
 START = 0.5  # of the true values

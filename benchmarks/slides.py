@@ -16,15 +16,8 @@ import numpy as np
 from benchmarks.timing import Array
 from twin.effects import load_catalogue
 from twin.log import AxisLog, Log
-from twin.model.machine import (
-    AxisModel,
-    Fitted,
-    MachineModel,
-    ParameterReference,
-    free_parameters,
-    read,
-    write,
-)
+from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.model.parameters import ParameterReference, free_parameters, read, write
 
 PERIOD = 1e-4  # s
 DURATION = 5.0  # s

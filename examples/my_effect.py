@@ -1,6 +1,7 @@
 """A user's own effect: a magnetic detent that pulls the axis to one place.
 
 F = -k d exp(-(d / w)^2), d = x - place. Try it: twin effects --effects my_effect.py my_effect
+Does it obey the laws of every effect? twin effects --effects my_effect.py --check
 
 A file like this is tried as it is loaded, and what is wrong with it is said in one line:
 

@@ -13,17 +13,17 @@ from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.fit import Fit, error_on, rms
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates
-from identify.experiment_design.plan import next_experiment, plan
+from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
 from identify.selection.candidates import Candidate, score, try_effect, usable
 from identify.selection.confounded import moved_parameters
-from identify.selection.forward_selection import diagnose_axis
+from identify.selection.forward_selection import AxisDiagnosis, diagnose_axis
 from identify.selection.nonparametric import describe, in_words, physics_alone
 from identify.validation.free_run import free_run, rms_error
 from identify.validation.misfit_maps import compare_axis, position_errors
 from twin.effect import Effect
 from twin.effects import Catalogue
-from twin.errors import InputError
+from twin.errors import CannotRun, InputError
 from twin.log import Log
 from twin.model.machine import AxisModel, HistoryStep, MachineModel
 from twin.simulator import MujocoSimulator
@@ -136,15 +136,32 @@ def diagnose(
         )
         for axis, fitted in result.fits.items()
     }
-    plans = {axis: next_experiment(found, result.model, window) for axis, found in axes.items()}
+    plans, not_planned = _next_experiments(axes, result.model, window)
     return Diagnosis(
         result.model,
         axes,
         _compared(result.model, result.datasets, progress),
-        {axis: found for axis, found in plans.items() if found is not None},
+        plans,
         result.refits,
         tuple(name for name in catalogue if name not in known),
+        not_planned,
     )
+
+
+def _next_experiments(
+    axes: Mapping[str, AxisDiagnosis], model: MachineModel, window: float | None
+) -> tuple[dict[str, Plan], dict[str, str]]:
+    """By axis, the experiment that decides an ambiguous diagnosis, or why there is none."""
+    plans, not_planned = {}, {}
+    for axis, found in axes.items():
+        try:
+            following = next_experiment(found, model, window)
+        except CannotRun as why:
+            not_planned[axis] = str(why)
+        else:
+            if following is not None:
+                plans[axis] = following
+    return plans, not_planned
 
 
 def add(

@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from effect_runs import CATALOGUE, Array
+from effect_runs import CATALOGUE
 
 from twin.core.control import Controller
 from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
 from twin.experiments.trajectory import Setpoint
+from twin.laws.motion import Array
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 

@@ -18,7 +18,8 @@ from identify.selection.candidates import Candidate
 from identify.selection.forward_selection import Stage, Step
 from twin.effect import Effect, Excitation
 from twin.effects import load_catalogue
-from twin.model.machine import AxisModel, Fitted, Hardware, free_parameters
+from twin.model.machine import AxisModel, Fitted, Hardware
+from twin.model.parameters import free_parameters
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from effect_runs import companion
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
@@ -16,6 +15,7 @@ from identify.estimation.fit import Fit, finished
 from identify.estimation.fit import Outcome as Ended
 from twin.effect import Excitation
 from twin.effects import load_catalogue
+from twin.laws.values import companion
 from twin.log import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from effect_runs import CATALOGUE, Array
+from effect_runs import CATALOGUE
 from scipy.optimize import brentq
 
 from twin.core.control import Controller
 from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
 from twin.core.native import walk
 from twin.experiments.trajectory import Setpoint
+from twin.laws.motion import Array
 from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 

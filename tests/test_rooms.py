@@ -20,6 +20,7 @@ ROOMS = (
     "output", "workflow", "demo", "cli",
 )  # fmt: skip
 MOST_FLOORS = 10
+ONE_OF_EACH = re.compile(r"np\.gradient|savgol|0\.6745|np\.diff\([^)]*\) / ")
 UNIT_SELECTORS = re.compile(r"""\bunit\s*(==|!=|in|not in)\s*[(\[{]?["'](?!1["'])""")
 
 
@@ -114,6 +115,12 @@ def test_only_effects_know_a_pitch_a_unit_or_another_number_of_the_stage() -> No
         text = path.read_text()
         assert "0.034" not in text, f"{path} knows the rollers' pitch"
         assert not UNIT_SELECTORS.search(text), f"{path} selects by a unit"
+
+
+def test_signals_are_differentiated_and_smoothed_in_one_file() -> None:
+    for path in [*IDENTIFY.rglob("*.py"), *TWIN.rglob("*.py")]:
+        own = ONE_OF_EACH.search(path.read_text())
+        assert not own or path == TWIN / "signals.py", f"{path}: {own} is in twin/signals.py"
 
 
 def test_only_its_own_file_names_an_effect() -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,6 +20,10 @@ from identify.cli.shared import (
     require_folder,
     say,
 )
+from twin.errors import InputError
+
+if TYPE_CHECKING:
+    from twin.effects import Catalogue
 
 
 @app.command()
@@ -112,13 +117,22 @@ def effects(
         Path | None, typer.Option(help="Draw what the effect leaves in the force (.png, .svg).")
     ] = None,
     files: Effects = None,
+    check_: Annotated[
+        bool, typer.Option("--check", help="Run the laws that every effect obeys.")
+    ] = False,
     as_json_: Json = False,
 ) -> None:
-    """Print the catalogue, or one effect with its equation, units and source."""
+    """Print the catalogue, or one effect with its equation, units and source; or check it."""
     from identify.output import as_json
     from identify.output import text as as_text
 
     catalogue = catalogue_with(files)
+    if check_:
+        if plot is not None:
+            raise InputError(f"--check draws nothing; give --plot {plot} in a command of its own")
+        names = [f.stem for f in files or ()] if name is None else [name]
+        _put_to_the_laws(catalogue, names, as_json_)
+        return
     if name is not None:
         chosen = catalogue[name]
         if plot is not None:
@@ -134,3 +148,18 @@ def effects(
         {"effects": [as_json.effect_json(e) for e in everything]},
         as_json_,
     )
+
+
+def _put_to_the_laws(catalogue: Catalogue, names: Sequence[str], as_json_: bool) -> None:
+    """Check these effects; exit code 1 where a law does not hold."""
+    from identify.output.laws import laws_json, laws_text
+    from twin.laws.verdict import check_effect
+
+    if not names:
+        raise InputError(
+            "--check was given no effect; give the NAME of one, or your own file with --effects"
+        )
+    reports = [check_effect(effect) for effect in [catalogue[name] for name in names]]
+    say(laws_text(reports), laws_json(reports), as_json_)
+    if not all(report.ok for report in reports):
+        raise typer.Exit(1)

@@ -16,6 +16,7 @@ from identify.dataset.motion import Motion
 from twin.core.native import walk, walk_sensing
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, axis_table
+from twin.signals import between
 
 Array = NDArray[np.float64]
 
@@ -95,4 +96,4 @@ def reading_error(sensing: AxisModel, motion: Motion) -> tuple[Array, Array]:
         )  # fmt: skip
         error = seen - true[0]
         true[0] = path - error
-    return error, np.diff(error, append=error[-1]) / motion.sample_period
+    return error, np.append(between(error, motion.sample_period), 0.0)

@@ -13,16 +13,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from twin.errors import InputError
 from twin.log import AxisLog, Log
-from twin.log.check.smooth import white_noise
 from twin.model.machine import MOST_AXES_OF_A_PAIR
 from twin.model.units import LINEAR, AxisUnits
-
-Array = NDArray[np.float64]
+from twin.signals import Array, between, local_parabola, rate, usual_size, white_noise
 
 SHORTEST_BLOCK = 1e-3  # s
 LONGEST_BLOCK = 1e-2  # s
@@ -117,6 +113,11 @@ class Motion:
         return self.signals[1]
 
     @property
+    def acceleration(self) -> Array:
+        """(n,) m/s^2, of the mean velocities of the blocks beside: as noisy as they are short."""
+        return rate(self.velocity, self.period)
+
+    @property
     def command(self) -> Array:
         """(n,) N."""
         return self.signals[2]
@@ -136,7 +137,7 @@ class Motion:
     def smoothed(self) -> Array:
         """Position m at the start of each sample, smoothed; velocity m/s and command N, (3, n)."""
         signals = self.at_samples(0.0)
-        signals[0] = savgol_filter(signals[0], SMOOTHED, 2)
+        signals[0] = local_parabola(signals[0], SMOOTHED)
         return signals
 
     @cached_property
@@ -153,8 +154,8 @@ class Motion:
         scale = np.sqrt(np.mean(past**2)) or 1.0
         rows, wanted = past / scale, command[lags - 1 :]
         gains = np.linalg.lstsq(rows.T @ rows, rows.T @ wanted, rcond=1e-12)[0]
-        left = np.median(np.abs(wanted - rows @ gains)) / 0.6745
-        return float(2.0 * self.sample_period * left**2 / 6.0)
+        left = usual_size(wanted - rows @ gains)
+        return 2.0 * self.sample_period * left**2 / 6.0
 
     @cached_property
     def resolution(self) -> float:
@@ -219,7 +220,7 @@ def motion_of(log: Log, axis: str, name: str, machine: Sequence[str] = ()) -> Mo
         other_units=LINEAR if other is None else other.units,
         beside=found if several else {},
         position_noise=noise,
-        raw=np.stack([np.diff(position) / log.period, force[:-1]])[:, : block * signals.shape[1]],
+        raw=np.stack([between(position, log.period), force[:-1]])[:, : block * signals.shape[1]],
         follows=_follows(log.axes[axis]),
     )
 
@@ -247,7 +248,7 @@ def _other(log: Log, axis: str, block: int) -> OtherAxis:
     """Another axis of a log in blocks of some samples."""
     x = log.axes[axis].position
     position, velocity, _ = _blocks(*_midpoints(x, x, log.period), block)
-    acceleration = np.gradient(velocity, block * log.period)
+    acceleration = rate(velocity, block * log.period)
     return OtherAxis(np.stack([position, velocity, acceleration]), log.axes[axis].kind)
 
 
@@ -262,7 +263,7 @@ def _block_samples(position: Array, noise: float, period: float) -> int:
 def _midpoints(position: Array, force: Array, period: float) -> tuple[Array, Array, Array]:
     return (
         0.5 * (position[1:] + position[:-1]),
-        np.diff(position) / period,
+        between(position, period),
         force[:-1],
     )
 

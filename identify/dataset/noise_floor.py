@@ -25,6 +25,7 @@ from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, on_blocks, sticks, total_force
 from identify.dataset.test_function import TestFunction
 from twin.model.machine import AxisModel
+from twin.signals import between
 
 Array = NDArray[np.float64]
 
@@ -102,7 +103,7 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     # The loop's own noise is in the command and moves the axis; a delay left out would tear the two
     # apart and pass for measurement noise.
     command = actual_force(axis, motion)
-    raw = 0.5 * (command[1:] + command[:-1]) - axis.mass * np.diff(velocity) / dt
+    raw = 0.5 * (command[1:] + command[:-1]) - axis.mass * between(velocity, dt)
     # What the model explains, a bump passed at speed say, is not noise either.
     raw += _between_samples(total_force(on_blocks(axis), motion), motion)
     # The median over segments passes by those with spikes and reversals.

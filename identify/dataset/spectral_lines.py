@@ -248,9 +248,7 @@ def ripples(motions: Sequence[Motion]) -> tuple[float, ...]:
 def _rest(motion: Motion) -> Array:
     """Command that a rough model leaves, (n,) N."""
     x, v = motion.position, motion.velocity
-    rows = np.stack(
-        [np.gradient(v, motion.period), np.sign(v), v, np.ones_like(x), x, x**2, x**3], axis=1
-    )
+    rows = np.stack([motion.acceleration, np.sign(v), v, np.ones_like(x), x, x**2, x**3], axis=1)
     rows /= np.maximum(np.abs(rows).max(axis=0), 1e-300)
     solution = np.linalg.lstsq(rows, motion.command, rcond=None)[0]
     return np.asarray(motion.command - rows @ solution)

@@ -11,11 +11,9 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.errors import InputError
-
-Array = NDArray[np.float64]
+from twin.signals import Array, between
 
 OVERLAP = 4  # windows that cover one instant
 LEAST_BLOCKS = 8  # that a window spans
@@ -55,7 +53,7 @@ class TestFunction:
     def _of_blocks(cls, n: int, period: float, stride: int) -> TestFunction:
         edges = (1.0 - (np.arange(n + 1) / n * 2.0 - 1.0) ** 2) ** 2
         phi = 0.5 * (edges[1:] + edges[:-1])
-        return cls(period, phi / phi.sum(), np.diff(edges) / phi.sum() / period, stride)
+        return cls(period, phi / phi.sum(), between(edges, period) / phi.sum(), stride)
 
     def sharpened(self, parts: int) -> TestFunction:
         """The same for means over blocks of ``parts`` samples of what varies within a block.

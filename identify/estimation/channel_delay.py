@@ -122,8 +122,9 @@ def shift_in_words(dataset: Dataset) -> str | None:
     if dataset.channel_delay == 0.0:
         return None
     samples = dataset.channel_delay / dataset.fit[0].motion.sample_period
+    words = dataset.units.words
     return (
-        f"axis {dataset.axis}: the force acts {1e6 * dataset.channel_delay:.0f} us "
+        f"axis {dataset.axis}: the {words('force')} acts {1e6 * dataset.channel_delay:.0f} us "
         f"({samples:.2f} samples) before its time stamp, which no drive can do; the log was "
-        "corrected. Check how force and position are sampled"
+        f"corrected. Check how {words('force and position')} are sampled"
     )

@@ -24,7 +24,8 @@ from identify.estimation.levenberg_marquardt import minimise
 from identify.estimation.scaling import Scaling
 from identify.estimation.smoothing import described, smoothing
 from twin.effect import Kind
-from twin.model.machine import AxisModel, ParameterReference, free_parameters, read
+from twin.model.machine import AxisModel
+from twin.model.parameters import ParameterReference, free_parameters, read
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,8 @@ from identify.dataset.prepared_log import PreparedLog, total_force, total_forces
 from twin.core.calling import P_AT
 from twin.core.native import Table
 from twin.effect import Kind
-from twin.model.machine import AxisModel, ParameterReference, axis_table, read, write
+from twin.model.machine import AxisModel, axis_table
+from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from scipy.stats import t as student
 from identify.estimation.evidence import left_out
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
-from twin.model.machine import ParameterReference, read, write
+from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]
 
@@ -110,10 +110,11 @@ def refusal(fit: Fit) -> str | None:
         return "no interval: the axis comes to rest within every window of these logs"
     if fit.ratio <= LARGEST_RATIO:
         return None
-    unit = fit.axis.units.force
+    units, unit = fit.axis.units, fit.axis.units.force
     return (
-        f"no interval: the force error {fit.error:.3g} {unit} stands {fit.ratio:.1f} times above "
-        f"the noise floor {fit.floor:.3g} {unit}, so the model is wrong by more than noise"
+        f"no interval: the {units.words('force error')} {fit.error:.3g} {unit} stands "
+        f"{fit.ratio:.1f} times above the noise floor {fit.floor:.3g} {unit}, so the "
+        "model is wrong by more than noise"
     )
 
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.model.machine import AxisModel, ParameterReference, read, write
+from twin.model.machine import AxisModel
+from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]
 

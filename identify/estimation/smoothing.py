@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.effect import Part
-from twin.model.machine import AxisModel, ParameterReference
+from twin.model.machine import AxisModel
+from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,8 @@ from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.effect import Effect, Excitation, Kind, Parameter
-from twin.model.machine import AxisModel, Fitted, ParameterReference, read, write
+from twin.model.machine import AxisModel, Fitted
+from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]
 

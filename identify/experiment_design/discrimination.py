@@ -32,7 +32,8 @@ from twin.experiments.experiment import Experiment
 from twin.experiments.named import outside_travel, simulate
 from twin.log import Log
 from twin.log.check import moves
-from twin.model.machine import AxisModel, MachineModel, free_parameters, read
+from twin.model.machine import AxisModel, MachineModel
+from twin.model.parameters import free_parameters, read
 from twin.model.units import AxisUnits
 from twin.simulator import ReducedSimulator
 

@@ -32,9 +32,10 @@ class Feature:
     of: Callable[[PreparedLog], Array]
     other: bool = False
 
-    def unit_on(self, motion: Motion) -> str:
-        """Its unit on that motion."""
-        return (motion.other_units if self.other else motion.units)(self.unit)
+    def on(self, motion: Motion) -> tuple[str, str]:
+        """Its name and its unit on that motion."""
+        units = motion.other_units if self.other else motion.units
+        return units.words(self.name), units(self.unit)
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ def gap(motion: PreparedLog, where: Array, logs: Sequence[PreparedLog]) -> Gap:
             share = _inside(np.concatenate([feature.of(log) for log in logs]), low, high)
         missed = 1.0 if share is None else share + SELDOM
         merit = missed * _inside(values, low, high)
-        found.append((merit, Gap(feature.name, feature.unit_on(motion.motion), low, high, share)))
+        found.append((merit, Gap(*feature.on(motion.motion), low, high, share)))
     return min(found, key=lambda pair: pair[0])[1]
 
 

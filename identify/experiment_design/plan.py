@@ -114,7 +114,8 @@ def next_experiment(
 
     window: the one that the diagnosis was asked to use, s.
 
-    None for any other verdict, and where the model does not say how far its axes may travel.
+    None for any other verdict. Raises CannotRun where the machine can run none, and where the model
+    does not say how far its axes may travel.
     """
     if found.verdict is not Verdict.AMBIGUOUS or found.best is None:
         return None
@@ -123,12 +124,9 @@ def next_experiment(
     if len(rivals) < 2:
         return None
     arena = replace(_between_candidates(model, found.dataset, rivals), window=window)
-    try:
-        return _planned(
-            arena, NEXT_DURATION, NEXT_VERIFIED, False, {c.effect.name: c.effect for c in rivals}
-        )
-    except CannotRun:
-        return None
+    return _planned(
+        arena, NEXT_DURATION, NEXT_VERIFIED, False, {c.effect.name: c.effect for c in rivals}
+    )
 
 
 def _planned(

@@ -16,7 +16,8 @@ from identify.estimation.fit import Fit, rms
 from identify.estimation.force_balance import residual
 from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.effect import Effect, Excitation, Parameter
-from twin.model.machine import AxisModel, Fitted, free_parameters, read, write
+from twin.model.machine import AxisModel, Fitted
+from twin.model.parameters import free_parameters, read, write
 
 Array = NDArray[np.float64]
 

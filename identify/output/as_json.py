@@ -9,7 +9,7 @@ from typing import Any
 from identify.estimation.intervals import Estimate
 from identify.experiment_design.discrimination import Trial
 from identify.experiment_design.plan import Plan
-from identify.output.remarks import remarks
+from identify.output.remarks import remarks_on
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
@@ -39,7 +39,7 @@ def fit_json(result: FitResult) -> dict[str, Any]:
     return {
         "axes": {
             axis: {
-                "outcome": fit.ended.value,
+                "outcome": fit.axis.units.words(fit.ended.value),
                 "converged": fit.ended.name != "NOT_CONVERGED",
                 "at_bound": list(fit.at_bound),
                 "force_error": fit.error,
@@ -118,9 +118,9 @@ def _axis_comparison(c: AxisComparison) -> dict[str, Any]:
 
 def _residual_tests(t: ResidualTests, units: AxisUnits) -> dict[str, Any]:
     return {
-        "tested": "force residual",
+        "tested": units.words("force residual"),
         "loop": t.loop.name.lower(),
-        "reason": t.reason,
+        "reason": units.words(t.reason),
         "samples": t.samples,
         "passed": t.passes,
         "histogram": {
@@ -152,7 +152,7 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
     following = result.next_experiments.get(axis)
     return {
         "verdict": d.verdict.name.lower(),
-        "explanation": d.verdict.value,
+        "explanation": units.words(d.verdict.value),
         "axis": axis,
         "effect": d.best.effect.name if d.best else None,
         "ranking": [_candidate(c) for c in d.ranking],
@@ -182,8 +182,9 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         },
         "refit": _refit(result.refits.get(axis)),
         "not_tried": list(result.not_tried),
-        "notes": list(remarks(d, result.refits.get(axis), result.not_tried)),
+        "notes": list(remarks_on(result, axis)),
         "next_experiment": following and plan_json(following),
+        "next_experiment_refused": result.not_planned.get(axis),
     }
 
 

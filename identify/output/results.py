@@ -78,7 +78,8 @@ class Diagnosis:
 
     next_experiments: for an axis whose diagnosis is ambiguous, the experiment that decides.
     refits: what fitting the model as given changed, by axis. not_tried: effects of the catalogue
-    that depend on the other axis, on a machine with more than two axes.
+    that depend on the other axis, on a machine with more than two axes. not_planned: for an
+    ambiguous axis without next experiment, why the machine can run none.
     """
 
     model: MachineModel
@@ -87,6 +88,7 @@ class Diagnosis:
     next_experiments: Mapping[str, Plan] = field(default_factory=dict)
     refits: Mapping[str, Refit] = field(default_factory=dict)
     not_tried: tuple[str, ...] = ()
+    not_planned: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def leading(self) -> AxisDiagnosis:

@@ -16,6 +16,7 @@ from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.model.file import write_atomically
 from twin.model.machine import AxisModel, Fitted, axis_table
+from twin.signals import rate
 
 Array = NDArray[np.float64]
 
@@ -34,12 +35,12 @@ def exemplary_motion() -> Motion:
         t = np.arange(0.0, 2.0 * half, PERIOD)
         parts.append(-REACH * np.cos(np.pi * t / half))
     position = np.concatenate(parts)
-    velocity = np.gradient(position, PERIOD)
-    command = MASS * np.gradient(velocity, PERIOD) + 0.3 * np.sign(velocity)
+    velocity = rate(position, PERIOD)
+    command = MASS * rate(velocity, PERIOD) + 0.3 * np.sign(velocity)
     others = np.zeros((3, len(position)))
     others[0] = 0.5 * np.roll(position, len(position) // 7)
-    others[1] = np.gradient(others[0], PERIOD)
-    others[2] = np.gradient(others[1], PERIOD)
+    others[1] = rate(others[0], PERIOD)
+    others[2] = rate(others[1], PERIOD)
     return Motion(
         name="exemplary", axis="x", signals=np.stack([position, velocity, command]), others=others,
         period=PERIOD, start=0.0, sample_period=PERIOD, position_noise=0.0,

@@ -10,7 +10,7 @@ from identify.estimation.intervals import Estimate, refusal
 from identify.experiment_design.discrimination import Trial
 from identify.experiment_design.plan import Plan
 from identify.experiment_design.rival_hypotheses import STRENGTH
-from identify.output.remarks import remarks
+from identify.output.remarks import remarks_on
 from identify.selection.candidates import Candidate
 from identify.selection.forward_selection import Step
 from identify.selection.nonparametric import described_labels, in_words
@@ -19,7 +19,7 @@ from twin.effects import load_catalogue
 from twin.experiments.file import in_short
 from twin.experiments.kinds import kind_of
 from twin.log.check import CheckReport
-from twin.model.units import ROTARY
+from twin.model.units import ROTARY, units_of
 
 if TYPE_CHECKING:  # results print themselves by these functions
     from identify.output.results import Addition, Comparison, Diagnosis, FitResult
@@ -29,13 +29,13 @@ def fit_text(result: FitResult) -> str:
     """Parameters of each axis, one a line."""
     lines = []
     for axis, fit in result.fits.items():
-        held, unit = result.holdout_error[axis], fit.axis.units.force
+        held, unit, words = result.holdout_error[axis], fit.axis.units.force, fit.axis.units.words
         tail = "" if held is None else f", held out {held:.4g} {unit}"
         lines.append(
-            f"axis {axis}: force error {fit.error:.4g} {unit}{tail}, noise floor "
+            f"axis {axis}: {words('force error')} {fit.error:.4g} {unit}{tail}, noise floor "
             f"{fit.floor:.4g} {unit} (ratio {fit.ratio:.2f})"
         )
-        lines.append(f"  {fit.ended.value}")
+        lines.append(f"  {words(fit.ended.value)}")
         lines += [f"  at its bound: {label}" for label in fit.at_bound]
         if shifted := shift_in_words(result.datasets[axis]):
             lines.append(f"  {shifted}")
@@ -72,17 +72,18 @@ def compare_text(result: Comparison) -> str:
     """Errors by log, and the three worst regions of each axis."""
     lines = []
     for axis, c in result.axes.items():
+        words = c.units.words
         for name, error in c.force_error.items():
             lines.append(
-                f"axis {axis}, {name}: force error {error:.4g} {c.units.force} "
-                f"({error / c.floor:.1f} x noise floor), free-running position error "
+                f"axis {axis}, {name}: {words('force error')} {error:.4g} {c.units.force} "
+                f"({error / c.floor:.1f} x noise floor), {words('free-running position error')} "
                 f"{c.position_error[name]:.3g} {c.units.position}"
             )
         lines += [f"  worst: {region.in_words()}" for region in c.worst]
         if not c.worst:
             lines.append("  nowhere does the error stand above the noise")
-        lines += [f"  {test.in_words()}" for test in c.tests.correlations]
-    lines += dict.fromkeys(c.tests.reason for c in result.axes.values())
+        lines += [f"  {words(test.in_words())}" for test in c.tests.correlations]
+    lines += dict.fromkeys(c.units.words(c.tests.reason) for c in result.axes.values())
     return "\n".join(lines)
 
 
@@ -90,12 +91,12 @@ def diagnose_text(result: Diagnosis) -> str:
     """The answer for each axis with the ranking's head."""
     lines = []
     for axis, d in result.axes.items():
-        unit = d.base.axis.units.force
+        unit, words = d.base.axis.units.force, d.base.axis.units.words
         named = f" {d.best.effect.name}." if d.best else ""
-        lines.append(f"axis {axis}: {d.verdict.value}{named}")
+        lines.append(f"axis {axis}: {words(d.verdict.value)}{named}")
         lines.append(
-            f"  force error {d.base.error:.4g} {unit}, noise floor {d.base.floor:.4g} {unit} "
-            f"(ratio {d.base.ratio:.2f})"
+            f"  {words('force error')} {d.base.error:.4g} {unit}, noise floor "
+            f"{d.base.floor:.4g} {unit} (ratio {d.base.ratio:.2f})"
         )
         if d.ambiguous_with:
             lines.append(f"  cannot be told apart from: {', '.join(d.ambiguous_with)}")
@@ -106,14 +107,12 @@ def diagnose_text(result: Diagnosis) -> str:
             again = f", period {s.period:.4g} {s.unit}" if s.period else ""
             lines.append(
                 f"  {100 * s.share_of_error:.0f} % of the squared error depends on "
-                f"{s.depends_on.replace('_', ' ')}{again}"
+                f"{units_of(s.unit).words(s.depends_on.replace('_', ' '))}{again}"
             )
             lines.append(f"  {advice()}")
         lines += [_ranking_line(c) for c in d.ranking[:4]]
         lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
-        lines += [
-            f"  note: {remark}" for remark in remarks(d, result.refits.get(axis), result.not_tried)
-        ]
+        lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]
     return "\n".join(lines)
 
 
@@ -184,20 +183,20 @@ def _trial_line(t: Trial, several: bool) -> str:
 
 def add_text(result: Addition) -> str:
     """What adding the effect did."""
-    s = result.step
+    s, words = result.step, result.units.words
     lines = [
         f"added {s.effect} to axis {s.axis}",
-        f"  force error on the fit logs   {s.fit_error_before:.4g} -> {s.fit_error_after:.4g} "
-        f"{s.unit}",
+        f"  {words('force error on the fit logs'):29s} {s.fit_error_before:.4g} -> "
+        f"{s.fit_error_after:.4g} {s.unit}",
     ]
     if s.holdout_error_before is not None and s.holdout_error_after is not None:
         lines.append(
-            "  force error held out          "
-            f"{s.holdout_error_before:.4g} -> {s.holdout_error_after:.4g} {s.unit}"
+            f"  {words('force error held out'):29s} {s.holdout_error_before:.4g} -> "
+            f"{s.holdout_error_after:.4g} {s.unit}"
         )
     (before, after), unit = result.position_error, result.units.position
     lines.append(
-        f"  free-running position error   {before:.3g} -> {after:.3g} {unit} "
+        f"  {words('free-running position error'):29s} {before:.3g} -> {after:.3g} {unit} "
         f"(MuJoCo: {result.replayed:.3g} {unit})"
     )
     lines += [f"  {note}" for note in result.notes]

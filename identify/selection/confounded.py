@@ -19,8 +19,9 @@ from identify.estimation.subspace import orthonormal, unabsorbed
 from identify.selection.candidates import absent_effects
 from twin.effect import Kind
 from twin.effects import Catalogue
-from twin.model.machine import AxisModel, Fitted, ParameterReference, read, write
-from twin.model.units import LINEAR
+from twin.model.machine import AxisModel, Fitted
+from twin.model.parameters import ParameterReference, read, write
+from twin.model.units import LINEAR, units_of
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,8 @@ class Change:
 
     def in_words(self) -> str:
         """E.g. "mass 15 -> 15.6 kg makes 0.57 N (payload_mass would be the same force)"."""
-        same = f" ({' and '.join(self.alike)} would be the same force)" if self.alike else ""
+        force = units_of(self.force_unit).words("force")
+        same = f" ({' and '.join(self.alike)} would be the same {force})" if self.alike else ""
         values = f"{self.before:.4g} -> {self.after:.4g} {self.unit}"
         return f"{self.label} {values} makes {self.force:.3g} {self.force_unit}{same}"
 

@@ -26,7 +26,8 @@ from identify.estimation.smoothing import part_rows, smoothing
 from identify.estimation.variable_projection import fit_without
 from identify.selection.candidates import Candidate
 from twin.effect import Effect, Part
-from twin.model.machine import AxisModel, Fitted, MachineModel, ParameterReference
+from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
 

@@ -50,10 +50,11 @@ class Repeat:
         """E.g. "a force repeats every 2.5 mm: 1.0 N in run, 0.9 N in pulses; ..."."""
         sizes = ", ".join(f"{a:.3g} {self.units.force} in {n}" for n, a in self.amplitude.items())
         turns = np.degrees(np.ptp(np.unwrap(list(self.phase.values()))))
+        words = self.units.words
         return (
-            f"a force repeats every {1e3 * self.period:.4g} m{self.units.position} of travel "
-            f"({sizes}), but its phase differs between the logs by {turns:.0f} degrees: "
-            "present in each run, not general, so no effect of position is named for it"
+            f"a {words('force')} repeats every {1e3 * self.period:.4g} m{self.units.position} of "
+            f"travel ({sizes}), but its phase differs between the logs by {turns:.0f} degrees: "
+            f"present in each run, not general, so no effect of {words('position')} is named for it"
         )
 
 
@@ -89,7 +90,7 @@ def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:
 def _left(fit: Fit, log: PreparedLog) -> Array:
     """Force (n,) N that the model leaves in each block."""
     m = log.motion
-    inertia = fit.axis.mass * np.gradient(m.velocity, m.period)
+    inertia = fit.axis.mass * m.acceleration
     return np.asarray(m.command + total_force(on_blocks(fit.axis), m) - inertia)
 
 

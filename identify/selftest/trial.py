@@ -20,7 +20,8 @@ from identify.selection.residual_dependence import dependences
 from identify.selftest.cases import AXIS, Machine, NotShown, machine
 from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model
-from twin.model.machine import Fitted, read
+from twin.model.machine import Fitted
+from twin.model.parameters import read
 
 STAGE = "proton_xy"
 NEARLY = 0.8  # part of the strongest dependence from which a coordinate counts as right

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from identify.dataset.noise_floor import noise_of
 from identify.dataset.prepared_log import PreparedLog
@@ -21,9 +20,8 @@ from twin.core.loop import N_SIGNALS, POSITION_COLUMN
 from twin.core.native import LAST_ACCELERATION, LAST_VELOCITY, Table, walk
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import passive_callback
+from twin.signals import Array, between, local_cubic, local_parabola
 from twin.simulator import MujocoSimulator, ReducedSimulator, Stepper
-
-Array = NDArray[np.float64]
 
 WINDOW = 0.5  # s between restarts
 SEED = 0  # of the noise drawn anew
@@ -62,7 +60,7 @@ def free_run(
     with passive_callback():
         simulation = simulator(model, table)
         for start, state in zip(starts, states, strict=True):
-            x, v, a = _local_motion(position[start - side : start + side + 1], period)
+            x, v, a = local_cubic(position[start - side : start + side + 1], period)
             state[table.axes[:, 2] + LAST_ACCELERATION] = a
             state[table.axes[:, 2] + LAST_VELOCITY] = v - period * a
             # The stepped position leads the true one by half a sample (see twin.core.loop).
@@ -142,7 +140,7 @@ def _states_at(
 ) -> Array:
     """Effect states (n_starts, n_states) after following the measured motion up to each start."""
     middle = 0.5 * (position[1:] + position[:-1]).T
-    velocity = np.diff(position, axis=0).T / period
+    velocity = between(position.T, period)
     acceleration = _smooth_acceleration(velocity, period)
     states = np.zeros(table.n_states)
     out = np.empty((len(starts), table.n_states))
@@ -168,16 +166,7 @@ def _states_at(
 def _smooth_acceleration(velocity: Array, period: float) -> Array:
     """Acceleration (n_axes, n) m/s^2 of a velocity, over the time of a start's fit."""
     samples = min(2 * max(round(START_FIT / period), 2) + 1, (velocity.shape[1] - 1) // 2 * 2 + 1)
-    order = min(2, samples - 1)
-    return np.asarray(savgol_filter(velocity, samples, order, deriv=1, delta=period, axis=1))
-
-
-def _local_motion(position: Array, period: float) -> tuple[Array, Array, Array]:
-    """Position, velocity and acceleration (n_axes,) in the middle of some samples, by a cubic."""
-    half = len(position) // 2
-    t = (np.arange(len(position)) - half) * period
-    fit = np.polynomial.polynomial.polyfit(t / t[-1], position, 3)
-    return fit[0], fit[1] / t[-1], 2.0 * fit[2] / t[-1] ** 2
+    return local_parabola(velocity, samples, derivative=1, period=period)
 
 
 def _open_loop(

@@ -20,7 +20,7 @@ from identify.validation.error_spectrum import bands
 from identify.validation.free_run import drift_of_noise, free_run, rms_error
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
 from twin.model.machine import AxisModel, MachineModel
-from twin.model.units import LINEAR, AxisUnits
+from twin.model.units import LINEAR, AxisUnits, units_of
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ class Region:
 
     def in_words(self) -> str:
         """E.g. "position between 12 and 26 mm: 0.12 N, 14 times the noise floor, ..."."""
-        what = self.coordinate.replace("_", " ")
+        what = units_of(self.unit).words(self.coordinate.replace("_", " "))
         span = f"{what} between {self.low:.4g} and {self.high:.4g} {self.unit}"
         if self.coordinate == "standstill":
             span = "at standstill" if self.low > 0.0 else "in motion"

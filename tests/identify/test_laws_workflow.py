@@ -16,7 +16,7 @@ from identify.selection import confounded
 from identify.selection.confounded import moved_parameters
 from identify.selection.forward_selection import Verdict
 from identify.workflow import _addition, add
-from twin.errors import InputError
+from twin.errors import CannotRun, InputError
 from twin.model.machine import MachineModel
 
 # The rules as they were decided.
@@ -197,6 +197,19 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_study(monkeypatch):
     assert found.next_experiments == {"y": (found.axes["y"], result.model, 0.07)}
     assert found.comparison == (result.model, result.datasets, progress)
     assert found.refits is result.refits
+
+
+def test_an_axis_whose_experiment_cannot_run_says_why(monkeypatch):
+    def next_experiment(found, model, window):
+        if found == "refused":
+            raise CannotRun("axis x has no travel")
+        return {"ambiguous": "the plan"}.get(found)
+
+    monkeypatch.setattr(workflow, "next_experiment", next_experiment)
+    axes = {"x": "refused", "y": "ambiguous", "z": "nothing missing"}
+    assert workflow._next_experiments(axes, made.MODEL, None) == (
+        {"y": "the plan"}, {"x": "axis x has no travel"},
+    )  # fmt: skip
 
 
 # --- add ------------------------------------------------------------------------------------

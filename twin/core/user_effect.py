@@ -42,11 +42,11 @@ SPEEDS = (0.0, 0.1, 1e-6, -1e-6, -0.1, 0.0)  # m/s, one sample each
 PERIOD = 1e-4  # s
 
 
-class _Outside(Exception):
+class Outside(Exception):
     """An index that an array does not have."""
 
 
-class _Guarded(list):
+class Guarded(list):
     """An array of doubles that refuses an index it does not have."""
 
     def __init__(self, name: str, values: list[float]) -> None:
@@ -61,22 +61,22 @@ class _Guarded(list):
 
     def _inside(self, index):
         if not 0 <= index < len(self):
-            raise _Outside(f"{self.name}[{index}]")
+            raise Outside(f"{self.name}[{index}]")
         return index
 
 
 def require_sound(effect: Effect, path: Path) -> None:
     """Raise InputError, in one line, where the law of a user's file cannot work."""
     values = [_tried(p.start, p.lower, p.upper, p.strength) for p in effect.parameters]
-    p, s = _Guarded("p", values), _Guarded("s", [0.0] * len(effect.states))
+    p, s = Guarded("p", values), Guarded("s", [0.0] * len(effect.states))
     acted = False
     for speed in SPEEDS:
-        io = _Guarded("io", _sample(speed))
+        io = Guarded("io", _sample(speed))
         before = list(io)
         try:
             effect.law(p, s, io)
-        except _Outside as touched:
-            raise InputError(f"{path}: {_outside(effect, str(touched))}") from None
+        except Outside as touched:
+            raise InputError(f"{path}: {outside_words(effect, str(touched))}") from None
         except (ArithmeticError, ValueError) as error:
             raise InputError(f"{path}: {_not_finite(speed, str(error))}") from error
         except Exception as error:
@@ -115,7 +115,8 @@ def _sample(speed: float) -> list[float]:
     return io
 
 
-def _outside(effect: Effect, touched: str) -> str:
+def outside_words(effect: Effect, touched: str) -> str:
+    """One sentence on a law that used ``touched``, such as "s[1]", which it does not have."""
     has = {
         "p": f"{len(effect.parameters)} parameters are declared; add a Parameter",
         "s": f"{len(effect.states)} states are declared; add a name to states=(...)",

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-
-import numpy as np
-from numpy.typing import NDArray
 
 from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, Effect, Kind, Parameter
@@ -251,57 +248,3 @@ def axis_table(axes: Mapping[str, AxisModel]) -> Table:
         {name: [(f.effect, f.vector()) for f in axis.effects] for name, axis in axes.items()},
         [axis.mass for axis in axes.values()],
     )
-
-
-@dataclass(frozen=True)
-class ParameterReference:
-    """One number of an axis model that a fit may change; effect "" is the axis' own mass."""
-
-    effect: str
-    parameter: Parameter
-
-    @property
-    def label(self) -> str:
-        """E.g. ``lugre.Fc``, ``mass`` or ``inertia``."""
-        return f"{self.effect}.{self.parameter.name}" if self.effect else self.parameter.name
-
-
-def free_parameters(axis: AxisModel) -> tuple[ParameterReference, ...]:
-    """The free numbers of an axis: its mass unless fixed, then those of its effects."""
-    mass = () if axis.mass_fixed else (ParameterReference("", axis.mass_parameter),)
-    return mass + tuple(
-        ParameterReference(f.effect.name, p)
-        for f in axis.effects
-        for p in f.effect.parameters
-        if p.name not in f.fixed and p.lower < p.upper
-    )
-
-
-def read(axis: AxisModel, where: Iterable[ParameterReference]) -> NDArray[np.float64]:
-    """Values of those coordinates, in SI units."""
-    return np.array(
-        [axis[c.effect].values[c.parameter.name] if c.effect else axis.mass for c in where]
-    )
-
-
-def write(
-    axis: AxisModel, where: Iterable[ParameterReference], values: Iterable[float]
-) -> AxisModel:
-    """The axis with those coordinates set."""
-    by_effect: dict[str, dict[str, float]] = {}
-    for c, value in zip(where, values, strict=True):
-        by_effect.setdefault(c.effect, {})[c.parameter.name] = float(value)
-    mass = by_effect.pop("", {}).get(axis.mass_parameter.name, axis.mass)
-    effects = tuple(
-        replace(f, values=_ordered(f.effect, {**f.values, **by_effect[f.effect.name]}))
-        if f.effect.name in by_effect
-        else f
-        for f in axis.effects
-    )
-    return replace(axis, mass=mass, effects=effects)
-
-
-def _ordered(effect: Effect, values: dict[str, float]) -> dict[str, float]:
-    """The values with each held one raised to the one it may not fall below (Fs >= Fc)."""
-    floors = {p.name: values[p.at_least] for p in effect.parameters if p.at_least}
-    return {name: max(value, floors.get(name, value)) for name, value in values.items()}

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from functools import cache
 
 _COUNTERPARTS = {"m": "rad", "N": "N m", "kg": "kg m^2"}
+_WORDS = {"force": "torque", "forces": "torques", "position": "angle", "positions": "angles"}
+_QUANTITY = re.compile(rf"\b({'|'.join(_WORDS)})\b", re.IGNORECASE)
 _FACTOR = re.compile(r"(?P<symbol>[^\s^]+)(\^(?P<power>\d+))?")
 
 
@@ -25,6 +27,15 @@ def rotary_unit(linear: str) -> str:
     return "/".join(
         f"({part})" if i and " " in part else part for i, part in enumerate(parts) if part
     )
+
+
+@cache
+def rotary_words(linear: str) -> str:
+    """The same words on a rotary axis: "Force error" -> "Torque error", "position" -> "angle".
+
+    For labels and sentences; a name of an effect or of a file is no words, and stays as it is.
+    """
+    return _QUANTITY.sub(lambda m: _WORDS.get(m[0]) or _WORDS[m[0].lower()].capitalize(), linear)
 
 
 def _product(text: str) -> str:
@@ -58,6 +69,10 @@ class AxisUnits:
         """The unit on this axis of what has the SI unit ``linear`` on a linear axis."""
         return rotary_unit(linear) if self.rotary else linear
 
+    def words(self, linear: str) -> str:
+        """What words that are for a linear axis, such as "Force error", are on this one."""
+        return rotary_words(linear) if self.rotary else linear
+
     @property
     def kind(self) -> str:
         """What such an axis is called."""
@@ -76,6 +91,12 @@ ROTARY = AxisUnits(
 )
 
 
-def units_of(position: str | None) -> AxisUnits:
-    """The units of an axis whose position is in this unit; linear where it is not known."""
-    return ROTARY if position == ROTARY.position else LINEAR
+_OF_A_ROTARY_AXIS = (ROTARY.position, ROTARY.velocity, ROTARY.acceleration, ROTARY.force)
+
+
+def units_of(unit: str | None) -> AxisUnits:
+    """The units of an axis whose position, velocity, acceleration or force is in this unit.
+
+    Linear where it is not known.
+    """
+    return ROTARY if unit in _OF_A_ROTARY_AXIS else LINEAR

@@ -15,6 +15,7 @@ from identify.selection.forward_selection import AxisDiagnosis, Verdict
 from identify.selection.residual_dependence import Dependence
 from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
+from twin.model.units import AxisUnits, units_of
 
 
 def section(subject: Subject) -> Section:
@@ -36,7 +37,7 @@ def _diagnosed(
     axis: AxisComparison, found: AxisDiagnosis, following: Plan | None, refit: Refit | None
 ) -> Answer:
     remarks = []
-    sentence = found.verdict.value
+    sentence = axis.units.words(found.verdict.value)
     if found.unexplained is not None:
         sentence = f"{sentence} {_dependence(found.unexplained)}"
     if found.best is not None:
@@ -70,21 +71,23 @@ def _headline(found: AxisDiagnosis) -> str:
 
 
 def _dependence(structure: Dependence) -> str:
+    depends_on = units_of(structure.unit).words(spaced(structure.depends_on))
     period = ""
     if structure.period is not None:
         period = f", with a period of {quantity(structure.period, structure.unit)}"
     return (
-        f"It depends most on {spaced(structure.depends_on)}, which accounts for "
+        f"It depends most on {depends_on}, which accounts for "
         f"{100 * structure.share_of_error:.0f} % of the squared error{period}."
     )
 
 
 def _left_over(best: Candidate) -> str:
     name, fit = spaced(best.effect.name), best.fit
+    error = fit.axis.units.words("force error")
     if fit.at_floor:
-        return f"With {name} the force error is at its noise floor."
+        return f"With {name} the {error} is at its noise floor."
     return (
-        f"With {name} the force error still stands {number(fit.ratio)} times above its noise "
+        f"With {name} the {error} still stands {number(fit.ratio)} times above its noise "
         "floor: add it, then diagnose again."
     )
 
@@ -127,18 +130,18 @@ def tested_on(found: AxisDiagnosis) -> str:
 
 def _tiles(axis: AxisComparison, found: AxisDiagnosis) -> list[Tile]:
     base, best = found.base, found.best
-    unit = axis.units.force
+    unit, words = axis.units.force, axis.units.words
     if best is None:
-        return [*_error_tiles(base.error, base.floor, unit), *_position_tile(axis, "")]
+        return [*_error_tiles(base.error, base.floor, axis.units), *_position_tile(axis, "")]
     name, gain = spaced(best.effect.name), best.gain
     return [
         Tile(
-            "Force error on the fit logs",
+            words("Force error on the fit logs"),
             _change(unit, base.error, best.fit.error),
             f"with {name}, RMS",
         ),
         Tile(
-            f"{tested_on(found).capitalize()} force error",
+            words(f"{tested_on(found).capitalize()} force error"),
             _change(unit, gain.before, gain.after),
             f"t = {number(gain.t)} over blocks",
         ),
@@ -151,10 +154,11 @@ def _tiles(axis: AxisComparison, found: AxisDiagnosis) -> list[Tile]:
     ]
 
 
-def _error_tiles(error: float, floor: float, unit: str) -> list[Tile]:
+def _error_tiles(error: float, floor: float, units: AxisUnits) -> list[Tile]:
+    of_noise = f"floor {quantity(floor, units.force)} RMS"
     return [
-        Tile("Force error", quantity(error, unit), "RMS over the logs"),
-        Tile("Error over noise floor", number(error / floor), f"floor {quantity(floor, unit)} RMS"),
+        Tile(units.words("Force error"), quantity(error, units.force), "RMS over the logs"),
+        Tile("Error over noise floor", number(error / floor), of_noise),
     ]
 
 
@@ -163,15 +167,15 @@ def _position_tile(axis: AxisComparison, model: str) -> list[Tile]:
         return []
     worst = max(axis.position_error.values())
     told = quantity(worst, axis.units.position)
-    return [Tile("Position, free run", told, f"RMS of the worst log{model}")]
+    return [Tile(axis.units.words("Position, free run"), told, f"RMS of the worst log{model}")]
 
 
 def _compared(axis: AxisComparison) -> Answer:
-    at_floor = axis.ratio < RULE.at_floor
+    at_floor, words = axis.ratio < RULE.at_floor, axis.units.words
     headline = (
         "the model explains the measurement"
         if at_floor
-        else f"force error {number(axis.ratio)} times the noise floor"
+        else f"{words('force error')} {number(axis.ratio)} times the noise floor"
     )
     sentence = (
         "The force error is at its noise floor."
@@ -181,9 +185,9 @@ def _compared(axis: AxisComparison) -> Answer:
     )
     return Answer(
         headline=f"Axis {axis.axis}: {headline}",
-        sentence=sentence,
+        sentence=words(sentence),
         tiles=[
-            *_error_tiles(axis.total_error, axis.floor, axis.units.force),
+            *_error_tiles(axis.total_error, axis.floor, axis.units),
             *_position_tile(axis, ""),
         ],
         remarks=[],
@@ -192,15 +196,15 @@ def _compared(axis: AxisComparison) -> Answer:
 
 
 def _added(addition: Addition) -> Answer:
-    step, unit = addition.step, addition.units.position
+    step, unit, words = addition.step, addition.units.position, addition.units.words
     errors = _change(step.unit, step.fit_error_before, step.fit_error_after)
-    tiles = [Tile("Force error on the fit logs", errors, "RMS")]
+    tiles = [Tile(words("Force error on the fit logs"), errors, "RMS")]
     if step.holdout_error_before is not None and step.holdout_error_after is not None:
         held = _change(step.unit, step.holdout_error_before, step.holdout_error_after)
-        tiles.append(Tile("Held-out force error", held, "RMS"))
+        tiles.append(Tile(words("Held-out force error"), held, "RMS"))
     tiles.append(
         Tile(
-            "Position, free run",
+            words("Position, free run"),
             _change(unit, *addition.position_error),
             f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo",
         )

@@ -16,6 +16,7 @@ from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, number, spaced, title_case
 from identify.output.results import Addition
 from twin.model.machine import HistoryStep
+from twin.model.units import units_of
 
 Array = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ def _picture(steps: Sequence[HistoryStep], floor: float | None) -> Picture:
         "Force error after each effect was added and the model refitted. An effect that is really "
         "there lowers the held-out error as much as that of the fit."
     )
-    return Picture(_figure(steps, floor), caption)
+    return Picture(_figure(steps, floor), units_of(steps[0].unit).words(caption))
 
 
 def _figure(steps: Sequence[HistoryStep], floor: float | None) -> Figure:
@@ -69,7 +70,7 @@ def _figure(steps: Sequence[HistoryStep], floor: float | None) -> Figure:
     axes.yaxis.set_minor_locator(NullLocator())
     axes.set_xlim(-0.4, len(names) - 0.6)
     axes.set_xlabel("Effect added")
-    axes.set_ylabel(scale.label("Force error, RMS"))
+    axes.set_ylabel(scale.label(units_of(steps[0].unit).words("Force error, RMS")))
     figure.legend(loc="outside upper right", ncols=3)
     return figure
 
@@ -112,7 +113,8 @@ def _table(steps: Sequence[HistoryStep]) -> Table:
     ]
     names = ("Fit, before", "Fit, after", "Held out, before", "Held out, after")
     columns = (Column("Effect added"), *(Column(n, numeric=True) for n in names))
-    return Table(columns, rows, "RMS force error; everything is refitted at each step.")
+    caption = "RMS force error; everything is refitted at each step."
+    return Table(columns, rows, units_of(steps[0].unit).words(caption))
 
 
 def _positions(additions: Sequence[Addition]) -> Table:
@@ -138,4 +140,6 @@ def _positions(additions: Sequence[Addition]) -> Table:
     columns = (
         Column("Effect added"), *(Column(n, numeric=True) for n in names), Column("Outcome")
     )  # fmt: skip
-    return Table(columns, rows, "RMS position error of the model driven by the logged command.")
+    told = dict.fromkeys(a.units.words("position") for a in additions)
+    caption = f"RMS {' and '.join(told)} error of the model driven by the logged command."
+    return Table(columns, rows, caption)

@@ -36,12 +36,13 @@ def _table(axis: AxisComparison) -> Table:
         )
         for name, error in axis.force_error.items()
     ]
+    words = axis.units.words
     columns = (
         Column("Log"),
         Column("Duration", numeric=True),
-        Column("Force error, RMS", numeric=True),
+        Column(words("Force error, RMS"), numeric=True),
         Column("Over noise floor", numeric=True),
-        Column("Position error, free run, RMS", numeric=True),
+        Column(words("Position error, free run, RMS"), numeric=True),
         Column("Of noise alone", numeric=True),
     )
     caption = (
@@ -49,4 +50,4 @@ def _table(axis: AxisComparison) -> Table:
         f"{quantity(axis.logs[0].window.length, 's')}. The free run starts again from the measured "
         f"motion every {WINDOW:g} s; every force drives it off, that of the noise too."
     )
-    return Table(columns, rows, caption)
+    return Table(columns, rows, words(caption))

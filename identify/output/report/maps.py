@@ -14,6 +14,7 @@ from identify.output.report.blocks import Picture
 from identify.output.report.drawing import BLUE, FLOOR, new_figure
 from identify.output.report.units import Scale, title_case
 from identify.validation.misfit_maps import AxisComparison, MisfitMap
+from twin.model.units import AxisUnits, units_of
 
 COLUMNS = 4
 NAMES = {
@@ -30,7 +31,7 @@ def picture(axis: AxisComparison) -> Picture:
         "RMS force error by region; the grey band is what noise alone leaves there. By frequency "
         "it is the error in bands of half an octave, whatever the window."
     )
-    return Picture(_figure(axis), caption)
+    return Picture(_figure(axis), axis.units.words(caption))
 
 
 def _figure(axis: AxisComparison) -> Figure:
@@ -42,7 +43,7 @@ def _figure(axis: AxisComparison) -> Figure:
     seen = np.concatenate([np.append(m.rms[m.visited > 0.0], m.floor) for m in shown])
     lowest = float(np.min(seen[seen > 0.0], initial=np.inf))
     for axes, found in zip(grid.ravel(), shown, strict=False):
-        _draw(axes, found, scale, lowest)
+        _draw(axes, found, scale, lowest, axis.units)
     for axes in grid.ravel()[len(shown) :]:
         axes.remove()
     for axes in grid[:, 0]:
@@ -51,7 +52,7 @@ def _figure(axis: AxisComparison) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, found: MisfitMap, scale: Scale, lowest: float) -> None:
+def _draw(axes: Axes, found: MisfitMap, scale: Scale, lowest: float, units: AxisUnits) -> None:
     along = Scale.of(found.unit, np.concatenate([found.low, found.high]))
     edges = along(np.append(found.low, found.high[-1]))
     visited = np.where(found.visited > 0.0, found.rms, np.nan)
@@ -59,12 +60,18 @@ def _draw(axes: Axes, found: MisfitMap, scale: Scale, lowest: float) -> None:
     noise: dict[str, Any] = {"fill": True, "color": FLOOR, "alpha": 0.7, "label": "noise floor"}
     axes.stairs(scale(found.floor), edges, baseline=low, **noise)
     axes.stairs(
-        scale(visited), edges, baseline=None, color=BLUE, linewidth=1.4, label="force error"
+        scale(visited),
+        edges,
+        baseline=None,
+        color=BLUE,
+        linewidth=1.4,
+        label=units.words("force error"),
     )
     axes.set_yscale("log")
     _plain_decades(axes.yaxis)
     axes.set_ylim(bottom=low)
-    axes.set_xlabel(along.label(NAMES.get(found.coordinate, title_case(found.coordinate))))
+    name = NAMES.get(found.coordinate, title_case(found.coordinate))
+    axes.set_xlabel(along.label(units_of(found.unit).words(name)))
     if found.coordinate == "frequency":
         axes.set_xscale("log")
         _plain_decades(axes.xaxis)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from identify.output.remarks import remarks
+from identify.output.remarks import remarks_on
 from identify.output.report.blocks import Listing, Section
 from identify.output.report.subject import Subject
 from identify.output.report.units import spaced
@@ -12,11 +12,10 @@ def section(subject: Subject) -> Section | None:
     """Notes of all axes and of the model's history, each once."""
     notes: list[str] = []
     for axis in subject.axes:
-        found = subject.diagnosed(axis.axis)
-        if found is not None:
+        if subject.diagnosis is not None and subject.diagnosed(axis.axis) is not None:
             notes.extend(
                 f"Axis {axis.axis}: {_sentence(note)}"
-                for note in remarks(found, subject.refit(axis.axis), subject.not_tried)
+                for note in remarks_on(subject.diagnosis, axis.axis)
             )
     for step in (*subject.steps, *(a.step for a in subject.additions)):
         what = f"Axis {step.axis}, {spaced(step.effect)} added"

@@ -24,6 +24,7 @@ from identify.output.report.drawing import (
 from identify.output.report.subject import LogForces, Subject, log_forces
 from identify.output.report.units import Scale, spaced
 from identify.validation.misfit_maps import AxisComparison
+from twin.model.units import units_of
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,12 @@ def section(subject: Subject) -> Section:
         if heading := subject.heading(axis.axis):
             blocks.append(Heading(heading))
         blocks.append(_picture(subject, axis))
-    return Section("force", "Measured and modelled force", blocks)
+    return Section("force", f"Measured and modelled {_words(subject)}", blocks)
+
+
+def _words(subject: Subject) -> str:
+    """What the axes are moved by: force, torque, or both."""
+    return " and ".join(dict.fromkeys(axis.units.words("force") for axis in subject.axes))
 
 
 def _picture(subject: Subject, axis: AxisComparison) -> Picture:
@@ -49,9 +55,10 @@ def _picture(subject: Subject, axis: AxisComparison) -> Picture:
     shown = min(forces, key=lambda f: abs(_error(f, slice(None)) - axis.total_error))
     span = representative(shown, STRETCH)
     named = spaced(best.effect.name) if best else ""
+    force = axis.units.words("force")
     caption = (
-        f"Log {shown.name}: the force that the model must explain (command less inertia) and the "
-        "force that it gives; look for where the two part. Above the whole log, below the "
+        f"Log {shown.name}: the {force} that the model must explain (command less inertia) and the "
+        f"{force} that it gives; look for where the two part. Above the whole log, below the "
         "shaded stretch and what is left of it."
     )
     return Picture(_figure(shown, span, axis.floor, named), caption)
@@ -84,7 +91,7 @@ def _figure(forces: LogForces, span: slice, floor: float, named: str) -> Figure:
                 forces.time[part], scale(line.values[part]), color=line.color, label=line.label,
                 linewidth=line.width, rasterized=len(forces.time[part]) > MOST_POINTS,
             )  # fmt: skip
-        axes.set_ylabel(scale.label("Force"))
+        axes.set_ylabel(scale.label(units_of(forces.unit).words("Force")))
         axes.margins(x=0.01)
     whole.axvspan(forces.time[span][0], forces.time[span][-1], color=GREY, alpha=0.18, linewidth=0)
     _draw_residual(left, forces, span, floor, lines[1:])

@@ -83,9 +83,9 @@ def _part(heading: str, fit: Fit, labels: Sequence[str]) -> _Part:
     if refusal(fit) is None:
         return _Part(columns, cells, "")
     # The reason is the same for all: said once instead of in a column.
-    error = quantity(fit.error, fit.axis.units.force)
+    error, words = quantity(fit.error, fit.axis.units.force), fit.axis.units.words
     remark = (
-        f"{heading}: no intervals, because the force error of {error} stands "
+        f"{heading}: no intervals, because the {words('force error')} of {error} stands "
         f"{number(fit.ratio)} times above the noise floor; the model is wrong by more than noise."
     )
     return _Part(columns[:1], [c[:1] for c in cells], remark)

@@ -35,7 +35,7 @@ def _picture(found: AxisDiagnosis) -> Picture:
         f"Force error on {tested_on(found)} data after each effect was added and everything "
         "refitted: a missing effect brings it from the dashed line towards the noise floor."
     )
-    return Picture(_figure(found), caption)
+    return Picture(_figure(found), found.dataset.units.words(caption))
 
 
 def _figure(found: AxisDiagnosis) -> Figure:
@@ -59,7 +59,8 @@ def _figure(found: AxisDiagnosis) -> Figure:
     axes.invert_yaxis()
     axes.grid(False, axis="y")
     axes.tick_params(axis="y", length=0)
-    axes.set_xlabel(scale.label(f"{tested_on(found).capitalize()} force error, RMS"))
+    tested = f"{tested_on(found).capitalize()} force error, RMS"
+    axes.set_xlabel(scale.label(found.dataset.units.words(tested)))
     axes.set_ylabel("Effect added")
     figure.legend(loc="outside upper right", ncols=2)
     return figure
@@ -98,7 +99,7 @@ def _table(found: AxisDiagnosis) -> Table:
         f"Error: RMS force, {tested_on(found)}. Supported: the evidence (ΔBIC above 10) and the "
         "data that the fit did not see both ask for the effect."
     )
-    return Table(columns, rows, caption)
+    return Table(columns, rows, found.dataset.units.words(caption))
 
 
 def _tone(found: AxisDiagnosis, candidate: Candidate) -> Tone:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from matplotlib.figure import Figure
 
 from identify.estimation.decision import RULE
@@ -13,6 +15,7 @@ from identify.output.report.units import Scale, number, quantity, spaced, title_
 from identify.selection.forward_selection import AxisDiagnosis
 from identify.selection.residual_dependence import Dependence
 from identify.validation.misfit_maps import AxisComparison, Region
+from twin.model.units import units_of
 
 
 def section(subject: Subject) -> Section | None:
@@ -33,7 +36,7 @@ def _blocks(axis: AxisComparison, found: AxisDiagnosis | None) -> list[Block]:
         blocks.append(Listing([in_words(region) for region in axis.worst]))
     blocks.append(maps.picture(axis))
     if found is not None and found.unexplained is not None:
-        blocks.append(_picture(found.unexplained))
+        blocks.append(_picture(found.unexplained, {m.coordinate: m.unit for m in axis.maps}))
     return blocks
 
 
@@ -51,22 +54,23 @@ def _span(region: Region) -> str:
         return "Moving forwards" if region.low > -0.5 else "Moving backwards"
     scale = Scale.of(region.unit, [region.low, region.high])
     low, high = scale.within(region.low, region.high, region.low, region.high)
-    return f"{title_case(region.coordinate)} between {low} and {high} {scale.unit}"
+    coordinate = units_of(region.unit).words(title_case(region.coordinate))
+    return f"{coordinate} between {low} and {high} {scale.unit}"
 
 
-def _picture(structure: Dependence) -> Picture:
+def _picture(structure: Dependence, units: Mapping[str, str]) -> Picture:
     caption = (
         "Part of the squared error that a curve over each coordinate alone accounts for: the "
         "longest bar says where to look for the missing physics."
     )
-    return Picture(_figure(structure), caption)
+    return Picture(_figure(structure, units), caption)
 
 
-def _figure(structure: Dependence) -> Figure:
+def _figure(structure: Dependence, units: Mapping[str, str]) -> Figure:
     ordered = sorted(structure.shares.items(), key=lambda pair: -pair[1])
     figure = new_figure(0.7 + 0.27 * len(ordered))
     axes = figure.subplots()
-    names = [spaced(name) for name, _ in ordered]
+    names = [units_of(units.get(name)).words(spaced(name)) for name, _ in ordered]
     percent = [100.0 * share for _, share in ordered]
     colors = [BLUE if name == structure.depends_on else GREY for name, _ in ordered]
     bars = axes.barh(names, percent, color=colors, height=0.62)

@@ -27,7 +27,7 @@ from identify.output.report.drawing import (
 from identify.output.report.subject import Subject, shown_residual
 from identify.output.report.units import Scale, quantity, spaced, title_case
 from identify.validation.misfit_maps import AxisComparison, periods, phase_name
-from twin.model.units import LINEAR
+from twin.model.units import LINEAR, AxisUnits
 
 Array = NDArray[np.float64]
 
@@ -49,13 +49,16 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class _Left:
-    """Residual (n,) of the model, and of the model with the named effect, and their floor: unit."""
+    """Residual (n,) of the model, and of the model with the named effect, and their floor.
+
+    In the unit of force of ``units``.
+    """
 
     model: Array
     named: Array | None
     label: str
     floor: float
-    unit: str = LINEAR.force
+    units: AxisUnits = LINEAR
 
 
 def section(subject: Subject) -> Section:
@@ -75,12 +78,12 @@ def _picture(subject: Subject, axis: AxisComparison) -> Picture:
         rows = [shown_residual(best.fit.axis, log) for log in axis.logs]
         named = np.concatenate(rows)[_kept(subject, axis)]
         label = f"mean with {spaced(best.effect.name)}"
-    left = _Left(axis.residual, named, label, axis.floor, axis.units.force)
+    left = _Left(axis.residual, named, label, axis.floor, axis.units)
     caption = (
         "Dots are single windows, lines the means. A mean that leaves the noise band shows what "
         "the missing force depends on: a wave along the track, a step with direction, a drift."
     )
-    return Picture(_figure(_views(subject, axis), left), caption)
+    return Picture(_figure(_views(subject, axis), left), axis.units.words(caption))
 
 
 def _kept(subject: Subject, axis: AxisComparison) -> NDArray[np.bool_]:
@@ -92,12 +95,13 @@ def _views(subject: Subject, axis: AxisComparison) -> Sequence[View]:
     views = [
         View(_running_time(subject, axis), "Time, logs in a row", "s"),
         View(where["velocity"], "Speed", units.velocity),
-        View(where["position"], "Position", units.position),
+        View(where["position"], units.words("Position"), units.position),
     ]
-    travelled = np.ptp(where["position"])
+    position, travelled = units.words("position"), np.ptp(where["position"])
     for effect, period in periods(subject.model(axis.axis)).items():
         if len(views) < PANELS and travelled > period:
-            name = f"{title_case(effect)} phase, position modulo {quantity(period, units.position)}"
+            cycle = quantity(period, units.position)
+            name = f"{title_case(effect)} phase, {position} modulo {cycle}"
             views.append(View(where[phase_name(effect)], name, units.position))
     return views
 
@@ -112,7 +116,7 @@ def _running_time(subject: Subject, axis: AxisComparison) -> Array:
 def _figure(views: Sequence[View], left: _Left) -> Figure:
     figure = new_figure(5.4)
     limit = symmetric_limit(left.floor, left.model)
-    scale = Scale.of(left.unit, [limit])
+    scale = Scale.of(left.units.force, [limit])
     grid = figure.subplots(2, 2, sharey=True).ravel()
     for axes, view in zip(grid, views, strict=False):
         _draw(axes, view, left, scale)
@@ -120,7 +124,7 @@ def _figure(views: Sequence[View], left: _Left) -> Figure:
     for axes in grid[len(views) :]:
         axes.remove()
     for axes in grid[: len(views) : 2]:
-        axes.set_ylabel(scale.label("Unexplained force"))
+        axes.set_ylabel(scale.label(left.units.words("Unexplained force")))
     entries = grid[0].get_legend_handles_labels()
     figure.legend(*entries, loc="outside upper left", ncols=4, markerscale=3.0)
     return figure

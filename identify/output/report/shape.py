@@ -33,7 +33,7 @@ def _picture(axis: AxisComparison, fitted: Fitted) -> Picture:
         "Mean force of the description along the logs, moving forwards and backwards. Its shape "
         "is a hint at the physics that is missing."
     )
-    return Picture(_figure(axis, fitted), caption)
+    return Picture(_figure(axis, fitted), axis.units.words(caption))
 
 
 def _figure(axis: AxisComparison, fitted: Fitted) -> Figure:
@@ -52,8 +52,8 @@ def _figure(axis: AxisComparison, fitted: Fitted) -> Figure:
     ):  # fmt: skip
         for axes, x in ((left, along(position)), (right, fast(velocity))):
             axes.plot(*binned_mean(x[mask], scale(force[mask])), color=color, label=label)
-    left.set_xlabel(along.label("Position"))
+    left.set_xlabel(along.label(axis.units.words("Position")))
     right.set_xlabel(fast.label("Speed"))
-    left.set_ylabel(scale.label("Force of the description"))
+    left.set_ylabel(scale.label(axis.units.words("Force of the description")))
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper left", ncols=2)
     return figure

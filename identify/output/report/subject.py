@@ -52,11 +52,6 @@ class Subject:
         """The experiment that decides what the diagnosis of one axis could not."""
         return self.diagnosis.next_experiments.get(axis) if self.diagnosis else None
 
-    @property
-    def not_tried(self) -> tuple[str, ...]:
-        """Effects that the diagnosis left out."""
-        return self.diagnosis.not_tried if self.diagnosis else ()
-
     def refit(self, axis: str) -> Refit | None:
         """What fitting the model as given changed on one axis."""
         return self.diagnosis.refits.get(axis) if self.diagnosis else None

@@ -13,6 +13,7 @@ from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, inverse
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import Correlation, ResidualTests
+from twin.model.units import AxisUnits
 
 
 def section(subject: Subject) -> Section:
@@ -22,8 +23,13 @@ def section(subject: Subject) -> Section:
         if heading := subject.heading(axis.axis):
             blocks.append(Heading(heading))
         blocks += _blocks(axis)
-    blocks.append(Listing(tuple(dict.fromkeys(axis.tests.reason for axis in subject.axes))))
+    blocks.append(Listing(_reasons(subject)))
     return Section("tests", "Is what is left noise?", blocks)
+
+
+def _reasons(subject: Subject) -> tuple[str, ...]:
+    """How each axis was tested, each way once."""
+    return tuple(dict.fromkeys(axis.units.words(axis.tests.reason) for axis in subject.axes))
 
 
 def _blocks(axis: AxisComparison) -> list[Block]:
@@ -34,23 +40,23 @@ def _blocks(axis: AxisComparison) -> list[Block]:
         "with n windows; a tenth of a white residual's values lie outside. Faint values are not "
         "tested."
     )
-    words = [c.in_words() for c in tests.correlations]
+    words = [axis.units.words(c.in_words()) for c in tests.correlations]
     items = [f"{w[:1].upper()}{w[1:]}." for w in words]
-    return [Picture(_figure(tests, axis.units.force), caption), Listing(items)]
+    return [Picture(_figure(tests, axis.units), axis.units.words(caption)), Listing(items)]
 
 
-def _figure(tests: ResidualTests, unit: str) -> Figure:
+def _figure(tests: ResidualTests, units: AxisUnits) -> Figure:
     figure = new_figure(5.2)
     grid = figure.subplots(2, 2).ravel()
-    _draw_histogram(grid[0], tests, unit)
+    _draw_histogram(grid[0], tests, units)
     for axes, test in zip(grid[1:], tests.correlations, strict=True):
         _draw_correlation(axes, test)
     figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
     return figure
 
 
-def _draw_histogram(axes: Axes, tests: ResidualTests, unit: str) -> None:
-    scale = Scale.of(unit, tests.edges)
+def _draw_histogram(axes: Axes, tests: ResidualTests, units: AxisUnits) -> None:
+    scale = Scale.of(units.force, tests.edges)
     edges = scale(tests.edges)
     # Density by the printed unit.
     axes.stairs(
@@ -59,7 +65,7 @@ def _draw_histogram(axes: Axes, tests: ResidualTests, unit: str) -> None:
     at = np.linspace(edges[0], edges[-1], 400)
     normal = norm.pdf(at, scale=float(scale(tests.floor)))
     axes.plot(at, normal, color=ORANGE, label="normal, of the noise floor")
-    axes.set_xlabel(scale.label("Force residual"))
+    axes.set_xlabel(scale.label(units.words("Force residual")))
     axes.set_ylabel(f"Density ({inverse(scale.unit)})")
 
 

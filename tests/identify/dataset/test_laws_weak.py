@@ -11,7 +11,7 @@ from identify.dataset.excitation import excitation
 from identify.dataset.motion import LONGEST_BLOCK, SMOOTHED, Motion, _block_samples, motion_of
 from identify.dataset.test_function import LEAST_BLOCKS, TestFunction
 from twin.errors import InputError
-from twin.log.check.smooth import white_noise
+from twin.signals import white_noise
 
 RATE = 4000.0
 PLACE = waves((0.03, 2.3, 0.4), (0.004, 7.1, 1.0))

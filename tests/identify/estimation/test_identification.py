@@ -18,7 +18,8 @@ from identify.workflow import diagnose
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
 from twin.model.file import load_model
-from twin.model.machine import Fitted, free_parameters, read, write
+from twin.model.machine import Fitted
+from twin.model.parameters import free_parameters, read, write
 from twin.simulator import ReducedSimulator
 
 CATALOGUE = load_catalogue()

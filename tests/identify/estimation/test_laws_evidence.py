@@ -33,7 +33,8 @@ from identify.estimation.intervals import (
 )
 from identify.estimation.scaling import Scaling
 from twin.effect import Parameter
-from twin.model.machine import AxisModel, ParameterReference, free_parameters, read
+from twin.model.machine import AxisModel
+from twin.model.parameters import ParameterReference, free_parameters, read
 
 RNG = np.random.default_rng(21)
 

@@ -21,7 +21,8 @@ from identify.estimation.fit import (
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.smoothing import described, part_rows, smoothing
 from twin.effect import Parameter, Part
-from twin.model.machine import AxisModel, ParameterReference, free_parameters, read
+from twin.model.machine import AxisModel
+from twin.model.parameters import ParameterReference, free_parameters, read
 
 ODD = AxisModel(
     1.7,

@@ -19,7 +19,6 @@ from constructed import (
     waves,
     windowed,
 )
-from effect_runs import legal
 
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import (
@@ -39,7 +38,9 @@ from identify.estimation.force_balance import (
     residual,
 )
 from twin.effect import Kind, Parameter
-from twin.model.machine import AxisModel, Fitted, ParameterReference, free_parameters, read, write
+from twin.laws.values import legal
+from twin.model.machine import AxisModel, Fitted
+from twin.model.parameters import ParameterReference, free_parameters, read, write
 
 H = np.array([[-1e-4], [0.0], [1e-4]])  # s
 LOGS = [windowed(SHORT)]

@@ -28,7 +28,8 @@ from identify.estimation.variable_projection import (
     tried_shapes,
 )
 from twin.effect import Excitation
-from twin.model.machine import Fitted, ParameterReference
+from twin.model.machine import Fitted
+from twin.model.parameters import ParameterReference
 
 # The rules as they were decided.
 BETTER, CHANCE, FULL_SHAPES, REFINED_STARTS = 0.99, 4.0, 4, 2

@@ -11,7 +11,8 @@ from identify.estimation.levenberg_marquardt import minimise
 from identify.estimation.scaling import Scaling
 from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.effect import Parameter
-from twin.model.machine import AxisModel, ParameterReference, free_parameters, read
+from twin.model.machine import AxisModel
+from twin.model.parameters import ParameterReference, free_parameters, read
 
 WIDE = np.full(3, -1e9), np.full(3, 1e9)
 TIGHT = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}

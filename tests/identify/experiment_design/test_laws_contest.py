@@ -30,7 +30,8 @@ from identify.experiment_design.discrimination import (
 from twin.errors import CannotRun
 from twin.experiments.kinds import Tracking
 from twin.log import AxisLog, Log
-from twin.model.machine import MachineModel, free_parameters, read
+from twin.model.machine import MachineModel
+from twin.model.parameters import free_parameters, read
 
 plans = importlib.import_module("identify.experiment_design.plan")
 STAGE = MachineModel("s", {"x": PLAIN, "y": replace(PLAIN, mass=3.1)}, 2000.0)

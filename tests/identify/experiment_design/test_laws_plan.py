@@ -126,7 +126,8 @@ def test_an_ambiguous_diagnosis_asks_for_an_experiment_between_its_rivals(monkey
         raise CannotRun("no travel")
 
     monkeypatch.setattr(plans, "_planned", refused)
-    assert plans.next_experiment(x, STAGE) is None
+    with pytest.raises(CannotRun, match="no travel"):
+        plans.next_experiment(x, STAGE)
 
 
 def planned(monkeypatch):

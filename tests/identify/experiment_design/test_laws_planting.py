@@ -38,14 +38,14 @@ from identify.validation.free_run import (
     WINDOW,
     FreeRun,
     _as_logged,
-    _local_motion,
     _states_at,
     free_run,
     rms_error,
 )
 from twin.core.native import walk
 from twin.effect import Parameter
-from twin.model.machine import AxisModel, Hardware, MachineModel, axis_table, free_parameters, read
+from twin.model.machine import AxisModel, Hardware, MachineModel, axis_table
+from twin.model.parameters import free_parameters, read
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
 LOGS = [
@@ -243,15 +243,6 @@ def test_the_log_has_the_sensors_and_limits_in_it_already():
     assert found.sample_rate == RATE
     got = found.axes["x"].hardware
     assert (got.force_limit, got.encoder_resolution, got.force_constant) == (np.inf, 0.0, 7.0)
-
-
-def test_a_cubic_has_its_own_value_and_slopes_in_the_middle():
-    t = (np.arange(21) - 10) * 1e-3
-    both = np.stack([0.3 + 0.7 * t - 5.0 * t**2 + 90.0 * t**3, 1.1 - 0.2 * t + 3.0 * t**2], axis=1)
-    x, v, a = _local_motion(both, 1e-3)
-    np.testing.assert_allclose(x, [0.3, 1.1])
-    np.testing.assert_allclose(v, [0.7, -0.2])
-    np.testing.assert_allclose(a, [-10.0, 6.0])
 
 
 def test_states_at_a_restart_are_those_of_the_motion_before_it():

@@ -180,6 +180,7 @@ def test_a_diagnosis():
         "not_tried": [],
         "notes": list(remarks.remarks(x, result.refits["x"])),
         "next_experiment": strict(plan_json(result.next_experiments["x"])),
+        "next_experiment_refused": None,
     }  # fmt: skip
     quiet = axes["y"]
     assert (quiet["verdict"], quiet["effect"], quiet["missing"]) == ("nothing_missing", None, [])
@@ -189,6 +190,11 @@ def test_a_diagnosis():
     bare = replace(result, refits={}, next_experiments={})
     assert strict(diagnose_json(bare))["refit"] is None
     assert strict(diagnose_json(bare))["next_experiment"] is None
+    refused = strict(diagnose_json(replace(bare, not_planned={"x": "no travel"})))
+    assert refused["next_experiment"] is None
+    assert refused["next_experiment_refused"] == "no travel"
+    assert any("is proposed: no travel" in note for note in refused["notes"])
+    assert refused["axes"]["y"]["next_experiment_refused"] is None
 
 
 def test_a_residual_of_nothing_is_null_in_a_diagnosis():

@@ -214,6 +214,10 @@ def test_notes_are_said_once():
     expected = remarks_module.remarks(made.diagnosis_of(), made.refit_of(0.0))
     assert told == [f"Axis x: {r.removesuffix('.')}." for r in expected]
     assert notes.section(subject_of(history=())) is None
+    refused = replace(made.diagnosed(), next_experiments={}, not_planned={"x": "no travel"})
+    (listing,) = notes.section(subject_of(refused)).blocks
+    why = "no experiment that would tell them apart is proposed: no travel"
+    assert f"Axis x: {why}." in listing.items
 
 
 def test_the_line_under_the_title_and_the_order_of_axes():

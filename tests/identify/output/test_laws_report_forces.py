@@ -22,6 +22,7 @@ from identify.output.report.drawing import (
 from identify.output.report.subject import LogForces, Subject, log_forces, shown_residual
 from identify.output.report.units import Scale
 from twin.model.machine import Fitted
+from twin.model.units import LINEAR
 
 RNG = np.random.default_rng(8)
 
@@ -183,7 +184,7 @@ def test_the_residual_with_the_named_effect_is_on_the_same_windows(monkeypatch):
 
 def test_the_histogram_and_correlations_have_their_bounds():
     tests = made.whiteness_of()
-    figure = whiteness._figure(tests, "N")
+    figure = whiteness._figure(tests, LINEAR)
     bars, *rest = figure.axes
     data = bars.patches[0].get_data()
     scale = Scale.of("N", tests.edges)

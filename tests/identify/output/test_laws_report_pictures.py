@@ -117,10 +117,11 @@ def test_the_longest_share_is_on_top_and_marked():
         depends_on="position",
         shares={"time": 0.117, "position": 0.631, "other_axis_velocity": 0.2},
     )
-    (axes,) = regions._figure(structure).axes
+    units = {"position": "rad", "other_axis_velocity": "m/s"}
+    (axes,) = regions._figure(structure, units).axes
     assert [b.get_width() for b in axes.patches] == pytest.approx([63.1, 20.0, 11.7])
     assert [t.get_text() for t in axes.get_yticklabels()] == [
-        "position", "other axis velocity", "time",
+        "angle", "other axis velocity", "time",
     ]  # fmt: skip
     assert len({b.get_facecolor() for b in axes.patches[1:]}) == 1
     assert axes.patches[0].get_facecolor() != axes.patches[1].get_facecolor()

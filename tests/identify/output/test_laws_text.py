@@ -138,6 +138,8 @@ def test_a_diagnosis():
     ]
     assert rest[7:] == [f"note: {r}" for r in remarks(x, result.refits["x"])]
     assert "axis y: Nothing is missing" in y
+    refused = diagnose_text(replace(result, next_experiments={}, not_planned={"x": "no travel"}))
+    assert "\n  note: no experiment that would tell them apart is proposed: no travel" in refused
     assert "cannot be told" not in y
     assert "squared error" not in y
 

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import laws
 import numpy as np
 import pytest
 from effect_runs import CATALOGUE
@@ -11,6 +10,7 @@ from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
+from twin.laws.verdict import check_effect
 from twin.log import Log
 from twin.model.file import load_model, save_model
 from twin.model.machine import Fitted, MachineModel
@@ -78,11 +78,8 @@ def test_it_takes_its_place_in_the_catalogue(catalogue: Catalogue, file: Path) -
 
 
 def test_it_obeys_the_laws_of_every_effect(effect: Effect) -> None:
-    laws.check_zero_is_absent(effect)
-    laws.check_acts(effect)
-    laws.check_finite(effect)
-    laws.check_compiled_equals_python(effect)
-    laws.check_writes_only_its_result(effect)
+    report = check_effect(effect)
+    assert report.ok, report
 
 
 @pytest.mark.parametrize("stage", [MujocoSimulator, ReducedSimulator])

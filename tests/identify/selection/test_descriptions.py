@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from effect_runs import Motion, forces
 from machines import one_axis
 from unexplained_effects import foreign
 
@@ -22,6 +21,8 @@ from identify.workflow import add, fit
 from twin.effect import Effect
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
+from twin.laws.motion import Motion
+from twin.laws.stepping import forces
 from twin.log import Log
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, Fitted, MachineModel

@@ -14,7 +14,8 @@ from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.log import Log
 from twin.model.file import load_model
-from twin.model.machine import MachineModel, free_parameters, write
+from twin.model.machine import MachineModel
+from twin.model.parameters import free_parameters, write
 
 CATALOGUE = load_catalogue()
 SAME_FORCE = {"mass": "payload_mass", "cable_slab.offset": "constant_force"}

@@ -26,7 +26,8 @@ from identify.selection.nonparametric import (
     in_words,
     physics_alone,
 )
-from twin.model.machine import Fitted, MachineModel, ParameterReference
+from twin.model.machine import Fitted, MachineModel
+from twin.model.parameters import ParameterReference
 
 # The rules as they were decided.
 WORTH, BETTER, ROUNDS = 0.99, 0.95, 3

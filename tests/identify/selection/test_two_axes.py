@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE, Array, moderate
+from effect_runs import CATALOGUE
 
 from twin.effect import Effect
 from twin.experiments.trajectory import Setpoint
+from twin.laws.motion import Array
+from twin.laws.values import moderate
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 

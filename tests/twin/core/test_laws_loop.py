@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from axis_runs import effect
-from effect_runs import Array
 
 from twin.core.control import (
     INTEGRAL,
@@ -31,6 +30,7 @@ from twin.core.control import (
 from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
 from twin.errors import InputError
 from twin.experiments.trajectory import Setpoint
+from twin.laws.motion import Array
 from twin.model.machine import AxisModel, Hardware, MachineModel
 from twin.simulator import FineSimulator, MujocoSimulator, ReducedSimulator, run
 

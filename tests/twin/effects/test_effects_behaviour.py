@@ -4,10 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE, Array, Motion, trace
+from effect_runs import CATALOGUE
 
 from twin.effect import DRY, FRICTION, IO_SIZE, OUT, READING, STATIC, VISCOUS, U, V
 from twin.effect import DT as STEP
+from twin.laws.motion import Array, Motion
+from twin.laws.stepping import trace
 
 DT = 1e-4  # s
 

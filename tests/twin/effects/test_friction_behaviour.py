@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE, Array
+from effect_runs import CATALOGUE
 from friction_runs import (
     ALL,
     FORGETFUL,
@@ -18,6 +18,7 @@ from friction_runs import (
 
 from twin.effect import DRY, DT, HOLD, INDEX, IO_SIZE, OUT, VISCOUS, V
 from twin.effect import STATIC as STATIC_LEVEL
+from twin.laws.motion import Array
 from twin.model.machine import Fitted
 from twin.simulator import MujocoSimulator, ReducedSimulator
 

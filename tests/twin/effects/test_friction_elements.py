@@ -10,7 +10,8 @@ from twin.effect import ELEMENTS, Effect
 from twin.errors import InputError
 from twin.experiments.named import simulate
 from twin.model.file import load_model, save_model
-from twin.model.machine import Fitted, MachineModel, free_parameters
+from twin.model.machine import Fitted, MachineModel
+from twin.model.parameters import free_parameters
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
 SIZED = [e for e in FRICTIONS if e.of_size is not None]

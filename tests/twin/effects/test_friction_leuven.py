@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from effect_runs import Array
 from friction_runs import (
     ELEMENTS,
     PAPER,
@@ -16,6 +15,8 @@ from friction_runs import (
 )
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
+
+from twin.laws.motion import Array
 
 
 def bristle(p: dict[str, float], force: float, v: float, reach: float) -> float:

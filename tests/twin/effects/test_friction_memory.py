@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE, trace
-from effect_runs import Motion as Given
+from effect_runs import CATALOGUE
 from friction_runs import FORGETFUL, MEMORY, PAPER, along, at_turns, dragged, friction
 from scipy.optimize import brentq
 
 from twin.effect import Effect
+from twin.laws.motion import Motion as Given
+from twin.laws.stepping import trace
 
 A, B, D = 9e-6, 5e-6, 12e-6  # m; turning points within the pre-sliding
 CLOSES = pytest.mark.parametrize("name", MEMORY)

@@ -6,7 +6,6 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 import pytest
-from effect_runs import Array
 from friction_runs import (
     ALL,
     ELEMENTS,
@@ -26,6 +25,8 @@ from friction_runs import (
 )
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+
+from twin.laws.motion import Array
 
 # --- Dahl -----------------------------------------------------------------------------------------
 

@@ -7,12 +7,14 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE, Array, compiled
+from effect_runs import CATALOGUE
 from reference_kit import Columns, Values
 from references import REFERENCES
 
 from twin import effect as slots
 from twin.effect import IO_SIZE, OUT, Effect, Kind, V
+from twin.laws.motion import Array
+from twin.laws.stepping import compiled
 
 SINGLE = ("dt", "when", "mass", "moved")
 WHENS = pytest.mark.parametrize("when", [1.0, 0.5])

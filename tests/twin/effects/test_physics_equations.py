@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE, Array, Motion, moderate, trace
+from effect_runs import CATALOGUE
 
 from twin.effect import DRY, OUT, VISCOUS, U
+from twin.laws.motion import Array, Motion
+from twin.laws.stepping import trace
+from twin.laws.values import moderate
 
 RANDOM = Motion.random(np.random.default_rng(51), samples=1000)
 

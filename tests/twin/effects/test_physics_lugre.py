@@ -5,13 +5,15 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE, Array, Motion, forces, trace
+from effect_runs import CATALOGUE
 from scipy.integrate import solve_ivp
 
 from twin.core.control import Controller
 from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
 from twin.effect import OUT
 from twin.experiments.trajectory import Setpoint
+from twin.laws.motion import Array, Motion
+from twin.laws.stepping import forces, trace
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 

@@ -9,7 +9,8 @@ import pytest
 
 from twin.log.check.dynamics import fit_dynamics
 from twin.log.check.lag import find_lag
-from twin.log.check.smooth import BLOCK, WINDOW, Smoother, white_noise
+from twin.log.check.smooth import BLOCK, WINDOW, Smoother
+from twin.signals import white_noise
 
 RATES = (200.0, 1000.0, 1500.0, 4000.0)
 

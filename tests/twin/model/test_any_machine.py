@@ -31,7 +31,7 @@ from twin.log import Log, read_log, write_log
 from twin.log.check import check_log
 from twin.model.file import format_model, parse_model
 from twin.model.machine import MachineModel
-from twin.model.units import LINEAR, ROTARY, AxisUnits, rotary_unit
+from twin.model.units import LINEAR, ROTARY, AxisUnits, rotary_unit, units_of
 from twin.mujoco.mjcf import machine_spec
 from twin.simulator import ReducedSimulator
 
@@ -227,6 +227,33 @@ OF_A_SLIDE = re.compile(
     r"(?:N(?! ?[·m]|\w)|kg(?! ?[·m]|\w)|m(?:/s(?:\^?[23²³])?)?(?![\w·/]))"
 )
 OF_A_HINGE = re.compile(r"\b[mµn]?rad\b|N·m|N m\b|kg·m|kg m\^")
+
+
+# What the same quantities are called on the other kind of axis, names of effects apart.
+WORDS_OF_A_SLIDE = re.compile(
+    r"\bforce (error|residual)|\bForce\b(?! constant)|\b[Pp]osition\b(?! loop)"
+)
+WORDS_OF_A_HINGE = re.compile(r"\b[Tt]orque\b|\bAngle\b|\bangle (error|between)")
+
+
+def test_labels_and_sentences_name_the_quantities_of_the_axis(gone_round: Round) -> None:
+    wrong, right = WORDS_OF_A_SLIDE, WORDS_OF_A_HINGE
+    if not gone_round.units.rotary:
+        wrong, right = right, wrong
+    printed = without_declarations(texts(gone_round))
+    page = without_declarations(words(gone_round.page))
+    for shown in (printed, page):
+        assert not (found := wrong.search(shown)), shown[found.start() - 80 : found.end() + 20]
+        assert right.search(shown)
+
+
+def without_declarations(text: str) -> str:
+    """The text less what effects declare, which is for a linear axis."""
+    for effect in CATALOGUE.values():
+        told = [p.meaning for p in effect.parameters]
+        for own in (effect.summary, effect.equation, effect.fingerprint, effect.excited_by, *told):
+            text = text.replace(own, "")
+    return text
 
 
 def test_texts_model_file_and_report_are_in_units_of_the_axis(gone_round: Round) -> None:
@@ -456,3 +483,12 @@ def test_no_unit_of_the_catalogue_keeps_a_length_a_force_or_a_mass() -> None:
             told = rotary_unit(p.unit)
             rest = told.replace("N m", "").replace("kg m^2", "")
             assert not set(re.findall(r"[A-Za-z]+", rest)) & {"m", "N", "kg"}, (effect.name, told)
+
+
+def test_words_have_a_rotary_counterpart_and_names_have_none() -> None:
+    said = "Force error, free-running position error; forces at two Positions of constant_force"
+    turned = "Torque error, free-running angle error; torques at two Angles of constant_force"
+    assert (LINEAR.words(said), ROTARY.words(said)) == (said, turned)
+    assert [units_of(u).kind for u in ("rad", "rad/s", "N m", "m", "s", None)] == (
+        ["rotary"] * 3 + ["linear"] * 3
+    )

@@ -8,11 +8,12 @@ from functools import cache
 import mujoco
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE, Array, with_all
+from effect_runs import CATALOGUE, with_all
 from mujoco.batch import Batch
 from mujoco.rollout import rollout
 
 from twin.experiments.named import simulate
+from twin.laws.motion import Array
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
 from twin.mujoco import callback as mujoco_link

@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE, moderate, with_all
+from effect_runs import CATALOGUE, with_all
 
 from twin.core.control import Controller
 from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, VELOCITY_COLUMN
 from twin.effect import Effect
 from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
+from twin.laws.values import moderate
 from twin.log import Log
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel

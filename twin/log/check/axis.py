@@ -9,8 +9,9 @@ import numpy as np
 
 from twin.log.check.dynamics import Dynamics, fit_dynamics
 from twin.log.check.lag import Lag, find_lag
-from twin.log.check.smooth import Array, Smoother, white_noise
+from twin.log.check.smooth import Smoother
 from twin.log.log import AxisLog
+from twin.signals import Array, white_noise
 
 _IMPOSSIBLE = 4.0  # times the acceleration that 99 % of the samples stay below
 _NOISE = 10.0  # times the rms of noise

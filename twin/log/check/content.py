@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.log.check.axis import Axis
 from twin.log.check.report import Fault, Finding, Severity
-from twin.log.check.smooth import Array
+from twin.signals import Array
 
 SHORTEST = 1.0  # s, what identification needs at the least
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.log.check.smooth import Array
+from twin.signals import Array
 
 _TRIMMED = 0.05  # share of the samples that a fit leaves out
 _ROUNDS = 4

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import correlate
 
-from twin.log.check.smooth import Array
+from twin.signals import Array
 
 LONGEST = 0.25  # s, searched both ways
 _MOTION = 20  # the log is so many times longer than the longest lag, to hold several moves

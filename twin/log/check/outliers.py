@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.log.check.axis import Axis
 from twin.log.check.report import Fault, Finding, Severity
-from twin.log.check.smooth import Array
+from twin.signals import Array
 
 _APART = 0.05  # s without an outlier ends a burst
 _UNUSUAL = 5.0  # times the level that 99 % of the samples stay below

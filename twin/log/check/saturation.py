@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from twin.log.check.axis import Axis
 from twin.log.check.report import Fault, Finding, Severity
-from twin.log.check.smooth import Array, white_noise
+from twin.signals import Array, white_noise
 
 _STUCK = 5e-3  # s at one value exactly
 _STUCK_SAMPLES = 5

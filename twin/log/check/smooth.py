@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from twin.signals import Array, between, rate
 
 BLOCK = 1e-3  # s
 WINDOW = 20e-3  # s, full length of the low-pass
@@ -59,7 +59,7 @@ class Smoother:
 
     def acceleration(self, x: Array) -> Array:
         """Position (n,) -> low-passed acceleration (m,); the ends repeat their neighbours."""
-        return self._low_pass(np.gradient(self._block_velocity(x), self.block))
+        return self._low_pass(rate(self._block_velocity(x), self.block))
 
     def direction(self, x: Array, slow: float) -> Array:
         """Position (n,) -> low-passed sign of the velocity (m,), rounded off below ``slow``."""
@@ -93,7 +93,7 @@ class Smoother:
         return float(noise / self.block**2 * np.linalg.norm(kernel))
 
     def _block_velocity(self, x: Array) -> Array:
-        return np.diff(self._edges(x)) / self.block
+        return between(self._edges(x), self.block)
 
     def _edges(self, x: Array) -> Array:
         count = (len(x) - 1) // self.samples
@@ -101,11 +101,3 @@ class Smoother:
 
     def _low_pass(self, signal: Array) -> Array:
         return np.convolve(signal, self.weights, "valid")
-
-
-def white_noise(signal: Array) -> float:
-    """RMS of the white part of a smooth signal: its fourth difference holds little else.
-
-    The fourth difference of white noise is sqrt(70) times as large.
-    """
-    return float(np.median(np.abs(np.diff(signal, 4)))) / 0.6745 / 70**0.5

@@ -9,7 +9,7 @@ import numpy as np
 from twin.log.check.axis import Axis
 from twin.log.check.lag import find_lag
 from twin.log.check.report import Fault, Finding, Severity
-from twin.log.check.smooth import Array
+from twin.signals import Array
 
 ALLOWED = 3e-3  # s
 ALLOWED_SAMPLES = 2.0

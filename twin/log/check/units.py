@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.log.check.axis import Axis
 from twin.log.check.report import Fault, Finding, Severity
-from twin.log.check.smooth import Array
+from twin.signals import Array
 
 LONGEST_TRAVEL = 10.0  # m
 _RELATED = 0.9  # correlation of two signals that state the same

@@ -1,0 +1,96 @@
+"""`twin effects --check`: what a user's own effect breaks is said in a line, and the exit code."""
+
+import json
+from pathlib import Path
+
+import pytest
+from cli_runs import refusal, twin
+
+from twin.laws.verdict import LAWS
+
+SOURCE = Path(__file__).parents[3] / "examples" / "my_effect.py"
+LAW_END = "io[OUT] = -p[0] * distance * exp(-ratio * ratio)"
+FAULTS = {
+    "force at zero strength": (
+        LAW_END, f"{LAW_END} - 0.25", "changes nothing at zero strength", "a force of 0.25 N",
+    ),
+    "not a number at a bound": (
+        LAW_END, f"{LAW_END} + 0.0 * p[0] / (1e5 - p[0])",
+        "is finite at every bound", "with k = 100000 N/m",
+    ),
+    "a state that is not declared": (
+        LAW_END, f"{LAW_END} + (p[0] * s[0] if io[X] > 0.19 else 0.0)",
+        "uses only what it declares", "s[0], but 0 states are declared",
+    ),
+    "a write to what is not its own": (
+        LAW_END, f"{LAW_END}\n    io[X] += 1e-9", "writes only its result", "writes io[X]",
+    ),
+    "never acts": (
+        '"N/m", 0.0, -1e5, 1e5,', '"N/m", 0.0, -1e-5, 1e-5,', "acts within its bounds", "N rms",
+    ),
+}  # fmt: skip
+
+
+def written(folder: Path, name: str, good: str = "", bad: str = "") -> Path:
+    text = SOURCE.read_text(encoding="utf-8")
+    assert good in text
+    text = text.replace(good, bad) if good else text
+    path = folder / f"{name}.py"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_broken_law_is_said_in_one_line(fault: str, tmp_path: Path) -> None:
+    good, bad, law, said = FAULTS[fault]
+    path = written(tmp_path, "bad", good, bad)
+    done = twin("effects", "bad", "--effects", path, "--check", folder=tmp_path)
+    failed = [line for line in done.stdout.splitlines() if "FAILED" in line]
+    assert done.stderr == ""
+    assert done.returncode == 1
+    (line,) = [line for line in failed if law in line]
+    assert line.startswith(f"bad: FAILED: {law}")
+    assert said in line
+
+
+def test_nothing_else_is_tried_where_a_law_reads_what_it_has_not(tmp_path: Path) -> None:
+    """Compiled, it would read and write anywhere."""
+    path = written(tmp_path, "bad", *FAULTS["a state that is not declared"][:2])
+    first, *others = twin(
+        "effects", "--effects", path, "--check", folder=tmp_path
+    ).stdout.splitlines()
+    assert "FAILED" in first
+    assert others
+    assert all(line.startswith("bad: not tried: ") for line in others)
+
+
+def test_the_example_and_an_effect_of_the_catalogue_obey(tmp_path: Path) -> None:
+    path = written(tmp_path, "mine")
+    for asked in (("--effects", path), ("mine", "--effects", path), ("quadratic_drag",)):
+        done = twin("effects", *asked, "--check", folder=tmp_path)
+        assert done.returncode == 0, done.stdout
+        lines = done.stdout.splitlines()
+        assert all(": ok: " in line for line in lines)
+        assert len(lines) == len(LAWS) - 1  # a force takes no energy as friction must
+
+
+def test_json_is_one_object_of_every_file(tmp_path: Path) -> None:
+    files = [written(tmp_path, "mine"), written(tmp_path, "bad", *FAULTS["never acts"][:2])]
+    done = twin(
+        "effects", "--effects", files[0], "--effects", files[1], "--check", "--json",
+        folder=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 1
+    answer = json.loads(done.stdout)
+    assert not answer["ok"]
+    assert list(answer["effects"]) == ["mine", "bad"]
+    assert all(law["holds"] and law["fault"] is None for law in answer["effects"]["mine"])
+    (broken,) = [law for law in answer["effects"]["bad"] if not law["holds"]]
+    assert broken["law"] == "acts within its bounds"
+    assert "it does nothing" in broken["fault"]
+
+
+def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
+    assert "NAME" in refusal("effects", "--check", folder=tmp_path)
+    assert "own" in refusal("effects", "cogging", "--check", "--plot", "c.png", folder=tmp_path)
+    assert "'cogging'" in refusal("effects", "coging", "--check", folder=tmp_path)

@@ -1,0 +1,92 @@
+"""All laws put to one effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.effect import Effect, Kind
+from twin.laws import checks, physics
+from twin.laws.checks import LawBroken
+
+EVERY = frozenset(Kind)
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law in words, the check that raises LawBroken, and the kinds of effect it is for."""
+
+    says: str
+    check: Callable[[Effect], None]
+    kinds: frozenset[Kind] = EVERY
+
+
+LAWS = (
+    Law("uses only what it declares", checks.check_declared),
+    Law("writes only its result and its states", checks.check_writes_only_its_result),
+    Law("changes nothing at zero strength", checks.check_zero_is_absent),
+    Law("acts within its bounds", checks.check_acts),
+    Law("is finite at every bound, speed and sample period", checks.check_finite),
+    Law("is the same compiled and as plain Python", checks.check_compiled_equals_python),
+    Law("is the same however often it is sampled", physics.check_sample_rate),
+    Law(
+        "takes energy in every closed cycle",
+        physics.check_takes_energy,
+        frozenset({Kind.FRICTION, Kind.MODIFIER}),
+    ),
+    Law(
+        "leaves no work around a loop, where it depends on position alone",
+        physics.check_of_position_alone,
+        frozenset({Kind.FORCE}),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A law put to an effect. holds: None where it was not tried; fault: why not, one sentence."""
+
+    law: str
+    holds: bool | None
+    fault: str = ""
+
+
+@dataclass(frozen=True)
+class LawReport:
+    """What each law made of one effect."""
+
+    effect: str
+    outcomes: tuple[Outcome, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether all laws hold."""
+        return all(o.holds for o in self.outcomes)
+
+
+def check_effect(effect: Effect) -> LawReport:
+    """Put every law for effects of this kind to the effect, about a second or two.
+
+    Where it uses what it has not declared nothing else is tried: compiled, it would write anywhere.
+    """
+    outcomes: list[Outcome] = []
+    for law in (law for law in LAWS if effect.kind in law.kinds):
+        if outcomes and outcomes[0].holds is False:
+            outcomes.append(Outcome(law.says, None, "not tried before the first law holds"))
+        else:
+            outcomes.append(_tried(law, effect))
+    return LawReport(effect.name, tuple(outcomes))
+
+
+def _tried(law: Law, effect: Effect) -> Outcome:
+    try:
+        with np.errstate(all="ignore"):
+            law.check(effect)
+    except LawBroken as broken:
+        return Outcome(law.says, False, str(broken))
+    except (ArithmeticError, ValueError) as error:  # of the law, run as plain Python
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        return Outcome(law.says, False, f"its law fails as plain Python: {reason}")
+    return Outcome(law.says, True)
