@@ -15,10 +15,11 @@ from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates
 from identify.experiment_design.plan import next_experiment, plan
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate, score, try_effect, usable
 from identify.selection.confounded import moved_parameters
 from identify.selection.forward_selection import diagnose_axis
-from identify.selection.nonparametric import describe, in_words, physics_alone
+from identify.selection.nonparametric import describe, physics_alone
 from identify.validation.free_run import free_run, rms_error
 from identify.validation.misfit_maps import compare_axis, position_errors
 from twin.effect import Effect
@@ -185,12 +186,9 @@ def add(
 def _addition(best: Candidate, before: FitResult, given: MachineModel) -> Addition:
     name = best.axis
     base, dataset = before.fits[name], before.datasets[name]
-    notes = moved_parameters(base, best.fit)
-    if best.effect.is_nonparametric:
-        notes = (in_words(best.fit.axis[best.effect.name]), *notes)
-    gone = [n for n in given.axes[name].names if n not in before.model.axes[name].names]
-    if gone:
-        notes = (*notes, f"{', '.join(gone)} made way; add it again for what is left")
+    moved = moved_parameters(base, best.fit)
+    left = before.model.axes[name].names
+    set_aside = tuple(n for n in given.axes[name].names if n not in left)
     step = HistoryStep(
         action="add",
         effect=best.effect.name,
@@ -200,7 +198,7 @@ def _addition(best: Candidate, before: FitResult, given: MachineModel) -> Additi
         holdout_error_before=holdout_error(base, dataset),
         holdout_error_after=holdout_error(best.fit, dataset),
         unit=best.fit.axis.units.force,
-        notes=notes,
+        notes=addition_notes(best, moved, set_aside),
     )
     new = before.model.with_axis(name, best.fit.axis).with_history(step)
     first = next(iter(by_log(before.datasets).values()))
@@ -214,7 +212,8 @@ def _addition(best: Candidate, before: FitResult, given: MachineModel) -> Additi
             rms_error(free_run(new, first), name),
         ),
         replayed=rms_error(free_run(new, first, MujocoSimulator), name),
-        notes=notes,
+        moved=moved,
+        set_aside=set_aside,
     )
 
 

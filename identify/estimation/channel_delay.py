@@ -115,15 +115,3 @@ def realigned(dataset: Dataset, shift: float) -> Dataset:
 
 def _moved(logs: Sequence[PreparedLog], shift: float) -> tuple[PreparedLog, ...]:
     return tuple(PreparedLog.of(w.motion.with_force_ahead(shift), w.window.length) for w in logs)
-
-
-def shift_in_words(dataset: Dataset) -> str | None:
-    """A sentence on the shift that was taken off the logs, or None."""
-    if dataset.channel_delay == 0.0:
-        return None
-    samples = dataset.channel_delay / dataset.fit[0].motion.sample_period
-    return (
-        f"axis {dataset.axis}: the force acts {1e6 * dataset.channel_delay:.0f} us "
-        f"({samples:.2f} samples) before its time stamp, which no drive can do; the log was "
-        "corrected. Check how force and position are sampled"
-    )

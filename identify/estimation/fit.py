@@ -38,12 +38,9 @@ AT_EDGE = 1e-6  # of a bound, within which a value is at it
 class Outcome(Enum):
     """How a fit ended."""
 
-    CONVERGED = "The fit converged: no parameter change lowers the force error further."
-    NOT_CONVERGED = (
-        "The fit stopped after its most evaluations before it converged; start nearer or fix some "
-        "parameters."
-    )
-    AT_BOUND = "The fit converged with a parameter at its bound; the data ask for a value beyond."
+    CONVERGED = "converged"
+    NOT_CONVERGED = "not converged"
+    AT_BOUND = "at bound"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -9,6 +9,7 @@ D. F. McCaffrey, Survey Methodology 28 (2002) for left-out residuals.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from itertools import pairwise
 
 import numpy as np
@@ -31,9 +32,52 @@ LEAST_RISE = 0.1  # of the rise that the slopes foresee
 LARGEST_RATIO = 3.0  # of error to noise floor; above it the model is wrong and no interval holds
 
 
+class Side(Enum):
+    """To which side of a value the error hardly rises."""
+
+    SMALLER = "smaller"
+    LARGER = "larger"
+
+
+@dataclass(frozen=True)
+class AlwaysAtRest:
+    """The axis comes to rest within every test function, so that nothing was fitted."""
+
+
+@dataclass(frozen=True)
+class ModelWrong:
+    """The force error (in ``unit``, RMS) is far above the noise floor."""
+
+    error: float
+    floor: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class NotExcited:
+    """The parameter has no influence on the force along this motion."""
+
+
+@dataclass(frozen=True)
+class Inseparable:
+    """The estimate is correlated to all but one with that of another parameter."""
+
+    label: str
+
+
+@dataclass(frozen=True)
+class OpenSided:
+    """The error hardly rises towards this side of the value."""
+
+    side: Side
+
+
+NoInterval = AlwaysAtRest | ModelWrong | NotExcited | Inseparable | OpenSided
+
+
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter: value with its unit and 90 % interval, or the reason why there is none."""
+    """One parameter: value with its unit and 90 % interval, or the reason why it has none."""
 
     label: str
     value: float
@@ -41,14 +85,14 @@ class Estimate:
     low: float | None
     high: float | None
     free: bool
-    reason: str | None = None
+    reason: NoInterval | None = None
 
 
 def estimates(fit: Fit) -> tuple[Estimate, ...]:
     """Estimates of all parameters of a fitted axis, free ones first."""
     values = read(fit.axis, fit.scaling.where)
     half = half_widths(fit)
-    reason = refusal(fit)
+    reason: NoInterval | None = refusal(fit)
     twins = inseparable(fit)
     free = []
     units = fit.axis.units
@@ -58,25 +102,25 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
         high: float | None = None
         why = reason
         if why is None and not np.isfinite(width):
-            why = "no interval: this motion does not show the parameter"
+            why = NotExcited()
         if why is None and c.label in twins:
-            why = f"no interval: this data cannot tell it from {twins[c.label]}"
+            why = Inseparable(twins[c.label])
         if why is None and (side := open_side(fit, c, width)):
-            why = f"no interval: a {side} value fits as well, these logs do not reach it"
+            why = OpenSided(side)
         if why is None:
             low, high = max(value - width, p.lower), min(value + width, p.upper)
         free.append(Estimate(c.label, float(value), units(p.unit), low, high, True, why))
     return (*free, *_held(fit))
 
 
-def open_side(fit: Fit, c: ParameterReference, half: float) -> str | None:
-    """The side, "smaller" or "larger", to which the error hardly rises; None where it does.
+def open_side(fit: Fit, c: ParameterReference, half: float) -> Side | None:
+    """The side to which the error hardly rises; None where it rises to both.
 
     An end stop out of reach is the example: where it just touches the motion the fit has a slope.
     """
     column = fit.jacobian[:, fit.scaling.where.index(c)]
     value = read(fit.axis, [c])[0]
-    for side, step in (("smaller", -FAR * half), ("larger", FAR * half)):
+    for side, step in ((Side.SMALLER, -FAR * half), (Side.LARGER, FAR * half)):
         moved = write(fit.axis, [c], [np.clip(value + step, c.parameter.lower, c.parameter.upper)])
         step = read(moved, [c])[0] - value
         foreseen = 2.0 * step * float(fit.residual @ column) + step**2 * float(column @ column)
@@ -104,17 +148,13 @@ def inseparable(fit: Fit) -> dict[str, str]:
     }
 
 
-def refusal(fit: Fit) -> str | None:
+def refusal(fit: Fit) -> NoInterval | None:
     """Why the fit has no intervals, or None where it has."""
     if len(fit.residual) == 0:
-        return "no interval: the axis comes to rest within every window of these logs"
+        return AlwaysAtRest()
     if fit.ratio <= LARGEST_RATIO:
         return None
-    unit = fit.axis.units.force
-    return (
-        f"no interval: the force error {fit.error:.3g} {unit} stands {fit.ratio:.1f} times above "
-        f"the noise floor {fit.floor:.3g} {unit}, so the model is wrong by more than noise"
-    )
+    return ModelWrong(fit.error, fit.floor, fit.axis.units.force)
 
 
 def half_widths(fit: Fit) -> Array:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.errors import CannotRun
 from twin.experiments.experiment import Experiment, OneAxis, gentle, machine_limits
-from twin.experiments.file import in_short
 from twin.experiments.kinds import (
     Moves,
     Passes,
@@ -37,12 +36,26 @@ FORCE_USED = 0.4  # part of the force limit that moves use; friction and the loo
 MOST_REPEATS = 1000
 
 
+@dataclass(frozen=True)
+class NotRun:
+    """An experiment that the machine cannot run, and the reason.
+
+    truth: the explanation with which it cannot run, where another one allows it. units: of its
+    axis.
+    """
+
+    experiment: Experiment
+    reason: str
+    units: AxisUnits = LINEAR
+    truth: str | None = None
+
+
 def proposals(
     model: MachineModel, axis: str, duration: float
-) -> tuple[list[Experiment], tuple[str, ...]]:
-    """Experiments of about that duration (s) for one axis, all within the stage's limits.
+) -> tuple[list[Experiment], tuple[NotRun, ...]]:
+    """Experiments of about that duration (s) for one axis, all within the machine's limits.
 
-    And why others of the family are not among them, a sentence each. Raises CannotRun where the
+    Also those of the family that are not among them, with the reason. Raises CannotRun where the
     travel is not known, and where none fits.
     """
     model.axis(axis)
@@ -61,7 +74,7 @@ def proposals(
         try:
             _require_fit(experiment, model, duration)
         except CannotRun as why:
-            not_run.append(refused(experiment, why, model.axes[axis].units))
+            not_run.append(NotRun(experiment, str(why), model.axes[axis].units))
         else:
             found.append(experiment)
     if not found:
@@ -69,11 +82,6 @@ def proposals(
             f"no experiment of {duration:g} s fits axis {axis}; give a longer --duration (s)"
         )
     return found, tuple(not_run)
-
-
-def refused(experiment: Experiment, why: CannotRun, units: AxisUnits = LINEAR) -> str:
-    """The sentence that says which experiment cannot run, and why."""
-    return f"{in_short(experiment, units)}: {why}"
 
 
 def _affordable(model: MachineModel, axis: str) -> float:

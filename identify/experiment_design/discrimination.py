@@ -26,7 +26,7 @@ from identify.estimation.evidence import effective_samples, evidence
 from identify.estimation.fit import fit_axis, rms
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.subspace import orthonormal, unabsorbed
-from identify.experiment_design.candidate_experiments import refused
+from identify.experiment_design.candidate_experiments import NotRun
 from twin.errors import CannotRun
 from twin.experiments.experiment import Experiment
 from twin.experiments.named import outside_travel, simulate
@@ -69,7 +69,7 @@ class Trial:
     gain: float
     motion: PreparedLog
     where: Array
-    not_run: str | None = None
+    not_run: NotRun | None = None
 
     @property
     def units(self) -> AxisUnits:
@@ -152,7 +152,7 @@ def favoured(arena: Arena) -> tuple[str, float]:
 
 def contest(
     arena: Arena, experiments: Sequence[Experiment], progress: Progress | None = None
-) -> tuple[list[Trial], tuple[str, ...]]:
+) -> tuple[list[Trial], tuple[NotRun, ...]]:
     """Every experiment tried, best first; and why the stage cannot run the others."""
     tried = _discriminating if len(arena.explanations) > 1 else _informative
     trials, not_run = [], []
@@ -162,7 +162,8 @@ def contest(
             try:
                 new = arena.record(arena.explanations[0], experiment)
             except CannotRun as why:
-                not_run.append(refused(experiment, why, arena.stage.axes[arena.name].units))
+                units = arena.stage.axes[arena.name].units
+                not_run.append(NotRun(experiment, str(why), units))
             else:
                 trials.append(pool.submit(tried, arena, experiment, new))
             if progress:
@@ -252,8 +253,8 @@ def refitted(arena: Arena, trial: Trial) -> Trial:
         try:
             motion = arena.record(truth, trial.experiment)
         except CannotRun as why:
-            told = f"{refused(trial.experiment, why, trial.units)} (with {truth.name})"
-            return replace(trial, gain=0.0, difference=0.0, not_run=told)
+            cannot = NotRun(trial.experiment, str(why), trial.units, truth.name)
+            return replace(trial, gain=0.0, difference=0.0, not_run=cannot)
         logs = arena.logs_with(motion)
         fits = [fit_axis(e.axis, logs) for e in (truth, rival)]
         kept = fits[0].kept & fits[1].kept

@@ -51,15 +51,10 @@ class Gap:
     high: float
     share: float | None
 
-    def in_words(self) -> str:
-        """One sentence."""
-        where = f"{self.feature} {self.low:.3g} to {self.high:.3g} {self.unit}"
-        if self.share is None:
-            return f"it shows most at {where}"
-        held = f"{100.0 * self.share:.1f} % of the data is there"
-        if self.share < RARE:
-            return f"missing motion: {where}; {held}"
-        return f"no motion is missing, but more of it is needed at {where}; {held}"
+    @property
+    def missing(self) -> bool:
+        """Whether the data have hardly any of this motion."""
+        return self.share is not None and self.share < RARE
 
 
 def _speed(log: PreparedLog) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from identify.dataset.dataset import Dataset, datasets
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.decision import RULE
-from identify.experiment_design.candidate_experiments import proposals
+from identify.experiment_design.candidate_experiments import NotRun, proposals
 from identify.experiment_design.discrimination import (
     Arena,
     Explanation,
@@ -30,6 +30,7 @@ from identify.selection.forward_selection import AxisDiagnosis, Verdict, diagnos
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
+from twin.experiments.file import in_short
 from twin.log import Log
 from twin.model.machine import MachineModel
 
@@ -62,7 +63,7 @@ class Plan:
     favoured: str | None
     excited_by: Mapping[str, str]
     supposed: bool
-    not_run: tuple[str, ...] = ()
+    not_run: tuple[NotRun, ...] = ()
 
     @property
     def chosen(self) -> Trial:
@@ -147,9 +148,10 @@ def _planned(
     experiments, too_long = proposals(arena.stage, arena.name, duration)
     trials, not_run = contest(arena, experiments, progress)
     if not trials:
+        first = f"{in_short(not_run[0].experiment, not_run[0].units)}: {not_run[0].reason}"
         raise CannotRun(
             f"axis {arena.name} can run none of the experiments; check its limits and force_limit; "
-            f"the first: {not_run[0]}"
+            f"the first: {first}"
         )
     chosen, *others = _verified(arena, trials, verified)
     names = tuple(e.name for e in arena.explanations)

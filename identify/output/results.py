@@ -11,8 +11,9 @@ from identify.estimation.fit import Fit
 from identify.estimation.intervals import Estimate
 from identify.experiment_design.plan import Plan
 from identify.output.text import add_text, compare_text, diagnose_text, fit_text
+from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate
-from identify.selection.confounded import Refit, refit
+from identify.selection.confounded import MovedParameter, Refit, refit
 from identify.selection.forward_selection import AxisDiagnosis, Verdict
 from identify.validation.misfit_maps import AxisComparison
 from twin.effect import Effect
@@ -119,7 +120,8 @@ class Addition:
 
     step: errors before and after. kept: whether the effect earned its place on held-out data.
     position_error: free-running RMS error before and after. replayed: the same of the new model
-    stepped by MuJoCo. Both in the units of the axis.
+    stepped by MuJoCo. Both in the units of the axis. moved: parameters that the effect changed.
+    set_aside: nonparametric effects that were removed from the model before.
     """
 
     model: MachineModel
@@ -128,7 +130,13 @@ class Addition:
     kept: bool
     position_error: tuple[float, float]
     replayed: float
-    notes: tuple[str, ...] = field(default=())
+    moved: tuple[MovedParameter, ...] = ()
+    set_aside: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader should know beside the errors, one sentence each."""
+        return addition_notes(self.candidate, self.moved, self.set_aside)
 
     @property
     def units(self) -> AxisUnits:

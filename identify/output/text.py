@@ -5,17 +5,33 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from identify.estimation.channel_delay import shift_in_words
-from identify.estimation.intervals import Estimate, refusal
+from identify.estimation.intervals import Estimate, NoInterval, refusal
 from identify.experiment_design.discrimination import Trial
 from identify.experiment_design.plan import Plan
 from identify.experiment_design.rival_hypotheses import STRENGTH
 from identify.output.remarks import remarks
+from identify.output.words.estimation import (
+    channel_delay_in_words,
+    no_interval_in_words,
+    outcome_in_words,
+)
+from identify.output.words.experiment_design import gap_in_words, not_run_in_words
+from identify.output.words.selection import (
+    advice,
+    dependence_in_words,
+    nonparametric_in_words,
+    refit_in_words,
+    verdict_in_words,
+)
+from identify.output.words.validation import (
+    correlation_in_words,
+    loop_in_words,
+    region_in_words,
+)
 from identify.selection.candidates import Candidate
 from identify.selection.forward_selection import Step
-from identify.selection.nonparametric import described_labels, in_words
+from identify.selection.nonparametric import described_labels
 from twin.effect import Effect
-from twin.effects import load_catalogue
 from twin.experiments.file import in_short
 from twin.experiments.kinds import kind_of
 from twin.log.check import CheckReport
@@ -35,36 +51,38 @@ def fit_text(result: FitResult) -> str:
             f"axis {axis}: force error {fit.error:.4g} {unit}{tail}, noise floor "
             f"{fit.floor:.4g} {unit} (ratio {fit.ratio:.2f})"
         )
-        lines.append(f"  {fit.ended.value}")
+        lines.append(f"  {outcome_in_words(fit.ended)}")
         lines += [f"  at its bound: {label}" for label in fit.at_bound]
-        if shifted := shift_in_words(result.datasets[axis]):
+        if shifted := channel_delay_in_words(result.datasets[axis]):
             lines.append(f"  {shifted}")
         if result.left_out[axis]:
             still = ", ".join(result.left_out[axis])
             lines.append(f"  left out, as axis {axis} stands still there: {still}")
-        if changed := result.refits[axis].in_words():
+        if changed := refit_in_words(result.refits[axis]):
             lines.append(f"  {changed}")
         hidden = described_labels(fit.axis)
         common = refusal(fit)
         if common is not None:
-            lines.append(f"  {common}")
+            lines.append(f"  {no_interval_in_words(common)}")
         lines += [
             f"  {e.label:34s} {_with_interval(e, common)}"
             for e in result.estimates[axis]
             if e.label not in hidden
         ]
-        lines += [f"  {in_words(f)}" for f in fit.axis.effects if f.effect.is_nonparametric]
+        lines += [
+            f"  {nonparametric_in_words(f)}" for f in fit.axis.effects if f.effect.is_nonparametric
+        ]
     lines += [f"axis {axis}: not fitted, as it moves in no log" for axis in result.not_fitted]
     return "\n".join(lines)
 
 
-def _with_interval(e: Estimate, common: str | None) -> str:
+def _with_interval(e: Estimate, common: NoInterval | None) -> str:
     """A value with its interval, or why it has none unless that was said for all."""
     text = f"{e.value:12.6g} {e.unit:10s}"
     if not e.free:
         return text + " fixed"
     if e.low is None:
-        return text if e.reason == common else f"{text} {e.reason}"
+        return text if e.reason in (None, common) else f"{text} {no_interval_in_words(e.reason)}"
     return text + f" 90 % in [{e.low:.6g}, {e.high:.6g}]"
 
 
@@ -78,11 +96,11 @@ def compare_text(result: Comparison) -> str:
                 f"({error / c.floor:.1f} x noise floor), free-running position error "
                 f"{c.position_error[name]:.3g} {c.units.position}"
             )
-        lines += [f"  worst: {region.in_words()}" for region in c.worst]
+        lines += [f"  worst: {region_in_words(region)}" for region in c.worst]
         if not c.worst:
             lines.append("  nowhere does the error stand above the noise")
-        lines += [f"  {test.in_words()}" for test in c.tests.correlations]
-    lines += dict.fromkeys(c.tests.reason for c in result.axes.values())
+        lines += [f"  {correlation_in_words(test)}" for test in c.tests.correlations]
+    lines += dict.fromkeys(loop_in_words(c.tests.loop) for c in result.axes.values())
     return "\n".join(lines)
 
 
@@ -92,7 +110,7 @@ def diagnose_text(result: Diagnosis) -> str:
     for axis, d in result.axes.items():
         unit = d.base.axis.units.force
         named = f" {d.best.effect.name}." if d.best else ""
-        lines.append(f"axis {axis}: {d.verdict.value}{named}")
+        lines.append(f"axis {axis}: {verdict_in_words(d.verdict)}{named}")
         lines.append(
             f"  force error {d.base.error:.4g} {unit}, noise floor {d.base.floor:.4g} {unit} "
             f"(ratio {d.base.ratio:.2f})"
@@ -102,12 +120,7 @@ def diagnose_text(result: Diagnosis) -> str:
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         if d.unexplained:
-            s = d.unexplained
-            again = f", period {s.period:.4g} {s.unit}" if s.period else ""
-            lines.append(
-                f"  {100 * s.share_of_error:.0f} % of the squared error depends on "
-                f"{s.depends_on.replace('_', ' ')}{again}"
-            )
+            lines.append(f"  {dependence_in_words(d.unexplained)}")
             lines.append(f"  {advice()}")
         lines += [_ranking_line(c) for c in d.ranking[:4]]
         lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
@@ -127,15 +140,6 @@ def _step_line(number: int, step: Step) -> str:
         f"  step {number}: with {step.candidate.effect.name}{beside} the held-out error falls from "
         f"{gain.before:.4g} to {gain.after:.4g} "
         f"{step.candidate.fit.axis.units.force}{dropped}"
-    )
-
-
-def advice() -> str:
-    """What lowers the error where no physical effect does."""
-    known = [e.name for e in load_catalogue().values() if e.is_nonparametric]
-    return (
-        f"twin add {' or '.join(known)} describes what is left without explaining it, and lowers "
-        "the error"
     )
 
 
@@ -162,14 +166,14 @@ def plan_text(result: Plan) -> str:
         f"axis {result.axis}: {asked}, {verdict}",
         f"  {in_short(result.chosen.experiment, result.chosen.units)}",
     ]
-    lines += [f"  {result.gap.in_words()}"]
+    lines += [f"  {gap_in_words(result.gap)}"]
     lines += [f"  {name} shows in {motion}" for name, motion in result.excited_by.items()]
     if result.favoured:
         lines.append(f"  the logs at hand favour {result.favoured} already")
     if result.supposed and several:
         lines.append(f"  without logs: effects at start values, {STRENGTH:g} times the noise floor")
     lines += [_trial_line(t, several) for t in result.ranking[:SHOWN]]
-    return "\n".join([*lines, *(f"  not run: {why}" for why in result.not_run)])
+    return "\n".join([*lines, *(f"  not run: {not_run_in_words(n)}" for n in result.not_run)])
 
 
 def _trial_line(t: Trial, several: bool) -> str:

@@ -45,12 +45,6 @@ class Change:
     alike: tuple[str, ...] = ()
     force_unit: str = LINEAR.force
 
-    def in_words(self) -> str:
-        """E.g. "mass 15 -> 15.6 kg makes 0.57 N (payload_mass would be the same force)"."""
-        same = f" ({' and '.join(self.alike)} would be the same force)" if self.alike else ""
-        values = f"{self.before:.4g} -> {self.after:.4g} {self.unit}"
-        return f"{self.label} {values} makes {self.force:.3g} {self.force_unit}{same}"
-
 
 @dataclass(frozen=True)
 class Refit:
@@ -60,16 +54,6 @@ class Refit:
     refitted: float
     changes: tuple[Change, ...]
     unit: str = LINEAR.force
-
-    def in_words(self) -> str | None:
-        """A sentence, or None where the values given were good."""
-        if not self.changes:
-            return None
-        told = ", ".join(c.in_words() for c in self.changes)
-        return (
-            f"as given the model misses by {self.given:.3g} {self.unit}, refitted by "
-            f"{self.refitted:.3g} {self.unit}: {told}"
-        )
 
 
 def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
@@ -114,8 +98,23 @@ def _within(force: Array, basis: Array) -> bool:
     return rms(unabsorbed(force, basis)) < SAME_FORCE * rms(force)
 
 
-def moved_parameters(before: Fit, after: Fit) -> tuple[str, ...]:
-    """Sentences on parameters that moved by more than their interval when the effect came."""
+@dataclass(frozen=True)
+class MovedParameter:
+    """A parameter that an added effect changed by more than its interval.
+
+    before, after: in ``unit``. collapsed: whether hardly any of a linear parameter is left, so that
+    it had taken over the force of the effect that was missing.
+    """
+
+    label: str
+    before: float
+    after: float
+    unit: str
+    collapsed: bool
+
+
+def moved_parameters(before: Fit, after: Fit) -> tuple[MovedParameter, ...]:
+    """The parameters of the smaller model that changed when the effect was added."""
     shared = [c for c in before.scaling.where if c in after.scaling.where]
     old, new = read(before.axis, shared), read(after.axis, shared)
     index = [after.scaling.where.index(c) for c in shared]
@@ -125,13 +124,11 @@ def moved_parameters(before: Fit, after: Fit) -> tuple[str, ...]:
     out = []
     for c, a, b, limit, first in zip(shared, old, new, allowed, earlier, strict=True):
         p = c.parameter
-        # Its own new interval does not matter here: what stood in for the effect may be collinear.
+        # Its new interval does not matter here: a confounded parameter may be collinear with the
+        # effect.
         collapsed = p.strength and abs(b) < RULE.collapse * abs(a) and abs(a) > first
         if not collapsed and not abs(b - a) > limit:
             continue
-        verb = "collapsed" if collapsed else "moved"
-        tail = (
-            "it stood in for the effect that was missing" if collapsed else "more than its interval"
-        )
-        out.append(f"{c.label} {verb} from {a:.4g} to {b:.4g} {after.axis.units(p.unit)}: {tail}")
+        unit = after.axis.units(p.unit)
+        out.append(MovedParameter(c.label, float(a), float(b), unit, bool(collapsed)))
     return tuple(out)

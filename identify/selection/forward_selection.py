@@ -23,14 +23,12 @@ from twin.effects import Catalogue
 
 
 class Verdict(Enum):
-    """The answer of a diagnosis, as a sentence."""
+    """The answer of a diagnosis."""
 
-    MISSING_EFFECT = "One effect explains what the model lacks, on the fit logs and held out."
-    NOTHING_MISSING = "Nothing is missing: the force error is at its noise floor."
-    AMBIGUOUS = "Several effects explain the error equally well; this data cannot tell them apart."
-    UNEXPLAINED = (
-        "The error stands above the noise floor, and no effect of the catalogue explains it."
-    )
+    MISSING_EFFECT = "missing effect"
+    NOTHING_MISSING = "nothing missing"
+    AMBIGUOUS = "ambiguous"
+    UNEXPLAINED = "unexplained"
 
 
 @dataclass(frozen=True, eq=False)

@@ -189,14 +189,10 @@ def _attempt(base: Fit, ground: Fit, dataset: Dataset, empty: Fitted) -> Candida
     )
 
 
-def in_words(fitted: Fitted) -> str:
-    """What a description follows, and what it is not."""
-    used = [p.name for p in fitted.effect.parts if any(fitted.values[n] for n in p.strengths)]
-    what = f"follows {', '.join(used)}" if used else "found nothing to follow"
-    return (
-        f"{fitted.effect.name} is a description, not physics: it {what}, and holds only where the "
-        "fit logs went"
-    )
+def followed(fitted: Fitted) -> tuple[str, ...]:
+    """The parts of a nonparametric effect that are not zero: what its force depends on."""
+    parts = fitted.effect.parts
+    return tuple(p.name for p in parts if any(fitted.values[n] for n in p.strengths))
 
 
 def described_labels(axis: AxisModel) -> frozenset[str]:

@@ -40,7 +40,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TrialResult:
     """What a trial found.
 
     answers: for each effect that was named, in order, its name and those declared as ambiguous
@@ -75,17 +75,6 @@ class Outcome:
             for order in permutations(self.case.effects)
         )
 
-    def in_words(self) -> str:
-        """One line: what was planted, and what the diagnosis said."""
-        planted = " and ".join(self.case.effects) or "nothing"
-        if not self.shown:
-            return f"{planted} cannot show on this stage's motion at {self.case.strength:g} floors"
-        known = "" if self.case.known else ", left out of the catalogue"
-        answer = " and ".join(" or ".join(answer) for answer in self.answers)
-        return (
-            f"{planted} at {self.case.strength:g} floors{known}: {answer or self.verdict.lower()}"
-        )
-
     @property
     def quiet(self) -> bool:
         """Whether no name was given."""
@@ -102,7 +91,7 @@ class Outcome:
 FLOOR = 1.3  # error over noise floor that passes for noise
 
 
-def run(case: Case) -> Outcome:
+def run(case: Case) -> TrialResult:
     """Make the machine, diagnose it with one thread, and compare with what was planted."""
     catalogue = load_catalogue()
     stage = load_model(STAGE, catalogue)
@@ -110,13 +99,13 @@ def run(case: Case) -> Outcome:
     try:
         built = machine(stage, [catalogue[e] for e in case.effects], case.strength, rng)
     except NotShown:
-        return Outcome(case, shown=False)
+        return TrialResult(case, shown=False)
     known = [e for e in catalogue.values() if case.known or e.name not in case.effects]
     begun = perf_counter()
     dataset = datasets(built.model, built.logs, built.holdout)[AXIS]
     dataset, base = fit_aligned(built.model.axes[AXIS], dataset)
     found = diagnose_axis(base, dataset, Catalogue(known), workers=1)
-    return Outcome(
+    return TrialResult(
         case=case,
         verdict=found.verdict.name,
         answers=found.answers,

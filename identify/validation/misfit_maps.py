@@ -71,19 +71,6 @@ class Region:
     share: float
     force_unit: str = LINEAR.force
 
-    def in_words(self) -> str:
-        """E.g. "position between 12 and 26 mm: 0.12 N, 14 times the noise floor, ..."."""
-        what = self.coordinate.replace("_", " ")
-        span = f"{what} between {self.low:.4g} and {self.high:.4g} {self.unit}"
-        if self.coordinate == "standstill":
-            span = "at standstill" if self.low > 0.0 else "in motion"
-        if self.coordinate == "direction":
-            span = "moving forwards" if self.low > -0.5 else "moving backwards"
-        return (
-            f"{span}: {self.rms:.3g} {self.force_unit} RMS, {self.ratio:.1f} times the noise "
-            f"floor, {100 * self.share:.0f} % of the squared error"
-        )
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AxisComparison:

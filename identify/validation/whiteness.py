@@ -3,7 +3,7 @@
 Tested is the force residual on windows that do not overlap, which is white where the model is
 right. Bounds are +-1.645/sqrt(n), n the number of those windows: 90 of 100 values of a white
 residual lie within (L. Jia 2023, residual analysis; L. Ljung, System Identification, 16.6). Which
-residual is tested and why depends on the loop, and is said in ``reason``.
+lags are tested depends on the loop.
 """
 
 from __future__ import annotations
@@ -28,27 +28,11 @@ REACH = 5.0  # noise floors that the histogram spans at least
 
 
 class Loop(Enum):
-    """How the logs were taken; the value says which residual is tested, and why."""
+    """Whether the logs were recorded under feedback."""
 
-    CLOSED = (
-        "Closed loop: feedback carries position noise into the force, so the free run is done on "
-        "the logged command, and of command and speed only what came before the residual is tested "
-        "against it. Whiteness is asked of the force residual alone: a simulated-position residual "
-        "is coloured even when the model is right, and a one-step-ahead one is small even when it "
-        "is wrong."
-    )
-    OPEN = (
-        "Open loop: the command knows nothing of the measurement's noise, so it is tested against "
-        "the residual at all lags. Whiteness is asked of the force residual alone: a "
-        "simulated-position residual is coloured even when the model is right, and a "
-        "one-step-ahead one is small even when it is wrong."
-    )
-    UNKNOWN = (
-        "No setpoint was logged, so the loop is taken for closed: feedback may carry position "
-        "noise into the force, and of command and speed only what came before the residual is "
-        "tested against it. Whiteness is asked of the force residual alone: a simulated-position "
-        "residual is coloured even when the model is right."
-    )
+    CLOSED = "closed"
+    OPEN = "open"
+    UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,15 +60,6 @@ class Correlation:
         """Whether no tested value is beyond the limit."""
         return bool(np.all(np.abs(self.value[self.tested]) < self.limit))
 
-    def in_words(self) -> str:
-        """E.g. "force residual against command: 12 % of the lags beyond the 90 % bounds, ..."."""
-        other = "its own past" if self.signal == "residual" else self.signal
-        verdict = "no more than by chance" if self.passes else "structure is left"
-        return (
-            f"force residual against {other}: {100 * self.outside:.0f} % of the lags beyond the "
-            f"90 % bounds of ±{self.bound:.2g}, {verdict}"
-        )
-
 
 @dataclass(frozen=True, eq=False)
 class ResidualTests:
@@ -101,11 +76,6 @@ class ResidualTests:
     density: Array
     within: float
     correlations: tuple[Correlation, ...]
-
-    @property
-    def reason(self) -> str:
-        """Which residual is tested, and why."""
-        return self.loop.value
 
     @property
     def passes(self) -> bool:

@@ -22,7 +22,9 @@ import twin.model.file
 from identify import workflow
 from identify.cli.shared import checked
 from identify.output import as_json
+from identify.output import selftest as selftest_output
 from identify.output import text as as_text
+from identify.selftest.tally import Rate
 from twin.log.check import CheckReport, Fault, Finding, Severity
 from twin.model.units import LINEAR
 
@@ -241,12 +243,15 @@ def test_selftest(monkeypatch, cli):
     cases = stub(monkeypatch, identify.selftest.Design, "cases", ["a case"])
     run = stub(monkeypatch, identify.selftest, "run_all", ["an outcome"])
     draw = stub(monkeypatch, identify.selftest, "draw")
-    line = SimpleNamespace(in_words=lambda: "mass: 1 of 2")
-    monkeypatch.setattr(identify.selftest, "rates", lambda outcomes: [line])
-    monkeypatch.setattr(identify.selftest, "coverage", lambda outcomes: {"mass": line})
-    monkeypatch.setattr(identify.selftest, "selftest_json", lambda outcomes: {"n": len(outcomes)})
+    rate = Rate("mass", 1, 2)
+    monkeypatch.setattr(selftest_output, "rates", lambda results: [rate])
+    monkeypatch.setattr(selftest_output, "coverage", lambda results: {"mass": rate})
+    monkeypatch.setattr(selftest_output, "selftest_json", lambda results: {"n": len(results)})
     code, text, _ = cli("selftest", "--seed", "4", "--only", "wear", "--only", "gms", "-o", "p.svg")
-    assert (code, text.splitlines()) == (0, ["mass: 1 of 2", "  interval of mass: 1 of 2"])
+    assert (code, text.splitlines()) == (
+        0,
+        ["mass: 1 of 2 (50 %)", "  interval of mass: 1 of 2 (50 %)"],
+    )
     assert cases.calls.pop()[0] == (4, ["wear", "gms"])
     assert run.calls.pop()[0] == (["a case"],)
     assert draw.only[0] == (["an outcome"], Path("p.svg"))

@@ -6,13 +6,19 @@ from identify.estimation.decision import RULE
 from identify.experiment_design.plan import Plan
 from identify.output.report.blocks import Answer, Section, Tile, Tone
 from identify.output.report.subject import Subject
-from identify.output.report.units import Scale, number, quantity, spaced
+from identify.output.report.units import SCALED, Scale, number, quantity, spaced
 from identify.output.results import Addition
-from identify.output.text import advice
+from identify.output.words.experiment_design import gap_in_words
+from identify.output.words.numbers import capitalised
+from identify.output.words.selection import (
+    advice,
+    dependence_in_words,
+    refit_in_words,
+    verdict_in_words,
+)
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
 from identify.selection.forward_selection import AxisDiagnosis, Verdict
-from identify.selection.residual_dependence import Dependence
 from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
 
@@ -36,9 +42,9 @@ def _diagnosed(
     axis: AxisComparison, found: AxisDiagnosis, following: Plan | None, refit: Refit | None
 ) -> Answer:
     remarks = []
-    sentence = found.verdict.value
+    sentence = verdict_in_words(found.verdict)
     if found.unexplained is not None:
-        sentence = f"{sentence} {_dependence(found.unexplained)}"
+        sentence = f"{sentence} {dependence_in_words(found.unexplained, SCALED)}"
     if found.best is not None:
         remarks.append(_left_over(found.best))
     remarks.extend(_runner_up(found))
@@ -46,8 +52,8 @@ def _diagnosed(
         remarks.append(f"{advice()}.")
     if following is not None:
         remarks.append(_next_step(following))
-    if found.verdict is Verdict.NOTHING_MISSING and refit and (changed := refit.in_words()):
-        remarks.append(f"{changed[0].upper()}{changed[1:]}.")
+    if found.verdict is Verdict.NOTHING_MISSING and refit and (changed := refit_in_words(refit)):
+        remarks.append(capitalised(changed))
     return Answer(
         headline=f"Axis {axis.axis}: {_headline(found)}",
         sentence=sentence,
@@ -67,16 +73,6 @@ def _headline(found: AxisDiagnosis) -> str:
             return "something outside the catalogue is missing"
         case Verdict.NOTHING_MISSING:
             return "nothing is missing"
-
-
-def _dependence(structure: Dependence) -> str:
-    period = ""
-    if structure.period is not None:
-        period = f", with a period of {quantity(structure.period, structure.unit)}"
-    return (
-        f"It depends most on {spaced(structure.depends_on)}, which accounts for "
-        f"{100 * structure.share_of_error:.0f} % of the squared error{period}."
-    )
 
 
 def _left_over(best: Candidate) -> str:
@@ -110,7 +106,7 @@ def _next_step(following: Plan) -> str:
         f"The experiment that {what} ({quantity(chosen.duration, 's')}; twin plan writes it): "
         f"{in_short(chosen.experiment, chosen.units)}. "
         f"It leaves {quantity(chosen.difference, unit)} RMS to the rival, where noise is "
-        f"{quantity(chosen.floor, unit)}; {following.gap.in_words()}."
+        f"{quantity(chosen.floor, unit)}; {gap_in_words(following.gap)}."
     )
 
 

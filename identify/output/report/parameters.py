@@ -10,6 +10,7 @@ from identify.estimation.intervals import Estimate, estimates, refusal
 from identify.output.report.blocks import Block, Column, Heading, Row, Section, Table, Tone
 from identify.output.report.subject import Subject
 from identify.output.report.units import NOTHING, Scale, number, quantity, spaced
+from identify.output.words.estimation import no_interval_in_words
 from identify.selection.forward_selection import AxisDiagnosis
 from identify.selection.nonparametric import described_labels
 from twin.model.machine import AxisModel
@@ -85,8 +86,8 @@ def _part(heading: str, fit: Fit, labels: Sequence[str]) -> _Part:
     # The reason is the same for all: said once instead of in a column.
     error = quantity(fit.error, fit.axis.units.force)
     remark = (
-        f"{heading}: no intervals, because the force error of {error} stands "
-        f"{number(fit.ratio)} times above the noise floor; the model is wrong by more than noise."
+        f"{heading}: no intervals, because the force error of {error} is {number(fit.ratio)} times "
+        "the noise floor; the model is wrong by more than noise."
     )
     return _Part(columns[:1], [c[:1] for c in cells], remark)
 
@@ -98,7 +99,8 @@ def _cells(estimate: Estimate | None) -> tuple[str, str]:
     if not estimate.free:
         return scale.text(estimate.value), ""
     if estimate.low is None or estimate.high is None:
-        return scale.text(estimate.value), estimate.reason or ""
+        reason = no_interval_in_words(estimate.reason) if estimate.reason else ""
+        return scale.text(estimate.value), reason
     low, value, high = scale.within(
         estimate.low, estimate.high, estimate.low, estimate.value, estimate.high
     )

@@ -9,10 +9,12 @@ from identify.output.report import maps
 from identify.output.report.blocks import Block, Heading, Listing, Picture, Section
 from identify.output.report.drawing import BLUE, GREY, new_figure
 from identify.output.report.subject import Subject
-from identify.output.report.units import Scale, number, quantity, spaced, title_case
+from identify.output.report.units import SCALED, spaced
+from identify.output.words.numbers import capitalised
+from identify.output.words.validation import region_in_words
 from identify.selection.forward_selection import AxisDiagnosis
 from identify.selection.residual_dependence import Dependence
-from identify.validation.misfit_maps import AxisComparison, Region
+from identify.validation.misfit_maps import AxisComparison
 
 
 def section(subject: Subject) -> Section | None:
@@ -30,28 +32,11 @@ def section(subject: Subject) -> Section | None:
 def _blocks(axis: AxisComparison, found: AxisDiagnosis | None) -> list[Block]:
     blocks: list[Block] = []
     if axis.worst:
-        blocks.append(Listing([in_words(region) for region in axis.worst]))
+        blocks.append(Listing([capitalised(region_in_words(r, SCALED)) for r in axis.worst]))
     blocks.append(maps.picture(axis))
     if found is not None and found.unexplained is not None:
         blocks.append(_picture(found.unexplained))
     return blocks
-
-
-def in_words(region: Region) -> str:
-    """E.g. "Position between 12.0 and 26.0 mm: 120 mN RMS, 14.0 times the noise floor, ..."."""
-    return (
-        f"{_span(region)}: {quantity(region.rms, region.force_unit)} RMS, "
-        f"{number(region.ratio)} times the noise floor, "
-        f"{100 * region.share:.0f} % of the squared error."
-    )
-
-
-def _span(region: Region) -> str:
-    if region.coordinate == "direction":
-        return "Moving forwards" if region.low > -0.5 else "Moving backwards"
-    scale = Scale.of(region.unit, [region.low, region.high])
-    low, high = scale.within(region.low, region.high, region.low, region.high)
-    return f"{title_case(region.coordinate)} between {low} and {high} {scale.unit}"
 
 
 def _picture(structure: Dependence) -> Picture:

@@ -10,7 +10,8 @@ from identify.output.report.blocks import Block, Heading, Listing, Picture, Sect
 from identify.output.report.drawing import BLUE, ORANGE, binned_mean, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, spaced
-from identify.selection.nonparametric import in_words
+from identify.output.words.numbers import capitalised
+from identify.output.words.selection import nonparametric_in_words
 from identify.validation.misfit_maps import AxisComparison
 from twin.model.machine import AxisModel, Fitted
 
@@ -24,7 +25,7 @@ def section(subject: Subject) -> Section | None:
                 continue
             blocks.append(Heading(f"{spaced(fitted.effect.name)} on {axis.axis}".capitalize()))
             blocks.append(_picture(axis, fitted))
-            blocks.append(Listing([f"{in_words(fitted)}."]))
+            blocks.append(Listing([capitalised(nonparametric_in_words(fitted))]))
     return Section("shape", "What is described, not explained", blocks) if blocks else None
 
 

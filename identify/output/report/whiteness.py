@@ -11,6 +11,8 @@ from identify.output.report.blocks import Block, Heading, Listing, Picture, Sect
 from identify.output.report.drawing import BLUE, FLOOR, GREY, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, inverse
+from identify.output.words.numbers import capitalised
+from identify.output.words.validation import correlation_in_words, loop_in_words
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import Correlation, ResidualTests
 
@@ -22,7 +24,9 @@ def section(subject: Subject) -> Section:
         if heading := subject.heading(axis.axis):
             blocks.append(Heading(heading))
         blocks += _blocks(axis)
-    blocks.append(Listing(tuple(dict.fromkeys(axis.tests.reason for axis in subject.axes))))
+    blocks.append(
+        Listing(tuple(dict.fromkeys(loop_in_words(axis.tests.loop) for axis in subject.axes)))
+    )
     return Section("tests", "Is what is left noise?", blocks)
 
 
@@ -34,8 +38,7 @@ def _blocks(axis: AxisComparison) -> list[Block]:
         "with n windows; a tenth of a white residual's values lie outside. Faint values are not "
         "tested."
     )
-    words = [c.in_words() for c in tests.correlations]
-    items = [f"{w[:1].upper()}{w[1:]}." for w in words]
+    items = [capitalised(correlation_in_words(c)) for c in tests.correlations]
     return [Picture(_figure(tests, axis.units.force), caption), Listing(items)]
 
 

@@ -12,7 +12,7 @@ from constructed import SHORT, dataset_of, effect, fit_of, log_of, waves, window
 
 from identify.dataset.motion import motion_of
 from identify.dataset.spectral_lines import MOST_LINES, _rest, lines, lines_of, ripples
-from identify.estimation.channel_delay import misalignment, realigned, shift_in_words
+from identify.estimation.channel_delay import misalignment, realigned
 from identify.estimation.time_origin import (
     _amplitude,
     depends_on_time_origin,
@@ -21,6 +21,8 @@ from identify.estimation.time_origin import (
     with_time_origins,
     without_timed_forces,
 )
+from identify.output.words.estimation import channel_delay_in_words
+from identify.output.words.selection import repeat_in_words
 from identify.selection.repeating_force import Repeat, _line, _term, not_general
 from twin.model.machine import AxisModel
 
@@ -132,7 +134,7 @@ def test_a_repeat_is_general_where_its_terms_are_alike():
     assert repeat(0.0, 0.51).general
     assert not repeat(0.0, 0.49).general
     assert repeat(2.0 * np.pi).general
-    words = repeat(1.0).in_words()
+    words = repeat_in_words(repeat(1.0))
     assert "repeats every 2.5 mm of travel (1 N in a, 1 N in b)" in words
     assert "by 57 degrees" in words
 
@@ -289,6 +291,6 @@ def test_a_force_that_acts_late_or_hardly_early_is_no_fault_of_the_log():
 
 def test_a_shift_is_said_in_samples():
     log = aligned(0.0)
-    assert shift_in_words(dataset_of(log)) is None
-    said = shift_in_words(dataset_of(log, channel_delay=1.5e-3))
+    assert channel_delay_in_words(dataset_of(log)) is None
+    said = channel_delay_in_words(dataset_of(log, channel_delay=1.5e-3))
     assert said.startswith("axis x: the force acts 1500 us (1.50 samples) before")

@@ -180,7 +180,8 @@ def test_a_refit_of_one_model_or_of_what_cannot_run(monkeypatch):
     monkeypatch.setattr(Arena, "record", refuse)
     found = refitted(arena(FIRST, SECOND), trial)
     assert (found.gain, found.difference) == (0.0, 0.0)
-    assert "beyond the travel" in found.not_run
+    assert "beyond the travel" in found.not_run.reason
+    assert found.not_run.truth == "one"
 
 
 def test_trials_come_by_falling_gain_without_those_that_cannot_run(monkeypatch):
@@ -202,7 +203,7 @@ def test_trials_come_by_falling_gain_without_those_that_cannot_run(monkeypatch):
         )  # fmt: skip
         found, not_run = contest(arena(*explanations), tried, lambda *done: bars.append(done[1:]))
         assert len(not_run) == 1
-        assert "beyond the travel" in not_run[0]
+        assert "beyond the travel" in not_run[0].reason
         assert found[0].new[1].duration == 3.0
         assert [t.gain for t in found] == [0.0, -1.0, -4.0]
         assert {(t.k, t.new[0]) for t in found} == {(kind, "one")}

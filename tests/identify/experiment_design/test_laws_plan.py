@@ -11,12 +11,14 @@ import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_motion, fitted
 
 from identify.dataset.prepared_log import PreparedLog
+from identify.experiment_design.candidate_experiments import NotRun
 from identify.experiment_design.discrimination import (
     Arena,
     Explanation,
 )
 from identify.selection.forward_selection import Verdict
 from twin.errors import CannotRun, InputError
+from twin.experiments.kinds import Tracking
 from twin.model.machine import MachineModel
 
 plans = importlib.import_module("identify.experiment_design.plan")
@@ -76,16 +78,20 @@ def test_an_experiment_decides_by_more_evidence_than_separates(gain, decides):
     assert made.plan_of("a", ranking=(trial(gain),)).decides
 
 
+TOO_LONG = NotRun(Tracking(50.0), "too long")
+TOO_FAR = NotRun(Tracking(70.0), "too far")
+
+
 @pytest.mark.parametrize(("proof", "refuted"), [(10.0, False), (10.1, True)])
 def test_what_the_logs_refute_already_is_planned_without_them(monkeypatch, proof, refuted):
     asked = {}
 
     def tried(arena, experiments, progress):
         asked.update(logs=arena.logs, experiments=experiments)
-        return [trial(50.0)], ("a sweep: too far",)
+        return [trial(50.0)], (TOO_FAR,)
 
     monkeypatch.setattr(plans, "favoured", lambda arena: ("two", proof))
-    monkeypatch.setattr(plans, "proposals", lambda *given: (given, ("a map: too long",)))
+    monkeypatch.setattr(plans, "proposals", lambda *given: (given, (TOO_LONG,)))
     monkeypatch.setattr(plans, "contest", tried)
     monkeypatch.setattr(plans, "refitted", lambda arena, t: t)
     monkeypatch.setattr(plans, "gap", lambda motion, where, logs: logs)
@@ -97,8 +103,8 @@ def test_what_the_logs_refute_already_is_planned_without_them(monkeypatch, proof
     assert (found.gap, found.between, found.axis) == ((OLD,), ("one", "two"), "x")
     assert found.excited_by == {"one": CATALOGUE["wear"].excited_by}
     assert found.supposed
-    assert set(found.not_run) == {"a map: too long", "a sweep: too far"}
-    monkeypatch.setattr(plans, "contest", lambda *_: ([], ("a pass: too far",)))
+    assert set(found.not_run) == {TOO_LONG, TOO_FAR}
+    monkeypatch.setattr(plans, "contest", lambda *_: ([], (TOO_FAR,)))
     with pytest.raises(InputError, match="none of the experiments"):
         plans._planned(arena(FIRST, SECOND), 7.0, 3, True, effects)
 

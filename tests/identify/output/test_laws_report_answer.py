@@ -24,8 +24,11 @@ from identify.output.report import (
 )
 from identify.output.report.blocks import Heading, Picture, Table, Tone
 from identify.output.report.subject import Subject
-from identify.output.report.units import Scale, number, quantity, spaced, title_case
-from identify.output.text import advice
+from identify.output.report.units import SCALED, Scale, number, quantity, spaced, title_case
+from identify.output.words.experiment_design import gap_in_words
+from identify.output.words.numbers import capitalised
+from identify.output.words.selection import advice, refit_in_words, verdict_in_words
+from identify.output.words.validation import region_in_words
 from identify.selection.forward_selection import Verdict
 
 
@@ -67,7 +70,7 @@ def cards(diagnosis=None, **changes):
 def test_the_answer_for_an_ambiguity():
     first, second = cards(made.diagnosed())
     assert first.headline == "Axis x: cogging or quadratic drag and lugre are missing"
-    assert (first.sentence, first.tone) == (Verdict.AMBIGUOUS.value, Tone.STRONG)
+    assert (first.sentence, first.tone) == (verdict_in_words(Verdict.AMBIGUOUS), Tone.STRONG)
     tiles = [(t.name, t.value, t.remark) for t in first.tiles]
     ratio = f"{number(8.37 / 2.11)} → {number(1.19 / 1.03)}"
     assert tiles == [
@@ -81,11 +84,11 @@ def test_the_answer_for_an_ambiguity():
         "Runner-up: quadratic drag, ΔBIC 423, held-out error 7.34 → 2.38 N, supported.",
         "The experiment that decides (8.30 s; twin plan writes it): passes: axis x, span 0.0831 m, "
         "speed 0.0127 m/s, repeats 7. It leaves 41.2 mN RMS to the rival, where noise is 11.3 mN; "
-        f"{made.plan_of('a').gap.in_words()}.",
+        f"{gap_in_words(made.plan_of('a').gap)}.",
     ]
     assert second.headline == "Axis y: nothing is missing"
     assert second.tone is Tone.PLAIN
-    words = made.refit_of(0.01).in_words()
+    words = refit_in_words(made.refit_of(0.01))
     assert second.remarks[-1] == f"{words[0].upper()}{words[1:]}."
     assert second.remarks[0].startswith("Nearest candidate: constant force, ΔBIC 66.0")
     assert second.remarks[0].endswith("not supported.")
@@ -100,8 +103,8 @@ def test_the_answer_for_what_nothing_explains():
     card, _ = cards(made.diagnosed(lost))
     assert card.headline == "Axis x: something outside the catalogue is missing"
     assert card.sentence == (
-        f"{Verdict.UNEXPLAINED.value} It depends most on other axis position, which accounts for "
-        "63 % of the squared error, with a period of 27.3 mm."
+        f"{verdict_in_words(Verdict.UNEXPLAINED)} The error depends most on other axis position, "
+        "which accounts for 63 % of the squared error, with a period of 27.3 mm."
     )
     assert f"{advice()}." in card.remarks
     assert card.remarks[0].startswith("Nearest candidate: cogging")
@@ -156,19 +159,23 @@ def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
 # --- regions, notes, facts ------------------------------------------------------------------
 
 
+def scaled(region) -> str:
+    return capitalised(region_in_words(region, SCALED))
+
+
 def test_the_worst_regions_in_words():
     near, back = made.comparison_of().worst
-    assert regions.in_words(near) == (
+    assert scaled(near) == (
         "Position between 12.3 and 25.7 mm: 121 mN RMS, 14.3 times the noise floor, 37 % of the "
         "squared error."
     )
-    assert regions.in_words(back).startswith("Moving backwards: 87.0 mN RMS, 7.70 times")
-    assert regions.in_words(replace(back, low=0.0, high=1.5)).startswith("Moving forwards")
+    assert scaled(back).startswith("Moving backwards: 87.0 mN RMS, 7.70 times")
+    assert scaled(replace(back, low=0.0, high=1.5)).startswith("Moving forwards")
 
 
 def test_a_narrow_region_has_the_digits_of_its_width():
     near, _ = made.comparison_of().worst
-    narrow = regions.in_words(replace(near, low=0.01131, high=0.01157))
+    narrow = scaled(replace(near, low=0.01131, high=0.01157))
     assert narrow.startswith("Position between 11.31 and 11.57 mm:")
 
 

@@ -21,6 +21,7 @@ from identify.output.report.drawing import (
 )
 from identify.output.report.subject import LogForces, Subject, log_forces, shown_residual
 from identify.output.report.units import Scale
+from identify.output.words.validation import correlation_in_words, loop_in_words
 from twin.model.machine import Fitted
 
 RNG = np.random.default_rng(8)
@@ -216,13 +217,13 @@ def test_the_tests_of_each_axis_are_in_words_and_their_reason_once(monkeypatch):
     monkeypatch.setattr(whiteness, "_figure", lambda tests, unit: tests)
     compared = made.compared()
     *blocks, reason = whiteness.section(subject_of(comparison=compared)).blocks
-    assert reason.items == (made.whiteness_of().reason,)
+    assert reason.items == (loop_in_words(made.whiteness_of().loop),)
     for axis, (heading, picture, listing) in zip("xy", (blocks[:3], blocks[3:]), strict=True):
         tests = compared.axes[axis].tests
         assert heading.text == f"Axis {axis}"
         assert picture.figure is tests
         assert "The force residual on 387 windows" in picture.caption
-        words = [c.in_words() for c in tests.correlations]
+        words = [correlation_in_words(c) for c in tests.correlations]
         assert listing.items == [f"F{w[1:]}." for w in words]
 
 

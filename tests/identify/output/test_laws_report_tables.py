@@ -204,7 +204,7 @@ def test_fitted_values_stand_beside_those_without_the_effect():
     }  # fmt: skip
     assert table["cogging.p"] == {
         "Without cogging": "–", "With cogging": "24.1 mm",
-        "90 % interval": "no interval: not shown", "Meaning": "magnet pitch",
+        "90 % interval": no_interval_in_words(NotExcited()), "Meaning": "magnet pitch",
     }  # fmt: skip
     assert table["coulomb_viscous.Fs"] == {
         "Without cogging": "0.837 N", "With cogging": "337 mN", "90 % interval": "",

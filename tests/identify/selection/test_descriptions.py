@@ -105,7 +105,7 @@ def test_a_force_of_no_known_effect_is_described(
     assert added.step.holdout_error_before is not None
     assert added.step.holdout_error_after is not None
     assert added.step.holdout_error_after * fall < added.step.holdout_error_before
-    assert "not physics" in added.notes[0]
+    assert "not a physical law" in added.notes[0]
     assert added.position_error[1] < added.position_error[0]
     assert added.replayed == pytest.approx(added.position_error[1], rel=0.02)
 
@@ -117,7 +117,7 @@ def test_adding_a_map_lowers_the_errors_of_force_and_position(mapped: Addition) 
     assert mapped.step.holdout_error_after is not None
     # All but what lies at the ends of the travel, which the short logs hardly reach.
     assert mapped.step.holdout_error_after * 5.0 < mapped.step.holdout_error_before
-    assert "not physics" in mapped.notes[0]
+    assert "not a physical law" in mapped.notes[0]
     assert mapped.position_error[1] < mapped.position_error[0]
     assert mapped.replayed == pytest.approx(mapped.position_error[1], rel=0.02)
 

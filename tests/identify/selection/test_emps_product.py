@@ -136,4 +136,4 @@ def test_the_term_of_a_screw_turn_is_present_in_each_run_but_not_general(found):
     final = found.leading.final
     for amplitude in repeat.amplitude.values():
         assert final.floor < amplitude < 2.0 * final.error
-    assert any("not general" in note for note in remarks(found.leading, None))
+    assert any("no function of position" in note for note in remarks(found.leading, None))

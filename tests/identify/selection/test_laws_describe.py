@@ -12,6 +12,7 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_study,
 from identify.estimation.evidence import BLOCKS, effective_samples
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import jacobian, residual
+from identify.output.words.selection import nonparametric_in_words
 from identify.selection import nonparametric as module
 from identify.selection.nonparametric import (
     RIDGE,
@@ -23,7 +24,6 @@ from identify.selection.nonparametric import (
     _solve,
     choose_stiffness,
     described_labels,
-    in_words,
     physics_alone,
 )
 from twin.model.machine import Fitted, MachineModel, ParameterReference
@@ -216,8 +216,8 @@ def test_parts_that_were_not_chosen_are_zero_and_held(about):
             assert (name in filled.fixed) is (part.name != chosen)
     stiffness = next(p.stiffness for p in MAP.parts if p.name == chosen)
     assert filled.values[stiffness] == 0.125
-    assert f"it follows {chosen}, and holds" in in_words(filled)
-    assert "found nothing to follow" in in_words(empty)
+    assert f"it depends on {chosen}, and is valid only" in nonparametric_in_words(filled)
+    assert "found nothing to depend on" in nonparametric_in_words(empty)
 
 
 @pytest.mark.parametrize("held", [False, True])
