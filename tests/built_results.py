@@ -10,7 +10,7 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_study,
 
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import Estimate, NotExcited
-from identify.experiment_design.discrimination import Trial
+from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
@@ -56,8 +56,10 @@ LATER = candidate("lugre", 0.44, bic=205.0)
 
 CHOSEN = Passes("x", 0.0831, 0.0127, 7)
 TRIALS = (
-    Trial(CHOSEN, 8.3, 0.0412, 0.0113, 57.3, STUDY.fit[0], np.array([0.3, 0.1])),
-    Trial(Tracking(9.7), 9.9, 0.0287, 0.0107, 31.9, STUDY.fit[1], np.array([0.2, 0.1])),
+    SimulatedExperiment(CHOSEN, 8.3, 0.0412, 0.0113, 57.3, STUDY.fit[0], np.array([0.3, 0.1])),
+    SimulatedExperiment(
+        Tracking(9.7), 9.9, 0.0287, 0.0107, 31.9, STUDY.fit[1], np.array([0.2, 0.1])
+    ),
 )
 
 

@@ -58,7 +58,7 @@ class Reach:
 def reach(root: Path, scratch: Path) -> Reach:
     """Run the quick suite of a copy of the project under coverage.
 
-    Raises RuntimeError where a test fails: a fault could not be told from that.
+    Raises RuntimeError where a test fails already without a fault.
     """
     report, data = scratch / "tests.xml", scratch / "coverage"
     command = [sys.executable, "-m", "pytest", "-n", "2", "-m", "not slow", "-q"]

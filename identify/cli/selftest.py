@@ -1,4 +1,4 @@
-"""`twin selftest`: does the diagnosis name what is planted?"""
+"""`twin selftest`: how often the diagnosis names planted effects."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
-"""Fit an axis model to logs: least squares on the windowed force residual.
+"""Fit an axis model to logs: least squares on the force residual.
 
-Several starts where the model has shape parameters; weak priors keep what the data cannot see near
-its start. The result says in a full sentence how it ended.
+Weak priors keep parameters that the data do not determine near their start values.
 """
 
 from __future__ import annotations
@@ -28,10 +27,10 @@ from twin.model.machine import AxisModel, ParameterReference, free_parameters, r
 
 Array = NDArray[np.float64]
 
-PRIOR_FORCE = 0.1  # expected force of what is added to the friction, over that to be explained
+PRIOR_FORCE = 0.1  # expected force of an effect beside the friction, over the force to explain
 PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
 MOST_EVALUATIONS = 40
-PUSHED = 3.0  # standard errors by which the data ask for a value beyond a bound
+PUSHED = 3.0  # standard errors by which the gradient must point beyond a bound
 AT_EDGE = 1e-6  # of a bound, within which a value is at it
 
 
@@ -47,8 +46,8 @@ class Outcome(Enum):
 class Fit:
     """A fitted axis.
 
-    residual (n,): N at the end over the windows of the logs that carry information (kept). begun:
-    the axis that the fit started from.
+    residual (n,): N at the end, of the test functions that carry information (kept). begun: the
+    axis that the fit started from.
     """
 
     axis: AxisModel
@@ -74,7 +73,7 @@ class Fit:
 
     @cached_property
     def lessened(self) -> float:
-        """RMS force of the motor over that commanded, where it is less than half; else 1."""
+        """RMS force of the motor over the RMS command, where that is less than half; else 1."""
         return forces_lessened(self.axis, [log.motion for log in self.logs])
 
     @cached_property
@@ -84,9 +83,9 @@ class Fit:
 
     @cached_property
     def at_bound(self) -> tuple[str, ...]:
-        """Labels of the parameters at a bound, beyond which the data ask for a value.
+        """Labels of the parameters at a bound whose better values are beyond it.
 
-        The gradient must push outwards by more than the residual's noise makes of it.
+        The gradient must point outwards by more than the noise of the residual explains.
         """
         if not len(self.residual):
             return ()
@@ -104,13 +103,13 @@ class Fit:
 
     @property
     def ended(self) -> Outcome:
-        """How the optimisation ended, with what the bounds did."""
+        """How the optimisation ended, bounds considered."""
         held = self.outcome is Outcome.CONVERGED and self.at_bound
         return Outcome.AT_BOUND if held else self.outcome
 
     @property
     def at_floor(self) -> bool:
-        """Whether the error is hardly more than noise."""
+        """Whether the error is at the noise floor."""
         return self.ratio < RULE.at_floor
 
     @property
@@ -120,7 +119,7 @@ class Fit:
 
 
 def _is_added(axis: AxisModel, c: ParameterReference) -> bool:
-    """Whether zero means the absence of a physical effect beside mass and friction."""
+    """Whether it is a strength of a physical effect other than mass and friction."""
     if not (c.effect and c.parameter.strength):
         return False
     effect = axis[c.effect].effect
@@ -128,7 +127,7 @@ def _is_added(axis: AxisModel, c: ParameterReference) -> bool:
 
 
 def _describes(axis: AxisModel, c: ParameterReference) -> bool:
-    """Whether it is a strength of a description."""
+    """Whether it is a strength of a nonparametric effect."""
     return bool(c.effect) and c.parameter.strength and axis[c.effect].effect.is_nonparametric
 
 
@@ -140,11 +139,11 @@ def rms(values: Array) -> float:
 class _Problem:
     """Residual and Jacobian of one fit in internal variables, with priors as extra rows.
 
-    The prior on what is added to the friction is a force of a tenth of what is to be explained; it
-    matters only along directions that the data cannot tell apart, such as a constant force and a
-    Coulomb asymmetry, where it shares the force out instead of opposing large ones to each other.
-    Beside a description the physical effects are pulled to where they were: what both could explain
-    stays with the physics. The description itself is smoothed.
+    The prior on an effect beside the friction is a force of a tenth of the force to be explained.
+    It matters only for parameters that the data cannot separate, such as a constant force and a
+    Coulomb asymmetry: it keeps both small, where they could be large and opposite. Beside a
+    nonparametric effect the prior of the physical effects is centred on their start values, so that
+    a force that both could explain stays with the physics. The nonparametric effect is smoothed.
     """
 
     def __init__(self, axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int) -> None:
@@ -159,7 +158,7 @@ class _Problem:
         self.centre = np.where(self.added & (not described(axis)), 0.0, self.start)
         self.pull = np.zeros(len(self.start))
         self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
-        # A description is linear in its strengths: their columns are taken once.
+        # A nonparametric effect is linear in its strengths, so their columns are computed once.
         self.constant = np.array([_describes(axis, c) for c in self.scaling.where], dtype=bool)
         self.described = jacobian(axis, logs, self._where(self.constant))
 
@@ -226,7 +225,7 @@ def fit_axis(
 def finished(
     axis: AxisModel, begun: AxisModel, logs: Sequence[PreparedLog], outcome: Outcome
 ) -> Fit:
-    """The fit that an axis is at its present values."""
+    """The fit object of an axis with its present values, without fitting."""
     kept = moving(logs, sticks(axis))
     return Fit(
         axis=axis,

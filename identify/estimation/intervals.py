@@ -1,4 +1,4 @@
-"""Intervals that survive coloured residuals, and are refused on a wrong model.
+"""Intervals that allow for coloured residuals; none are given for a wrong model.
 
 Sandwich covariance with blocks: (J'J)^-1 [sum_b J_b' r_b r_b' J_b] (J'J)^-1, where the blocks are
 longer than the residual's memory and r_b is what the fit without block b leaves there. H. White,
@@ -25,11 +25,11 @@ Array = NDArray[np.float64]
 
 BLOCKS = 30
 RIDGE = 1e-6  # keeps a fit without one block finite
-INSEPARABLE = 0.9999  # correlation of two estimates from which they are one number
+INSEPARABLE = 0.9999  # correlation of two estimates from which the data cannot separate them
 CONFIDENCE = 0.90
 FAR = 4.0  # half widths to either side at which the error must have risen
-LEAST_RISE = 0.1  # of the rise that the slopes foresee
-LARGEST_RATIO = 3.0  # of error to noise floor; above it the model is wrong and no interval holds
+LEAST_RISE = 0.1  # of the rise that the linearised residual predicts
+LARGEST_RATIO = 3.0  # of error to noise floor; above it the model is wrong, intervals mean nothing
 
 
 class Side(Enum):
@@ -116,18 +116,18 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
 def open_side(fit: Fit, c: ParameterReference, half: float) -> Side | None:
     """The side to which the error hardly rises; None where it rises to both.
 
-    An end stop out of reach is the example: where it just touches the motion the fit has a slope.
+    Example: the position of an end stop that the motion just touches has a slope to one side only.
     """
     column = fit.jacobian[:, fit.scaling.where.index(c)]
     value = read(fit.axis, [c])[0]
     for side, step in ((Side.SMALLER, -FAR * half), (Side.LARGER, FAR * half)):
         moved = write(fit.axis, [c], [np.clip(value + step, c.parameter.lower, c.parameter.upper)])
         step = read(moved, [c])[0] - value
-        foreseen = 2.0 * step * float(fit.residual @ column) + step**2 * float(column @ column)
-        if abs(step) < 0.5 * FAR * half or foreseen <= 0.0:  # a bound is in the way
+        predicted = 2.0 * step * float(fit.residual @ column) + step**2 * float(column @ column)
+        if abs(step) < 0.5 * FAR * half or predicted <= 0.0:  # a bound is in the way
             continue
         there = residual(moved, fit.logs)[fit.kept]
-        if float(there @ there - fit.residual @ fit.residual) < LEAST_RISE * foreseen:
+        if float(there @ there - fit.residual @ fit.residual) < LEAST_RISE * predicted:
             return side
     return None
 
@@ -158,7 +158,7 @@ def refusal(fit: Fit) -> NoInterval | None:
 
 
 def half_widths(fit: Fit) -> Array:
-    """Half widths (k,) of the 90 % intervals, in the parameters' units; inf where unseen."""
+    """Half widths (k,) of the 90 % intervals, in the parameters' units; inf where not excited."""
     norms = np.linalg.norm(fit.jacobian, axis=0)
     seen = norms > 0
     out = np.full(len(norms), np.inf)
@@ -167,12 +167,12 @@ def half_widths(fit: Fit) -> Array:
     columns = fit.jacobian[:, seen] / norms[seen]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-12, hermitian=True)
     edges = np.linspace(0, len(fit.residual), BLOCKS + 1).astype(int)
-    # Residuals of a block are smaller than its errors, by what the fit took from it: left out of
-    # the fit they are not (jackknife, CR3).
+    # The fit makes the residuals of a block smaller than its errors, so the residuals of a fit
+    # without the block are used (jackknife, CR3).
     honest = left_out(fit.residual, columns, np.full(columns.shape[1], RIDGE), BLOCKS)
     scores = np.stack([columns[a:b].T @ honest[a:b] for a, b in pairwise(edges)])
     covariance = inverse @ (scores.T @ scores * (BLOCKS - 1) / BLOCKS) @ inverse
-    # What holds a parameter off the least squares, a prior or a bound, shifts it by this much.
+    # A prior or a bound shifts the estimate from the least-squares solution by this much.
     shift = np.abs(inverse @ (columns.T @ fit.residual))
     quantile = student.ppf(0.5 + CONFIDENCE / 2.0, BLOCKS - 1)
     spread_of = np.sqrt(np.maximum(np.diag(covariance), 0.0))

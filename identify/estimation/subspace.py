@@ -1,4 +1,4 @@
-"""What the parameters of a fit can take over of a force, and what is left of it."""
+"""The part of a force that the parameters of a fit can reproduce, and the part they cannot."""
 
 from __future__ import annotations
 

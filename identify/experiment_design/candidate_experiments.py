@@ -1,4 +1,4 @@
-"""The experiments among which a plan chooses: a modest family, each within the stage's limits."""
+"""The experiments among which a plan chooses: a fixed family, each within the machine's limits."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from twin.model.units import LINEAR, AxisUnits
 USED = 0.9  # part of the travel that passes cover
 SLOWEST = 5e-4  # m/s
 LOWEST = 2.0  # Hz, where a sweep begins
-SWEPT = (60.0, 120.0)  # Hz, where it ends: the shortest windows pass little above
+SWEPT = (60.0, 120.0)  # Hz, where it ends: the shortest test functions pass little above
 EFFORTS = (1.0, 0.3)  # parts of the acceleration limit that steps use in turn
 STEP_DWELL = 0.05  # s
 MARGIN = 0.5  # part of the allowed force that a sweep uses; the loop adds to it near its bandwidth
 GENTLE = 0.5  # part of the acceleration limit that the passes under a sweep use
-FORCE_USED = 0.4  # part of the force limit that moves use; friction and the loop need theirs
+FORCE_USED = 0.4  # part of the force limit that moves use; the rest is for friction and the loop
 MOST_REPEATS = 1000
 
 
@@ -98,16 +98,16 @@ def _eased(draft: Experiment, effort: float) -> Experiment:
 
 
 def _require_fit(experiment: Experiment, model: MachineModel, duration: float) -> None:
-    """Raise CannotRun unless the stage can run it, in not much more than that time (s)."""
+    """Raise CannotRun unless the machine can run it, in not much more than that time (s)."""
     setpoint = experiment.setpoint(model, np.random.default_rng(0))
     if setpoint.duration >= TOLERANCE * duration:
         raise CannotRun(
-            f"takes {setpoint.duration:.3g} s of the {duration:g} s asked for; give a longer "
+            f"takes {setpoint.duration:.3g} s, more than the {duration:g} s planned; give a longer "
             "--duration (s)"
         )
 
 
-TOLERANCE = 1.3  # times the duration asked for that an experiment may take
+TOLERANCE = 1.3  # an experiment may take this times the planned duration
 
 
 def _random(duration: float) -> Iterator[Experiment]:

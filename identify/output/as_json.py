@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from identify.estimation.intervals import Estimate
-from identify.experiment_design.discrimination import Trial
+from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
 from identify.output.remarks import remarks
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
@@ -152,7 +152,7 @@ def diagnose_json(result: Diagnosis) -> dict[str, Any]:
 def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
     d = result.axes[axis]
     units = d.base.axis.units
-    structure = d.unexplained
+    dependence = d.unexplained
     following = result.next_experiments.get(axis)
     return {
         "verdict": d.verdict.name.lower(),
@@ -163,12 +163,12 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "ambiguous_with": list(d.ambiguous_with),
         "missing": list(d.named),
         "steps": [_step(s) for s in d.steps],
-        "unexplained": structure
+        "unexplained": dependence
         and {
-            "share_of_error": structure.share_of_error,
-            "depends_on": structure.depends_on,
-            "period": structure.period,
-            "unit": structure.unit,
+            "share_of_error": dependence.share_of_error,
+            "depends_on": dependence.depends_on,
+            "period": dependence.period,
+            "unit": dependence.unit,
         },
         "force_error": d.base.error,
         "noise_floor": d.base.floor,
@@ -223,13 +223,13 @@ def plan_json(result: Plan) -> dict[str, Any]:
         "refitted_on_logs": not result.supposed,
         "missing_motion": gap_in_words(result.gap),
         "excited_by": dict(result.excited_by),
-        **_trial(result.chosen, several),
-        "ranking": [_trial(t, several) for t in result.ranking],
+        **_simulated(result.chosen, several),
+        "ranking": [_simulated(t, several) for t in result.ranking],
         "not_run": [not_run_in_words(n) for n in result.not_run],
     }
 
 
-def _trial(t: Trial, several: bool) -> dict[str, Any]:
+def _simulated(t: SimulatedExperiment, several: bool) -> dict[str, Any]:
     return {
         "experiment": {"kind": kind_of(t.experiment), **parameters(t.experiment)},
         "duration": t.duration,

@@ -1,4 +1,4 @@
-"""What a reader of a diagnosis should know beside the answer, one sentence each."""
+"""Remarks beside the answer of a diagnosis, one sentence each."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from identify.selection.forward_selection import AxisDiagnosis
 def remarks(
     found: AxisDiagnosis, refit: Refit | None, not_tried: Sequence[str] = ()
 ) -> tuple[str, ...]:
-    """Shifted channels, fits that did not end well, parameters that moved, what is weak.
+    """Channel delays, fits that did not converge, changed parameters, weak evidence.
 
-    not_tried: effects that depend on the other axis, where there are several.
+    not_tried: effects that depend on the other axis, on a machine with more than two axes.
     """
     out = []
     if refit and (changed := refit_in_words(refit)):

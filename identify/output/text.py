@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from identify.estimation.intervals import Estimate, NoInterval, refusal
-from identify.experiment_design.discrimination import Trial
+from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
 from identify.experiment_design.rival_hypotheses import STRENGTH
 from identify.output.remarks import remarks
@@ -42,7 +42,7 @@ if TYPE_CHECKING:  # results print themselves by these functions
 
 
 def fit_text(result: FitResult) -> str:
-    """Parameters of each axis, one a line."""
+    """The fit of each axis, one parameter a line."""
     lines = []
     for axis, fit in result.fits.items():
         held, unit = result.holdout_error[axis], fit.axis.units.force
@@ -57,7 +57,7 @@ def fit_text(result: FitResult) -> str:
             lines.append(f"  {shifted}")
         if result.left_out[axis]:
             still = ", ".join(result.left_out[axis])
-            lines.append(f"  left out, as axis {axis} stands still there: {still}")
+            lines.append(f"  not fitted on {still}, where axis {axis} stands still")
         if changed := refit_in_words(result.refits[axis]):
             lines.append(f"  {changed}")
         hidden = described_labels(fit.axis)
@@ -77,7 +77,7 @@ def fit_text(result: FitResult) -> str:
 
 
 def _with_interval(e: Estimate, common: NoInterval | None) -> str:
-    """A value with its interval, or why it has none unless that was said for all."""
+    """A value with its interval, or why it has none, unless the reason is common to all."""
     text = f"{e.value:12.6g} {e.unit:10s}"
     if not e.free:
         return text + " fixed"
@@ -98,14 +98,14 @@ def compare_text(result: Comparison) -> str:
             )
         lines += [f"  worst: {region_in_words(region)}" for region in c.worst]
         if not c.worst:
-            lines.append("  nowhere does the error stand above the noise")
+            lines.append("  in no region is the error above the noise")
         lines += [f"  {correlation_in_words(test)}" for test in c.tests.correlations]
     lines += dict.fromkeys(loop_in_words(c.tests.loop) for c in result.axes.values())
     return "\n".join(lines)
 
 
 def diagnose_text(result: Diagnosis) -> str:
-    """The answer for each axis with the ranking's head."""
+    """The answer for each axis, and its best candidates."""
     lines = []
     for axis, d in result.axes.items():
         unit = d.base.axis.units.force
@@ -116,7 +116,7 @@ def diagnose_text(result: Diagnosis) -> str:
             f"(ratio {d.base.ratio:.2f})"
         )
         if d.ambiguous_with:
-            lines.append(f"  cannot be told apart from: {', '.join(d.ambiguous_with)}")
+            lines.append(f"  these data cannot separate it from: {', '.join(d.ambiguous_with)}")
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         if d.unexplained:
@@ -133,8 +133,10 @@ def diagnose_text(result: Diagnosis) -> str:
 def _step_line(number: int, step: Step) -> str:
     gain = step.candidate.gain
     if step.candidate.is_noise:
-        return f"  step {number}: {step.candidate.effect.name} makes the rest of the error noise"
-    dropped = f"; needless then: {', '.join(step.dropped)}" if step.dropped else ""
+        return (
+            f"  step {number}: {step.candidate.effect.name} explains the remaining error as noise"
+        )
+    dropped = f"; no longer needed: {', '.join(step.dropped)}" if step.dropped else ""
     beside = f" beside {step.beside}" if step.beside else ""
     return (
         f"  step {number}: with {step.candidate.effect.name}{beside} the held-out error falls from "
@@ -151,62 +153,67 @@ def _ranking_line(c: Candidate) -> str:
     )
 
 
-SHOWN = 4  # trials of a plan that are printed
+SHOWN = 4  # experiments of a plan that are printed
 
 
 def plan_text(result: Plan) -> str:
-    """What is decided, the chosen experiment and what it shows, and the next best."""
+    """The question, the chosen experiment and what it is expected to show, and the next best."""
     several = len(result.between) > 1
-    asked, verdict = " or ".join(result.between), "decided by"
+    what, verdict = " or ".join(result.between), "decided by"
     if not several:
-        asked, verdict = f"the parameters of {asked}", "best shown by"
+        what, verdict = f"the parameters of {what}", "best constrained by"
     elif not result.decides:
         verdict = "not decided by any experiment of this length; the nearest is"
     lines = [
-        f"axis {result.axis}: {asked}, {verdict}",
+        f"axis {result.axis}: {what}, {verdict}",
         f"  {in_short(result.chosen.experiment, result.chosen.units)}",
     ]
     lines += [f"  {gap_in_words(result.gap)}"]
-    lines += [f"  {name} shows in {motion}" for name, motion in result.excited_by.items()]
+    lines += [f"  {name} is excited by {motion}" for name, motion in result.excited_by.items()]
     if result.favoured:
-        lines.append(f"  the logs at hand favour {result.favoured} already")
+        lines.append(f"  the existing logs already favour {result.favoured}")
     if result.supposed and several:
-        lines.append(f"  without logs: effects at start values, {STRENGTH:g} times the noise floor")
-    lines += [_trial_line(t, several) for t in result.ranking[:SHOWN]]
+        lines.append(
+            f"  no logs given: each effect is assumed at {STRENGTH:g} times the noise floor"
+        )
+    lines += [_experiment_line(t, several) for t in result.ranking[:SHOWN]]
     return "\n".join([*lines, *(f"  not run: {not_run_in_words(n)}" for n in result.not_run)])
 
 
-def _trial_line(t: Trial, several: bool) -> str:
+def _experiment_line(t: SimulatedExperiment, several: bool) -> str:
     tail = f"{t.gain:8.1f} nats on the parameters"
     if several:
         tail = (
-            f"{t.difference:.3g} {t.units.force} left to the rival "
+            f"{t.difference:.3g} {t.units.force} unexplained by the rival "
             f"({t.difference / t.floor:.1f} x noise floor), evidence {t.gain:.1f}"
         )
     return f"  {kind_of(t.experiment):10s} {t.duration:5.1f} s   {tail}"
 
 
 def add_text(result: Addition) -> str:
-    """What adding the effect did."""
+    """The errors before and after adding the effect."""
     s = result.step
     lines = [
         f"added {s.effect} to axis {s.axis}",
-        f"  force error on the fit logs   {s.fit_error_before:.4g} -> {s.fit_error_after:.4g} "
+        f"  force error on the fit logs      {s.fit_error_before:.4g} -> {s.fit_error_after:.4g} "
         f"{s.unit}",
     ]
     if s.holdout_error_before is not None and s.holdout_error_after is not None:
         lines.append(
-            "  force error held out          "
+            "  force error on the held-out logs "
             f"{s.holdout_error_before:.4g} -> {s.holdout_error_after:.4g} {s.unit}"
         )
     (before, after), unit = result.position_error, result.units.position
     lines.append(
-        f"  free-running position error   {before:.3g} -> {after:.3g} {unit} "
+        f"  free-running position error      {before:.3g} -> {after:.3g} {unit} "
         f"(MuJoCo: {result.replayed:.3g} {unit})"
     )
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
-        lines.append("  the data do not support this effect: it does not help held out")
+        lines.append(
+            "  the data do not support this effect: evidence and held-out error do not both favour "
+            "it"
+        )
     return "\n".join(lines)
 
 
@@ -243,5 +250,5 @@ def check_text(reports: Mapping[str, CheckReport]) -> str:
     for name, report in reports.items():
         lines += [f"{name}: {f.severity.value}: {f}" for f in report.findings]
         if not report.findings:
-            lines.append(f"{name}: fit for identification")
+            lines.append(f"{name}: suitable for identification")
     return "\n".join(lines)

@@ -1,7 +1,7 @@
-"""What refitting changed: where a model as given disagrees with a machine by its values alone.
+"""Confounded parameters: values that a fit changed, and what may have caused the change.
 
-A fit takes over what its parameters can, so an effect that is one of them by another name (a tilt
-and the cable's constant, a payload and the mass) never shows as missing. It shows here.
+An effect whose force equals that of a parameter (a tilt and the constant of the cable, a payload
+and the mass) is absorbed by the fit and never found missing. It shows as a changed value here.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from twin.model.units import LINEAR
 
 Array = NDArray[np.float64]
 
-LEAST_FORCE = 0.1  # of the error as given, that a parameter's change must make to be told
-SAME_FORCE = 0.01  # of a parameter's force at most, that an effect leaves which is it by other name
-MOST_TOLD = 3
+LEAST_FORCE = 0.1  # of the error before the fit: least force of a change that is reported
+SAME_FORCE = 0.01  # largest part of that force outside the span of an effect with the same force
+MOST_CHANGES = 3  # that are reported
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Change:
     """A parameter that a fit moved by more than its interval.
 
     before, after: in ``unit``. force: RMS force that the change makes, in ``force_unit``. alike:
-    absent effects that are the same force.
+    absent effects that can produce the same force.
     """
 
     label: str
@@ -48,7 +48,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Refit:
-    """The RMS force errors of an axis as given and refitted, in ``unit``, and what told most."""
+    """RMS force errors of an axis before and after a fit, in ``unit``, and the main changes."""
 
     given: float
     refitted: float
@@ -57,13 +57,13 @@ class Refit:
 
 
 def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
-    """What a fit changed of the model given, where that stood above the noise floor."""
+    """What a fit changed of the given model; nothing where its error was at the noise floor."""
     error, units = rms(residual(given, fit.logs)[fit.kept]), fit.axis.units
     if not error > RULE.at_floor * max(fit.floor, fit.error):
         return Refit(error, fit.error, (), units.force)
     where = fit.scaling.where
     values = zip(where, read(given, where), read(fit.axis, where), half_widths(fit), strict=True)
-    told: list[tuple[Change, Array]] = []
+    found: list[tuple[Change, Array]] = []
     for c, before, after, half in values:
         if abs(after - before) > half:
             back = residual(write(fit.axis, [c], [before]), fit.logs)[fit.kept] - fit.residual
@@ -71,19 +71,19 @@ def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
                 c.label, float(before), float(after), units(c.parameter.unit), rms(back),
                 force_unit=units.force,
             )  # fmt: skip
-            told.append((change, back))
-    told = [t for t in told if t[0].force > LEAST_FORCE * error]
-    told = sorted(told, key=lambda t: -t[0].force)[:MOST_TOLD]
-    bases = _bases(fit, catalogue) if told else {}
+            found.append((change, back))
+    found = [t for t in found if t[0].force > LEAST_FORCE * error]
+    found = sorted(found, key=lambda t: -t[0].force)[:MOST_CHANGES]
+    bases = _bases(fit, catalogue) if found else {}
     changes = tuple(
         replace(change, alike=tuple(name for name, basis in bases.items() if _within(back, basis)))
-        for change, back in told
+        for change, back in found
     )
     return Refit(error, fit.error, changes, units.force)
 
 
 def _bases(fit: Fit, catalogue: Catalogue) -> dict[str, Array]:
-    """Orthonormal basis (n, k) of what each absent effect without a shape can be, by name."""
+    """Orthonormal basis (n, k) of the force of each absent effect that is linear, by name."""
     out = {}
     for effect in absent_effects(fit.axis, catalogue):
         if effect.kind is Kind.FRICTION or len(effect.strengths) < len(effect.parameters):

@@ -22,7 +22,7 @@ PAIR_STRENGTH = 5.0  # times the noise floor, of each of two planted effects
 
 @dataclass(frozen=True)
 class Design:
-    """How much is tried: strengths (times the noise floor), and how many machines of each sort.
+    """The size of a self-test: strengths (times the noise floor), and machines of each sort.
 
     each: of every effect and strength. empty: with nothing planted. pairs: with two effects.
     left_out: of every effect, at PAIR_STRENGTH, with the effect taken out of the catalogue.

@@ -1,4 +1,4 @@
-"""What a self-test adds up to: rates with their counts."""
+"""The rates of a self-test, with their counts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from identify.selftest.trial import TrialResult
 
 @dataclass(frozen=True)
 class Rate:
-    """How many of some trials came out so. asked: least and greatest rate wanted, 0..1, if any."""
+    """How many trials had an outcome. asked: the range of the rate that is the target, if any."""
 
     what: str
     count: int

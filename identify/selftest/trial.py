@@ -1,4 +1,4 @@
-"""One trial: a machine with effects that the analysis is not told of, and what it answers."""
+"""One trial: a machine with planted effects, and the answer of the diagnosis."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ class Case:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """What a trial found.
+    """The result of a trial.
 
     answers: for each effect that was named, in order, its name and those declared as ambiguous
     with it. ratio, left: error over noise floor before and after. depends_on: of an unexplained
-    residual. coordinates: those that are right, from the planted force itself. covered: for each
-    parameter of an honest machine with an interval, whether it holds the truth. shown: whether the
-    effect could show at all.
+    residual. coordinates: the right ones, from the planted force. covered: with nothing planted,
+    for each parameter with an interval whether it holds the truth. shown: whether the effect
+    could reach its strength on this motion.
     """
 
     case: Case
@@ -88,7 +88,7 @@ class TrialResult:
         return self.left < FLOOR
 
 
-FLOOR = 1.3  # error over noise floor that passes for noise
+FLOOR = 1.3  # error over noise floor below which the error counts as noise
 
 
 def run(case: Case) -> TrialResult:
@@ -139,7 +139,7 @@ def _planted_force(planted: tuple[Fitted, ...], base: Fit, dataset: Dataset) -> 
 
 
 def _covered(built: Machine, found: AxisDiagnosis) -> tuple[tuple[str, bool], ...]:
-    """Whether the 90 % intervals of an honest machine's fit hold its true values."""
+    """Whether the 90 % intervals of a fit hold the machine's true values."""
     fit = found.base
     truth = read(built.true.axes[AXIS], fit.scaling.where)
     out = []

@@ -45,7 +45,7 @@ def refuse(constant: str) -> None:
     raise AssertionError(f"{constant} is no JSON")
 
 
-COMMON = ("--window", "0.07", "--effects", "e1.py", "--effects", "e2.py")
+COMMON = ("--test-function", "0.07", "--effects", "e1.py", "--effects", "e2.py")
 HELD = ("--holdout", "h1.mcap", "--holdout", "h2.mcap")
 LOGS = {"a.mcap": "log a.mcap", "b.mcap": "log b.mcap"}
 HOLDOUT = {"h1.mcap": "log h1.mcap", "h2.mcap": "log h2.mcap"}
@@ -68,7 +68,7 @@ def test_the_loop_is_called_with_what_was_given(monkeypatch, cli, name):
     given, named = call.only
     assert given[0].name == NAME
     assert given[1:] == ((LOGS,) if name == "compare" else (LOGS, HOLDOUT))
-    assert named.pop("window") == 0.07
+    assert named.pop("test_function") == 0.07
     catalogue = named.pop("catalogue", None)
     assert (catalogue or {}).get("all") == (None if name == "compare" else ["e1.py", "e2.py"])
     assert named == {}
@@ -87,7 +87,7 @@ def test_the_loop_is_called_with_what_was_given(monkeypatch, cli, name):
     assert text.count("\n") == 1
     assert len(save.calls) + len(write.calls) == 1
     given, named = call.calls[-1]
-    assert named["window"] is None
+    assert named["test_function"] is None
     assert given[1:] == (({"a.mcap": "log a.mcap"},) if name == "compare" else (
         {"a.mcap": "log a.mcap"}, {},
     ))  # fmt: skip
@@ -104,7 +104,7 @@ def test_add(monkeypatch, cli, kept, code):
     assert (found, text.strip()) == (code, "text of add")
     given, named = call.only
     assert (given[0], given[1].name, *given[2:]) == ("W", NAME, LOGS, HOLDOUT)
-    assert named == {"axis": "y", "window": 0.07}
+    assert named == {"axis": "y", "test_function": 0.07}
     assert save.only == (("the new model", Path("n.toml")), {})
     found, text, _ = cli(*command, "--json")
     assert (found, json.loads(text)) == (code, {"json of": "add", "bad": None})
@@ -126,7 +126,7 @@ def test_plan(monkeypatch, cli, decides, code):
     first, second = named.pop("between")
     assert (first, second.name) == ("W", "other.toml")
     assert named.pop("catalogue")["all"] == ["e1.py", "e2.py"]
-    assert named == {"axis": "y", "duration": 7.5, "window": 0.07}
+    assert named == {"axis": "y", "duration": 7.5, "test_function": 0.07}
     saved = ("the experiment", Path("next.toml"), "one", "two", "three")
     assert save.calls == ([(saved, {"units": LINEAR})] if decides else [])
     assert ("twin simulate next.toml" in text) is decides
@@ -136,7 +136,7 @@ def test_plan(monkeypatch, cli, decides, code):
         code, {"json of": "plan", "bad": None, "file": "experiment.toml" if decides else None},
     )  # fmt: skip
     assert call.calls[-1][1] | {"catalogue": 0} == {
-        "between": [], "catalogue": 0, "axis": None, "duration": 20.0, "window": None,
+        "between": [], "catalogue": 0, "axis": None, "duration": 20.0, "test_function": None,
     }  # fmt: skip
     assert cli("plan", "m.toml", "-o", "next.mcap")[0] == 2
 

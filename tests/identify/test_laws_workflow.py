@@ -125,7 +125,7 @@ def handed(monkeypatch):
 def test_a_fit_takes_over_the_values_and_the_shift_of_each_axis(monkeypatch):
     seen, bars = handed(monkeypatch), []
     found = workflow.fit(
-        made.MODEL, "logs", "held", catalogue="known", window=0.07,
+        made.MODEL, "logs", "held", catalogue="known", test_function=0.07,
         progress=lambda *done: bars.append(done),
     )  # fmt: skip
     assert seen["datasets"] == (made.MODEL, "logs", "held", 0.07)
@@ -158,7 +158,7 @@ def test_a_comparison_is_of_the_axes_that_move(monkeypatch):
     monkeypatch.setattr(workflow, "compare_axis", lambda *given: given)
     bars = []
     found = workflow.compare(
-        made.MODEL, "logs", window=0.07, progress=lambda *done: bars.append(done)
+        made.MODEL, "logs", test_function=0.07, progress=lambda *done: bars.append(done)
     )
     prepared = (7.9, "dataset y")
     assert found.axes == {"y": (made.MODEL, prepared, "errors of y", "floors of y")}
@@ -184,15 +184,15 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_study(monkeypatch):
     monkeypatch.setattr(workflow, "diagnose_axis", diagnose_axis)
     monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
     monkeypatch.setattr(
-        workflow, "next_experiment", lambda d, model, window: plans[d.axis] and (d, model, window)
+        workflow, "next_experiment", lambda d, model, length: plans[d.axis] and (d, model, length)
     )
     monkeypatch.setattr(workflow, "_compared", lambda *given: given)
     progress = lambda *done: bars.append(done)  # noqa: E731
     found = workflow.diagnose(
-        described, "logs", "held", catalogue="known", window=0.07, progress=progress
+        described, "logs", "held", catalogue="known", test_function=0.07, progress=progress
     )
     assert asked["given"] == (made.MODEL, "logs", "held")
-    assert asked["named"] == {"catalogue": "known", "window": 0.07, "progress": progress}
+    assert asked["named"] == {"catalogue": "known", "test_function": 0.07, "progress": progress}
     for axis in "xy":
         d = found.axes[axis]
         assert (d.axis, d.fit, d.catalogue) == (axis, result.fits[axis], "known")
@@ -220,12 +220,12 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
     monkeypatch.setattr(workflow, "try_effect", attempt)
     monkeypatch.setattr(workflow, "_addition", lambda best, before, given: (best, given))
     wear = CATALOGUE["wear"]
-    best, _ = add(wear, made.MODEL, "logs", "held", window=0.07)
+    best, _ = add(wear, made.MODEL, "logs", "held", test_function=0.07)
     assert best.axis == "y"
     assert [t[1:] for t in tried] == [("sx", "wear"), ("sy", "wear")]
     assert [t[0] for t in tried] == list(both.fits.values())
     assert seen[0][0][1:] == ("logs", "held")
-    assert seen[0][1]["window"] == 0.07
+    assert seen[0][1]["test_function"] == 0.07
     bars = []
     found = add(wear, made.MODEL, "logs", axis="x", progress=lambda *done: bars.append(done))
     assert (found[0].axis, bars) == ("x", [("adding", 1, 1)])

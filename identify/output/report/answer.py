@@ -1,4 +1,4 @@
-"""The answer in big words, an axis at a time: what is missing, and what it would change."""
+"""The answer for each axis: what is missing, and how much it would improve the model."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from twin.experiments.file import in_short
 
 
 def section(subject: Subject) -> Section:
-    """A card for each axis; for a model that just got an effect, that first."""
+    """A card for each axis; a card for the latest addition first where nothing was diagnosed."""
     cards = []
     if subject.additions and subject.diagnosis is None:
         cards.append(_added(subject.additions[-1]))
@@ -80,8 +80,8 @@ def _left_over(best: Candidate) -> str:
     if fit.at_floor:
         return f"With {name} the force error is at its noise floor."
     return (
-        f"With {name} the force error still stands {number(fit.ratio)} times above its noise "
-        "floor: add it, then diagnose again."
+        f"With {name} the force error is still {number(fit.ratio)} times its noise floor: add it, "
+        "then diagnose again."
     )
 
 
@@ -105,7 +105,7 @@ def _next_step(following: Plan) -> str:
     return (
         f"The experiment that {what} ({quantity(chosen.duration, 's')}; twin plan writes it): "
         f"{in_short(chosen.experiment, chosen.units)}. "
-        f"It leaves {quantity(chosen.difference, unit)} RMS to the rival, where noise is "
+        f"The rival leaves {quantity(chosen.difference, unit)} RMS unexplained, where noise is "
         f"{quantity(chosen.floor, unit)}; {gap_in_words(following.gap)}."
     )
 
@@ -158,8 +158,8 @@ def _position_tile(axis: AxisComparison, model: str) -> list[Tile]:
     if not axis.position_error:
         return []
     worst = max(axis.position_error.values())
-    told = quantity(worst, axis.units.position)
-    return [Tile("Position, free run", told, f"RMS of the worst log{model}")]
+    error = quantity(worst, axis.units.position)
+    return [Tile("Position, free run", error, f"RMS of the worst log{model}")]
 
 
 def _compared(axis: AxisComparison) -> Answer:
@@ -172,8 +172,8 @@ def _compared(axis: AxisComparison) -> Answer:
     sentence = (
         "The force error is at its noise floor."
         if at_floor
-        else "The model leaves force that noise does not explain; twin diagnose says which effect "
-        "is missing."
+        else "The force error is larger than noise explains; twin diagnose finds which effect is "
+        "missing."
     )
     return Answer(
         headline=f"Axis {axis.axis}: {headline}",
@@ -201,9 +201,11 @@ def _added(addition: Addition) -> Answer:
             f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo",
         )
     )
-    sentence = "The effect earned its place on data that the fit did not see."
+    sentence = "The evidence and the held-out logs support the effect."
     if not addition.kept:
-        sentence = "Data that the fit did not see does not ask for this effect; leave it out."
+        sentence = (
+            "The evidence and the held-out logs do not both support this effect; leave it out."
+        )
     return Answer(
         headline=f"Axis {step.axis}: {spaced(step.effect)} added",
         sentence=sentence,

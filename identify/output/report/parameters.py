@@ -28,7 +28,7 @@ def section(subject: Subject) -> Section:
 
 
 def _given(axis: AxisModel) -> Table:
-    """Values as the model has them."""
+    """Values of a model that was not fitted here."""
     meanings = _meanings(axis)
     units, mass = axis.units, axis.mass_parameter
     rows = [Row((mass.name, quantity(axis.mass, units(mass.unit)), meanings[mass.name]))]
@@ -41,7 +41,7 @@ def _given(axis: AxisModel) -> Table:
             value = quantity(fitted.values[p.name], units(p.unit))
             rows.append(Row((label, value, meanings[label])))
     columns = (Column("Parameter"), Column("Value", numeric=True), Column("Meaning"))
-    return Table(columns, rows, "Values of the model as it was given; twin fit adds intervals.")
+    return Table(columns, rows, "Values of the given model; twin fit adds intervals.")
 
 
 def _fitted(found: AxisDiagnosis) -> Table:
@@ -83,7 +83,7 @@ def _part(heading: str, fit: Fit, labels: Sequence[str]) -> _Part:
     columns = (Column(heading, numeric=True), Column("90 % interval"))
     if refusal(fit) is None:
         return _Part(columns, cells, "")
-    # The reason is the same for all: said once instead of in a column.
+    # All values have the same reason, so it is in the caption instead of a column.
     error = quantity(fit.error, fit.axis.units.force)
     remark = (
         f"{heading}: no intervals, because the force error of {error} is {number(fit.ratio)} times "

@@ -1,4 +1,4 @@
-"""Where the error is: the worst regions in words, and what the error depends on."""
+"""Where the error is: the worst regions, the misfit maps, and what the error depends on."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from identify.validation.misfit_maps import AxisComparison
 
 
 def section(subject: Subject) -> Section | None:
-    """The worst regions of each axis above its noise; the dependence of what nothing explains."""
+    """The worst regions and maps of each axis above its noise floor, and the dependence found."""
     blocks: list[Block] = []
     for axis in subject.axes:
         own = _blocks(axis, subject.diagnosed(axis.axis)) if axis.ratio >= RULE.at_floor else []
@@ -39,21 +39,21 @@ def _blocks(axis: AxisComparison, found: AxisDiagnosis | None) -> list[Block]:
     return blocks
 
 
-def _picture(structure: Dependence) -> Picture:
+def _picture(dependence: Dependence) -> Picture:
     caption = (
-        "Part of the squared error that a curve over each coordinate alone accounts for: the "
-        "longest bar says where to look for the missing physics."
+        "Part of the squared error that a curve over each coordinate alone accounts for; the "
+        "missing physics depends most on the coordinate with the longest bar."
     )
-    return Picture(_figure(structure), caption)
+    return Picture(_figure(dependence), caption)
 
 
-def _figure(structure: Dependence) -> Figure:
-    ordered = sorted(structure.shares.items(), key=lambda pair: -pair[1])
+def _figure(dependence: Dependence) -> Figure:
+    ordered = sorted(dependence.shares.items(), key=lambda pair: -pair[1])
     figure = new_figure(0.7 + 0.27 * len(ordered))
     axes = figure.subplots()
     names = [spaced(name) for name, _ in ordered]
     percent = [100.0 * share for _, share in ordered]
-    colors = [BLUE if name == structure.depends_on else GREY for name, _ in ordered]
+    colors = [BLUE if name == dependence.depends_on else GREY for name, _ in ordered]
     bars = axes.barh(names, percent, color=colors, height=0.62)
     axes.bar_label(bars, fmt="%.0f", padding=4, fontsize=8.5)
     axes.set_xlim(0.0, 1.1 * max(*percent, 1.0))

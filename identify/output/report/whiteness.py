@@ -1,4 +1,4 @@
-"""Is what the model leaves noise: its histogram, and its correlations with 90 % bounds."""
+"""Whiteness of the force residual: its histogram, and its correlations with 90 % bounds."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from identify.validation.whiteness import Correlation, ResidualTests
 
 
 def section(subject: Subject) -> Section:
-    """A picture for each axis, what it says, and why this residual is the one tested."""
+    """A picture for each axis, its numbers, and which lags are tested and why."""
     blocks: list[Block] = []
     for axis in subject.axes:
         if heading := subject.heading(axis.axis):
@@ -27,16 +27,16 @@ def section(subject: Subject) -> Section:
     blocks.append(
         Listing(tuple(dict.fromkeys(loop_in_words(axis.tests.loop) for axis in subject.axes)))
     )
-    return Section("tests", "Is what is left noise?", blocks)
+    return Section("tests", "Is the residual noise?", blocks)
 
 
 def _blocks(axis: AxisComparison) -> list[Block]:
     tests = axis.tests
     caption = (
-        f"The force residual on {tests.samples} windows that do not overlap. Bars: its histogram "
-        "beside the normal distribution of the noise floor. Grey bands: 90 % bounds, ±1.645/√n "
-        "with n windows; a tenth of a white residual's values lie outside. Faint values are not "
-        "tested."
+        f"The force residual on {tests.samples} test functions that do not overlap. Bars: its "
+        "histogram beside the normal distribution of the noise floor. Grey bands: 90 % bounds, "
+        "±1.645/√n for n test functions; a tenth of a white residual's values lie outside. Faint "
+        "values are not tested."
     )
     items = [capitalised(correlation_in_words(c)) for c in tests.correlations]
     return [Picture(_figure(tests, axis.units.force), caption), Listing(items)]

@@ -273,7 +273,7 @@ def test_a_force_that_acts_before_its_stamp_is_found_by_so_many_samples(samples)
     left = [fit_of(axis, *logs).error for logs in ((log,), dataset.fit, dataset.holdout)]
     assert left[1] < 0.15 * left[0]
     assert left[1] == left[2]
-    assert dataset.window == pytest.approx(0.02)
+    assert dataset.test_function_length == pytest.approx(0.02)
     back = realigned(dataset, 0.0)
     assert back.channel_delay == 0.0
     np.testing.assert_allclose(back.fit[0].command[9:-9], log.command[9:-9], atol=0.1)

@@ -129,7 +129,7 @@ def test_twice_the_noise_is_twice_the_floor():
     stage = STAGE.with_axis("x", replace(AXIS, hardware=loud))
     logs = [simulate(s, "tracking", seed=5, duration=8.0) for s in (STAGE, stage)]
     floors = [
-        fit_axis(AXIS, datasets(STAGE, {"log": log}, {}, window=0.05)["x"].fit).floor
+        fit_axis(AXIS, datasets(STAGE, {"log": log}, {}, test_function=0.05)["x"].fit).floor
         for log in logs
     ]
     assert floors[1] == pytest.approx(4.0 * floors[0], rel=0.3)

@@ -43,8 +43,8 @@ MOTION, OLD = (
 )
 
 
-def arena(*explanations: Explanation, logs=(OLD,), window=0.04) -> Arena:
-    return Arena(STAGE, "x", explanations, logs, window)
+def arena(*explanations: Explanation, logs=(OLD,), test_function=0.04) -> Arena:
+    return Arena(STAGE, "x", explanations, logs, test_function)
 
 
 def absorbed(force, columns):
@@ -241,17 +241,17 @@ def test_what_cannot_run_or_is_too_slow_has_no_record(monkeypatch):
     (stage, _, keywords), = seen  # fmt: skip
     assert stage.axes["x"] is ONE
     assert (keywords["seed"], stage.axes["y"]) == (0, STAGE.axes["y"])
-    assert arena(FIRST, window=0.0081).record(FIRST, "e") is MOTION
+    assert arena(FIRST, test_function=0.0081).record(FIRST, "e") is MOTION
     with pytest.raises(CannotRun, match="too slowly"):
-        arena(FIRST, window=0.0079).record(FIRST, "e")
-    assert arena(FIRST, window=None).record(FIRST, "e") is MOTION
+        arena(FIRST, test_function=0.0079).record(FIRST, "e")
+    assert arena(FIRST, test_function=None).record(FIRST, "e") is MOTION
     monkeypatch.setattr(module, "moves", lambda log, axis: False)
     with pytest.raises(CannotRun, match="hardly moves"):
         arena(FIRST).record(FIRST, "e")
 
 
 def test_logs_are_windowed_alike():
-    longer = arena(FIRST, window=0.08).logs_with(MOTION)
+    longer = arena(FIRST, test_function=0.08).logs_with(MOTION)
     assert [w.window.length for w in longer] == pytest.approx([0.08, 0.08])
     same = arena(FIRST).logs_with(MOTION)
     assert same[0] is OLD

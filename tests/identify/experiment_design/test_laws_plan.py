@@ -32,8 +32,8 @@ MOTION, OLD = (
 )
 
 
-def arena(*explanations: Explanation, logs=(OLD,), window=0.04) -> Arena:
-    return Arena(STAGE, "x", explanations, logs, window)
+def arena(*explanations: Explanation, logs=(OLD,), test_function=0.04) -> Arena:
+    return Arena(STAGE, "x", explanations, logs, test_function)
 
 
 def absorbed(force, columns):
@@ -113,7 +113,9 @@ def test_an_ambiguous_diagnosis_asks_for_an_experiment_between_its_rivals(monkey
     asked = []
 
     def planned(arena, *given):
-        asked.append((tuple(e.name for e in arena.explanations), arena.logs, arena.window, given))
+        asked.append(
+            (tuple(e.name for e in arena.explanations), arena.logs, arena.test_function, given)
+        )
         return "the plan"
 
     monkeypatch.setattr(plans, "_planned", planned)
@@ -160,14 +162,14 @@ def test_a_plan_between_rivals_hands_on_what_it_was_asked(monkeypatch, logs):
     rivals, bar = [CATALOGUE["wear"], CATALOGUE["cogging"]], object()
     found = plans.plan(
         STAGE, logs, {"h": "held"}, catalogue={"gms": 1}, between=rivals, axis="x", duration=7.0,
-        window=0.07, progress=bar,
+        test_function=0.07, progress=bar,
     )  # fmt: skip
     assert found == "the plan"
     assert asked["dataset"] == (STAGE, logs or {}, {"h": "held"}, rivals, "x", 0.07)
     effects = {"gms": 1, **{r.name: r for r in rivals}}
     assert asked["given"] == (7.0, 6, not logs, effects, bar)
     chosen = asked["arena"]
-    assert (chosen.stage, chosen.name, chosen.window) == (STAGE, "x", 0.07)
+    assert (chosen.machine, chosen.name, chosen.test_function) == (STAGE, "x", 0.07)
     assert chosen.explanations == (rivals, STAGE, made.STUDY, bool(logs))
     assert chosen.logs == (made.STUDY.fit if logs else ())
     with pytest.raises(InputError, match="no axis"):
@@ -202,7 +204,7 @@ def test_without_rivals_a_plan_asks_what_the_diagnosis_leaves_open(monkeypatch, 
 def test_the_study_is_that_of_the_axis_in_question(monkeypatch):
     every = {"y": "dataset y", "x": "dataset x"}
     monkeypatch.setattr(plans, "datasets", lambda *given: every)
-    monkeypatch.setattr(plans, "trial_dataset", lambda stage, axis: f"trial {axis}")
+    monkeypatch.setattr(plans, "simulated_dataset", lambda stage, axis: f"trial {axis}")
     other = replace(STAGE, name="o", axes={"x": PLAIN, "y": PLAIN})
     differ = [STAGE, other]  # on y
     assert plans._dataset(STAGE, {"a": 1}, {}, [], "x", None) == "dataset x"

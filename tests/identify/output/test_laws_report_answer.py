@@ -83,7 +83,8 @@ def test_the_answer_for_an_ambiguity():
         "With cogging the force error is at its noise floor.",
         "Runner-up: quadratic drag, ΔBIC 423, held-out error 7.34 → 2.38 N, supported.",
         "The experiment that decides (8.30 s; twin plan writes it): passes: axis x, span 0.0831 m, "
-        "speed 0.0127 m/s, repeats 7. It leaves 41.2 mN RMS to the rival, where noise is 11.3 mN; "
+        "speed 0.0127 m/s, repeats 7. The rival leaves 41.2 mN RMS unexplained, where noise is "
+        "11.3 mN; "
         f"{gap_in_words(made.plan_of('a').gap)}.",
     ]
     assert second.headline == "Axis y: nothing is missing"
@@ -122,7 +123,7 @@ def test_the_answer_for_one_effect_that_leaves_more():
     card, _ = cards(replace(found, next_experiments={"x": made.plan_of("a", "b", ranking=(
         replace(made.TRIALS[0], gain=1.0),))}))  # fmt: skip
     assert card.headline == "Axis x: cogging is missing"
-    assert "still stands 3.10 times above its noise floor" in card.remarks[0]
+    assert "is still 3.10 times its noise floor" in card.remarks[0]
     assert "cross-validated error" in card.remarks[1]
     assert "comes nearest to deciding, but is too short" in card.remarks[2]
     assert [t.name for t in card.tiles][1] == "Cross-validated force error"
@@ -152,7 +153,7 @@ def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
     ]  # fmt: skip
     assert "1.97 µm replayed by MuJoCo" in first.tiles[2].remark
     assert (first.tone is Tone.STRONG) is kept
-    assert ("earned its place" in first.sentence) is kept
+    assert ("held-out logs support" in first.sentence) is kept
     assert len(cards(made.diagnosed(), additions=(made.addition(),))) == 2
 
 

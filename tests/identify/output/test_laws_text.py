@@ -117,8 +117,8 @@ def test_a_comparison():
     assert lines[-1] == loop_in_words(made.whiteness_of().loop)
     assert lines.count(lines[-1]) == 1
     quiet = made.Comparison(made.MODEL, {"x": replace(made.comparison_of(), worst=[])})
-    assert "nowhere does the error stand above the noise" in compare_text(quiet)
-    assert "nowhere" not in compare_text(made.compared())
+    assert "in no region is the error above the noise" in compare_text(quiet)
+    assert "in no region" not in compare_text(made.compared())
 
 
 def test_a_diagnosis():
@@ -130,7 +130,7 @@ def test_a_diagnosis():
     lines = lines.splitlines()
     assert lines[0] == f"{verdict_in_words(Verdict.AMBIGUOUS)} cogging."
     assert lines[1] == "  force error 8.37 N, noise floor 2.11 N (ratio 3.97)"
-    assert lines[2] == "  cannot be told apart from: quadratic_drag"
+    assert lines[2] == "  these data cannot separate it from: quadratic_drag"
     planned = [f"  {line}" for line in plan_text(result.next_experiments["x"]).splitlines()]
     assert lines[3 : 3 + len(planned)] == planned
     rest = [" ".join(line.split()) for line in lines[3 + len(planned) :]]
@@ -146,8 +146,8 @@ def test_a_diagnosis():
     ]
     assert rest[5:7] == [
         "step 1: with cogging the held-out error falls from 7.13 to 2.17 N",
-        "step 2: with lugre beside cogging the held-out error falls from 7.57 to 2.61 N; needless "
-        "then: wear",
+        "step 2: with lugre beside cogging the held-out error falls from 7.57 to 2.61 N; no "
+        "longer needed: wear",
     ]
     assert rest[7:] == [f"note: {r}" for r in remarks(x, result.refits["x"])]
     assert "axis y: Nothing is missing" in y
@@ -157,7 +157,7 @@ def test_a_diagnosis():
 
 def test_a_step_that_makes_the_rest_noise_has_no_errors():
     line = _step_line(3, Step(built(NOISE), ()))
-    assert line.strip() == f"step 3: {NOISE.name} makes the rest of the error noise"
+    assert line.strip() == f"step 3: {NOISE.name} explains the remaining error as noise"
 
 
 def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
@@ -212,12 +212,12 @@ def test_a_plan_between_two():
     assert lines[0] == "axis x: cogging or wear, decided by"
     assert lines[1] == "  passes: axis x, span 0.0831 m, speed 0.0127 m/s, repeats 7"
     assert lines[2] == "  missing motion: speed 0.0137 to 0.0591 m/s; 1.2 % of the data is there"
-    assert lines[3] == "  cogging shows in slow passes"
-    assert lines[4] == "  the logs at hand favour wear already"
-    assert lines[5] == "  without logs: effects at start values, 10 times the noise floor"
+    assert lines[3] == "  cogging is excited by slow passes"
+    assert lines[4] == "  the existing logs already favour wear"
+    assert lines[5] == "  no logs given: each effect is assumed at 10 times the noise floor"
     assert [" ".join(line.split()) for line in lines[6:]] == [
-        "passes 8.3 s 0.0412 N left to the rival (3.6 x noise floor), evidence 57.3",
-        "tracking 9.9 s 0.0287 N left to the rival (2.7 x noise floor), evidence 31.9",
+        "passes 8.3 s 0.0412 N unexplained by the rival (3.6 x noise floor), evidence 57.3",
+        "tracking 9.9 s 0.0287 N unexplained by the rival (2.7 x noise floor), evidence 31.9",
     ]
     weak = replace(made.TRIALS[0], gain=10.0)
     text = plan_text(made.plan_of("cogging", "wear", ranking=(weak,)))
@@ -228,7 +228,7 @@ def test_a_plan_between_two():
 
 def test_a_plan_for_one_model():
     lines = plan_text(made.plan_of("the stage", supposed=True)).splitlines()
-    assert lines[0] == "axis x: the parameters of the stage, best shown by"
+    assert lines[0] == "axis x: the parameters of the stage, best constrained by"
     assert [" ".join(line.split()) for line in lines[4:]] == [
         "passes 8.3 s 57.3 nats on the parameters", "tracking 9.9 s 31.9 nats on the parameters",
     ]  # fmt: skip
@@ -258,14 +258,14 @@ def test_an_addition(kept):
     lines = [" ".join(line.split()) for line in add_text(made.addition(kept)).splitlines()]
     assert lines[:5] == [
         "added cogging to axis x", "force error on the fit logs 7.31 -> 4.57 N",
-        "force error held out 7.83 -> 4.91 N",
+        "force error on the held-out logs 7.83 -> 4.91 N",
         "free-running position error 3.71e-06 -> 1.93e-06 m (MuJoCo: 1.97e-06 m)",
         moved_in_words(made.MOVED),
     ]  # fmt: skip
     assert ("do not support" in lines[-1]) is not kept
     assert len(lines) == (5 if kept else 6)
     unheld = add_text(replace(made.addition(), step=made.STEPS[2]))
-    assert "held out" not in unheld
+    assert "held-out" not in unheld
     assert "added wear to axis y" in unheld
 
 
@@ -293,5 +293,5 @@ def test_a_check():
     finding = Finding(Severity.WARNING, Fault.LAG, "y", "the what", "the where", "the remedy")
     reports = {"a": CheckReport((finding,)), "b": CheckReport(())}
     assert check_text(reports).splitlines() == [
-        "a: warning: axis y, the where: the what; the remedy", "b: fit for identification",
+        "a: warning: axis y, the where: the what; the remedy", "b: suitable for identification",
     ]  # fmt: skip

@@ -39,7 +39,7 @@ def by_frequency(compared):
 
 @pytest.mark.parametrize("window", [0.02, 0.1])
 def test_noise_alone_fills_the_noise_band_whatever_the_window(window):
-    result = fit(STAGE, logs(3), window=window)
+    result = fit(STAGE, logs(3), test_function=window)
     found = bands(result.fits["x"].axis, result.datasets["x"].fit)
     assert found.high[-1] > 100.0
     wide = found.low > 2.0

@@ -58,7 +58,7 @@ def test_descriptions_are_marked_and_never_a_diagnosis() -> None:
     offered = {e.name for e in absent_effects(STAGE.axes["x"], CATALOGUE)}
     assert not marked & offered
     for name in marked:
-        assert "not physics" in CATALOGUE[name].summary
+        assert "not a physical law" in CATALOGUE[name].summary
 
 
 @pytest.fixture(scope="module")
