@@ -54,7 +54,7 @@ class Stepper(Protocol):
 
 
 class MujocoSimulator:
-    """The stage in MuJoCo with its effects attached; steps only under passive_callback()."""
+    """The machine in MuJoCo with its effects attached; steps only under passive_callback()."""
 
     def __init__(self, model: MachineModel, table: Table) -> None:
         spec = machine_spec(model)

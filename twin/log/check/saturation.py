@@ -1,4 +1,4 @@
-"""A command that stays at its extreme: the limit of the drive, not what the controller asked."""
+"""Saturation: a command that stays at its extreme, the limit of the drive."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LEVEL_BLOCKS = 10
 _NEAR = 10.0  # times the noise
 _WIDE = 40.0
 _EDGE_BLOCKS = 3  # a limited command leaves its level at once, a smooth one slowly
-_LIVELY = 200.0  # range of a command worth the name, times the noise
+_LIVELY = 200.0  # least range of a command, times the noise
 
 
 def check(axis: Axis) -> Iterator[Finding]:

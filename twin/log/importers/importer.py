@@ -1,4 +1,4 @@
-"""Foreign file + map -> Log: SI units, one clock, delays undone, nothing left unsaid."""
+"""Foreign file + map -> Log: SI units, one time base, delays removed."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _sample_rate(table: Table, mapping: ImportMap, columns: Mapping[str, Array])
     rate = mapping.sample_rate or table.sample_rate
     if rate is None:
         raise InputError(
-            "does not tell its sample rate; state sample_rate (Hz) or time "
+            "does not state its sample rate; give sample_rate (Hz) or time "
             '({column = "t", unit = "s"}) in the map'
         )
     if table.sample_rate is not None and abs(table.sample_rate - rate) > 1e-6 * rate:
