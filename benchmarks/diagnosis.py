@@ -24,7 +24,7 @@ FITS = 2  # baseline fits before the diagnoses, and again after them
 
 
 def measure() -> list[Figure]:
-    """Time of a diagnosis over that of the baseline fit, and with two threads over one."""
+    """Time of a diagnosis over that of the baseline fit, and of two threads over one."""
     catalogue = load_catalogue()
     for effect in catalogue.values():
         law_address(effect)  # compiled before anything is timed

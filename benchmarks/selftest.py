@@ -1,4 +1,4 @@
-"""The self-test at full length: how often the diagnosis names what is planted."""
+"""The self-test at full length: how often the diagnosis names planted effects."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate, score, try_effect, usable
 from identify.selection.confounded import moved_parameters
 from identify.selection.forward_selection import diagnose_axis
-from identify.selection.nonparametric import describe, physics_alone
+from identify.selection.nonparametric import fit_nonparametric, physics_alone
 from identify.validation.free_run import free_run, rms_error
 from identify.validation.misfit_maps import compare_axis, position_errors
 from twin.effect import Effect
@@ -187,7 +187,7 @@ def add(
         raise InputError(
             f"axis {', '.join(names)} has the effect '{effect.name}' already; `twin fit` refits it"
         )
-    attempt = describe if effect.is_nonparametric else try_effect
+    attempt = fit_nonparametric if effect.is_nonparametric else try_effect
     tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]
     best = max(tried, key=lambda c: c.delta_bic)
     progress("adding", 1, 1)

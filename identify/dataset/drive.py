@@ -19,7 +19,7 @@ from twin.model.machine import AxisModel, axis_table
 
 Array = NDArray[np.float64]
 
-LESSENED = 0.5  # of the commanded force; below it the forces of the log are scaled as a whole
+LESSENED = 0.5  # of the commanded force; below it errors are divided by actual over commanded
 PASSES = 3  # iterations from a reading to the true position
 
 
@@ -87,12 +87,12 @@ def reading_error(sensing: AxisModel, motion: Motion) -> tuple[Array, Array]:
     table = axis_table({motion.axis: sensing})
     _, _, _, first, last = table.axes[0]
     true = motion.smoothed.copy()
-    path, seen = motion.smoothed[0], np.empty(true.shape[1])
+    path, reading = motion.smoothed[0], np.empty(true.shape[1])
     for _ in range(PASSES):
         walk_sensing(
             table.entries, first, last, table.parameters, np.zeros(table.n_states), true,
-            motion.sample_period, seen,
+            motion.sample_period, reading,
         )  # fmt: skip
-        error = seen - true[0]
+        error = reading - true[0]
         true[0] = path - error
     return error, np.diff(error, append=error[-1]) / motion.sample_period

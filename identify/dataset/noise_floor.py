@@ -1,10 +1,10 @@
 """The noise floor of a force residual, from the data alone.
 
-The raw residual, with a from second differences, is all noise at high frequency: white
-noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 cos(w dt))/dt^2)^2. A and B
-are fitted to its spectrum above the band of the effects, and give what passes the windows. Where
-the encoder's noise hides that of the force in all of that band, the force's is what the controller
-did not make of its readings.
+The residual before averaging, with a from second differences, is pure noise at high frequency:
+white noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 cos(w dt))/dt^2)^2.
+A and B are fitted to its spectrum above the band of the effects; the test functions pass a part of
+both. Where the encoder's noise hides that of the force in the whole band, the noise of the force is
+taken from the command: the part that the controller did not compute from its readings.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ def _median_spectrum(
 ) -> tuple[Array, Array]:
     """Welch's one-sided density with medians: frequency Hz, power unit^2/Hz, (segment // 2 + 1,).
 
-    Only the quarter of the segments with the fewest left-out samples is used, or more of equal.
+    At least a quarter of the segments is used, those with the fewest left-out samples.
     The same as scipy.signal.welch with average="median" and linear detrending, but faster: its
     detrending of one segment after another took a third of a fit. P. D. Welch (1967); bias of the
     median: B. Allen et al., Phys. Rev. D 85, 122006 (2012).

@@ -84,9 +84,13 @@ def misalignment(fit: Fit, dataset: Dataset) -> float:
     after = left + shift * own
     sample = dataset.fit[0].motion.sample_period
     fall = 1.0 - float(after @ after) / max(float(left @ left), 1e-300)
-    told = fall > RULE.least_fall and evidence(left, after, 1).delta_bic > RULE.least_bic
+    significant = fall > RULE.least_fall and evidence(left, after, 1).delta_bic > RULE.least_bic
     in_all = dataset.channel_delay + shift
-    return shift if told and RULE.least_shift * sample < in_all < RULE.most_shift * sample else 0.0
+    return (
+        shift
+        if significant and RULE.least_shift * sample < in_all < RULE.most_shift * sample
+        else 0.0
+    )
 
 
 def moved_by(fit: Fit, dataset: Dataset) -> Dataset | None:

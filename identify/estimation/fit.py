@@ -21,7 +21,7 @@ from identify.estimation.evidence import effective_samples
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.levenberg_marquardt import minimise
 from identify.estimation.scaling import Scaling
-from identify.estimation.smoothing import described, smoothing
+from identify.estimation.smoothing import has_nonparametric, smoothing
 from twin.effect import Kind
 from twin.model.machine import AxisModel, ParameterReference, free_parameters, read
 
@@ -78,7 +78,7 @@ class Fit:
 
     @cached_property
     def jacobian(self) -> Array:
-        """Derivative of the residual by the free coordinates, (n, k) N per unit."""
+        """Derivative of the residual by the free parameters, (n, k) N per unit."""
         return jacobian(self.axis, self.logs, self.scaling.where)[self.kept]
 
     @cached_property
@@ -126,7 +126,7 @@ def _is_added(axis: AxisModel, c: ParameterReference) -> bool:
     return effect.kind is not Kind.FRICTION and not effect.is_nonparametric
 
 
-def _describes(axis: AxisModel, c: ParameterReference) -> bool:
+def _is_nonparametric(axis: AxisModel, c: ParameterReference) -> bool:
     """Whether it is a strength of a nonparametric effect."""
     return bool(c.effect) and c.parameter.strength and axis[c.effect].effect.is_nonparametric
 
@@ -142,7 +142,7 @@ class _Problem:
     The prior on an effect beside the friction is a force of a tenth of the force to be explained.
     It matters only for parameters that the data cannot separate, such as a constant force and a
     Coulomb asymmetry: it keeps both small, where they could be large and opposite. Beside a
-    nonparametric effect the prior of the physical effects is centred on their start values, so that
+    nonparametric effect the prior of the physical effects is centred where the fit starts, so that
     a force that both could explain stays with the physics. The nonparametric effect is smoothed.
     """
 
@@ -155,12 +155,14 @@ class _Problem:
         self.bounds = self.scaling.bounds()
         self.start = np.clip(self.scaling.inside(axis), *self.bounds)
         self.added = np.array([_is_added(axis, c) for c in self.scaling.where], dtype=bool)
-        self.centre = np.where(self.added & (not described(axis)), 0.0, self.start)
+        self.centre = np.where(self.added & (not has_nonparametric(axis)), 0.0, self.start)
         self.pull = np.zeros(len(self.start))
         self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
         # A nonparametric effect is linear in its strengths, so their columns are computed once.
-        self.constant = np.array([_describes(axis, c) for c in self.scaling.where], dtype=bool)
-        self.described = jacobian(axis, logs, self._where(self.constant))
+        self.constant = np.array(
+            [_is_nonparametric(axis, c) for c in self.scaling.where], dtype=bool
+        )
+        self.constant_columns = jacobian(axis, logs, self._where(self.constant))
 
     def set_priors(self, internal: Array) -> None:
         """Weigh the priors by the residual's size, its colour, and the force to be explained."""
@@ -180,9 +182,9 @@ class _Problem:
         return [c for c, wanted in zip(self.scaling.where, mask, strict=True) if wanted]
 
     def jacobian(self, axis: AxisModel) -> Array:
-        """Derivative of the residual by the free coordinates, (n, k) N per unit."""
+        """Derivative of the residual by the free parameters, (n, k) N per unit."""
         columns = np.empty((len(self.kept), len(self.constant)))
-        columns[:, self.constant] = self.described
+        columns[:, self.constant] = self.constant_columns
         columns[:, ~self.constant] = jacobian(axis, self.logs, self._where(~self.constant))
         return columns
 

@@ -60,7 +60,7 @@ class NotExcited:
 
 @dataclass(frozen=True)
 class Inseparable:
-    """The estimate is correlated to all but one with that of another parameter."""
+    """The correlation with the estimate of another parameter is almost 1."""
 
     label: str
 
@@ -133,14 +133,14 @@ def open_side(fit: Fit, c: ParameterReference, half: float) -> Side | None:
 
 
 def inseparable(fit: Fit) -> dict[str, str]:
-    """Pairs of parameters, by label, whose estimates are correlated to all but one."""
+    """Pairs of parameters, by label, whose estimates have a correlation of almost 1."""
     norms = np.linalg.norm(fit.jacobian, axis=0)
-    seen = np.flatnonzero(norms > 0)
-    columns = fit.jacobian[:, seen] / norms[seen]
+    excited = np.flatnonzero(norms > 0)
+    columns = fit.jacobian[:, excited] / norms[excited]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-15, hermitian=True)
     spread = np.sqrt(np.diag(inverse))
-    correlation = np.abs(inverse / np.outer(spread, spread)) - np.eye(len(seen))
-    labels = [fit.scaling.where[i].label for i in seen]
+    correlation = np.abs(inverse / np.outer(spread, spread)) - np.eye(len(excited))
+    labels = [fit.scaling.where[i].label for i in excited]
     return {
         label: labels[int(np.argmax(row))]
         for label, row in zip(labels, correlation, strict=True)
@@ -160,11 +160,11 @@ def refusal(fit: Fit) -> NoInterval | None:
 def half_widths(fit: Fit) -> Array:
     """Half widths (k,) of the 90 % intervals, in the parameters' units; inf where not excited."""
     norms = np.linalg.norm(fit.jacobian, axis=0)
-    seen = norms > 0
+    excited = norms > 0
     out = np.full(len(norms), np.inf)
-    if not seen.any():
+    if not excited.any():
         return out
-    columns = fit.jacobian[:, seen] / norms[seen]
+    columns = fit.jacobian[:, excited] / norms[excited]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-12, hermitian=True)
     edges = np.linspace(0, len(fit.residual), BLOCKS + 1).astype(int)
     # The fit makes the residuals of a block smaller than its errors, so the residuals of a fit
@@ -176,7 +176,7 @@ def half_widths(fit: Fit) -> Array:
     shift = np.abs(inverse @ (columns.T @ fit.residual))
     quantile = student.ppf(0.5 + CONFIDENCE / 2.0, BLOCKS - 1)
     spread_of = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    out[seen] = (quantile * spread_of + shift) / norms[seen]
+    out[excited] = (quantile * spread_of + shift) / norms[excited]
     return out
 
 

@@ -13,7 +13,7 @@ from twin.model.machine import AxisModel, ParameterReference
 Array = NDArray[np.float64]
 
 
-def described(axis: AxisModel) -> bool:
+def has_nonparametric(axis: AxisModel) -> bool:
     """Whether the axis has a nonparametric effect."""
     return any(f.effect.is_nonparametric for f in axis.effects)
 

@@ -30,7 +30,7 @@ from identify.output.words.validation import (
 )
 from identify.selection.candidates import Candidate
 from identify.selection.forward_selection import Step
-from identify.selection.nonparametric import described_labels
+from identify.selection.nonparametric import nonparametric_labels
 from twin.effect import Effect
 from twin.experiments.file import in_short
 from twin.experiments.kinds import kind_of
@@ -60,7 +60,7 @@ def fit_text(result: FitResult) -> str:
             lines.append(f"  not fitted on {still}, where axis {axis} stands still")
         if changed := refit_in_words(result.refits[axis]):
             lines.append(f"  {changed}")
-        hidden = described_labels(fit.axis)
+        hidden = nonparametric_labels(fit.axis)
         common = refusal(fit)
         if common is not None:
             lines.append(f"  {no_interval_in_words(common)}")

@@ -149,7 +149,7 @@ def _best(linear: _Linear, chosen: Mapping[str, float], name: str) -> tuple[floa
     return errors[least], name, float(STIFFNESS[least])
 
 
-def describe(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
+def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     """Fit a nonparametric effect beside the physics of a base, and judge it on the held-out logs.
 
     Without held-out logs it is judged by cross-validation. The curves cover the motion of the fit
@@ -196,7 +196,7 @@ def followed(fitted: Fitted) -> tuple[str, ...]:
     return tuple(p.name for p in parts if any(fitted.values[n] for n in p.strengths))
 
 
-def described_labels(axis: AxisModel) -> frozenset[str]:
+def nonparametric_labels(axis: AxisModel) -> frozenset[str]:
     """Labels of the strengths of nonparametric effects, which have no meaning one by one."""
     return frozenset(
         f"{f.effect.name}.{p.name}"

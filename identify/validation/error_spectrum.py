@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 SHORTEST = 8  # blocks of the test functions used here, the fewest allowed
 SEGMENT = 4.0  # s of each part of a log that is transformed
-SEEN = 0.2  # of the force's power that the test functions must pass
+LEAST_PASSED = 0.2  # of the force's power that the test functions must pass
 OCTAVE_PARTS = 2  # bands an octave
 
 
@@ -69,10 +69,10 @@ def _spectrum(axis: AxisModel, log: PreparedLog) -> tuple[Array, Array, Array, A
     frequency, power = welch(both, 1.0 / period, nperseg=segment, detrend="constant")
     ratio = round(period / motion.sample_period)
     passed = short.window.response(motion.sample_period, segment * ratio)[: len(frequency)]
-    seen = (passed > SEEN) & (frequency > 0.0)
+    passed_band = (passed > LEAST_PASSED) & (frequency > 0.0)
     noise = noise_of(axis, motion)
-    frequency = frequency[seen]
-    error, explain = power[:, seen] / passed[seen]
+    frequency = frequency[passed_band]
+    error, explain = power[:, passed_band] / passed[passed_band]
     return frequency, error, np.interp(frequency, noise.frequency, noise.power), explain
 
 

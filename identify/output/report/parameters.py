@@ -12,7 +12,7 @@ from identify.output.report.subject import Subject
 from identify.output.report.units import NOTHING, Scale, number, quantity, spaced
 from identify.output.words.estimation import no_interval_in_words
 from identify.selection.forward_selection import AxisDiagnosis
-from identify.selection.nonparametric import described_labels
+from identify.selection.nonparametric import nonparametric_labels
 from twin.model.machine import AxisModel
 
 
@@ -32,7 +32,7 @@ def _given(axis: AxisModel) -> Table:
     meanings = _meanings(axis)
     units, mass = axis.units, axis.mass_parameter
     rows = [Row((mass.name, quantity(axis.mass, units(mass.unit)), meanings[mass.name]))]
-    hidden = described_labels(axis)
+    hidden = nonparametric_labels(axis)
     for fitted in axis.effects:
         for p in fitted.effect.parameters:
             label = f"{fitted.effect.name}.{p.name}"

@@ -20,7 +20,7 @@ from identify.estimation.force_balance import residual
 from identify.estimation.levenberg_marquardt import minimise
 from identify.output.as_json import fit_json
 from identify.output.text import fit_text
-from identify.validation.free_run import WINDOW, free_run, rms_error
+from identify.validation.free_run import HORIZON, free_run, rms_error
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import Loop, correlation
 from identify.workflow import compare, diagnose, fit
@@ -126,7 +126,7 @@ def test_a_restart_knows_the_other_axis_acceleration(name, values, simulator):
     bare = free_run(TWO, by_log(datasets(TWO, {"log": logged(TWO)}, {}))["log"], simulator).error[
         "x"
     ]
-    starts = 10 + np.arange(1, 7) * round(WINDOW * RATE)
+    starts = 10 + np.arange(1, 7) * round(HORIZON * RATE)
     jumps, usual = (np.abs(e[starts + 20]).max() for e in (found, bare))
     assert jumps < 3.0 * usual + 2e-8
     assert np.sqrt(np.nanmean(found**2)) < 3.0 * np.sqrt(np.nanmean(bare**2))

@@ -23,7 +23,7 @@ from identify.selection.nonparametric import (
     _Linear,
     _solve,
     choose_stiffness,
-    described_labels,
+    nonparametric_labels,
     physics_alone,
 )
 from twin.model.machine import Fitted, MachineModel, ParameterReference
@@ -162,7 +162,7 @@ def test_rounds_go_on_while_the_error_falls(monkeypatch, ratio, rounds):
 
     monkeypatch.setattr(module, "_attempt", attempt)
     monkeypatch.setattr(module, "fit_without", lambda fit, dataset, name: (fit.error, name))
-    found = module.describe(base, dataset, MAP)
+    found = module.fit_nonparametric(base, dataset, MAP)
     assert len(grounds) == rounds
     assert grounds[:2] == [base, (4.0, MAP.name)]
     assert found.fit.error == pytest.approx(4.0 if rounds == 2 else 4.0 * ratio**ROUNDS)
@@ -251,9 +251,9 @@ def test_an_attempt_is_judged_by_the_degrees_of_freedom_it_takes(monkeypatch, ab
 
 def test_descriptions_are_told_from_physics():
     axis = axis_of(fitted("cogging"), Fitted.at_start(MAP))
-    labels = described_labels(axis)
+    labels = nonparametric_labels(axis)
     assert labels == {f"{MAP.name}.{p.name}" for p in MAP.strengths}
-    assert described_labels(PLAIN) == frozenset()
+    assert nonparametric_labels(PLAIN) == frozenset()
     stage = MachineModel("s", {"x": axis, "y": replace(PLAIN, mass=7.0)})
     found = physics_alone(stage)
     assert found.axes["x"].names == ("coulomb_viscous", "cogging")

@@ -17,7 +17,7 @@ from identify.dataset.prepared_log import on_blocks, total_force
 from identify.estimation.fit import fit_axis
 from identify.output.results import Addition, FitResult
 from identify.selection.candidates import absent_effects
-from identify.selection.nonparametric import describe
+from identify.selection.nonparametric import fit_nonparametric
 from identify.workflow import add, fit
 from twin.effect import Effect
 from twin.effects import load_catalogue
@@ -143,7 +143,7 @@ def test_the_shape_is_recovered_and_the_physics_keeps_its_values(
 @pytest.mark.parametrize("seed", [11, pytest.param(21, marks=SLOW)])
 def test_nothing_is_kept_on_an_honest_machine(name: str, seed: int) -> None:
     before = honest(seed)
-    found = describe(before.fits["x"], before.datasets["x"], CATALOGUE[name])
+    found = fit_nonparametric(before.fits["x"], before.datasets["x"], CATALOGUE[name])
     assert not found.supported
     assert found.gain.after < 1.01 * found.gain.before
 
@@ -170,7 +170,7 @@ def noisy(judged: str) -> FitResult:
 )
 def test_pure_noise_is_not_described(name: str, judged: str) -> None:
     before = noisy(judged)
-    found = describe(before.fits["x"], before.datasets["x"], CATALOGUE[name])
+    found = fit_nonparametric(before.fits["x"], before.datasets["x"], CATALOGUE[name])
     assert not found.supported
 
 
