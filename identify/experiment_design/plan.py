@@ -50,11 +50,10 @@ class Plan:
 
     axis: the axis that is explained. between: names of the explanations; a single one where the
     experiment is to constrain a model. ranking: simulated experiments by falling evidence; the
-    first is chosen.
-    gap: the motion that the logs lack. not_run: experiments that the machine cannot run. favoured:
-    the explanation that the existing logs already separate from the others, if any. excited_by:
-    effect -> the motion that excites it. supposed: whether the explanations have start values,
-    as there are no logs to fit them to.
+    first is chosen. gap: the motion that the logs lack. not_run: experiments that the machine
+    cannot run. favoured: the explanation that the existing logs already separate from the others,
+    if any. excited_by: effect -> the motion that excites it. supposed: whether the explanations
+    have start values, as there are no logs to fit them to.
     """
 
     axis: str

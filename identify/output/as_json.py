@@ -242,7 +242,7 @@ def _simulated(t: SimulatedExperiment, several: bool) -> dict[str, Any]:
 
 
 def add_json(result: Addition) -> dict[str, Any]:
-    """Errors before and after, whether the effect earned its place, and what moved."""
+    """Errors before and after, whether the effect is supported, and what it changed."""
     step = result.step
     return {
         "effect": step.effect,

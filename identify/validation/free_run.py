@@ -26,7 +26,7 @@ from twin.simulator import MujocoSimulator, ReducedSimulator, Stepper
 Array = NDArray[np.float64]
 
 HORIZON = 0.5  # s between restarts
-SEED = 0  # of the noise drawn anew
+SEED = 0  # of the added noise
 START_FIT = 5e-3  # s on each side of a restart from which its position and velocity are taken
 
 

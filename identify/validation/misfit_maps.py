@@ -98,7 +98,7 @@ class AxisComparison:
 
     @property
     def units(self) -> AxisUnits:
-        """What the axis' quantities are given in."""
+        """The units of the axis."""
         return self.logs[0].motion.units
 
     @property

@@ -2,8 +2,8 @@
 
 The force residual is tested on test functions that do not overlap, where it is white if the model
 is right. Bounds are +-1.645/sqrt(n) for n test functions: 90 of 100 values of a white residual lie
-within (L. Jia 2023, residual analysis; L. Ljung, System Identification, 16.6). Which
-lags are tested depends on the loop.
+within (L. Jia 2023, residual analysis; L. Ljung, System Identification, 16.6). The loop decides
+which lags are tested.
 """
 
 from __future__ import annotations
@@ -155,9 +155,7 @@ def correlation(
     products = sum(_products(x, y, lags) for x, y in zip(a, b, strict=True))
     tested = np.ones(len(lags), bool)
     if not own and loop is not Loop.OPEN:
-        tested = (
-            lags > 0
-        )  # under feedback even the command of the same instant depends on the noise
+        tested = lags > 0  # under feedback the command of the same instant depends on the noise
     count = int(tested.sum())
     root = np.sqrt(max(n, 1))
     return Correlation(
