@@ -18,19 +18,22 @@ from twin.experiments.named import simulate
 from twin.model.file import load_model
 
 DURATION = 30.0  # s of each log
-RUNS = ("tracking", "moves", "tracking", "moves")
+EXPERIMENTS = ("tracking", "moves", "tracking", "moves")
 TITLE = f"Diagnosis: the whole catalogue over four logs of {DURATION:g} s at 10 kHz, both axes"
 FITS = 2  # baseline fits before the diagnoses, and again after them
 
 
 def measure() -> list[Figure]:
-    """Time of a diagnosis over that of the baseline fit, and with two threads over one."""
+    """Time of a diagnosis over that of the baseline fit, and of two threads over one."""
     catalogue = load_catalogue()
     for effect in catalogue.values():
         law_address(effect)  # compiled before anything is timed
     model = load_model("proton_xy", catalogue)
     machine = load_model("example_machine", catalogue)
-    logs = {f"{e} {i}": simulate(machine, e, seed=i, duration=DURATION) for i, e in enumerate(RUNS)}
+    logs = {
+        f"{e} {i}": simulate(machine, e, seed=i, duration=DURATION)
+        for i, e in enumerate(EXPERIMENTS)
+    }
     tried = sum(len(absent_effects(axis, catalogue)) for axis in model.axes.values())
 
     def fits() -> list[float]:

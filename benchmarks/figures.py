@@ -1,4 +1,4 @@
-"""What a benchmark finds: figures, some with a target, and the two files that keep them."""
+"""Figures of a benchmark, some with a target, and the two files that they are written to."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Figure:
 
 
 def machine() -> str:
-    """What the figures were measured on."""
+    """The machine that the figures were measured on."""
     versions = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
     return f"{os.cpu_count()} CPUs, Python {platform.python_version()}, {versions}"
 

@@ -1,4 +1,4 @@
-"""Time to the whole catalogue, compiled, over that of the imports it cannot do without."""
+"""Time to load the whole compiled catalogue, over the time of the imports that it needs."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """Fits against mujoco.sysid on the same logs, from a start 50 % off.
 
-The logs have noise, and positions between the peer's own steps, as a machine's have. On noiseless
-logs of its own steps its scaled solver is exact and its default ends in a wrong place all the same.
+The logs have noise, and positions between the peer's own steps, as those of a machine have. On
+noiseless logs of its own steps the peer's scaled solver is exact; its default solver is wrong there
+as well.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The self-test at full length: how often the diagnosis names what is planted."""
+"""The self-test at full length: how often the diagnosis names planted effects."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.figures import Figure, Target
-from identify.selftest import FULL, Outcome, draw, rates, run_all
+from identify.output.words.selftest import trial_in_words
+from identify.selftest import FULL, TrialResult, draw, rates, run_all
 
 SEED = 1
 TITLE = "Self-test: effects planted in machines drawn at random, logs of 12 s, one axis"
@@ -16,19 +17,19 @@ PICTURE = Path(__file__).parent.parent / "docs" / "selftest.png"
 
 def measure() -> list[Figure]:
     """Run the full design; draws the confusion matrix that the README shows."""
-    outcomes = run_all(FULL.cases(SEED), progress=_tell)
-    draw(outcomes, PICTURE)
-    return figures(outcomes)
+    results = run_all(FULL.cases(SEED), progress=_tell)
+    draw(results, PICTURE)
+    return figures(results)
 
 
-def figures(outcomes: Sequence[Outcome]) -> list[Figure]:
+def figures(results: Sequence[TrialResult]) -> list[Figure]:
     """The rates with their targets."""
     return [
         Figure(r.what, r.value, "1", Target(*r.asked) if r.asked else None,
                f"{r.count} of {r.trials}")
-        for r in rates(outcomes)
+        for r in rates(results)
     ]  # fmt: skip
 
 
-def _tell(outcome: Outcome, done: int, total: int) -> None:
-    print(f"  {done} of {total}: {outcome.in_words()}", file=sys.stderr, flush=True)
+def _tell(result: TrialResult, done: int, total: int) -> None:
+    print(f"  {done} of {total}: {trial_in_words(result)}", file=sys.stderr, flush=True)

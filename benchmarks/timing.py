@@ -1,4 +1,4 @@
-"""Time several jobs in turn, so that what else the machine does falls on all of them alike."""
+"""Time several jobs in turn, so that other load of the machine affects all of them alike."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What tells the friction models apart: one picture for each behaviour.
+"""How the friction models differ: one picture for each behaviour.
 
     python examples/friction_gallery.py FOLDER
 
@@ -184,7 +184,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
 
 def main() -> None:
     """Draw every picture into the folder that was given."""
-    parser = argparse.ArgumentParser(description="Draw what tells the friction models apart.")
+    parser = argparse.ArgumentParser(description="Draw how the friction models differ.")
     parser.add_argument("folder", type=Path, help="where to save the pictures; made if missing")
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)

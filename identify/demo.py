@@ -1,4 +1,4 @@
-"""The whole loop on a machine with an effect that the analysis is not told of."""
+"""The whole loop on a machine with a hidden effect."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from twin.model.file import save_model
 from twin.model.machine import Fitted, MachineModel
 
 DURATION = 20.0  # s of each log
-RUNS = ("tracking", "moves", "tracking")  # the last is held out
+EXPERIMENTS = ("tracking", "moves", "tracking")  # the last is held out
 FORCE = 0.05  # N RMS of the hidden effect, about 50 times the noise floor
-VISIBLE = 0.5  # part of the hidden force that the baseline must not be able to absorb
+VISIBLE = 0.5  # least part of the hidden force that a fit without the effect cannot absorb
 
 
 @dataclass(frozen=True, eq=False)
 class Demo:
-    """What the demonstration did: the hidden effect, the diagnosis and the addition."""
+    """The result of the demonstration."""
 
     hidden: Fitted
     diagnosis: Diagnosis
@@ -52,7 +52,7 @@ def demo(
     say: Callable[[str], None] = print,
     progress: workflow.Progress = workflow.silent,
 ) -> Demo:
-    """Make a machine with a hidden effect, log it, and let the tools find the effect.
+    """Make a machine with a hidden effect, log it, and diagnose the logs.
 
     Writes machine_*.mcap, better.toml and report.html into the folder. Raises InputError where the
     folder cannot be made.
@@ -68,7 +68,7 @@ def demo(
         f"machine_{i}.mcap": _record(
             machine, experiment, folder / f"machine_{i}.mcap", seed + 1000 * i, progress
         )
-        for i, experiment in enumerate(RUNS, start=1)
+        for i, experiment in enumerate(EXPERIMENTS, start=1)
     }
     held = {"machine_3.mcap": logs.pop("machine_3.mcap")}
     known = ", ".join(model.axes[_first(model)].names)
@@ -125,13 +125,13 @@ def _fallen(addition: Addition) -> str:
 def hidden_machine(
     model: MachineModel, catalogue: Catalogue, rng: np.random.Generator
 ) -> tuple[MachineModel, Fitted]:
-    """A machine of other values with one catalogue effect more on its first axis, that shows."""
+    """A machine with other values and one more effect on its first axis, large enough to find."""
     machine = model
     for name, axis in model.axes.items():
         machine = machine.with_axis(name, other_machine(axis, rng))
-    trial = simulate(machine, "tracking", seed=int(rng.integers(1 << 30)), duration=DURATION)
+    log = simulate(machine, "tracking", seed=int(rng.integers(1 << 30)), duration=DURATION)
     name = _first(machine)
-    dataset = datasets(machine, {"trial": trial}, {})[name]
+    dataset = datasets(machine, {"log": log}, {})[name]
     base = fit_axis(machine.axes[name], dataset.fit)
     absent = [e for e in catalogue.values() if _can_hide(e, machine)]
     for index in rng.permutation(len(absent)):
@@ -140,7 +140,9 @@ def hidden_machine(
         )
         if shows(hidden, base, dataset):
             return machine.with_axis(name, machine.axes[name].with_effect(hidden)), hidden
-    raise InputError("no effect of the catalogue shows in this stage's motion; try another seed")
+    raise InputError(
+        "no effect of the catalogue can be seen in the motion of this machine; try another seed"
+    )
 
 
 def _first(model: MachineModel) -> str:
@@ -158,5 +160,5 @@ def _can_hide(effect: Effect, machine: MachineModel) -> bool:
 
 
 def shows(hidden: Fitted, base: Fit, dataset: Dataset) -> bool:
-    """Whether the parameters of the base can not take over the hidden effect's force."""
+    """Whether the parameters of the base cannot absorb the hidden effect's force."""
     return hidden_part(hidden, base, dataset) < 1.0 - VISIBLE

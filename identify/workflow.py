@@ -1,4 +1,4 @@
-"""The loop in Python: fit, compare, diagnose, add and plan, on a whole stage and its logs."""
+"""Fit, compare, diagnose, add and plan for a whole machine and its logs."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates
 from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate, score, try_effect, usable
 from identify.selection.confounded import moved_parameters
 from identify.selection.forward_selection import AxisDiagnosis, diagnose_axis
-from identify.selection.nonparametric import describe, in_words, physics_alone
+from identify.selection.nonparametric import fit_nonparametric, physics_alone
 from identify.validation.free_run import free_run, rms_error
 from identify.validation.misfit_maps import compare_axis, position_errors
 from twin.effect import Effect
@@ -33,7 +34,7 @@ Progress = Callable[[str, int, int], None]
 
 
 def silent(what: str, done: int, total: int) -> None:
-    """Progress that nobody watches."""
+    """Progress that is not shown."""
 
 
 def fit(
@@ -42,17 +43,17 @@ def fit(
     holdout: Logs | None = None,
     *,
     catalogue: Catalogue | None = None,
-    window: float | None = None,
+    test_function: float | None = None,
     progress: Progress = silent,
 ) -> FitResult:
     """Identify the free parameters of a model's effects.
 
-    logs, holdout: by name. catalogue: its absent effects are told where a parameter stands in for
-    them. window: of the weak form in s; from the noise where None. Raises InputError for logs that
-    do not fit the model, and where they leave nothing to fit: an axis that comes to rest in every
-    window, a force that is not a number.
+    logs, holdout: by name. catalogue: with it the result says which absent effects give the same
+    force as a parameter that changed. test_function: length in s; chosen from the noise where None.
+    Raises InputError for logs that do not fit the model, and where nothing can be fitted: an axis
+    that comes to rest within every test function, a force that is not a number.
     """
-    found, given = datasets(model, logs, holdout or {}, window), model
+    found, given = datasets(model, logs, holdout or {}, test_function), model
     fits: dict[str, Fit] = {}
     for i, (axis, dataset) in enumerate(list(found.items())):
         require_residual(model.axes[axis], dataset)
@@ -68,22 +69,22 @@ def fit(
 
 
 def require_residual(axis: AxisModel, dataset: Dataset) -> None:
-    """Raise InputError where the logs leave nothing to judge the axis by, or no number at all."""
+    """Raise InputError where no test function is usable, or the residual is not a number."""
     kept = moving(dataset.fit, sticks(axis))
     names = ", ".join(log.motion.name for log in dataset.fit)
     if not kept.any():
         raise InputError(
-            f"axis {dataset.axis} comes to rest within every window of {dataset.window:g} s of "
-            f"{names}, where its friction may be any force; give a log in which it moves for "
-            "longer at a time, or a shorter --window (s)"
+            f"axis {dataset.axis} comes to rest within every test function of "
+            f"{dataset.test_function_length:g} s of {names}, and at rest its friction is unknown; "
+            "give a log in which it moves for longer at a time, or a shorter --test-function (s)"
         )
     with np.errstate(all="ignore"):
         bad = np.count_nonzero(~np.isfinite(residual(axis, dataset.fit)[kept]))
     if bad:
         raise InputError(
             f"axis {dataset.axis}: the force of the model is not a finite number in {bad} of "
-            f"{np.count_nonzero(kept)} windows of {names}; check the values of its effects, or "
-            "leave them to their start values"
+            f"{np.count_nonzero(kept)} test functions of {names}; check the values of its effects, "
+            "or leave them out to begin with their start values"
         )
 
 
@@ -93,10 +94,14 @@ def holdout_error(fitted: Fit, dataset: Dataset) -> float | None:
 
 
 def compare(
-    model: MachineModel, logs: Logs, *, window: float | None = None, progress: Progress = silent
+    model: MachineModel,
+    logs: Logs,
+    *,
+    test_function: float | None = None,
+    progress: Progress = silent,
 ) -> Comparison:
-    """Error numbers of a model as it stands, and where it fails. Raises InputError."""
-    found = datasets(model, logs, {}, window)
+    """The errors of a model with its present values, and where it fails. Raises InputError."""
+    found = datasets(model, logs, {}, test_function)
     for axis, dataset in found.items():
         require_residual(model.axes[axis], dataset)
     found = {axis: aligned(model.axes[axis], dataset) for axis, dataset in found.items()}
@@ -104,7 +109,7 @@ def compare(
 
 
 def _compared(model: MachineModel, found: Mapping[str, Dataset], progress: Progress) -> Comparison:
-    """The same on logs that are prepared already."""
+    """The comparison on datasets that are prepared already."""
     errors, floors = position_errors(model, found, partial(progress, "comparing"))
     axes = {a: compare_axis(model, dataset, errors[a], floors[a]) for a, dataset in found.items()}
     return Comparison(model, axes)
@@ -116,16 +121,21 @@ def diagnose(
     holdout: Logs | None = None,
     *,
     catalogue: Catalogue,
-    window: float | None = None,
+    test_function: float | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
     """Fit the model, then find which effect of the catalogue it lacks. Raises InputError.
 
-    Descriptions that the model holds are set aside: what they describe is to be explained.
+    Nonparametric effects of the model are removed first, so that their force can be explained.
     """
     known = usable(catalogue, model)
     result = fit(
-        physics_alone(model), logs, holdout, catalogue=catalogue, window=window, progress=progress
+        physics_alone(model),
+        logs,
+        holdout,
+        catalogue=catalogue,
+        test_function=test_function,
+        progress=progress,
     )
     axes = {
         axis: diagnose_axis(
@@ -136,7 +146,7 @@ def diagnose(
         )
         for axis, fitted in result.fits.items()
     }
-    plans, not_planned = _next_experiments(axes, result.model, window)
+    plans, not_planned = _next_experiments(axes, result.model, test_function)
     return Diagnosis(
         result.model,
         axes,
@@ -171,17 +181,17 @@ def add(
     holdout: Logs | None = None,
     *,
     axis: str | None = None,
-    window: float | None = None,
+    test_function: float | None = None,
     progress: Progress = silent,
 ) -> Addition:
-    """Add an effect to the axis that it helps most (or the one given), refit, record the errors.
+    """Add an effect to the axis that it helps most (or to ``axis``), refit and record the errors.
 
-    Descriptions that the model holds make way for a physical effect. Raises InputError where the
-    axis has the effect already.
+    Nonparametric effects of the model are removed before a physical effect is added. Raises
+    InputError where the axis has the effect already.
     """
     model.require_usable(effect, axis or next(iter(model.axes)))
     given, model = model, model if effect.is_nonparametric else physics_alone(model)
-    before = fit(model, logs, holdout, window=window, progress=progress)
+    before = fit(model, logs, holdout, test_function=test_function, progress=progress)
     names = [axis] if axis else list(before.fits)
     for name in names:
         model.axis(name)
@@ -192,7 +202,7 @@ def add(
         raise InputError(
             f"axis {', '.join(names)} has the effect '{effect.name}' already; `twin fit` refits it"
         )
-    attempt = describe if effect.is_nonparametric else try_effect
+    attempt = fit_nonparametric if effect.is_nonparametric else try_effect
     tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]
     best = max(tried, key=lambda c: c.delta_bic)
     progress("adding", 1, 1)
@@ -202,12 +212,9 @@ def add(
 def _addition(best: Candidate, before: FitResult, given: MachineModel) -> Addition:
     name = best.axis
     base, dataset = before.fits[name], before.datasets[name]
-    notes = moved_parameters(base, best.fit)
-    if best.effect.is_nonparametric:
-        notes = (in_words(best.fit.axis[best.effect.name]), *notes)
-    gone = [n for n in given.axes[name].names if n not in before.model.axes[name].names]
-    if gone:
-        notes = (*notes, f"{', '.join(gone)} made way; add it again for what is left")
+    moved = moved_parameters(base, best.fit)
+    left = before.model.axes[name].names
+    set_aside = tuple(n for n in given.axes[name].names if n not in left)
     step = HistoryStep(
         action="add",
         effect=best.effect.name,
@@ -217,7 +224,7 @@ def _addition(best: Candidate, before: FitResult, given: MachineModel) -> Additi
         holdout_error_before=holdout_error(base, dataset),
         holdout_error_after=holdout_error(best.fit, dataset),
         unit=best.fit.axis.units.force,
-        notes=notes,
+        notes=addition_notes(best, moved, set_aside),
     )
     new = before.model.with_axis(name, best.fit.axis).with_history(step)
     first = next(iter(by_log(before.datasets).values()))
@@ -231,7 +238,8 @@ def _addition(best: Candidate, before: FitResult, given: MachineModel) -> Additi
             rms_error(free_run(new, first), name),
         ),
         replayed=rms_error(free_run(new, first, MujocoSimulator), name),
-        notes=notes,
+        moved=moved,
+        set_aside=set_aside,
     )
 
 

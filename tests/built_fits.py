@@ -15,7 +15,7 @@ from identify.estimation.evidence import Evidence, Gain
 from identify.estimation.fit import Fit, Outcome
 from identify.estimation.scaling import Scaling
 from identify.selection.candidates import Candidate
-from identify.selection.forward_selection import Stage, Step
+from identify.selection.forward_selection import SelectionState, Step
 from twin.effect import Effect, Excitation
 from twin.effects import load_catalogue
 from twin.model.machine import AxisModel, Fitted, Hardware
@@ -96,8 +96,8 @@ def step(effect: str = "cogging", tied: tuple[str, ...] = (), **changes: object)
     return Step(built(effect, **changes), tied, **told)  # type: ignore[arg-type]
 
 
-def stage(fit: Fit, *steps: Step) -> Stage:
-    return Stage(tuple(steps), fit)
+def stage(fit: Fit, *steps: Step) -> SelectionState:
+    return SelectionState(tuple(steps), fit)
 
 
 def study_stub(holdout: Sequence[object] = (), fit: Sequence[object] = ()) -> SimpleNamespace:

@@ -9,12 +9,12 @@ import numpy as np
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_study, fitted
 
 from identify.estimation.fit import Outcome
-from identify.estimation.intervals import Estimate
-from identify.experiment_design.discrimination import Trial
+from identify.estimation.intervals import Estimate, NotExcited
+from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
-from identify.selection.confounded import Change, Refit
+from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.forward_selection import AxisDiagnosis, Step, Verdict
 from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
@@ -33,7 +33,7 @@ def estimates(offset: float) -> tuple[Estimate, ...]:
     o = offset
     return (
         Estimate("mass", 5.31 + o, "kg", 5.23 + o, 5.47 + o, True),
-        Estimate("cogging.p", 0.0241 + o, "m", None, None, True, "no interval: not shown"),
+        Estimate("cogging.p", 0.0241 + o, "m", None, None, True, NotExcited()),
         Estimate("coulomb_viscous.Fs", 0.337 + o, "N", None, None, False),
     )
 
@@ -56,8 +56,10 @@ LATER = candidate("lugre", 0.44, bic=205.0)
 
 CHOSEN = Passes("x", 0.0831, 0.0127, 7)
 TRIALS = (
-    Trial(CHOSEN, 8.3, 0.0412, 0.0113, 57.3, STUDY.fit[0], np.array([0.3, 0.1])),
-    Trial(Tracking(9.7), 9.9, 0.0287, 0.0107, 31.9, STUDY.fit[1], np.array([0.2, 0.1])),
+    SimulatedExperiment(CHOSEN, 8.3, 0.0412, 0.0113, 57.3, STUDY.fit[0], np.array([0.3, 0.1])),
+    SimulatedExperiment(
+        Tracking(9.7), 9.9, 0.0287, 0.0107, 31.9, STUDY.fit[1], np.array([0.2, 0.1])
+    ),
 )
 
 
@@ -180,10 +182,11 @@ STEPS = (
 )
 
 
+MOVED = MovedParameter("mass", 5.31, 5.47, "kg", False)
+
+
 def addition(kept: bool = True) -> Addition:
-    return Addition(
-        MODEL, STEPS[0], BEST, kept, (3.71e-6, 1.93e-6), 1.97e-6, ("a note of what moved",)
-    )
+    return Addition(MODEL, STEPS[0], BEST, kept, (3.71e-6, 1.93e-6), 1.97e-6, (MOVED,))
 
 
 class Page(HTMLParser):

@@ -24,7 +24,7 @@ LONGEST_WAIT = 300.0  # s for what another worker compiles
 LONGEST = (
     "test_catalogue_recovery",
     "test_readme",
-    "test_descriptions",
+    "test_nonparametric",
     "test_plan",
     "test_catalogue_laws",
     "test_rounding",

@@ -123,6 +123,19 @@ def test_signals_are_differentiated_and_smoothed_in_one_file() -> None:
         assert not own or path == TWIN / "signals.py", f"{path}: {own} is in twin/signals.py"
 
 
+def test_sentences_about_results_are_made_in_output_alone() -> None:
+    for name, path in modules(IDENTIFY).items():
+        if room(name) == "output":
+            continue
+        nodes = list(ast.walk(ast.parse(path.read_text())))
+        functions = [n.name for n in nodes if isinstance(n, ast.FunctionDef)]
+        assert not [f for f in functions if "in_words" in f], f"{path} makes sentences"
+        enums = [n for n in nodes if isinstance(n, ast.ClassDef) and "Enum" in ast.dump(n)]
+        texts = [str(c.value) for e in enums for s in e.body if isinstance(s, ast.Assign)
+                 for c in ast.walk(s) if isinstance(c, ast.Constant)]  # fmt: skip
+        assert all(len(t.split()) < 4 for t in texts), f"{path} has an Enum of sentences"
+
+
 def test_only_its_own_file_names_an_effect() -> None:
     names = set(load_catalogue())
     for path in [*IDENTIFY.rglob("*.py"), *TWIN.rglob("*.py")]:

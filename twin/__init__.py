@@ -1,5 +1,5 @@
 """The machine: its effects, its model, its simulation, its experiments and its logs.
 
-Data flows effects -> model -> core -> mujoco and the reduced simulator -> log. Nothing here imports
+Data flow: effects -> model -> core -> mujoco and the reduced simulator -> log. Nothing here imports
 ``identify``.
 """

@@ -9,9 +9,9 @@ A law is one function ``law(p, s, io)`` of three arrays of doubles:
 The law reads what it needs from ``io`` and writes one result: a force effect writes OUT (the force
 on the axis, N); a friction writes OUT (the force opposing motion, N); an actuation changes U; a
 modifier multiplies DRY, STATIC or VISCOUS; a sensing effect changes READING.
-A structure effect writes OUT, the force (N) that bodies attached to the axis add to its motion. It
-answers linearly to ACC when it rides on the axis, to NET when the axis stands on it; where WHEN is
-0 it is only asked, and leaves its states alone.
+A structure effect writes OUT, the force (N) that bodies attached to the axis add to its motion. OUT
+is linear in ACC for a body on the axis, and linear in NET for the body that the axis stands on;
+where WHEN is 0 the law must not change its states.
 It is plain Python and also compiles, once, to native code (see twin.core.native).
 """
 
@@ -43,10 +43,10 @@ VISCOUS = 13  # 1, factor on the viscous part
 HOLD = 14  # N, friction that would bring the axis to rest within this sample
 READING = 15  # m, encoder reading
 OUT = 16  # N, result of a force or friction law
-WHEN = 17  # 1, where in the sample states are wanted: 1 its end (stepping), 1/2 its middle (walk)
+WHEN = 17  # 1, instant of the result in the sample: 1 its end (stepping), 1/2 its middle (walk)
 MOVED = 18  # kg, moved mass of the axis
 NET = 19  # m/s^2, all forces on the axis but those of structure, over its moved mass
-ACC = 20  # m/s^2, acceleration in space of what rides on the axis
+ACC = 20  # m/s^2, absolute acceleration of the bodies on the axis
 IO_SIZE = 21
 
 Law = Callable[[Any, Any, Any], None]
@@ -100,9 +100,10 @@ class Parameter:
     unit: SI unit text ("1" for a ratio) on a linear axis; on a rotary one it is shown as its
     counterpart (twin.model.units). start: value before anything is known; start_rule gives a
     better one from the data. lower, upper: bounds, same unit. strength: the effect is absent when
-    every strength is zero. fixed: known by design, held by a fit. at_least: name of a parameter of
-    the same effect below which this one may not fall. scan: values that the diagnosis tries, from
-    the data. screened: whether a strength takes part while those are tried; a detail need not.
+    every strength is zero; strengths are linear parameters, the others nonlinear. fixed: known by
+    design, not fitted. at_least: name of a parameter of the same effect that is a lower bound of
+    this one. scan: values that a diagnosis tries, computed from the data. screened: whether a
+    strength is fitted during that scan; a strength of minor weight need not be.
     period: whether it is a length at which the force repeats along the track. dry: whether it is a
     level of dry friction.
     """
@@ -130,11 +131,11 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Part:
-    """Strengths of a description that belong to one curve, and how little they may bend.
+    """Strengths of a nonparametric effect that belong to one curve, and how it is smoothed.
 
-    strengths: names, in order along the curve. stiffness: name of the parameter (a ratio) that says
-    how little; chosen from the data. rows: number of strengths n -> (m, n) such that a fit adds the
-    square of stiffness x rows @ strengths to the mean square of the residual.
+    strengths: names, in order along the curve. stiffness: name of the parameter (a ratio) that
+    weighs the smoothing; chosen from the data. rows: number of strengths n -> (m, n) such that a
+    fit adds the square of stiffness x rows @ strengths to the mean square of the residual.
     """
 
     name: str
@@ -145,19 +146,19 @@ class Part:
 
 @dataclass(frozen=True)
 class Effect:
-    """One physical effect, or a description of a force that none explains.
+    """One physical effect, or a nonparametric effect: a curve with no physical law.
 
     equation and source: as printed in `twin effects NAME`. states: names of internal states.
-    fingerprint: what is left in the residual when the effect is missing. excited_by: the motion
-    that shows it. of_size: for a law of any number of elements, the effect with that many; its
+    fingerprint: the trace in the residual when the effect is missing. excited_by: the motion that
+    excites it. of_size: for a law of any number of elements, the effect with that many; its
     parameter ``elements``, whose bounds are both that number, tells the law. attach: of a structure
     effect, builds its bodies in MuJoCo, given a twin.mujoco.bodies.Mount and the values by
     name; its first two states are then the position (m) and speed (m/s) of the joint built.
     added_mass: values by name -> what the effect adds to the moved mass, as a part of it.
-    sticks: a friction that holds the axis at rest by whatever force that takes. simplest: the same
-    force in simpler values, such as a pitch of which only harmonics were used. parts: of a
-    description, whose force is linear in its strengths, what these are grouped in. A description is
-    no physics and never a diagnosis.
+    sticks: whether it is a friction that holds the axis at rest with any force up to a level.
+    simplest: the same force with simpler values, such as a shorter pitch where only harmonics were
+    used. parts: the curves of a nonparametric effect, whose force is linear in its strengths; such
+    an effect is never the answer of a diagnosis.
     """
 
     kind: Kind
@@ -209,7 +210,7 @@ class Effect:
 
     @property
     def is_nonparametric(self) -> bool:
-        """Whether it describes a force without explaining it."""
+        """Whether it is a fitted curve with no physical law."""
         return bool(self.parts)
 
     @property
@@ -218,7 +219,7 @@ class Effect:
         return tuple(p for p in self.parameters if p.strength)
 
     def is_present(self, values: Mapping[str, float]) -> bool:
-        """Whether these values give the effect any strength."""
+        """Whether any strength of the effect is not zero."""
         return any(values[p.name] != 0.0 for p in self.strengths)
 
     def reads(self, slot: str) -> bool:

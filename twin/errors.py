@@ -11,5 +11,6 @@ class InputError(ValueError):
 class CannotRun(InputError):
     """A motion that cannot be run on this machine: beyond its limits, or unstable on it.
 
-    What chooses among motions may leave such a one out, and say so; any other error is a mistake.
+    Code that chooses among motions may leave such a motion out and report it; any other error must
+    not be caught.
     """

@@ -28,7 +28,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What a simulation leaves behind.
+    """The recorded signals of a simulation.
 
     signals (n, n_axes, 4): encoder reading m, command N, true position m, true velocity m/s.
     forces (n, n_entries): N, by the table's labels. states (n, n_watched), by ``state_names``.
@@ -54,7 +54,7 @@ class Stepper(Protocol):
 
 
 class MujocoSimulator:
-    """The stage in MuJoCo with its effects attached; steps only under passive_callback()."""
+    """The machine in MuJoCo with its effects attached; steps only under passive_callback()."""
 
     def __init__(self, model: MachineModel, table: Table) -> None:
         spec = machine_spec(model)
@@ -109,7 +109,7 @@ class MujocoSimulator:
 
 
 class ReducedSimulator:
-    """The same axes as point masses: what fitting simulates with."""
+    """The reduced model: the axes as point masses, used for free runs and planned experiments."""
 
     substeps = 1  # integration steps a sample
 

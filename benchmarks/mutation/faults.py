@@ -1,6 +1,6 @@
 """Small faults: a line drawn at random, and one operator of cosmic-ray applied to it.
 
-To its operators come two that it lacks: arguments swapped, and a term dropped.
+Two operators are added that it lacks: arguments swapped, and a term dropped.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from cosmic_ray.operators.operator import Example, Operator
 from cosmic_ray.plugins import get_operator
 
 PACKAGES = ("twin", "identify")
-# A comparison is turned round, not moved by its boundary: between doubles that is the same.
+# A comparison is inverted; moving its boundary (< to <=) hardly ever matters between doubles.
 KINDS = (
     *(f"ReplaceBinaryOperator_{k}" for k in (
         "Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "FloorDiv_Div", "Mod_Add",
@@ -158,7 +158,7 @@ def _compiles(altered: str, source: str) -> bool:
 
 @cache
 def _idle_lines(source: str) -> frozenset[int]:
-    """Lines whose change shows in no result: annotations, imports, decorators and texts."""
+    """Lines that no result depends on: annotations, imports, decorators and texts."""
     idle: set[int] = set()
 
     def add(node: ast.AST) -> None:
@@ -181,7 +181,7 @@ def _idle_lines(source: str) -> frozenset[int]:
 
 
 def is_native(source: str, line: int) -> bool:
-    """Whether a line is of a function that runs compiled: a law, what it calls, the core."""
+    """Whether a line is in a compiled function: a law, a function that it calls, the core."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.FunctionDef) and node.lineno <= line <= (node.end_lineno or 0):
             law = [a.arg for a in node.args.args] == ["p", "s", "io"]

@@ -17,7 +17,7 @@ from benchmarks.mutation.faults import PACKAGES, Fault
 
 
 def environment(root: Path) -> dict[str, str]:
-    """Variables under which that copy of the project is tested, and no other."""
+    """Environment variables with which the tests import that copy of the project."""
     return {
         **os.environ,
         "PYTHONPATH": str(root),
@@ -36,8 +36,8 @@ class Reach:
     def tests_for(self, fault: Fault, budget: float, native: bool = False) -> list[str]:
         """Tests that can notice a fault, of ``budget`` seconds together.
 
-        First those that name its file's subject, an effect say, then the quickest. Native code and
-        what runs at import leave no trace of their line: there any test may notice.
+        Tests that name the subject of its file, such as an effect, come first, then the quickest.
+        Coverage does not record native code and code that runs at import; there any test counts.
         """
         by_line = self.contexts.get(fault.path, {})
         chosen = by_line.get(fault.line) or frozenset().union(*by_line.values())
@@ -58,7 +58,7 @@ class Reach:
 def reach(root: Path, scratch: Path) -> Reach:
     """Run the quick suite of a copy of the project under coverage.
 
-    Raises RuntimeError where a test fails: a fault could not be told from that.
+    Raises RuntimeError where a test fails already without a fault.
     """
     report, data = scratch / "tests.xml", scratch / "coverage"
     command = [sys.executable, "-m", "pytest", "-n", "2", "-m", "not slow", "-q"]

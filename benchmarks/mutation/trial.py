@@ -14,14 +14,14 @@ from pathlib import Path
 from benchmarks.mutation.faults import PACKAGES, Fault, is_native
 from benchmarks.mutation.reach import Reach, environment, reach
 
-BUDGET = 40.0  # s of tests that a fault is put to
-HANGS = 6.0  # times the budget after which a run counts as hanging, which is noticed
+BUDGET = 40.0  # s of tests that are run for a fault
+HANGS = 6.0  # times the budget after which the tests count as hanging, and the fault as noticed
 LEFT_OUT = shutil.ignore_patterns(".git", ".venv", ".mypy_cache", ".ruff_cache", "*.mcap")
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What became of a fault. shown: the line before and after. by: the test that noticed."""
+    """The result for a fault. shown: the line before and after. by: the test that noticed it."""
 
     fault: Fault
     shown: str

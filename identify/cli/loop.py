@@ -34,7 +34,7 @@ def fit(
     logs: Logs,
     holdout: Holdout = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Fitted model to write.")] = None,
-    window: TestFunction = None,
+    test_function: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
@@ -48,7 +48,7 @@ def fit(
         require_folder(out)
     catalogue = catalogue_with(effects)
     result, recorded = with_holdout(
-        partial(workflow.fit, catalogue=catalogue, window=window),
+        partial(workflow.fit, catalogue=catalogue, test_function=test_function),
         machine_model(model, catalogue), logs, holdout,
     )  # fmt: skip
     if out:
@@ -61,27 +61,27 @@ def compare(
     model: Model,
     logs: Logs,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")] = None,
-    window: TestFunction = None,
+    test_function: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Say how far model and machine are apart, and where the model fails."""
+    """Print the errors of the model, and where it fails."""
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
 
     if out:
         require_folder(out)
-    stage = machine_model(model, catalogue_with(effects))
+    machine = machine_model(model, catalogue_with(effects))
     recorded = read_logs(logs)
     with bars_on_stderr() as bars:
-        result = workflow.compare(stage, recorded, window=window, progress=bars)
+        result = workflow.compare(machine, recorded, test_function=test_function, progress=bars)
     if out:
         from identify.output.report import write_report
 
         write_report(
-            out, title=f"{stage.name}: model against measurement", diagnosis=None,
-            comparison=result, history=stage.history,
+            out, title=f"{machine.name}: model against measurement", diagnosis=None,
+            comparison=result, history=machine.history,
         )  # fmt: skip
     say(as_text.compare_text(result), as_json.compare_json(result), as_json_, checked(recorded))
 
@@ -92,11 +92,11 @@ def diagnose(
     logs: Logs,
     holdout: Holdout = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")] = None,
-    window: TestFunction = None,
+    test_function: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Say which physical effect is missing, with the evidence for it."""
+    """Find which physical effect is missing, with the evidence for it."""
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
@@ -104,15 +104,18 @@ def diagnose(
     if out:
         require_folder(out)
     catalogue = catalogue_with(effects)
-    stage = machine_model(model, catalogue)
+    machine = machine_model(model, catalogue)
     result, recorded = with_holdout(
-        partial(workflow.diagnose, catalogue=catalogue, window=window), stage, logs, holdout
+        partial(workflow.diagnose, catalogue=catalogue, test_function=test_function),
+        machine,
+        logs,
+        holdout,
     )
     if out:
         from identify.output.report import write_report
 
         write_report(
-            out, title=f"{stage.name}: what the model lacks", diagnosis=result,
+            out, title=f"{machine.name}: what the model lacks", diagnosis=result,
             comparison=result.comparison, history=result.model.history,
         )  # fmt: skip
     say(as_text.diagnose_text(result), as_json.diagnose_json(result), as_json_, checked(recorded))
@@ -126,9 +129,9 @@ def add(
     out: Annotated[Path, typer.Option("--out", "-o", help="Model with the effect.")],
     holdout: Holdout = None,
     axis: Annotated[
-        str | None, typer.Option(help="Axis; the one it helps most if left out.")
+        str | None, typer.Option(help="Axis; the one that it improves most if left out.")
     ] = None,
-    window: TestFunction = None,
+    test_function: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
@@ -142,7 +145,7 @@ def add(
     catalogue = catalogue_with(effects)
     chosen = catalogue[effect]
     result, recorded = with_holdout(
-        partial(workflow.add, chosen, axis=axis, window=window),
+        partial(workflow.add, chosen, axis=axis, test_function=test_function),
         machine_model(model, catalogue), logs, holdout,
     )  # fmt: skip
     save_model(result.model, out)
@@ -155,22 +158,22 @@ def add(
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path("demo"),
     seed: Annotated[int, typer.Option(help="Draws the machine and its hidden effect.")] = 2,
-    model: Annotated[str, typer.Option("--model", help="Stage model (.toml).")] = "proton_xy",
+    model: Annotated[str, typer.Option("--model", help="Machine model (.toml).")] = "proton_xy",
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Run the whole loop on a machine with an effect that the analysis is not told of."""
+    """Run the whole loop on a machine with a hidden effect."""
     from identify.demo import demo as run
     from identify.output import as_json
 
     catalogue = catalogue_with(effects)
-    stage = machine_model(model, catalogue)
+    machine = machine_model(model, catalogue)
 
     def tell(text: str) -> None:
         print(text, file=sys.stderr if as_json_ else sys.stdout, flush=True)
 
     with bars_on_stderr() as bars:
-        result = run(stage, catalogue, out, seed, tell, bars)
+        result = run(machine, catalogue, out, seed, tell, bars)
     hidden = result.hidden.effect.name
     summary = {
         "hidden": hidden,
@@ -180,6 +183,6 @@ def demo(
         "addition": result.addition and as_json.add_json(result.addition),
     }
     verdict = "the diagnosis is right" if result.named else "the diagnosis did not name it"
-    say(f"5. hidden was {hidden}: {verdict}\nreport: {result.report}", summary, as_json_)
+    say(f"5. the hidden effect was {hidden}: {verdict}\nreport: {result.report}", summary, as_json_)
     if not result.named:
         raise typer.Exit(1)

@@ -31,7 +31,7 @@ def simulate(
     experiment: Annotated[
         str, typer.Argument(help="tracking, moves, cable_pass, ...; or a .toml from `twin plan`.")
     ],
-    model: Annotated[str, typer.Option("--model", help="Stage model (.toml).")] = "proton_xy",
+    model: Annotated[str, typer.Option("--model", help="Machine model (.toml).")] = "proton_xy",
     out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")] = Path("log.mcap"),
     seed: Annotated[int, typer.Option(help="Same seed, same log.")] = 0,
     duration: Annotated[

@@ -36,17 +36,19 @@ Out = Annotated[Path, typer.Option("--out", "-o", help="Experiment to write (.to
 def plan(
     model: Model,
     logs: Annotated[
-        list[Path] | None, typer.Argument(metavar="[LOG...]", help="MCAP logs that there are.")
+        list[Path] | None, typer.Argument(metavar="[LOG...]", help="Existing MCAP logs.")
     ] = None,
     between: Annotated[
         tuple[str, str] | None,
         typer.Option(help="Two effects to add to the model, or two fitted models (.toml)."),
     ] = None,
-    axis: Annotated[str | None, typer.Option(help="Axis that is explained.")] = None,
-    duration: Annotated[float, typer.Option(help="About that of the experiment, s.")] = 20.0,
+    axis: Annotated[str | None, typer.Option(help="Axis to be explained.")] = None,
+    duration: Annotated[
+        float, typer.Option(help="Duration of the experiment in s, roughly.")
+    ] = 20.0,
     out: Out = Path("experiment.toml"),
     holdout: Holdout = None,
-    window: TestFunction = None,
+    test_function: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
@@ -60,13 +62,13 @@ def plan(
         raise InputError(f"{out}: an experiment is a {SUFFIX} file; give such a name")
     require_folder(out)
     catalogue = catalogue_with(effects)
-    stage = machine_model(model, catalogue)
+    machine = machine_model(model, catalogue)
     rivals = [_rival(name, catalogue) for name in between or ()]
     recorded = read_logs(logs)
     with bars_on_stderr() as bars:
         result = workflow.plan(
-            stage, recorded, read_logs(holdout), between=rivals, catalogue=catalogue, axis=axis,
-            duration=duration, window=window, progress=bars,
+            machine, recorded, read_logs(holdout), between=rivals, catalogue=catalogue, axis=axis,
+            duration=duration, test_function=test_function, progress=bars,
         )  # fmt: skip
     text, file = as_text.plan_text(result), None
     if result.decides:

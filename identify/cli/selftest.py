@@ -1,4 +1,4 @@
-"""`twin selftest`: does the diagnosis name what is planted?"""
+"""`twin selftest`: how often the diagnosis names planted effects."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ def selftest(
     as_json_: Json = False,
 ) -> None:
     """Plant effects in machines drawn at random, and count how often they are named."""
-    from identify.selftest import FULL, QUICK, coverage, draw, rates, run_all, selftest_json
-    from identify.selftest.trial import Outcome
+    from identify.output.selftest import selftest_json, selftest_text
+    from identify.output.words.selftest import trial_in_words
+    from identify.selftest import FULL, QUICK, draw, run_all
+    from identify.selftest.trial import TrialResult
     from twin.effects import load_catalogue
 
     if out:
@@ -33,12 +35,10 @@ def selftest(
     catalogue = load_catalogue()
     names = [catalogue[name].name for name in only or ()] or None
 
-    def tell(outcome: Outcome, done: int, total: int) -> None:
-        print(f"{done} of {total}: {outcome.in_words()}", file=sys.stderr, flush=True)
+    def tell(result: TrialResult, done: int, total: int) -> None:
+        print(f"{done} of {total}: {trial_in_words(result)}", file=sys.stderr, flush=True)
 
-    outcomes = run_all((FULL if full else QUICK).cases(seed, names), progress=tell)
+    results = run_all((FULL if full else QUICK).cases(seed, names), progress=tell)
     if out:
-        draw(outcomes, out)
-    lines = [r.in_words() for r in rates(outcomes)]
-    lines += [f"  interval of {rate.in_words()}" for rate in coverage(outcomes).values()]
-    say("\n".join(lines), selftest_json(outcomes), as_json_)
+        draw(results, out)
+    say(selftest_text(results), selftest_json(results), as_json_)

@@ -1,4 +1,4 @@
-"""What the commands share: their options, how they read input and how they speak."""
+"""Options, input and output that the commands share."""
 
 from __future__ import annotations
 
@@ -30,13 +30,19 @@ app = typer.Typer(
 )
 
 Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs to fit on.")]
-Model = Annotated[str, typer.Argument(metavar="MODEL", help="Stage model (.toml).")]
+Model = Annotated[str, typer.Argument(metavar="MODEL", help="Machine model (.toml).")]
 Holdout = Annotated[
-    list[Path] | None, typer.Option("--holdout", help="MCAP log held out; may be repeated.")
+    list[Path] | None,
+    typer.Option("--holdout", help="MCAP log that no parameter is fitted on; may be repeated."),
 ]
 TestFunction = Annotated[
     float | None,
-    typer.Option("--window", help="Weak-form window in s; from the noise if left out."),
+    typer.Option(
+        "--test-function",
+        metavar="SECONDS",
+        help="Length of the test functions, the time scale of the residual; from the noise if "
+        "left out.",
+    ),
 ]
 
 
@@ -51,7 +57,7 @@ def _version(asked: bool) -> None:
 @app.callback()
 def front_door(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Say which.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Find out why the model and the machine disagree."""
@@ -106,12 +112,12 @@ def machine_model(name: str, catalogue: Catalogue) -> MachineModel:
 
 
 def with_holdout(
-    job: Callable[..., Result], stage: MachineModel, logs: list[Path], holdout: list[Path] | None
+    job: Callable[..., Result], model: MachineModel, logs: list[Path], holdout: list[Path] | None
 ) -> tuple[Result, dict[str, Log]]:
-    """What a job makes of a stage, logs and held-out logs; and the logs."""
+    """The result of a job on a model, logs and held-out logs; and the logs."""
     recorded = read_logs(logs)
     with bars_on_stderr() as bars:
-        return job(stage, recorded, read_logs(holdout), progress=bars), recorded
+        return job(model, recorded, read_logs(holdout), progress=bars), recorded
 
 
 def read_logs(paths: list[Path] | None) -> dict[str, Log]:
@@ -121,7 +127,7 @@ def read_logs(paths: list[Path] | None) -> dict[str, Log]:
 
 
 def checked(logs: Mapping[str, Log]) -> list[str]:
-    """What is wrong with the logs, one sentence a finding."""
+    """The findings of the log check, one sentence each."""
     from twin.log.check import check_log
 
     return [
@@ -132,6 +138,6 @@ def checked(logs: Mapping[str, Log]) -> list[str]:
 
 
 def require_folder(path: Path) -> None:
-    """Fail before the work, not after it."""
+    """Raise InputError now, instead of after the work, where the folder does not exist."""
     if not path.parent.is_dir():
         raise InputError(f"{path}: its folder does not exist; create {path.parent} first")

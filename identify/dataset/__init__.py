@@ -1,4 +1,4 @@
 """Logs -> one prepared dataset: motion, test functions, noise floor, spectral lines.
 
-What is done to a log before it is fitted is done here, once; nothing here knows a fit.
+Every step from a log to the data of a fit is done here, once; nothing here depends on a fit.
 """

@@ -1,4 +1,4 @@
-"""The logs of one axis, ready for identification: those to fit on and those held out."""
+"""The logs of one axis, prepared for identification: those to fit on and those held out."""
 
 from __future__ import annotations
 
@@ -23,17 +23,18 @@ from twin.model.units import AxisUnits
 
 Array = NDArray[np.float64]
 
-WINDOWS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
-TRIED = 12.0  # s of motion on which the shapes of an effect are tried before all of it is used
+TEST_FUNCTIONS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
+TRIED = 12.0  # s of motion on which nonlinear parameters are scanned before all of it is used
 SHORTEST_HEAD = 3.0  # s of each log
-QUIET = 0.01  # noise floor wanted, as a part of the force that the inertia does not explain
+QUIET = 0.01  # largest noise floor, as a part of the force that the inertia does not explain
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Dataset:
-    """One axis: windowed fit logs, windowed held-out logs (may be none), and the motion covered.
+    """One axis: its prepared fit logs and held-out logs (may be none), and what they cover.
 
-    channel_delay: s, by which the logs' force was moved ahead to where it acted. still: names of
+    The held-out logs take part in the choice of effects; no parameter is fitted on them.
+    channel_delay: s, by which the force of the logs was shifted to earlier samples. still: names of
     logs that were left out because the axis stands still in them.
     """
 
@@ -56,23 +57,23 @@ class Dataset:
 
     @cached_property
     def heads(self) -> tuple[PreparedLog, ...]:
-        """The beginnings of the fit logs, together long enough to try shapes on."""
+        """The beginnings of the fit logs, long enough together to scan nonlinear parameters on."""
         each = max(TRIED / len(self.fit), SHORTEST_HEAD)
         return tuple(PreparedLog.of(w.motion.head(each), w.window.length) for w in self.fit)
 
     @cached_property
     def in_heads(self) -> NDArray[np.bool_]:
-        """Which windows of the fit logs are in their heads."""
+        """Which test functions of the fit logs are in their heads."""
         pairs = zip(self.heads, self.fit, strict=True)
         return np.concatenate([np.arange(len(w)) < len(h) for h, w in pairs])
 
     @property
     def units(self) -> AxisUnits:
-        """What the axis' quantities are given in."""
+        """The units of the axis."""
         return self.fit[0].motion.units
 
     @property
-    def window(self) -> float:
+    def test_function_length(self) -> float:
         """Length of the test functions, s."""
         return self.fit[0].window.length
 
@@ -81,13 +82,13 @@ def datasets(
     model: MachineModel,
     logs: Mapping[str, Log],
     holdout: Mapping[str, Log],
-    window: float | None = None,
+    test_function: float | None = None,
 ) -> dict[str, Dataset]:
     """A dataset for each axis of the model that the logs hold and in which it moves.
 
-    logs, holdout: by name, for messages. window: length in s; chosen from the noise where None.
-    Raises InputError where no axis of the model moves in any log, where a signal is not a number,
-    and where one log is given both to fit and held out.
+    logs, holdout: by name, for messages. test_function: length in s; chosen from the noise where
+    None. Raises InputError where no axis of the model moves in any log, where a signal is not a
+    number, and where a held-out log is also one to fit.
     """
     _require_apart(logs, holdout)
     out: dict[str, Dataset] = {}
@@ -97,7 +98,7 @@ def datasets(
         if not fit:
             continue
         held, still_held = _moving(holdout, name, tuple(model.axes))
-        length = window or choose_window(fit, held)
+        length = test_function or choose_test_function(fit, held)
         out[name] = Dataset(
             axis=name,
             fit=tuple(PreparedLog.of(m, length) for m in fit),
@@ -129,8 +130,8 @@ def _require_apart(logs: Mapping[str, Log], holdout: Mapping[str, Log]) -> None:
         for name, log in logs.items():
             if _same(log, other):
                 raise InputError(
-                    f"{held}: held out, but has the same samples as {name}, which is fitted; a log "
-                    "that was fitted cannot judge the fit: give another run"
+                    f"{held}: held out, but has the same samples as {name}, which is fitted, and "
+                    "so cannot test the fit; give a log of another experiment"
                 )
 
 
@@ -144,13 +145,13 @@ def _same(one: Log, other: Log) -> bool:
 
 
 def _require_one_kind(logs: Mapping[str, Log], name: str, axis: AxisModel) -> None:
-    """Raise InputError where a log and the model disagree whether an axis turns."""
+    """Raise InputError where an axis is rotary in a log and linear in the model, or vice versa."""
     units = axis.units
     for log_name, log in logs.items():
         if name in log.axes and (logged := log.axes[name].kind) != units:
             raise InputError(
-                f"{log_name}: axis {name} is {logged.kind} (position in {logged.position}), that "
-                f"of the model is {units.kind} (position in {units.position}); give the model "
+                f"{log_name}: axis {name} is {logged.kind} (position in {logged.position}), but in "
+                f"the model it is {units.kind} (position in {units.position}); give the model "
                 f"{logged.mass_name} in {logged.mass}, or correct the units in the import map"
             )
 
@@ -179,14 +180,14 @@ def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array)
         )
 
 
-def choose_window(motions: Sequence[Motion], others: Sequence[Motion] = ()) -> float:
-    """The shortest window (s) whose noise floor is small against what is to be explained.
+def choose_test_function(motions: Sequence[Motion], others: Sequence[Motion] = ()) -> float:
+    """The shortest test function (s) whose noise floor is small against the force to be explained.
 
-    others: motions that it must suit as well, by the length of their blocks.
+    others: motions whose blocks it must also be long enough for.
     """
     mass = inertia(motions)
     longest_block = max(m.period for m in (*motions, *others))
-    for length in WINDOWS:
+    for length in TEST_FUNCTIONS:
         if length < LEAST_BLOCKS * longest_block:
             continue
         windows = [TestFunction.of_length(length, m.period) for m in motions]
@@ -199,7 +200,7 @@ def choose_window(motions: Sequence[Motion], others: Sequence[Motion] = ()) -> f
         floor = noise_floor(AxisModel(mass), list(zip(motions, windows, strict=True)))
         if floor < QUIET * np.sqrt(np.mean(rest**2)):
             return length
-    return WINDOWS[-1]
+    return TEST_FUNCTIONS[-1]
 
 
 def inertia(motions: Sequence[Motion], length: float = 0.1) -> float:

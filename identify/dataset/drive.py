@@ -1,4 +1,4 @@
-"""What actuator and encoder made of a log: the actual force, and the motion behind the readings.
+"""The actual force behind the command of a log, and the true motion behind its readings.
 
 A delay or a lag is a fraction of a millisecond, and an encoder ripple a few micrometres long,
 so these effects are stepped sample by sample, not over blocks.
@@ -20,8 +20,8 @@ from twin.signals import between
 
 Array = NDArray[np.float64]
 
-LESSENED = 0.5  # of the commanded force, below which the motor gives another one altogether
-PASSES = 3  # from the reading to the position it was taken at
+LESSENED = 0.5  # of the commanded force; below it errors are divided by actual over commanded
+PASSES = 3  # iterations from a reading to the true position
 
 
 def parts_of(axis: AxisModel, *kinds: Kind) -> AxisModel:
@@ -30,7 +30,7 @@ def parts_of(axis: AxisModel, *kinds: Kind) -> AxisModel:
 
 
 def is_noise(effect: Effect) -> bool:
-    """Whether an effect shows in the readings as noise alone: nothing of it can be fitted."""
+    """Whether an effect adds only noise to the readings, so that none of it can be fitted."""
     return effect.kind is Kind.SENSING and all(p.fixed for p in effect.parameters)
 
 
@@ -53,9 +53,9 @@ def actual_force(axis: AxisModel, motion: Motion) -> Array:
 
 
 def forces_lessened(axis: AxisModel, motions: Sequence[Motion]) -> float:
-    """RMS force of the motor over that commanded, where it is less than half; else 1.
+    """RMS force of the motor over the RMS command, where that is less than half; else 1.
 
-    A millionth at least, which keeps what is divided by it finite.
+    At least 1e-6, so that one can divide by it.
     """
     given = np.linalg.norm(np.concatenate([actual_force(axis, m) for m in motions]))
     asked = np.linalg.norm(np.concatenate([m.raw[1] for m in motions]))
@@ -63,9 +63,9 @@ def forces_lessened(axis: AxisModel, motions: Sequence[Motion]) -> float:
 
 
 def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
-    """The motion that the readings come from, and the rate of their error, (n,) m/s.
+    """The true motion behind the readings, and the rate of their error, (n,) m/s.
 
-    The rate is at the log's own rate.
+    The error is sampled at the log's own rate.
     """
     sensing = parts_of(axis, Kind.SENSING)
     part = replace(sensing, effects=tuple(f for f in sensing.effects if not is_noise(f.effect)))
@@ -79,21 +79,21 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
 
 
 def reading_error(sensing: AxisModel, motion: Motion) -> tuple[Array, Array]:
-    """What these sensing effects add to the readings, (n,) m, and its rate, m/s.
+    """The error that these sensing effects add to the readings, (n,) m, and its rate, m/s.
 
-    A reading is the true position and an error that depends on it, so the error is taken at the
-    reading, then where that says the axis was, and so on. The readings are smoothed for that: a
-    delay undone on their noise would make more of it.
+    The error depends on the true position, which is the reading less the error: a fixed-point
+    iteration that starts from the reading. The readings are smoothed first, because inverting a
+    delay would amplify their noise.
     """
     table = axis_table({motion.axis: sensing})
     _, _, _, first, last = table.axes[0]
     true = motion.smoothed.copy()
-    path, seen = motion.smoothed[0], np.empty(true.shape[1])
+    path, reading = motion.smoothed[0], np.empty(true.shape[1])
     for _ in range(PASSES):
         walk_sensing(
             table.entries, first, last, table.parameters, np.zeros(table.n_states), true,
-            motion.sample_period, seen,
+            motion.sample_period, reading,
         )  # fmt: skip
-        error = seen - true[0]
+        error = reading - true[0]
         true[0] = path - error
     return error, np.append(between(error, motion.sample_period), 0.0)

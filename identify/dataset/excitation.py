@@ -1,4 +1,4 @@
-"""What the motions of one axis cover, from which effects take start values and scans."""
+"""What the motions of one axis cover; effects derive start values and scans from it."""
 
 from __future__ import annotations
 

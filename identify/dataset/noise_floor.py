@@ -1,10 +1,10 @@
 """The noise floor of a force residual, from the data alone.
 
-The raw residual, with a from second differences, is all noise at high frequency: white
-noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 cos(w dt))/dt^2)^2. A and B
-are fitted to its spectrum above the band of the effects, and give what passes the windows. Where
-the encoder's noise hides that of the force in all of that band, the force's is what the controller
-did not make of its readings.
+The residual before averaging, with a from second differences, is pure noise at high frequency:
+white noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 cos(w dt))/dt^2)^2.
+A and B are fitted to its spectrum above the band of the effects; the test functions pass a part of
+both. Where the encoder's noise hides that of the force in the whole band, the noise of the force is
+taken from the command: the part that the controller did not compute from its readings.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ Array = NDArray[np.float64]
 SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
 LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
 ROUNDS = 12
-TOLERATED = 0.5  # logarithm of the power over the fit from which a frequency weighs half
+TOLERATED = 0.5  # log of power over fit at which a frequency has half its weight
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
-PLAIN = 3.0  # of the reading's noise where the band begins, from which the force's is seen in it
+PLAIN = 3.0  # times the reading's noise where the band begins; above it the force's noise shows
 
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Measurement noise of one log, before any window.
+    """Measurement noise of one log, before it is averaged by test functions.
 
     frequency (k,): Hz. force: N^2/Hz, one-sided and white. reading: m^2/Hz, one-sided and white.
-    bend (k,): power gain from a reading to the force that it pretends, N^2/m^2. segment: samples
-    that the frequencies belong to.
+    bend (k,): power gain from a reading to the apparent force, N^2/m^2. segment: samples of the
+    transform.
     """
 
     frequency: Array
@@ -54,17 +54,17 @@ class Noise:
 
     @property
     def power(self) -> Array:
-        """What is left in a force residual, (k,) N^2/Hz."""
+        """Power of the noise in the force residual, (k,) N^2/Hz."""
         return np.asarray(self.force + self.reading * self.bend)
 
 
 def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
-    """RMS noise floor in N of the windowed residual of these logs."""
+    """RMS noise floor in N of the force residual of these logs."""
     return noise_floor(axis, [(log.motion, log.window) for log in logs])
 
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
-    """RMS in N of what measurement noise leaves in the windowed residual of these logs."""
+    """RMS in N of what measurement noise alone leaves in the force residual of these logs."""
     parts = [_variance(axis, *log) for log in logs]
     weights = [motion.signals.shape[1] for motion, _ in logs]
     return float(np.sqrt(np.average(parts, weights=weights)))
@@ -80,9 +80,9 @@ def _variance(axis: AxisModel, motion: Motion, window: TestFunction) -> float:
 
 
 def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
-    """One-sided power (segment // 2 + 1,) N^2/Hz of what the readings' rounding pretends.
+    """One-sided power (segment // 2 + 1,) N^2/Hz of the apparent force of the readings' rounding.
 
-    White at speed, where the spectrum's median holds it already; its slow steps are added.
+    At speed rounding is white and already in the median spectrum; its slow steps are added here.
     """
     frequency, power = welch(
         motion.rounding, 1.0 / motion.sample_period, nperseg=segment, detrend="linear"
@@ -91,7 +91,7 @@ def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
 
 
 def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
-    """Power gain (k,) from a position m to the force N that it pretends."""
+    """Power gain (k,) from a position error m to the apparent force N."""
     dt = motion.sample_period
     return ((2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * dt)) * axis.mass / dt**2) ** 2
 
@@ -100,13 +100,13 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     """The measurement noise of one log, from its raw residual."""
     dt = motion.sample_period
     velocity = motion.raw[0]
-    # The loop's own noise is in the command and moves the axis; a delay left out would tear the two
-    # apart and pass for measurement noise.
+    # Noise in the command moves the axis as well; without the actuator's delay the two would not
+    # cancel and would look like measurement noise.
     command = actual_force(axis, motion)
     raw = 0.5 * (command[1:] + command[:-1]) - axis.mass * between(velocity, dt)
-    # What the model explains, a bump passed at speed say, is not noise either.
+    # The forces that the model explains, such as a bump passed at speed, are not noise either.
     raw += _between_samples(total_force(on_blocks(axis), motion), motion)
-    # The median over segments passes by those with spikes and reversals.
+    # The median over segments ignores those with spikes and reversals.
     segment = min(max(round(SEGMENT / dt), 256), len(raw))
     frequency, power = _median_spectrum(raw, segment, dt, _at_rest(axis, motion))
     half = np.cos(np.pi * frequency * dt) ** 2
@@ -127,7 +127,7 @@ def _between_samples(force: Array, motion: Motion) -> Array:
 def _at_rest(axis: AxisModel, motion: Motion) -> NDArray[np.bool_]:
     """Where the axis may stick, (n,) over the log's inner samples.
 
-    Static friction then takes up the command and its noise, however large.
+    Static friction then balances the command and its noise, whatever they are.
     """
     speed = np.abs(motion.velocity)
     still = speed < REST_SPEED * speed.max()
@@ -140,10 +140,10 @@ def _median_spectrum(
 ) -> tuple[Array, Array]:
     """Welch's one-sided density with medians: frequency Hz, power unit^2/Hz, (segment // 2 + 1,).
 
-    Of the segments with the least of what is left out, at least a quarter.
-    As scipy.signal.welch with average="median" and linear detrending, whose segment by segment
-    detrending took a third of a fit. P. D. Welch (1967); bias of the median: B. Allen et al.,
-    Phys. Rev. D 85, 122006 (2012).
+    At least a quarter of the segments is used, those with the fewest left-out samples.
+    The same as scipy.signal.welch with average="median" and linear detrending, but faster: its
+    detrending of one segment after another took a third of a fit. P. D. Welch (1967); bias of the
+    median: B. Allen et al., Phys. Rev. D 85, 122006 (2012).
     """
     step = max(segment - segment // 2, 1)
     out = sliding_window_view(left_out, segment)[::step].mean(axis=1)
@@ -164,7 +164,7 @@ def _median_spectrum(
 def _fit_levels(shapes: Array, power: Array) -> Array:
     """Non-negative levels by least squares on the relative error, repeated: a Whittle fit.
 
-    What stands above the fit, such as a resonance, weighs the less the higher it stands.
+    A frequency above the fit, such as a resonance, has the less weight the higher it is.
     """
     model = _underneath(power)
     levels = np.zeros(shapes.shape[1])

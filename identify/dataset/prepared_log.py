@@ -17,15 +17,15 @@ from twin.model.machine import AxisModel, axis_table
 
 Array = NDArray[np.float64]
 
-REST_SPEED = 1e-3  # of the highest speed; below it a friction that sticks can be anything
+REST_SPEED = 1e-3  # of the highest speed; below it the force of a friction that sticks is unknown
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PreparedLog:
     """One log's motion of an axis with its weak form.
 
-    window, fine: over the motion's blocks, and the same over the log's samples. command (n,) N and
-    acceleration (n,) m/s^2 are windowed means.
+    window, fine: the test function over the motion's blocks, and over the log's samples. command
+    (n,) N and acceleration (n,) m/s^2 are means by test functions.
     """
 
     motion: Motion
@@ -42,7 +42,7 @@ class PreparedLog:
 
     @classmethod
     def of(cls, motion: Motion, length: float) -> PreparedLog:
-        """Weak form with windows of that length (s)."""
+        """The log with test functions of that length (s)."""
         window = TestFunction.of_length(length, motion.period)
         samples = round(motion.period / motion.sample_period)
         fine, window = window.refined(samples), window.sharpened(samples)
@@ -51,7 +51,7 @@ class PreparedLog:
 
     @property
     def time(self) -> Array:
-        """(n,) s, middle of each window."""
+        """(n,) s, middle of each test function."""
         return self.window.mean(self.motion.time)
 
     def __len__(self) -> int:
@@ -59,7 +59,7 @@ class PreparedLog:
 
 
 def total_force(table: Table, motion: Motion) -> Array:
-    """Sum of the forces of a table's first axis along a measured motion, (n,) N, less command."""
+    """Sum of the effects' forces on a table's first axis along a measured motion, (n,) N."""
     return total_forces(table, table.parameters[None], motion)[0]
 
 
@@ -76,19 +76,19 @@ def total_forces(table: Table, sets: Array, motion: Motion) -> Array:
 
 
 def on_blocks(axis: AxisModel) -> Table:
-    """Table of what acts between actuator and encoder, which blocks of a motion resolve."""
+    """Table of the effects between actuator and encoder, which need no finer steps than blocks."""
     return axis_table(
         {"": parts_of(axis, Kind.FORCE, Kind.MODIFIER, Kind.FRICTION, Kind.STRUCTURE)}
     )
 
 
 def sticks(axis: AxisModel) -> bool:
-    """Whether the axis' friction is a static one, whose force at rest can be anything."""
+    """Whether the axis has static friction, whose force at rest the motion does not determine."""
     return any(f.effect.sticks for f in axis.effects)
 
 
 def moving(logs: Sequence[PreparedLog], sticks: bool) -> NDArray[np.bool_]:
-    """Which windows carry information: for a friction that sticks, those without standstill."""
+    """Which test functions carry information: with static friction, those without standstill."""
     masks = []
     for log in logs:
         speed = np.abs(log.motion.velocity)

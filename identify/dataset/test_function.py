@@ -1,8 +1,8 @@
-"""The weak form: forces averaged by smooth windows, the acceleration integrated by parts.
+"""The weak form: forces averaged by test functions, the acceleration integrated by parts.
 
-With a window phi that vanishes at its ends, integral(phi m a) = -integral(phi' m v), so that only
+A test function phi vanishes at its ends, so integral(phi m a) = -integral(phi' m v), and only
 the velocity of the log is needed. D. A. Messenger, D. M. Bortz, "Weak SINDy", Multiscale Model.
-Simul. 19 (2021). The window is (1 - r^2)^2, normalised to unit sum: a windowed force is a mean, N.
+Simul. 19 (2021). It is (1 - r^2)^2, normalised to unit sum: an averaged force is a mean, N.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from twin.errors import InputError
 from twin.signals import Array, between
 
-OVERLAP = 4  # windows that cover one instant
-LEAST_BLOCKS = 8  # that a window spans
+OVERLAP = 4  # test functions that cover one instant
+LEAST_BLOCKS = 8  # that a test function spans
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +44,8 @@ class TestFunction:
         n = round(length / period)
         if n < LEAST_BLOCKS:
             raise InputError(
-                f"window = {length:g} s: shorter than {LEAST_BLOCKS} blocks of {period:g} s; "
-                f"give at least {LEAST_BLOCKS * period:g} s"
+                f"a test function of {length:g} s is shorter than {LEAST_BLOCKS} blocks of "
+                f"{period:g} s; give at least {LEAST_BLOCKS * period:g} s"
             )
         return cls._of_blocks(n, period, max(n // OVERLAP, 1))
 
@@ -56,26 +56,26 @@ class TestFunction:
         return cls(period, phi / phi.sum(), between(edges, period) / phi.sum(), stride)
 
     def sharpened(self, parts: int) -> TestFunction:
-        """The same for means over blocks of ``parts`` samples of what varies within a block.
+        """The same test function for signals that are means over blocks of ``parts`` samples.
 
-        The weights and the means are each smoothed over a block, which the window refined to the
-        samples is not; the second difference takes that off again, to fourth order in the block.
+        Block means smooth the signal, and block weights the test function, which ``refined`` does
+        not have; the second difference removes that smoothing, to fourth order in the block.
         """
         bend = np.diff(np.pad(self.weights, 1), 2)
         weights = self.weights - (2.0 - 1.0 / parts**2) / 12.0 * bend
         return replace(self, weights=weights / weights.sum())
 
     def refined(self, parts: int) -> TestFunction:
-        """The same windows over blocks ``parts`` times shorter."""
+        """The same test function over blocks ``parts`` times shorter."""
         n = len(self.weights) * parts
         return self._of_blocks(n, self.period / parts, self.stride * parts)
 
     def mean(self, signals: Array) -> Array:
-        """Means of signals (..., n) -> (..., n_windows)."""
+        """Means of signals (..., n) -> (..., n_test_functions)."""
         return self._apply(signals, self.weights)
 
     def acceleration(self, velocity: Array) -> Array:
-        """Mean acceleration (n_windows,) m/s^2 of a velocity (n,) m/s."""
+        """Mean acceleration (n_test_functions,) m/s^2 of a velocity (n,) m/s."""
         return -self._apply(velocity, self.slope)
 
     def _apply(self, signals: Array, kernel: Array) -> Array:

@@ -1,9 +1,9 @@
-"""Force and position channels that were not sampled together, found before physics is blamed.
+"""Channel delay: force and position of one sample that are not of one instant.
 
-A command that acts later than its stamp is a delay, which the catalogue has effects for. One that
-seems to act earlier cannot be physics: the channels' time stamps disagree, or the log holds every
-n-th sample of a faster controller, whose mean force lies ahead of the sample logged. Such a shift
-is taken off the log, and said.
+A command that acts later than its time stamp is a physical delay, for which the catalogue has
+effects. One that seems to act earlier is not physical: the time stamps of the channels disagree, or
+the log holds every n-th sample of a faster controller, whose mean force is earlier than the logged
+sample. Such a delay is removed from the log and reported.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ ROUNDS = 3
 
 
 def fit_aligned(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
-    """The fit of an axis, and the dataset with its force channel moved to where it acted.
+    """The fit of an axis, and the dataset with its channel delay removed.
 
-    The dataset's clocks are set by what repeats in time.
+    The time origins of its logs are set by the phase of what repeats in time.
     """
     fit = fit_thoroughly(axis, dataset)
     for _ in range(ROUNDS):
@@ -51,9 +51,9 @@ def fit_aligned(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
 
 
 def aligned(axis: AxisModel, dataset: Dataset) -> Dataset:
-    """The dataset as a model with these values sees it: its force channel and its time origins.
+    """The dataset with the channel delay and the time origins that a model with these values finds.
 
-    Nothing is fitted, so that the values stand; ``fit_aligned`` finds the same where it fits them.
+    No parameter is fitted; ``fit_aligned`` does the same together with a fit.
     """
     for _ in range(ROUNDS):
         fit = finished(axis, axis, dataset.fit, Outcome.CONVERGED)
@@ -68,10 +68,11 @@ def aligned(axis: AxisModel, dataset: Dataset) -> Dataset:
 
 
 def misalignment(fit: Fit, dataset: Dataset) -> float:
-    """How much earlier than its stamp the force seems to act, s; 0 where nothing says so.
+    """How much earlier than its time stamp the force seems to act, s; 0 without evidence for it.
 
-    One linear step: the residual against the rate of the command, beside the fit's own parameters.
-    Of a dataset whose force was moved already, by how much more, or less; in all never backwards.
+    One linear step: the residual regressed on the rate of the command, beside the parameters of the
+    fit. Where the dataset has a channel delay already, the result is the change of it; the delay as
+    a whole is never negative.
     """
     rate = np.concatenate([w.fine.acceleration(w.motion.raw[1]) for w in dataset.fit])[fit.kept]
     basis = orthonormal(fit.jacobian)
@@ -83,15 +84,19 @@ def misalignment(fit: Fit, dataset: Dataset) -> float:
     after = left + shift * own
     sample = dataset.fit[0].motion.sample_period
     fall = 1.0 - float(after @ after) / max(float(left @ left), 1e-300)
-    told = fall > RULE.least_fall and evidence(left, after, 1).delta_bic > RULE.least_bic
+    significant = fall > RULE.least_fall and evidence(left, after, 1).delta_bic > RULE.least_bic
     in_all = dataset.channel_delay + shift
-    return shift if told and RULE.least_shift * sample < in_all < RULE.most_shift * sample else 0.0
+    return (
+        shift
+        if significant and RULE.least_shift * sample < in_all < RULE.most_shift * sample
+        else 0.0
+    )
 
 
 def moved_by(fit: Fit, dataset: Dataset) -> Dataset | None:
-    """The dataset with its force channel where a larger model says that it acted, if elsewhere.
+    """The dataset with the channel delay that a larger model finds, or None if it is the same.
 
-    What the smaller model lacked can have passed for a shift, or hidden one.
+    An effect that the smaller model lacked may have looked like a delay, or hidden one.
     """
     if ahead := misalignment(fit, dataset):
         return realigned(dataset, dataset.channel_delay + ahead)
@@ -103,7 +108,7 @@ def moved_by(fit: Fit, dataset: Dataset) -> Dataset | None:
 
 
 def realigned(dataset: Dataset, shift: float) -> Dataset:
-    """The dataset with the force channel of its logs moved ahead by ``shift`` (s) in all."""
+    """The dataset with a channel delay of ``shift`` (s) removed, counted from the original logs."""
     more = shift - dataset.channel_delay
     return replace(
         dataset,
@@ -115,16 +120,3 @@ def realigned(dataset: Dataset, shift: float) -> Dataset:
 
 def _moved(logs: Sequence[PreparedLog], shift: float) -> tuple[PreparedLog, ...]:
     return tuple(PreparedLog.of(w.motion.with_force_ahead(shift), w.window.length) for w in logs)
-
-
-def shift_in_words(dataset: Dataset) -> str | None:
-    """A sentence on the shift that was taken off the logs, or None."""
-    if dataset.channel_delay == 0.0:
-        return None
-    samples = dataset.channel_delay / dataset.fit[0].motion.sample_period
-    words = dataset.units.words
-    return (
-        f"axis {dataset.axis}: the {words('force')} acts {1e6 * dataset.channel_delay:.0f} us "
-        f"({samples:.2f} samples) before its time stamp, which no drive can do; the log was "
-        f"corrected. Check how {words('force and position')} are sampled"
-    )

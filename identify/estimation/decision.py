@@ -1,4 +1,4 @@
-"""The thresholds of every decision, each with its reason; nothing else decides with a number.
+"""The thresholds of every decision, in one place and each with its reason.
 
 Evidence is a difference of BIC on the effective sample size, errors are RMS forces, parts are of
 the squared error above the noise floor, 0..1.
@@ -13,37 +13,37 @@ from dataclasses import dataclass
 class DecisionRule:
     """When an effect is supported, when it is named, and when a search ends.
 
-    at_floor: error over noise floor below which a residual is taken for noise; the floor is an
-    estimate, within 10 % on most machines.
+    at_floor: error over noise floor below which a residual counts as noise; the floor is an
+    estimate, accurate to 10 % on most machines.
     least_bic: evidence that supports an effect, "very strong" in R. E. Kass, A. E. Raftery, Bayes
     Factors, JASA 90 (1995). no_evidence: "not worth more than a bare mention", same source.
-    least_t: gain on the logs held out over its standard error across blocks.
+    least_t: gain on the held-out logs over its standard error across blocks.
 
-    beyond_doubt: evidence asked of an effect where the error is at its floor already.
-    partial_bic: evidence asked of an effect that leaves other dependence behind.
-    nearly_all: part explained that speaks for itself. least_part: part that must be explained where
-    what the residual depended on is gone. floor_sure: error over floor where nothing more is
-    sought. most_steps: effects added to one axis at most. most_shifts: how often a channel delay
-    may be found anew, after which a diagnosis begins again no more.
+    beyond_doubt: evidence required of an effect where the error is already at the noise floor.
+    partial_bic: evidence required of an effect after which the residual still depends on something.
+    nearly_all: explained part that is sufficient by itself. least_part: explained part required
+    where the effect also removes the foremost dependence. floor_sure: error over noise floor within
+    which no further effect is sought. most_steps: effects added to one axis at most. most_shifts:
+    how often a diagnosis may start again because a channel delay was found anew.
 
-    near: part of the best's gain in log likelihood that makes a rival. tie: t of the held-out
-    difference from which one of two is the better. least_separation: evidence that separates two.
-    settled: part of the error to which another start of the base must bring it. collapse: part that
-    a strength keeps at most where an effect took it over.
+    near: part of the best candidate's gain in log likelihood from which another is a rival. tie: t
+    of the held-out difference from which one of two candidates is better. least_separation:
+    evidence that separates two candidates. settled: a refit of the base is kept if it lowers the
+    error below this part. collapse: a strength has collapsed if less than this part of it is left.
 
-    promise: part of the evidence asked for that a first look must show. same_error: error that
-    simpler values may cost. pair_first: part of the squared error that the first of two effects
-    must explain alone.
+    promise: part of the required evidence that a linear step must reach before a refit is made.
+    same_error: relative error that simpler values may have. pair_first: part of the squared error
+    that the first of two effects must explain alone.
 
-    least_share: share of the residual's square below which a dependence says nothing. rather: part
+    least_share: share of the squared residual below which a dependence does not count. rather: part
     of the share of time from which another coordinate is preferred. left_over: part of a dependence
-    that an explanation may leave.
+    that may remain after an effect that explains it.
 
-    line_chance: false-alarm probability below which a spectral line is told. line_share: part of
-    the residual's square from which it is the period of a dependence.
+    line_chance: false-alarm probability below which a spectral line counts. line_share: part of the
+    squared residual from which it is the period of a dependence.
 
-    least_fall: part of the squared error that a channel delay must take away. least_shift,
-    most_shift: samples; less is no delay, more is a fault that the log's check finds.
+    least_fall: part of the squared error that a channel delay must remove. least_shift, most_shift:
+    samples; less is no delay, more is a fault of the log that its check finds.
     """
 
     at_floor: float = 1.3

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-BLOCKS = 24  # blocks over which a held-out gain is judged
+BLOCKS = 24  # over which the standard error of a held-out gain is taken
 
 
 def effective_samples(residual: Array) -> float:
-    """Number of independent samples that a coloured residual is worth.
+    """Effective sample size of a coloured residual.
 
     n / (1 + 2 sum rho_k), summed while pairs of autocorrelations stay positive (C. J. Geyer,
     "Practical Markov chain Monte Carlo", Stat. Sci. 7, 1992).
@@ -38,7 +38,7 @@ class Evidence:
     """Evidence for a larger model.
 
     log_gain: logarithm of the squared error before over after. parameters: how many were added.
-    samples: effective number of residual samples.
+    samples: effective sample size of the residual.
     """
 
     log_gain: float
@@ -51,10 +51,10 @@ class Evidence:
         return float(self.samples * self.log_gain - self.parameters * np.log(self.samples))
 
     def over(self, other: Evidence) -> float:
-        """By how much this BIC is the better of two, on the fewer samples of both.
+        """Difference of BIC between two larger models; positive where this one is better.
 
-        Each number of samples is an estimate; with a large gain in common, a part in a thousand
-        between the two would pass for evidence.
+        Both use the smaller of the two sample sizes. Each is an estimate, and where both gains are
+        large, its error of a part in a thousand would count as evidence.
         """
         samples = min(self.samples, other.samples)
         gained = self.log_gain - other.log_gain
@@ -80,10 +80,10 @@ class Gain:
 def held_out_gain(before: Array, after: Array, floor: float) -> Gain:
     """Compare two models on the same held-out residual samples (n,) N, with noise floor (N).
 
-    t is taken from the logarithm of the squared errors of each block, over the floor: a few blocks
-    of hard motion then do not decide alone.
+    t is that of the logarithm of squared error plus squared floor, block by block, so that a few
+    blocks with large errors do not decide alone.
     """
-    if not len(before):  # at rest within every window
+    if not len(before):  # at rest within every test function
         return Gain(np.nan, np.nan, 0.0)
     blocks = min(BLOCKS, len(before))
     edges = np.linspace(0, len(before), blocks + 1).astype(int)
@@ -96,19 +96,19 @@ def held_out_gain(before: Array, after: Array, floor: float) -> Gain:
 
 
 def noise_gain(residual: Array, before: float, after: float) -> float:
-    """Twice the gain in log likelihood per sample where noise of another size (N RMS) is expected.
+    """Twice the gain in log likelihood per sample by another noise level, for a residual (n,) N.
 
-    residual (n,) N.
+    before, after: expected noise, N RMS.
     """
     power = np.mean(residual**2)
     return float(power / before**2 - power / after**2 - 2.0 * np.log(after / before))
 
 
 def left_out(residual: Array, jacobian: Array, scale: Array, blocks: int = BLOCKS) -> Array:
-    """Residual (n,) each of some blocks would have if the fit had not seen it.
+    """Residual (n,) by cross-validation: each block predicted by a fit to the other blocks.
 
     Exact for a model linear in its parameters: (I - H_bb)^-1 r_b with the hat matrix H. scale (k,):
-    pull of the priors in units of the columns, which keeps the inverse finite.
+    weight of the priors in units of the columns, which keeps the inverse finite.
     """
     information = jacobian.T @ jacobian + np.diag(scale**2)
     edges = np.linspace(0, len(residual), min(blocks, len(residual)) + 1).astype(int)

@@ -1,7 +1,6 @@
-"""Fit an axis model to logs: least squares on the windowed force residual.
+"""Fit an axis model to logs: least squares on the force residual.
 
-Several starts where the model has shape parameters; weak priors keep what the data cannot see near
-its start. The result says in a full sentence how it ended.
+Weak priors keep parameters that the data do not determine near their start values.
 """
 
 from __future__ import annotations
@@ -22,37 +21,34 @@ from identify.estimation.evidence import effective_samples
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.levenberg_marquardt import minimise
 from identify.estimation.scaling import Scaling
-from identify.estimation.smoothing import described, smoothing
+from identify.estimation.smoothing import has_nonparametric, smoothing
 from twin.effect import Kind
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters, read
 
 Array = NDArray[np.float64]
 
-PRIOR_FORCE = 0.1  # expected force of what is added to the friction, over that to be explained
+PRIOR_FORCE = 0.1  # expected force of an effect beside the friction, over the force to explain
 PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
 MOST_EVALUATIONS = 40
-PUSHED = 3.0  # standard errors by which the data ask for a value beyond a bound
+PUSHED = 3.0  # standard errors by which the gradient must point beyond a bound
 AT_EDGE = 1e-6  # of a bound, within which a value is at it
 
 
 class Outcome(Enum):
     """How a fit ended."""
 
-    CONVERGED = "The fit converged: no parameter change lowers the force error further."
-    NOT_CONVERGED = (
-        "The fit stopped after its most evaluations before it converged; start nearer or fix some "
-        "parameters."
-    )
-    AT_BOUND = "The fit converged with a parameter at its bound; the data ask for a value beyond."
+    CONVERGED = "converged"
+    NOT_CONVERGED = "not converged"
+    AT_BOUND = "at bound"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit:
     """A fitted axis.
 
-    residual (n,): N at the end over the windows of the logs that carry information (kept). begun:
-    the axis that the fit started from.
+    residual (n,): N at the end, of the test functions that carry information (kept). begun: the
+    axis that the fit started from.
     """
 
     axis: AxisModel
@@ -78,19 +74,19 @@ class Fit:
 
     @cached_property
     def lessened(self) -> float:
-        """RMS force of the motor over that commanded, where it is less than half; else 1."""
+        """RMS force of the motor over the RMS command, where that is less than half; else 1."""
         return forces_lessened(self.axis, [log.motion for log in self.logs])
 
     @cached_property
     def jacobian(self) -> Array:
-        """Derivative of the residual by the free coordinates, (n, k) N per unit."""
+        """Derivative of the residual by the free parameters, (n, k) N per unit."""
         return jacobian(self.axis, self.logs, self.scaling.where)[self.kept]
 
     @cached_property
     def at_bound(self) -> tuple[str, ...]:
-        """Labels of the parameters at a bound, beyond which the data ask for a value.
+        """Labels of the parameters at a bound whose better values are beyond it.
 
-        The gradient must push outwards by more than the residual's noise makes of it.
+        The gradient must point outwards by more than the noise of the residual explains.
         """
         if not len(self.residual):
             return ()
@@ -108,13 +104,13 @@ class Fit:
 
     @property
     def ended(self) -> Outcome:
-        """How the optimisation ended, with what the bounds did."""
+        """How the optimisation ended, bounds considered."""
         held = self.outcome is Outcome.CONVERGED and self.at_bound
         return Outcome.AT_BOUND if held else self.outcome
 
     @property
     def at_floor(self) -> bool:
-        """Whether the error is hardly more than noise."""
+        """Whether the error is at the noise floor."""
         return self.ratio < RULE.at_floor
 
     @property
@@ -124,15 +120,15 @@ class Fit:
 
 
 def _is_added(axis: AxisModel, c: ParameterReference) -> bool:
-    """Whether zero means the absence of a physical effect beside mass and friction."""
+    """Whether it is a strength of a physical effect other than mass and friction."""
     if not (c.effect and c.parameter.strength):
         return False
     effect = axis[c.effect].effect
     return effect.kind is not Kind.FRICTION and not effect.is_nonparametric
 
 
-def _describes(axis: AxisModel, c: ParameterReference) -> bool:
-    """Whether it is a strength of a description."""
+def _is_nonparametric(axis: AxisModel, c: ParameterReference) -> bool:
+    """Whether it is a strength of a nonparametric effect."""
     return bool(c.effect) and c.parameter.strength and axis[c.effect].effect.is_nonparametric
 
 
@@ -144,11 +140,11 @@ def rms(values: Array) -> float:
 class _Problem:
     """Residual and Jacobian of one fit in internal variables, with priors as extra rows.
 
-    The prior on what is added to the friction is a force of a tenth of what is to be explained; it
-    matters only along directions that the data cannot tell apart, such as a constant force and a
-    Coulomb asymmetry, where it shares the force out instead of opposing large ones to each other.
-    Beside a description the physical effects are pulled to where they were: what both could explain
-    stays with the physics. The description itself is smoothed.
+    The prior on an effect beside the friction is a force of a tenth of the force to be explained.
+    It matters only for parameters that the data cannot separate, such as a constant force and a
+    Coulomb asymmetry: it keeps both small, where they could be large and opposite. Beside a
+    nonparametric effect the prior of the physical effects is centred where the fit starts, so that
+    a force that both could explain stays with the physics. The nonparametric effect is smoothed.
     """
 
     def __init__(self, axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int) -> None:
@@ -160,12 +156,14 @@ class _Problem:
         self.bounds = self.scaling.bounds()
         self.start = np.clip(self.scaling.inside(axis), *self.bounds)
         self.added = np.array([_is_added(axis, c) for c in self.scaling.where], dtype=bool)
-        self.centre = np.where(self.added & (not described(axis)), 0.0, self.start)
+        self.centre = np.where(self.added & (not has_nonparametric(axis)), 0.0, self.start)
         self.pull = np.zeros(len(self.start))
         self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
-        # A description is linear in its strengths: their columns are taken once.
-        self.constant = np.array([_describes(axis, c) for c in self.scaling.where], dtype=bool)
-        self.described = jacobian(axis, logs, self._where(self.constant))
+        # A nonparametric effect is linear in its strengths, so their columns are computed once.
+        self.constant = np.array(
+            [_is_nonparametric(axis, c) for c in self.scaling.where], dtype=bool
+        )
+        self.constant_columns = jacobian(axis, logs, self._where(self.constant))
         self._last: tuple[bytes, Array] = b"", np.zeros((0, 0))
 
     def set_priors(self, internal: Array) -> None:
@@ -186,9 +184,9 @@ class _Problem:
         return [c for c, wanted in zip(self.scaling.where, mask, strict=True) if wanted]
 
     def jacobian(self, axis: AxisModel) -> Array:
-        """Derivative of the residual by the free coordinates, (n, k) N per unit."""
+        """Derivative of the residual by the free parameters, (n, k) N per unit."""
         columns = np.empty((len(self.kept), len(self.constant)))
-        columns[:, self.constant] = self.described
+        columns[:, self.constant] = self.constant_columns
         columns[:, ~self.constant] = jacobian(axis, self.logs, self._where(~self.constant))
         return columns
 
@@ -238,7 +236,7 @@ def fit_axis(
 def finished(
     axis: AxisModel, begun: AxisModel, logs: Sequence[PreparedLog], outcome: Outcome
 ) -> Fit:
-    """The fit that an axis is at its present values."""
+    """The fit object of an axis with its present values, without fitting."""
     kept = moving(logs, sticks(axis))
     return Fit(
         axis=axis,

@@ -1,4 +1,4 @@
-"""Log and model -> unexplained force in newtons on the measured motion."""
+"""The force balance: log and model -> force residual in newtons on the measured motion."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ Array = NDArray[np.float64]
 
 
 def averaged_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
-    """What the axis' effects add to the command, means by test functions (n,) N, log after log.
+    """The force that the axis' effects add to the command, averaged by test functions (n,) N.
 
-    A sensing effect adds the force that the reading's error pretends, mass x its acceleration, and
-    the other effects act along the motion behind the readings, under the actual force.
+    Log after log. A sensing effect adds an apparent force, mass x acceleration of the reading's
+    error, and the other effects act along the true motion, under the actual force.
     """
     table = _between(axis)
     parts = []
@@ -59,7 +59,7 @@ def _driven(axis: AxisModel, log: PreparedLog) -> tuple[Motion, Array | float]:
 
 
 def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
-    """Unexplained force (n,) N: windowed command + effects - mass x acceleration, log after log."""
+    """Force residual (n,) N: averaged command + effects - mass x acceleration, log after log."""
     inertia = np.concatenate([log.command - axis.mass * log.acceleration for log in logs])
     return np.asarray(inertia + averaged_force(axis, logs))
 
@@ -67,9 +67,9 @@ def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
 def group_of(axis: AxisModel, effect: str) -> AxisModel:
     """The part of the axis whose force can change when a parameter of that effect does.
 
-    Friction and its modifiers act together, and so does what is in a chain; both together where a
-    friction depends on the force that the chain gives. Any other effect acts by itself. All act
-    along the motion that the sensing effects leave.
+    Friction and its modifiers form one group, the actuation effects another; the two are one group
+    where a friction depends on the motor's force. Any other effect is a group by itself. Sensing
+    effects belong to every group, because they change the motion that all others act along.
     """
     kind = axis[effect].effect.kind
     if kind is Kind.SENSING:
@@ -85,7 +85,7 @@ def group_of(axis: AxisModel, effect: str) -> AxisModel:
 def jacobian(
     axis: AxisModel, logs: Sequence[PreparedLog], where: Sequence[ParameterReference]
 ) -> Array:
-    """Derivative of the residual by those coordinates, (n, n_coordinates), N per unit."""
+    """Derivative of the residual by these parameters, (n, n_parameters), N per unit."""
     columns = np.empty((sum(map(len, logs)), len(where)))
     by_effect: dict[str, list[int]] = {}
     for j, c in enumerate(where):
@@ -130,14 +130,14 @@ def _differences(
 
 
 def _by_mass(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
-    """Derivative by the moved mass, to which structure and sensing errors are in proportion."""
+    """Derivative by the moved mass; attached masses and sensing errors are in proportion to it."""
     attached = parts_of(axis, Kind.STRUCTURE, Kind.SENSING)
     inertia = np.concatenate([log.acceleration for log in logs])
     return np.asarray(averaged_force(attached, logs) / axis.mass - inertia)
 
 
 def difference_step(c: ParameterReference, value: float) -> float:
-    """A step inside the bounds, small against the value or against the parameter's range."""
+    """A step within the bounds, small relative to the value or to the parameter's range."""
     p = c.parameter
     size = 1e-5 * max(abs(value), abs(p.start), 1e-6 * min(p.upper - p.lower, 1e3))
     return size if value + size <= p.upper else -size

@@ -1,4 +1,4 @@
-"""Intervals that survive coloured residuals, and are refused on a wrong model.
+"""Intervals that allow for coloured residuals; none are given for a wrong model.
 
 Sandwich covariance with blocks: (J'J)^-1 [sum_b J_b' r_b r_b' J_b] (J'J)^-1, where the blocks are
 longer than the residual's memory and r_b is what the fit without block b leaves there. H. White,
@@ -9,6 +9,7 @@ D. F. McCaffrey, Survey Methodology 28 (2002) for left-out residuals.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from itertools import pairwise
 
 import numpy as np
@@ -24,16 +25,59 @@ Array = NDArray[np.float64]
 
 BLOCKS = 30
 RIDGE = 1e-6  # keeps a fit without one block finite
-INSEPARABLE = 0.9999  # correlation of two estimates from which they are one number
+INSEPARABLE = 0.9999  # correlation of two estimates from which the data cannot separate them
 CONFIDENCE = 0.90
 FAR = 4.0  # half widths to either side at which the error must have risen
-LEAST_RISE = 0.1  # of the rise that the slopes foresee
-LARGEST_RATIO = 3.0  # of error to noise floor; above it the model is wrong and no interval holds
+LEAST_RISE = 0.1  # of the rise that the linearised residual predicts
+LARGEST_RATIO = 3.0  # of error to noise floor; above it the model is wrong, intervals mean nothing
+
+
+class Side(Enum):
+    """To which side of a value the error hardly rises."""
+
+    SMALLER = "smaller"
+    LARGER = "larger"
+
+
+@dataclass(frozen=True)
+class AlwaysAtRest:
+    """The axis comes to rest within every test function, so that nothing was fitted."""
+
+
+@dataclass(frozen=True)
+class ModelWrong:
+    """The force error (in ``unit``, RMS) is far above the noise floor."""
+
+    error: float
+    floor: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class NotExcited:
+    """The parameter has no influence on the force along this motion."""
+
+
+@dataclass(frozen=True)
+class Inseparable:
+    """The correlation with the estimate of another parameter is almost 1."""
+
+    label: str
+
+
+@dataclass(frozen=True)
+class OpenSided:
+    """The error hardly rises towards this side of the value."""
+
+    side: Side
+
+
+NoInterval = AlwaysAtRest | ModelWrong | NotExcited | Inseparable | OpenSided
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter: value with its unit and 90 % interval, or the reason why there is none."""
+    """One parameter: value with its unit and 90 % interval, or the reason why it has none."""
 
     label: str
     value: float
@@ -41,14 +85,14 @@ class Estimate:
     low: float | None
     high: float | None
     free: bool
-    reason: str | None = None
+    reason: NoInterval | None = None
 
 
 def estimates(fit: Fit) -> tuple[Estimate, ...]:
     """Estimates of all parameters of a fitted axis, free ones first."""
     values = read(fit.axis, fit.scaling.where)
     half = half_widths(fit)
-    reason = refusal(fit)
+    reason: NoInterval | None = refusal(fit)
     twins = inseparable(fit)
     free = []
     units = fit.axis.units
@@ -58,45 +102,45 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
         high: float | None = None
         why = reason
         if why is None and not np.isfinite(width):
-            why = "no interval: this motion does not show the parameter"
+            why = NotExcited()
         if why is None and c.label in twins:
-            why = f"no interval: this data cannot tell it from {twins[c.label]}"
+            why = Inseparable(twins[c.label])
         if why is None and (side := open_side(fit, c, width)):
-            why = f"no interval: a {side} value fits as well, these logs do not reach it"
+            why = OpenSided(side)
         if why is None:
             low, high = max(value - width, p.lower), min(value + width, p.upper)
         free.append(Estimate(c.label, float(value), units(p.unit), low, high, True, why))
     return (*free, *_held(fit))
 
 
-def open_side(fit: Fit, c: ParameterReference, half: float) -> str | None:
-    """The side, "smaller" or "larger", to which the error hardly rises; None where it does.
+def open_side(fit: Fit, c: ParameterReference, half: float) -> Side | None:
+    """The side to which the error hardly rises; None where it rises to both.
 
-    An end stop out of reach is the example: where it just touches the motion the fit has a slope.
+    Example: the position of an end stop that the motion just touches has a slope to one side only.
     """
     column = fit.jacobian[:, fit.scaling.where.index(c)]
     value = read(fit.axis, [c])[0]
-    for side, step in (("smaller", -FAR * half), ("larger", FAR * half)):
+    for side, step in ((Side.SMALLER, -FAR * half), (Side.LARGER, FAR * half)):
         moved = write(fit.axis, [c], [np.clip(value + step, c.parameter.lower, c.parameter.upper)])
         step = read(moved, [c])[0] - value
-        foreseen = 2.0 * step * float(fit.residual @ column) + step**2 * float(column @ column)
-        if abs(step) < 0.5 * FAR * half or foreseen <= 0.0:  # a bound is in the way
+        predicted = 2.0 * step * float(fit.residual @ column) + step**2 * float(column @ column)
+        if abs(step) < 0.5 * FAR * half or predicted <= 0.0:  # a bound is in the way
             continue
         there = residual(moved, fit.logs)[fit.kept]
-        if float(there @ there - fit.residual @ fit.residual) < LEAST_RISE * foreseen:
+        if float(there @ there - fit.residual @ fit.residual) < LEAST_RISE * predicted:
             return side
     return None
 
 
 def inseparable(fit: Fit) -> dict[str, str]:
-    """Pairs of parameters, by label, whose estimates are correlated to all but one."""
+    """Pairs of parameters, by label, whose estimates have a correlation of almost 1."""
     norms = np.linalg.norm(fit.jacobian, axis=0)
-    seen = np.flatnonzero(norms > 0)
-    columns = fit.jacobian[:, seen] / norms[seen]
+    excited = np.flatnonzero(norms > 0)
+    columns = fit.jacobian[:, excited] / norms[excited]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-15, hermitian=True)
     spread = np.sqrt(np.diag(inverse))
-    correlation = np.abs(inverse / np.outer(spread, spread)) - np.eye(len(seen))
-    labels = [fit.scaling.where[i].label for i in seen]
+    correlation = np.abs(inverse / np.outer(spread, spread)) - np.eye(len(excited))
+    labels = [fit.scaling.where[i].label for i in excited]
     return {
         label: labels[int(np.argmax(row))]
         for label, row in zip(labels, correlation, strict=True)
@@ -104,40 +148,35 @@ def inseparable(fit: Fit) -> dict[str, str]:
     }
 
 
-def refusal(fit: Fit) -> str | None:
+def refusal(fit: Fit) -> NoInterval | None:
     """Why the fit has no intervals, or None where it has."""
     if len(fit.residual) == 0:
-        return "no interval: the axis comes to rest within every window of these logs"
+        return AlwaysAtRest()
     if fit.ratio <= LARGEST_RATIO:
         return None
-    units, unit = fit.axis.units, fit.axis.units.force
-    return (
-        f"no interval: the {units.words('force error')} {fit.error:.3g} {unit} stands "
-        f"{fit.ratio:.1f} times above the noise floor {fit.floor:.3g} {unit}, so the "
-        "model is wrong by more than noise"
-    )
+    return ModelWrong(fit.error, fit.floor, fit.axis.units.force)
 
 
 def half_widths(fit: Fit) -> Array:
-    """Half widths (k,) of the 90 % intervals, in the parameters' units; inf where unseen."""
+    """Half widths (k,) of the 90 % intervals, in the parameters' units; inf where not excited."""
     norms = np.linalg.norm(fit.jacobian, axis=0)
-    seen = norms > 0
+    excited = norms > 0
     out = np.full(len(norms), np.inf)
-    if not seen.any():
+    if not excited.any():
         return out
-    columns = fit.jacobian[:, seen] / norms[seen]
+    columns = fit.jacobian[:, excited] / norms[excited]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-12, hermitian=True)
     edges = np.linspace(0, len(fit.residual), BLOCKS + 1).astype(int)
-    # Residuals of a block are smaller than its errors, by what the fit took from it: left out of
-    # the fit they are not (jackknife, CR3).
+    # The fit makes the residuals of a block smaller than its errors, so the residuals of a fit
+    # without the block are used (jackknife, CR3).
     honest = left_out(fit.residual, columns, np.full(columns.shape[1], RIDGE), BLOCKS)
     scores = np.stack([columns[a:b].T @ honest[a:b] for a, b in pairwise(edges)])
     covariance = inverse @ (scores.T @ scores * (BLOCKS - 1) / BLOCKS) @ inverse
-    # What holds a parameter off the least squares, a prior or a bound, shifts it by this much.
+    # A prior or a bound shifts the estimate from the least-squares solution by this much.
     shift = np.abs(inverse @ (columns.T @ fit.residual))
     quantile = student.ppf(0.5 + CONFIDENCE / 2.0, BLOCKS - 1)
     spread_of = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    out[seen] = (quantile * spread_of + shift) / norms[seen]
+    out[excited] = (quantile * spread_of + shift) / norms[excited]
     return out
 
 

@@ -2,11 +2,11 @@
 
 K. Levenberg (1944), D. W. Marquardt (1963), with the damping schedule of L. Jia (2023): 0.01 to
 start, a tenth on success, tenfold on failure. A variable at a bound that the gradient pushes
-outwards is held there for the step. Working on the normal equations of scaled columns costs two
-matrix products an iteration, where a general solver's decomposition of all rows took most of a fit.
+outwards is held there for the step. It solves the normal equations of scaled columns, which costs
+two matrix products an iteration; the QR decomposition of a general solver took most of a fit.
 
-A Jacobian costs a walk over the motion for every variable, a residual one. So between two
-Jacobians the columns follow the residuals by secants (C. G. Broyden, "A class of methods for
+A Jacobian costs a walk over the motion for every variable, a residual one. Between two Jacobians
+the columns therefore follow the residuals by secants (C. G. Broyden, "A class of methods for
 solving nonlinear simultaneous equations", Math. Comput. 19, 1965) while each step keeps most of
 what it promises; the search ends only on a true Jacobian.
 """
@@ -47,8 +47,8 @@ def minimise(
 ) -> Solution:
     """Variables that minimise the sum of squares of the residual (n,) within bounds (k,), (k,).
 
-    tolerance: relative fall of the sum of squares below which the search ends. start: (k,). From a
-    start whose residual is no finite number nothing converges.
+    tolerance: relative fall of the sum of squares below which the search ends. start: (k,). Where
+    the residual at the start is not finite, the start is returned as not converged.
     """
     low, high = bounds
     x = np.clip(start, low, high)

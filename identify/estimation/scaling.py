@@ -1,7 +1,7 @@
-"""Free parameters as the unbounded-scale variables that the least squares moves.
+"""Maps between the free parameters and the internal variables of the least squares.
 
-A positive parameter is fitted as its logarithm; one that may not fall below another (Fs >= Fc) as
-its excess over it, so that every inequality holds by construction.
+A positive parameter is fitted as its logarithm, and one that may not fall below another (Fs >= Fc)
+as its excess over it, so that every inequality holds by construction.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Scaling:
-    """Maps the coordinates of an axis to internal variables and back."""
+    """Maps parameters of an axis to internal variables and back."""
 
     where: tuple[ParameterReference, ...]
 
     def _floors(self, axis: AxisModel) -> list[tuple[int | None, float]]:
-        """For each coordinate: index of the free coordinate it may not fall below, or its value."""
+        """For each parameter: index of the free parameter that bounds it below, or its value."""
         floors: list[tuple[int | None, float]] = []
         for c in self.where:
             other = c.parameter.at_least
@@ -43,7 +43,7 @@ class Scaling:
         return floors
 
     def inside(self, axis: AxisModel) -> Array:
-        """Internal variables of this axis' values."""
+        """The internal variables for the values of this axis."""
         values = read(axis, self.where)
         out = np.empty_like(values)
         for i, (c, (index, fixed)) in enumerate(zip(self.where, self._floors(axis), strict=True)):
@@ -67,7 +67,7 @@ class Scaling:
         return write(axis, self.where, values)
 
     def chain(self, axis: AxisModel, columns: Array) -> Array:
-        """Derivatives by the coordinates (n, k) -> by the internal variables (n, k)."""
+        """Derivatives by the parameters (n, k) -> by the internal variables (n, k)."""
         out = columns.copy()
         values = read(axis, self.where)
         for i, (c, (index, _)) in enumerate(zip(self.where, self._floors(axis), strict=True)):

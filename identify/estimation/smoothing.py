@@ -1,4 +1,4 @@
-"""The smoothing of descriptions: rows that the least squares of a fit has beside the residual."""
+"""Smoothing of nonparametric effects: penalty rows that are appended to the residual of a fit."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from twin.model.parameters import ParameterReference
 Array = NDArray[np.float64]
 
 
-def described(axis: AxisModel) -> bool:
-    """Whether the axis holds a description beside its physics."""
+def has_nonparametric(axis: AxisModel) -> bool:
+    """Whether the axis has a nonparametric effect."""
     return any(f.effect.is_nonparametric for f in axis.effects)
 
 
@@ -32,7 +32,7 @@ def part_rows(part: Part, effect: str, where: Sequence[ParameterReference]) -> A
 
 
 def smoothing(axis: AxisModel, where: Sequence[ParameterReference], samples: int) -> Array:
-    """Rows (m, len(where)) whose product with the values is N beside that many residuals in N."""
+    """Penalty rows (m, len(where)), N per unit, weighted for ``samples`` residuals in N."""
     rows = [
         np.sqrt(samples) * f.values[part.stiffness] * part_rows(part, f.effect.name, where)
         for f in axis.effects

@@ -1,4 +1,4 @@
-"""What the parameters of a fit can take over of a force, and what is left of it."""
+"""The part of a force that the parameters of a fit can reproduce, and the part they cannot."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ def orthonormal(columns: Array) -> Array:
     norms = np.linalg.norm(columns, axis=0)
     scaled = columns[:, norms > 0] / norms[norms > 0]
     power, directions = np.linalg.eigh(scaled.T @ scaled)
-    seen = power > 1e-12 * power.max(initial=1.0)
-    return scaled @ (directions[:, seen] / np.sqrt(power[seen]))
+    kept = power > 1e-12 * power.max(initial=1.0)
+    return scaled @ (directions[:, kept] / np.sqrt(power[kept]))
 
 
 def unabsorbed(force: Array, basis: Array) -> Array:

@@ -1,4 +1,8 @@
-"""Search an effect's shape: at each, its best strengths by one linear step from a base fit."""
+"""Variable projection: scan an effect's nonlinear parameters, solve for the linear ones at each.
+
+The linear parameters are called strengths, a set of nonlinear values a shape. The strengths at a
+shape are found by one linear step together with the parameters of a base fit.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +30,10 @@ Array = NDArray[np.float64]
 
 RIDGE = 1e-4  # keeps the linear step finite along directions that the base explains already
 RESCORED_SHAPES = 24  # best shapes of a coarse scan that are tried with every strength
-CHANCE = 4.0  # of the gain in log likelihood (times two) for each strength, found by searching
+CHANCE = 4.0  # twice the gain in log likelihood, for each strength, that a scan of noise finds
 FULL_SHAPES = 4  # best shapes on the logs' heads that are tried on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
-RESIDUAL_LINES = 12  # frequencies of the residual that are tried
+RESIDUAL_LINES = 12  # spectral lines of the residual that are tried
 BETTER = 0.99  # part of the error that a new start must reach to be taken
 
 
@@ -37,7 +41,7 @@ BETTER = 0.99  # part of the error that a new start must reach to be taken
 class Start:
     """An effect at one shape with the strengths that one linear step finds best beside a base.
 
-    squared_error: N^2, sum over the windows that is left when the base moves along.
+    squared_error: N^2, sum over the test functions after that step.
     """
 
     squared_error: float
@@ -68,7 +72,7 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
 
 
 def _worth_all(base: Fit, head: _Ground, whole: _Ground, start: Start) -> bool:
-    """Whether what a shape gains on the heads is more than chance, so that others deserve a try."""
+    """Whether the best shape gains more on the heads than chance, so that others are tried too."""
     samples = effective_samples(base.residual)
     before = float(np.sum(head.unchanged**2))
     gain = samples * np.log(before / max(start.squared_error, 1e-12 * before))
@@ -84,7 +88,7 @@ def _best(
 
 
 def stepped(base: Fit, fitted: Fitted, logs: Sequence[PreparedLog]) -> AxisModel:
-    """The base with the effect, its own parameters moved along by one linear step."""
+    """The base with the effect, after one linear step of the base's own parameters."""
     together = base.axis.with_effect(fitted)
     where = [c for c in base.scaling.where if _belongs(c, together)]
     columns = base.jacobian[:, [base.scaling.where.index(c) for c in where]]
@@ -97,7 +101,7 @@ def stepped(base: Fit, fitted: Fitted, logs: Sequence[PreparedLog]) -> AxisModel
 
 
 def fit_thoroughly(axis: AxisModel, dataset: Dataset) -> Fit:
-    """Fit an axis; search its effects' shapes anew where the first fit leaves more than noise."""
+    """Fit an axis; scan its effects' shapes again where the error is above the noise floor."""
     best = fit_axis(axis, dataset.fit)
     for name in axis.names:
         effect = axis[name].effect
@@ -114,12 +118,12 @@ def fit_thoroughly(axis: AxisModel, dataset: Dataset) -> Fit:
 
 
 def fit_without(fit: Fit, dataset: Dataset, name: str) -> Fit:
-    """The fit with one effect taken out, its other parameters left where they are."""
+    """The fit with one effect removed and the values of the others unchanged."""
     return finished(fit.axis.without(name), fit.begun, dataset.fit, fit.outcome)
 
 
 def _with_lines_left(base: Fit, dataset: Dataset) -> Excitation:
-    """What the motion covers, with the frequencies at which the base's residual repeats first."""
+    """What the motion covers, with the spectral lines of the base's residual first."""
     every = np.zeros(len(base.kept))
     every[base.kept] = base.residual
     ends = np.cumsum([len(w) for w in dataset.fit])[:-1]
@@ -130,7 +134,7 @@ def _with_lines_left(base: Fit, dataset: Dataset) -> Excitation:
 
 
 def tried_shapes(effect: Effect, excitation: Excitation) -> Iterator[dict[str, float]]:
-    """Values to try for the parameters that the effect says must be searched."""
+    """Combinations of values to try for the nonlinear parameters that the effect scans."""
     scanned = [p for p in effect.parameters if p.scan]
     grids = [p.scan(excitation) if p.scan else () for p in scanned]
     for values in itertools.product(*grids):
@@ -139,7 +143,7 @@ def tried_shapes(effect: Effect, excitation: Excitation) -> Iterator[dict[str, f
 
 @dataclass(frozen=True, eq=False)
 class _Ground:
-    """What is the same at every shape: the base without what the effect replaces."""
+    """The data that all shapes share: the base, without the friction that a friction replaces."""
 
     logs: Sequence[PreparedLog]
     excitation: Excitation
@@ -176,7 +180,7 @@ def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter
     where = [ParameterReference(effect.name, p) for p in strengths if p.name not in first.fixed]
     silent = all(first.values[p.name] == 0.0 for p in effect.strengths)
     force = ground.unchanged if silent else residual(axis, ground.logs)[ground.kept]
-    # That a reading's error moves the other forces too is of second order here.
+    # A reading's error changes the other forces too, but only to second order.
     alone = parts_of(axis, Kind.SENSING) if effect.kind is Kind.SENSING else axis
     columns = jacobian(alone, ground.logs, where)[ground.kept]
     step, squared = _bounded_step(ground.basis, force, columns, where, first)
@@ -202,7 +206,7 @@ def _without_friction(axis: AxisModel) -> AxisModel:
 def _bounded_step(
     basis: Array, force: Array, columns: Array, where: list[ParameterReference], first: Fitted
 ) -> tuple[Array, float]:
-    """Strengths within their bounds that minimise the force left beside the base's columns."""
+    """Strengths within bounds that minimise the force outside the span of the base's columns."""
     left, own = unabsorbed(force, basis), unabsorbed(columns, basis)
     norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     start = np.array([first.values[c.parameter.name] for c in where])

@@ -1,4 +1,4 @@
-"""The experiment that decides: missing excitation, rival hypotheses, candidate experiments, choice.
+"""Experiment design: missing excitation, rival hypotheses, candidate experiments, the choice.
 
 A new kind of experiment becomes a candidate in ``candidate_experiments``.
 """

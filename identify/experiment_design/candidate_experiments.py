@@ -1,17 +1,16 @@
-"""The experiments among which a plan chooses: a modest family, each within the stage's limits."""
+"""The experiments among which a plan chooses: a fixed family, each within the machine's limits."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.errors import CannotRun
 from twin.experiments.experiment import Experiment, OneAxis, gentle, machine_limits
-from twin.experiments.file import in_short
 from twin.experiments.kinds import (
     Moves,
     Passes,
@@ -28,21 +27,35 @@ from twin.model.units import LINEAR, AxisUnits
 USED = 0.9  # part of the travel that passes cover
 SLOWEST = 5e-4  # m/s
 LOWEST = 2.0  # Hz, where a sweep begins
-SWEPT = (60.0, 120.0)  # Hz, where it ends: the shortest windows pass little above
+SWEPT = (60.0, 120.0)  # Hz, where it ends: the shortest test functions pass little above
 EFFORTS = (1.0, 0.3)  # parts of the acceleration limit that steps use in turn
 STEP_DWELL = 0.05  # s
 MARGIN = 0.5  # part of the allowed force that a sweep uses; the loop adds to it near its bandwidth
 GENTLE = 0.5  # part of the acceleration limit that the passes under a sweep use
-FORCE_USED = 0.4  # part of the force limit that moves use; friction and the loop need theirs
+FORCE_USED = 0.4  # part of the force limit that moves use; the rest is for friction and the loop
 MOST_REPEATS = 1000
+
+
+@dataclass(frozen=True)
+class NotRun:
+    """An experiment that the machine cannot run, and the reason.
+
+    truth: the explanation with which it cannot run, where another one allows it. units: of its
+    axis.
+    """
+
+    experiment: Experiment
+    reason: str
+    units: AxisUnits = LINEAR
+    truth: str | None = None
 
 
 def proposals(
     model: MachineModel, axis: str, duration: float
-) -> tuple[list[Experiment], tuple[str, ...]]:
-    """Experiments of about that duration (s) for one axis, all within the stage's limits.
+) -> tuple[list[Experiment], tuple[NotRun, ...]]:
+    """Experiments of about that duration (s) for one axis, all within the machine's limits.
 
-    And why others of the family are not among them, a sentence each. Raises CannotRun where the
+    Also those of the family that are not among them, with the reason. Raises CannotRun where the
     travel is not known, and where none fits.
     """
     model.axis(axis)
@@ -61,7 +74,7 @@ def proposals(
         try:
             _require_fit(experiment, model, duration)
         except CannotRun as why:
-            not_run.append(refused(experiment, why, model.axes[axis].units))
+            not_run.append(NotRun(experiment, str(why), model.axes[axis].units))
         else:
             found.append(experiment)
     if not found:
@@ -69,11 +82,6 @@ def proposals(
             f"no experiment of {duration:g} s fits axis {axis}; give a longer --duration (s)"
         )
     return found, tuple(not_run)
-
-
-def refused(experiment: Experiment, why: CannotRun, units: AxisUnits = LINEAR) -> str:
-    """The sentence that says which experiment cannot run, and why."""
-    return f"{in_short(experiment, units)}: {why}"
 
 
 def _affordable(model: MachineModel, axis: str) -> float:
@@ -90,16 +98,16 @@ def _eased(draft: Experiment, effort: float) -> Experiment:
 
 
 def _require_fit(experiment: Experiment, model: MachineModel, duration: float) -> None:
-    """Raise CannotRun unless the stage can run it, in not much more than that time (s)."""
+    """Raise CannotRun unless the machine can run it, in not much more than that time (s)."""
     setpoint = experiment.setpoint(model, np.random.default_rng(0))
     if setpoint.duration >= TOLERANCE * duration:
         raise CannotRun(
-            f"takes {setpoint.duration:.3g} s of the {duration:g} s asked for; give a longer "
+            f"takes {setpoint.duration:.3g} s, more than the {duration:g} s planned; give a longer "
             "--duration (s)"
         )
 
 
-TOLERANCE = 1.3  # times the duration asked for that an experiment may take
+TOLERANCE = 1.3  # an experiment may take this times the planned duration
 
 
 def _random(duration: float) -> Iterator[Experiment]:

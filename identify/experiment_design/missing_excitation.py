@@ -1,4 +1,4 @@
-"""Which motion a set of logs lacks: where two explanations differ, against where the data are."""
+"""Which motion the logs lack: the motion where explanations differ and few data are."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from twin.model.units import LINEAR
 
 Array = NDArray[np.float64]
 
-HEART = (0.25, 0.75)  # quantiles of the squared difference between which it is said to live
-SELDOM = 0.01  # share of the data below which one motion is missed as much as another
+HEART = (0.25, 0.75)  # quantiles of the squared difference that bound the range of a feature
+SELDOM = 0.01  # share of the data below which all motions count as equally rare
 RARE = 0.05  # share of the data below which a motion counts as missing
 
 
 @dataclass(frozen=True)
 class Feature:
-    """A property of motion: how it is called, its unit, and its value (n_windows,) on a log.
+    """A property of motion: its name, its unit, and its values (n_test_functions,) on a log.
 
-    unit: on a linear axis. other: whether it is of the other axis.
+    unit: on a linear axis. other: whether it is a property of the other axis.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Gap:
-    """Where the explanations differ and the data are not.
+    """A range of motion where the explanations differ, and how much of the data is in it.
 
     low, high: range of the feature in its unit. share: part of the data inside it, 0..1; None where
     there are no data.
@@ -52,15 +52,10 @@ class Gap:
     high: float
     share: float | None
 
-    def in_words(self) -> str:
-        """One sentence."""
-        where = f"{self.feature} {self.low:.3g} to {self.high:.3g} {self.unit}"
-        if self.share is None:
-            return f"it shows most at {where}"
-        held = f"{100.0 * self.share:.1f} % of the data is there"
-        if self.share < RARE:
-            return f"missing motion: {where}; {held}"
-        return f"no motion is missing, but more of it is needed at {where}; {held}"
+    @property
+    def missing(self) -> bool:
+        """Whether the data have hardly any of this motion."""
+        return self.share is not None and self.share < RARE
 
 
 def _speed(log: PreparedLog) -> Array:
@@ -68,7 +63,7 @@ def _speed(log: PreparedLog) -> Array:
 
 
 def _rest(log: PreparedLog) -> Array:
-    """Time (s) that the axis stood before it last began to move, to a tenth: it settles slowly."""
+    """Rest (s) before the last start of motion, rounded to 0.1 s because settling is gradual."""
     m = log.motion
     still = np.abs(m.velocity) < REST_SPEED * np.abs(m.velocity).max()
     index = np.arange(len(still))
@@ -109,10 +104,10 @@ FEATURES = (
 
 
 def gap(motion: PreparedLog, where: Array, logs: Sequence[PreparedLog]) -> Gap:
-    """The property of motion in which the logs miss the difference most.
+    """The property of motion for which the logs have least data where the explanations differ.
 
-    where: squared difference (n_windows,) on the planned motion. Among those that the logs miss
-    alike, the property that tells the windows of the difference from the others best.
+    where: squared difference (n_test_functions,) on the planned motion. Among properties with
+    equally few data, the one whose range singles out the difference best.
     """
     found = []
     for feature in FEATURES:

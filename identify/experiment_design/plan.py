@@ -1,4 +1,4 @@
-"""The experiment that decides between explanations, or that tells most about a model."""
+"""The experiment that decides between explanations, or that constrains a model most."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from identify.dataset.dataset import Dataset, datasets
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.decision import RULE
-from identify.experiment_design.candidate_experiments import proposals
+from identify.experiment_design.candidate_experiments import NotRun, proposals
 from identify.experiment_design.discrimination import (
     Arena,
     Explanation,
-    Trial,
+    SimulatedExperiment,
     contest,
     favoured,
     refitted,
@@ -23,13 +23,14 @@ from identify.experiment_design.rival_hypotheses import (
     differing_axis,
     explained,
     require_different,
-    trial_dataset,
+    simulated_dataset,
 )
 from identify.selection.candidates import Candidate, usable
 from identify.selection.forward_selection import AxisDiagnosis, Verdict, diagnose_axis
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
+from twin.experiments.file import in_short
 from twin.log import Log
 from twin.model.machine import MachineModel
 
@@ -38,7 +39,7 @@ Progress = Callable[[str, int, int], None]
 
 DURATION = 20.0  # s of a planned experiment
 NEXT_DURATION = 10.0  # s of the one that a diagnosis proposes
-VERIFIED = 6  # experiments at most that are tried again with a full refit
+VERIFIED = 6  # experiments at most that are judged again by full refits
 NEXT_VERIFIED = 3  # the same for the one that a diagnosis proposes
 MOST_RIVALS = 3  # explanations that a diagnosis asks one experiment to separate
 
@@ -47,31 +48,31 @@ MOST_RIVALS = 3  # explanations that a diagnosis asks one experiment to separate
 class Plan:
     """The experiment that decides, and those that it was chosen from.
 
-    axis: the one explained. between: names of the explanations; one, where the experiment is to
-    constrain a model. ranking: trials by falling evidence; the first is chosen. gap: where the data
-    lack motion. not_run: experiments that were left out as the stage cannot run them, and why.
-    favoured: the explanation that the logs separate from the others already, if any.
-    excited_by: effect -> the motion that shows it. supposed: whether the explanations
-    are not fitted to any data.
+    axis: the axis that is explained. between: names of the explanations; a single one where the
+    experiment is to constrain a model. ranking: simulated experiments by falling evidence; the
+    first is chosen. gap: the motion that the logs lack. not_run: experiments that the machine
+    cannot run. favoured: the explanation that the existing logs already separate from the others,
+    if any. excited_by: effect -> the motion that excites it. supposed: whether the explanations
+    have start values, as there are no logs to fit them to.
     """
 
     axis: str
     between: tuple[str, ...]
-    ranking: tuple[Trial, ...]
+    ranking: tuple[SimulatedExperiment, ...]
     gap: Gap
     favoured: str | None
     excited_by: Mapping[str, str]
     supposed: bool
-    not_run: tuple[str, ...] = ()
+    not_run: tuple[NotRun, ...] = ()
 
     @property
-    def chosen(self) -> Trial:
+    def chosen(self) -> SimulatedExperiment:
         """The experiment that is planned."""
         return self.ranking[0]
 
     @property
     def decides(self) -> bool:
-        """Whether it is expected to tell the explanations apart, or one model's parameters."""
+        """Whether it is expected to separate the explanations; with a single one, always."""
         return self.chosen.gain > RULE.least_separation or len(self.between) == 1
 
 
@@ -84,16 +85,16 @@ def plan(
     between: Sequence[Rival] = (),
     axis: str | None = None,
     duration: float = DURATION,
-    window: float | None = None,
+    test_function: float | None = None,
     progress: Progress | None = None,
 ) -> Plan:
-    """Find the experiment within the stage's limits that decides between explanations.
+    """Find the experiment within the machine's limits that decides between explanations.
 
-    between: effects, each added to the model, or models; refitted where there are logs. Without it,
-    what a diagnosis of the logs cannot tell apart, or its best explanation and the runner-up;
-    without logs or a missing effect, the experiment that says most about the model's own
-    parameters. duration: about that of the experiment, s. Raises InputError for an unknown axis,
-    an axis whose travel is not known, and two explanations that are one.
+    between: effects, each added to the model, or models; refitted where there are logs. Where it is
+    empty, the logs are diagnosed, and the plan is for the effects that the diagnosis cannot
+    separate, or for the best and the runner-up; without logs or a missing effect, it is for the
+    model's own parameters. duration: of the experiment, s, roughly. Raises InputError for an
+    unknown axis, an axis whose travel is not known, and explanations that are the same.
     """
     if axis is not None:
         model.axis(axis)
@@ -102,20 +103,21 @@ def plan(
         if isinstance(rival, Effect):
             model.require_usable(rival, axis or next(iter(model.axes)))
     catalogue = usable(catalogue, model)
-    dataset = _dataset(model, logs or {}, holdout or {}, between, axis, window)
-    arena = replace(_arena(model, dataset, bool(logs), between, catalogue), window=window)
+    dataset = _dataset(model, logs or {}, holdout or {}, between, axis, test_function)
+    arena = replace(
+        _arena(model, dataset, bool(logs), between, catalogue), test_function=test_function
+    )
     return _planned(arena, duration, VERIFIED, not logs, _named(between, catalogue), progress)
 
 
 def next_experiment(
-    found: AxisDiagnosis, model: MachineModel, window: float | None = None
+    found: AxisDiagnosis, model: MachineModel, test_function: float | None = None
 ) -> Plan | None:
     """The experiment that separates the explanations that an ambiguous diagnosis left.
 
-    window: the one that the diagnosis was asked to use, s.
-
-    None for any other verdict. Raises CannotRun where the machine can run none, and where the model
-    does not say how far its axes may travel.
+    test_function: length that the diagnosis used, s; None where it was chosen from the noise.
+    Returns None for any other verdict. Raises CannotRun where the machine can run none, and where
+    the model does not say how far its axes may travel.
     """
     if found.verdict is not Verdict.AMBIGUOUS or found.best is None:
         return None
@@ -123,7 +125,7 @@ def next_experiment(
     rivals = [c for c in found.ranking if c.effect.name in names]
     if len(rivals) < 2:
         return None
-    arena = replace(_between_candidates(model, found.dataset, rivals), window=window)
+    arena = replace(_between_candidates(model, found.dataset, rivals), test_function=test_function)
     return _planned(
         arena, NEXT_DURATION, NEXT_VERIFIED, False, {c.effect.name: c.effect for c in rivals}
     )
@@ -140,16 +142,17 @@ def _planned(
     logs = arena.logs
     favourite, evidence = favoured(arena)
     if evidence > RULE.least_separation:
-        # A rival that the logs refute already would lose by them alone, on any experiment.
+        # The logs already refute a rival, so they would decide whatever the new experiment is.
         arena = replace(arena, logs=())
-    experiments, too_long = proposals(arena.stage, arena.name, duration)
-    trials, not_run = contest(arena, experiments, progress)
-    if not trials:
+    experiments, too_long = proposals(arena.machine, arena.name, duration)
+    ranked, not_run = contest(arena, experiments, progress)
+    if not ranked:
+        first = f"{in_short(not_run[0].experiment, not_run[0].units)}: {not_run[0].reason}"
         raise CannotRun(
             f"axis {arena.name} can run none of the experiments; check its limits and force_limit; "
-            f"the first: {not_run[0]}"
+            f"the first: {first}"
         )
-    chosen, *others = _verified(arena, trials, verified)
+    chosen, *others = _verified(arena, ranked, verified)
     names = tuple(e.name for e in arena.explanations)
     return Plan(
         axis=arena.name,
@@ -163,13 +166,15 @@ def _planned(
     )
 
 
-def _verified(arena: Arena, trials: Sequence[Trial], most: int) -> list[Trial]:
-    """The trials with the best truly refitted, until one of those refitted leads; it comes first.
+def _verified(
+    arena: Arena, ranked: Sequence[SimulatedExperiment], most: int
+) -> list[SimulatedExperiment]:
+    """The experiments, the best of them judged again by full refits; the best of these is first.
 
-    trials: by falling evidence. most: how many are refitted at most.
+    It stops when a refitted experiment leads. ranked: by falling evidence. most: refitted at most.
     """
-    waiting = list(trials)
-    done: list[Trial] = []
+    waiting = list(ranked)
+    done: list[SimulatedExperiment] = []
     while waiting and len(done) < most:
         done.append(refitted(arena, waiting.pop(0)))
         done.sort(key=lambda t: -t.gain)
@@ -188,12 +193,12 @@ def _dataset(
     holdout: Logs,
     between: Sequence[Rival],
     axis: str | None,
-    window: float | None,
+    test_function: float | None,
 ) -> Dataset:
-    """The dataset of the axis in question; of a simulated log where there are none."""
+    """The dataset of the axis to be explained; of a simulated log where there are no logs."""
     if not logs:
-        return trial_dataset(model, axis or differing_axis(between, model))
-    found = datasets(model, logs, holdout, window)
+        return simulated_dataset(model, axis or differing_axis(between, model))
+    found = datasets(model, logs, holdout, test_function)
     name = axis or differing_axis(between, model)
     if name in found:
         return found[name]

@@ -1,4 +1,4 @@
-"""Draw a machine: a stage with other values than the model's, and an effect the model lacks."""
+"""Draw a machine at random: values other than the model's, and an effect that the model lacks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from twin.model.parameters import free_parameters, read, write
 Array = NDArray[np.float64]
 
 SPREAD = 0.2  # relative spread of a machine's values about the model's
-SHAPE_SPREAD = 0.3  # of the logarithm of shape parameters that nothing scans
+SHAPE_SPREAD = 0.3  # of the logarithm of nonlinear parameters that are not scanned
 TINY = 1e-300
 
 
@@ -56,9 +56,10 @@ def draw_effect(
 ) -> Fitted:
     """Random values of an effect such that it changes the axis' force by ``force`` (N RMS).
 
-    Shape parameters are drawn between the ends of what a diagnosis would scan, or about their start
-    where nothing scans them; strengths in a random direction, scaled along the motion of the logs.
-    beside: a fit to those logs; only what its parameters cannot take over counts then.
+    Nonlinear parameters are drawn from the range that a diagnosis scans, or about their start where
+    they are not scanned. Linear parameters (strengths) get a random direction and are scaled on the
+    motion of the logs. beside: a fit to those logs; then only the part of the force counts that its
+    parameters cannot reproduce.
     """
     values = effect.starts(excitation)
     for p in effect.parameters:
@@ -94,9 +95,9 @@ def strength_for(
     values: Mapping[str, float] | None = None,
     rng: np.random.Generator | None = None,
 ) -> Fitted:
-    """The effect with strengths scaled until ``added`` (the force it adds, N) has that RMS.
+    """The effect with strengths scaled until ``added`` (the force it adds, N) has RMS ``force``.
 
-    values: the other parameters. rng: draws the strengths' directions; all alike where None.
+    values: the other parameters. rng: draws the ratios of the strengths; all are equal where None.
     """
     values = values or effect.starts()
     direction = {p.name: _direction(p.lower, rng) for p in effect.strengths}
@@ -140,13 +141,13 @@ def _scale(size: Callable[[float], float], wanted: float) -> float:
 
 
 def visible_force(fitted: Fitted, base: Fit, dataset: Dataset) -> float:
-    """RMS force (N) of an effect that the parameters of a fit cannot take over."""
+    """RMS force (N) of an effect that the parameters of a fit cannot reproduce."""
     force = _beside(fitted, base, dataset)
     return rms(unabsorbed(force, orthonormal(base.jacobian)))
 
 
 def hidden_part(fitted: Fitted, base: Fit, dataset: Dataset) -> float:
-    """Part of an effect's RMS force that the parameters of a fit take over; of no force, all."""
+    """Part of an effect's RMS force that the parameters of a fit reproduce; 1 where it has none."""
     force = rms(_beside(fitted, base, dataset))
     return 1.0 - visible_force(fitted, base, dataset) / force if force > 0.0 else 1.0
 
@@ -158,7 +159,7 @@ def _beside(fitted: Fitted, base: Fit, dataset: Dataset) -> Array:
 def added_force(
     fitted: Fitted, axis: AxisModel, logs: Sequence[PreparedLog], without: Array
 ) -> Array:
-    """What the effect adds (n,) N to the residual of an axis, or pretends in its readings."""
+    """Force (n,) N that the effect adds to the residual of an axis, apparent force included."""
     if not is_noise(fitted.effect):
         return residual(axis.with_effect(fitted), logs) - without
     alone = replace(axis, effects=(fitted,))

@@ -1,4 +1,4 @@
-"""Explanations of an axis, from effects, models and logs: what a plan decides between."""
+"""The explanations that a plan decides between, made from effects, models and logs."""
 
 from __future__ import annotations
 
@@ -27,30 +27,31 @@ from twin.simulator import ReducedSimulator
 
 Array = NDArray[np.float64]
 
-STRENGTH = 10.0  # times the noise floor: force of an effect of which there are no data
-TRIAL = 10.0  # s of simulated tracking on which such an effect is given that force
+STRENGTH = 10.0  # times the noise floor: assumed force of an effect when there are no logs
+SIMULATED = 10.0  # s of simulated tracking on which such an effect is scaled to that force
 
 Rival = Effect | MachineModel
 
 
-def trial_dataset(stage: MachineModel, axis: str) -> Dataset:
-    """A dataset of simulated random moves of the model itself, where there are no logs."""
+def simulated_dataset(machine: MachineModel, axis: str) -> Dataset:
+    """A dataset of simulated random moves of the model, for use when there are no logs."""
     log: Mapping[str, Log] = {
-        "trial": simulate(stage, Tracking(TRIAL), seed=0, simulator=ReducedSimulator)
+        "simulated": simulate(machine, Tracking(SIMULATED), seed=0, simulator=ReducedSimulator)
     }
-    return datasets(stage, log, {})[axis]
+    return datasets(machine, log, {})[axis]
 
 
 def explained(
-    rivals: Sequence[Rival], stage: MachineModel, dataset: Dataset, fitted: bool
+    rivals: Sequence[Rival], machine: MachineModel, dataset: Dataset, fitted: bool
 ) -> tuple[Explanation, ...]:
     """Each rival as an explanation of the dataset's axis.
 
-    An effect is added to the stage's axis without the others; a model gives its axis. fitted: to
-    refit them on the dataset's logs. Otherwise an effect takes start values, with strengths that
-    give STRENGTH times the noise floor. Raises InputError where a model lacks the axis.
+    For an effect it is the machine's axis with this effect and without the other rivals, for a
+    model its axis. fitted: whether they are refitted on the dataset's logs. Otherwise an effect has
+    start values, and strengths that give STRENGTH times the noise floor. Raises InputError where a
+    model lacks the axis.
     """
-    own = stage.axis(dataset.axis)
+    own = machine.axis(dataset.axis)
     names = {r.name for r in rivals if isinstance(r, Effect)}
     base = replace(own, effects=tuple(f for f in own.effects if f.effect.name not in names))
     fit = fit_thoroughly(base, dataset) if fitted else None
@@ -71,7 +72,10 @@ def explained(
 
 
 def _supposed(effect: Effect, axis: AxisModel, dataset: Dataset) -> AxisModel:
-    """The axis with the effect at start values and a force above the noise; a friction fitted."""
+    """The axis with the effect at start values and a force above the noise floor.
+
+    A friction is fitted to the dataset instead, as it replaces the friction of the axis.
+    """
     if effect.kind is Kind.FRICTION:
         base = fit_axis(axis, dataset.fit)
         return fit_axis(
@@ -87,18 +91,18 @@ def _supposed(effect: Effect, axis: AxisModel, dataset: Dataset) -> AxisModel:
     return axis.with_effect(strength_for(effect, added, STRENGTH * floor, starts))
 
 
-def differing_axis(rivals: Sequence[Rival], stage: MachineModel) -> str:
-    """The first axis on which models among the rivals differ; the stage's first otherwise."""
+def differing_axis(rivals: Sequence[Rival], machine: MachineModel) -> str:
+    """The first axis on which models among the rivals differ; the machine's first otherwise."""
     models = [r for r in rivals if isinstance(r, MachineModel)]
-    for name in stage.axes:
+    for name in machine.axes:
         axes = [m.axis(name) for m in models]
         if any(a.effects != axes[0].effects or a.mass != axes[0].mass for a in axes[1:]):
             return name
-    return next(iter(stage.axes))
+    return next(iter(machine.axes))
 
 
 def require_different(rivals: Sequence[Rival]) -> None:
-    """Raise InputError where two rivals are one."""
+    """Raise InputError where two rivals are the same."""
     names = [r.name for r in rivals]
     if len(set(names)) < len(names):
-        raise InputError(f"{names[0]} against itself: give two different explanations")
+        raise InputError(f"{names[0]} is given twice; give two different explanations")

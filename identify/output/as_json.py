@@ -7,10 +7,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from identify.estimation.intervals import Estimate
-from identify.experiment_design.discrimination import Trial
+from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
 from identify.output.remarks import remarks_on
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+from identify.output.words.estimation import no_interval_in_words, outcome_in_words
+from identify.output.words.experiment_design import gap_in_words, not_run_in_words
+from identify.output.words.selection import verdict_in_words
+from identify.output.words.validation import loop_in_words, region_in_words
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
 from identify.selection.forward_selection import Step
@@ -39,7 +43,7 @@ def fit_json(result: FitResult) -> dict[str, Any]:
     return {
         "axes": {
             axis: {
-                "outcome": fit.axis.units.words(fit.ended.value),
+                "outcome": fit.axis.units.words(outcome_in_words(fit.ended)),
                 "converged": fit.ended.name != "NOT_CONVERGED",
                 "at_bound": list(fit.at_bound),
                 "force_error": fit.error,
@@ -62,7 +66,7 @@ def _estimate(e: Estimate) -> dict[str, Any]:
     interval = None if e.low is None else [e.low, e.high]
     return {
         "value": e.value, "unit": e.unit, "interval_90": interval, "free": e.free,
-        "interval_refused": e.reason,
+        "interval_refused": e.reason and no_interval_in_words(e.reason),
     }  # fmt: skip
 
 
@@ -111,7 +115,7 @@ def _axis_comparison(c: AxisComparison) -> dict[str, Any]:
             }
             for m in c.maps
         },
-        "worst": [r.in_words() for r in c.worst],
+        "worst": [region_in_words(r) for r in c.worst],
         "residual_tests": _residual_tests(c.tests, c.units),
     }  # fmt: skip
 
@@ -120,7 +124,7 @@ def _residual_tests(t: ResidualTests, units: AxisUnits) -> dict[str, Any]:
     return {
         "tested": units.words("force residual"),
         "loop": t.loop.name.lower(),
-        "reason": units.words(t.reason),
+        "reason": units.words(loop_in_words(t.loop)),
         "samples": t.samples,
         "passed": t.passes,
         "histogram": {
@@ -148,23 +152,23 @@ def diagnose_json(result: Diagnosis) -> dict[str, Any]:
 def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
     d = result.axes[axis]
     units = d.base.axis.units
-    structure = d.unexplained
+    dependence = d.unexplained
     following = result.next_experiments.get(axis)
     return {
         "verdict": d.verdict.name.lower(),
-        "explanation": units.words(d.verdict.value),
+        "explanation": units.words(verdict_in_words(d.verdict)),
         "axis": axis,
         "effect": d.best.effect.name if d.best else None,
         "ranking": [_candidate(c) for c in d.ranking],
         "ambiguous_with": list(d.ambiguous_with),
         "missing": list(d.named),
         "steps": [_step(s) for s in d.steps],
-        "unexplained": structure
+        "unexplained": dependence
         and {
-            "share_of_error": structure.share_of_error,
-            "depends_on": structure.depends_on,
-            "period": structure.period,
-            "unit": structure.unit,
+            "share_of_error": dependence.share_of_error,
+            "depends_on": dependence.depends_on,
+            "period": dependence.period,
+            "unit": dependence.unit,
         },
         "force_error": d.base.error,
         "noise_floor": d.base.floor,
@@ -218,15 +222,15 @@ def plan_json(result: Plan) -> dict[str, Any]:
         "decides": result.decides,
         "favoured_by_the_logs": result.favoured,
         "refitted_on_logs": not result.supposed,
-        "missing_motion": result.gap.in_words(),
+        "missing_motion": gap_in_words(result.gap),
         "excited_by": dict(result.excited_by),
-        **_trial(result.chosen, several),
-        "ranking": [_trial(t, several) for t in result.ranking],
-        "not_run": list(result.not_run),
+        **_simulated(result.chosen, several),
+        "ranking": [_simulated(t, several) for t in result.ranking],
+        "not_run": [not_run_in_words(n) for n in result.not_run],
     }
 
 
-def _trial(t: Trial, several: bool) -> dict[str, Any]:
+def _simulated(t: SimulatedExperiment, several: bool) -> dict[str, Any]:
     return {
         "experiment": {"kind": kind_of(t.experiment), **parameters(t.experiment)},
         "duration": t.duration,
@@ -239,7 +243,7 @@ def _trial(t: Trial, several: bool) -> dict[str, Any]:
 
 
 def add_json(result: Addition) -> dict[str, Any]:
-    """Errors before and after, whether the effect earned its place, and what moved."""
+    """Errors before and after, whether the effect is supported, and what it changed."""
     step = result.step
     return {
         "effect": step.effect,

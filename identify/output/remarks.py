@@ -1,12 +1,13 @@
-"""What a reader of a diagnosis should know beside the answer, one sentence each."""
+"""Remarks beside the answer of a diagnosis, one sentence each."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from identify.estimation.channel_delay import shift_in_words
 from identify.estimation.fit import Outcome
+from identify.output.words.estimation import channel_delay_in_words, outcome_in_words
+from identify.output.words.selection import moved_in_words, refit_in_words, repeat_in_words
 from identify.selection.confounded import Refit, moved_parameters
 from identify.selection.forward_selection import AxisDiagnosis
 
@@ -27,36 +28,37 @@ def remarks(
     not_tried: Sequence[str] = (),
     not_planned: str | None = None,
 ) -> tuple[str, ...]:
-    """Shifted channels, fits that did not end well, parameters that moved, what is weak.
+    """Channel delays, fits that did not converge, changed parameters, weak evidence.
 
-    not_tried: effects that depend on the other axis, where there are several. not_planned: why no
-    experiment is proposed that would tell an ambiguous answer apart.
+    not_tried: effects that depend on the other axis, on a machine with more than two axes.
+    not_planned: why no experiment is proposed for an ambiguous answer.
     """
     words = found.base.axis.units.words
     out = []
-    if refit and (changed := refit.in_words()):
+    if refit and (changed := refit_in_words(refit)):
         out.append(changed)
-    if shifted := shift_in_words(found.dataset):
+    if shifted := channel_delay_in_words(found.dataset):
         out.append(shifted)
     if found.base.ended is not Outcome.CONVERGED:
-        out.append(words(found.base.ended.value))
+        out.append(words(outcome_in_words(found.base.ended)))
     if found.best is not None:
         name = found.best.effect.name
         if found.best.fit.ended is not Outcome.CONVERGED:
-            out.append(f"with {name}: {words(found.best.fit.ended.value)}")
-        out += [f"with {name}, {m}" for m in moved_parameters(found.base, found.best.fit)]
+            out.append(f"with {name}: {words(outcome_in_words(found.best.fit.ended))}")
+        moved = moved_parameters(found.base, found.best.fit)
+        out += [f"with {name}, {words(moved_in_words(m))}" for m in moved]
     if found.repeat is not None:
-        out.append(found.repeat.in_words())
+        out.append(repeat_in_words(found.repeat))
     if not found.dataset.holdout:
         out.append(
-            "no log was held out; candidates were judged on blocks left out of the fit, which is "
-            "weaker. Give --holdout a log of another run."
+            "no log was held out, so candidates were judged by cross-validation on blocks of the "
+            "fit logs, which is a weaker test. Give --holdout a log of another experiment."
         )
     if not_planned is not None:
         out.append(f"no experiment that would tell them apart is proposed: {not_planned}")
     if not_tried:
         out.append(
-            f"not tried: {', '.join(not_tried)}, because with more than two axes it is not known "
-            "which is the other axis; a model of two axes alone tries them"
+            f"not tried: {', '.join(not_tried)}, because each depends on the other axis, and with "
+            "more than two axes it is not known which that is; diagnose a model of two axes alone"
         )
     return tuple(out)

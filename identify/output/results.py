@@ -1,4 +1,4 @@
-"""What fit, compare, diagnose and add return; each prints as the command does."""
+"""The results of fit, compare, diagnose and add; ``print`` shows the text of the command."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from identify.estimation.fit import Fit
 from identify.estimation.intervals import Estimate
 from identify.experiment_design.plan import Plan
 from identify.output.text import add_text, compare_text, diagnose_text, fit_text
+from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate
-from identify.selection.confounded import Refit, refit
+from identify.selection.confounded import MovedParameter, Refit, refit
 from identify.selection.forward_selection import AxisDiagnosis, Verdict
 from identify.validation.misfit_maps import AxisComparison
 from twin.effect import Effect
@@ -23,9 +24,10 @@ from twin.model.units import AxisUnits
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FitResult:
-    """A fitted stage: fits and estimates by axis, held-out force errors (RMS) where given.
+    """A fitted machine: by axis the fit, the estimates and the held-out force error (RMS) if any.
 
-    given: the stage before the fit. catalogue: whose absent effects a parameter may stand in for.
+    given: the model before the fit. catalogue: absent effects that a parameter may be confounded
+    with.
     """
 
     model: MachineModel
@@ -38,7 +40,7 @@ class FitResult:
 
     @property
     def left_out(self) -> Mapping[str, tuple[str, ...]]:
-        """By axis, the logs that it was not fitted on, as it stands still in them."""
+        """By axis, the logs in which it stands still, and which were left out of its fit."""
         return {axis: dataset.still for axis, dataset in self.datasets.items()}
 
     @property
@@ -48,7 +50,7 @@ class FitResult:
 
     @cached_property
     def refits(self) -> Mapping[str, Refit]:
-        """What the fit changed of the model given, by axis."""
+        """What the fit changed of the given model, by axis."""
         return {a: refit(self.given.axes[a], f, self.catalogue) for a, f in self.fits.items()}
 
     def __str__(self) -> str:
@@ -60,7 +62,7 @@ class FitResult:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """A stage against logs, by axis."""
+    """The errors of a model on logs, by axis."""
 
     model: MachineModel
     axes: Mapping[str, AxisComparison]
@@ -77,7 +79,7 @@ class Diagnosis:
     """Diagnoses by axis; the answer is that of the axis with the strongest evidence.
 
     next_experiments: for an axis whose diagnosis is ambiguous, the experiment that decides.
-    refits: what fitting the model as given changed, by axis. not_tried: effects of the catalogue
+    refits: what fitting changed of the given model, by axis. not_tried: effects of the catalogue
     that depend on the other axis, on a machine with more than two axes. not_planned: for an
     ambiguous axis without next experiment, why the machine can run none.
     """
@@ -117,11 +119,12 @@ class Diagnosis:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Addition:
-    """A stage with one effect more.
+    """A model with one added effect.
 
-    step: errors before and after. kept: whether the effect earned its place on held-out data.
-    position_error: free-running RMS error before and after. replayed: the same of the new model
-    stepped by MuJoCo. Both in the units of the axis.
+    step: errors before and after. kept: whether evidence and held-out logs support the effect.
+    position_error: free-running RMS error before and after; replayed: the same after, stepped by
+    MuJoCo. Both in the units of the axis. moved: parameters that the effect changed.
+    set_aside: nonparametric effects that were removed from the model before.
     """
 
     model: MachineModel
@@ -130,7 +133,13 @@ class Addition:
     kept: bool
     position_error: tuple[float, float]
     replayed: float
-    notes: tuple[str, ...] = field(default=())
+    moved: tuple[MovedParameter, ...] = ()
+    set_aside: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader should know beside the errors, one sentence each."""
+        return addition_notes(self.candidate, self.moved, self.set_aside)
 
     @property
     def units(self) -> AxisUnits:

@@ -1,4 +1,4 @@
-"""A picture of what an effect leaves in the force when the model lacks it."""
+"""A picture of the force that an effect adds: the fingerprint it leaves when it is missing."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FORMATS = ("png", "svg", "pdf")
 
 
 def exemplary_motion() -> Motion:
-    """Passes over the travel at falling speeds, both ways, with the command that moves 10 kg."""
+    """Passes over the travel in both directions, ever slower, with the command for 10 kg."""
     parts = []
     for half in (1.5, 3.0, 6.0):  # s for one way
         t = np.arange(0.0, 2.0 * half, PERIOD)

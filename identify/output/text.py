@@ -5,28 +5,44 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from identify.estimation.channel_delay import shift_in_words
-from identify.estimation.intervals import Estimate, refusal
-from identify.experiment_design.discrimination import Trial
+from identify.estimation.intervals import Estimate, NoInterval, refusal
+from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
 from identify.experiment_design.rival_hypotheses import STRENGTH
 from identify.output.remarks import remarks_on
+from identify.output.words.estimation import (
+    channel_delay_in_words,
+    no_interval_in_words,
+    outcome_in_words,
+)
+from identify.output.words.experiment_design import gap_in_words, not_run_in_words
+from identify.output.words.selection import (
+    advice,
+    dependence_in_words,
+    nonparametric_in_words,
+    refit_in_words,
+    verdict_in_words,
+)
+from identify.output.words.validation import (
+    correlation_in_words,
+    loop_in_words,
+    region_in_words,
+)
 from identify.selection.candidates import Candidate
 from identify.selection.forward_selection import Step
-from identify.selection.nonparametric import described_labels, in_words
+from identify.selection.nonparametric import nonparametric_labels
 from twin.effect import Effect
-from twin.effects import load_catalogue
 from twin.experiments.file import in_short
 from twin.experiments.kinds import kind_of
 from twin.log.check import CheckReport
-from twin.model.units import ROTARY, units_of
+from twin.model.units import ROTARY
 
 if TYPE_CHECKING:  # results print themselves by these functions
     from identify.output.results import Addition, Comparison, Diagnosis, FitResult
 
 
 def fit_text(result: FitResult) -> str:
-    """Parameters of each axis, one a line."""
+    """The fit of each axis, one parameter a line."""
     lines = []
     for axis, fit in result.fits.items():
         held, unit, words = result.holdout_error[axis], fit.axis.units.force, fit.axis.units.words
@@ -35,36 +51,38 @@ def fit_text(result: FitResult) -> str:
             f"axis {axis}: {words('force error')} {fit.error:.4g} {unit}{tail}, noise floor "
             f"{fit.floor:.4g} {unit} (ratio {fit.ratio:.2f})"
         )
-        lines.append(f"  {words(fit.ended.value)}")
+        lines.append(f"  {words(outcome_in_words(fit.ended))}")
         lines += [f"  at its bound: {label}" for label in fit.at_bound]
-        if shifted := shift_in_words(result.datasets[axis]):
+        if shifted := channel_delay_in_words(result.datasets[axis]):
             lines.append(f"  {shifted}")
         if result.left_out[axis]:
             still = ", ".join(result.left_out[axis])
-            lines.append(f"  left out, as axis {axis} stands still there: {still}")
-        if changed := result.refits[axis].in_words():
+            lines.append(f"  not fitted on {still}, where axis {axis} stands still")
+        if changed := refit_in_words(result.refits[axis]):
             lines.append(f"  {changed}")
-        hidden = described_labels(fit.axis)
+        hidden = nonparametric_labels(fit.axis)
         common = refusal(fit)
         if common is not None:
-            lines.append(f"  {common}")
+            lines.append(f"  {no_interval_in_words(common)}")
         lines += [
             f"  {e.label:34s} {_with_interval(e, common)}"
             for e in result.estimates[axis]
             if e.label not in hidden
         ]
-        lines += [f"  {in_words(f)}" for f in fit.axis.effects if f.effect.is_nonparametric]
+        lines += [
+            f"  {nonparametric_in_words(f)}" for f in fit.axis.effects if f.effect.is_nonparametric
+        ]
     lines += [f"axis {axis}: not fitted, as it moves in no log" for axis in result.not_fitted]
     return "\n".join(lines)
 
 
-def _with_interval(e: Estimate, common: str | None) -> str:
-    """A value with its interval, or why it has none unless that was said for all."""
+def _with_interval(e: Estimate, common: NoInterval | None) -> str:
+    """A value with its interval, or why it has none, unless the reason is common to all."""
     text = f"{e.value:12.6g} {e.unit:10s}"
     if not e.free:
         return text + " fixed"
     if e.low is None:
-        return text if e.reason == common else f"{text} {e.reason}"
+        return text if e.reason in (None, common) else f"{text} {no_interval_in_words(e.reason)}"
     return text + f" 90 % in [{e.low:.6g}, {e.high:.6g}]"
 
 
@@ -79,36 +97,31 @@ def compare_text(result: Comparison) -> str:
                 f"({error / c.floor:.1f} x noise floor), {words('free-running position error')} "
                 f"{c.position_error[name]:.3g} {c.units.position}"
             )
-        lines += [f"  worst: {region.in_words()}" for region in c.worst]
+        lines += [f"  worst: {region_in_words(region)}" for region in c.worst]
         if not c.worst:
-            lines.append("  nowhere does the error stand above the noise")
-        lines += [f"  {words(test.in_words())}" for test in c.tests.correlations]
-    lines += dict.fromkeys(c.units.words(c.tests.reason) for c in result.axes.values())
+            lines.append("  in no region is the error above the noise")
+        lines += [f"  {words(correlation_in_words(test))}" for test in c.tests.correlations]
+    lines += dict.fromkeys(c.units.words(loop_in_words(c.tests.loop)) for c in result.axes.values())
     return "\n".join(lines)
 
 
 def diagnose_text(result: Diagnosis) -> str:
-    """The answer for each axis with the ranking's head."""
+    """The answer for each axis, and its best candidates."""
     lines = []
     for axis, d in result.axes.items():
         unit, words = d.base.axis.units.force, d.base.axis.units.words
         named = f" {d.best.effect.name}." if d.best else ""
-        lines.append(f"axis {axis}: {words(d.verdict.value)}{named}")
+        lines.append(f"axis {axis}: {words(verdict_in_words(d.verdict))}{named}")
         lines.append(
             f"  {words('force error')} {d.base.error:.4g} {unit}, noise floor "
             f"{d.base.floor:.4g} {unit} (ratio {d.base.ratio:.2f})"
         )
         if d.ambiguous_with:
-            lines.append(f"  cannot be told apart from: {', '.join(d.ambiguous_with)}")
+            lines.append(f"  these data cannot separate it from: {', '.join(d.ambiguous_with)}")
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         if d.unexplained:
-            s = d.unexplained
-            again = f", period {s.period:.4g} {s.unit}" if s.period else ""
-            lines.append(
-                f"  {100 * s.share_of_error:.0f} % of the squared error depends on "
-                f"{units_of(s.unit).words(s.depends_on.replace('_', ' '))}{again}"
-            )
+            lines.append(f"  {words(dependence_in_words(d.unexplained))}")
             lines.append(f"  {advice()}")
         lines += [_ranking_line(c) for c in d.ranking[:4]]
         lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
@@ -119,22 +132,15 @@ def diagnose_text(result: Diagnosis) -> str:
 def _step_line(number: int, step: Step) -> str:
     gain = step.candidate.gain
     if step.candidate.is_noise:
-        return f"  step {number}: {step.candidate.effect.name} makes the rest of the error noise"
-    dropped = f"; needless then: {', '.join(step.dropped)}" if step.dropped else ""
+        return (
+            f"  step {number}: {step.candidate.effect.name} explains the remaining error as noise"
+        )
+    dropped = f"; no longer needed: {', '.join(step.dropped)}" if step.dropped else ""
     beside = f" beside {step.beside}" if step.beside else ""
     return (
         f"  step {number}: with {step.candidate.effect.name}{beside} the held-out error falls from "
         f"{gain.before:.4g} to {gain.after:.4g} "
         f"{step.candidate.fit.axis.units.force}{dropped}"
-    )
-
-
-def advice() -> str:
-    """What lowers the error where no physical effect does."""
-    known = [e.name for e in load_catalogue().values() if e.is_nonparametric]
-    return (
-        f"twin add {' or '.join(known)} describes what is left without explaining it, and lowers "
-        "the error"
     )
 
 
@@ -146,62 +152,67 @@ def _ranking_line(c: Candidate) -> str:
     )
 
 
-SHOWN = 4  # trials of a plan that are printed
+SHOWN = 4  # experiments of a plan that are printed
 
 
 def plan_text(result: Plan) -> str:
-    """What is decided, the chosen experiment and what it shows, and the next best."""
+    """The question, the chosen experiment and what it is expected to show, and the next best."""
     several = len(result.between) > 1
-    asked, verdict = " or ".join(result.between), "decided by"
+    what, verdict = " or ".join(result.between), "decided by"
     if not several:
-        asked, verdict = f"the parameters of {asked}", "best shown by"
+        what, verdict = f"the parameters of {what}", "best constrained by"
     elif not result.decides:
         verdict = "not decided by any experiment of this length; the nearest is"
     lines = [
-        f"axis {result.axis}: {asked}, {verdict}",
+        f"axis {result.axis}: {what}, {verdict}",
         f"  {in_short(result.chosen.experiment, result.chosen.units)}",
     ]
-    lines += [f"  {result.gap.in_words()}"]
-    lines += [f"  {name} shows in {motion}" for name, motion in result.excited_by.items()]
+    lines += [f"  {gap_in_words(result.gap)}"]
+    lines += [f"  {name} is excited by {motion}" for name, motion in result.excited_by.items()]
     if result.favoured:
-        lines.append(f"  the logs at hand favour {result.favoured} already")
+        lines.append(f"  the existing logs already favour {result.favoured}")
     if result.supposed and several:
-        lines.append(f"  without logs: effects at start values, {STRENGTH:g} times the noise floor")
-    lines += [_trial_line(t, several) for t in result.ranking[:SHOWN]]
-    return "\n".join([*lines, *(f"  not run: {why}" for why in result.not_run)])
+        lines.append(
+            f"  no logs given: each effect is assumed at {STRENGTH:g} times the noise floor"
+        )
+    lines += [_experiment_line(t, several) for t in result.ranking[:SHOWN]]
+    return "\n".join([*lines, *(f"  not run: {not_run_in_words(n)}" for n in result.not_run)])
 
 
-def _trial_line(t: Trial, several: bool) -> str:
+def _experiment_line(t: SimulatedExperiment, several: bool) -> str:
     tail = f"{t.gain:8.1f} nats on the parameters"
     if several:
         tail = (
-            f"{t.difference:.3g} {t.units.force} left to the rival "
+            f"{t.difference:.3g} {t.units.force} unexplained by the rival "
             f"({t.difference / t.floor:.1f} x noise floor), evidence {t.gain:.1f}"
         )
     return f"  {kind_of(t.experiment):10s} {t.duration:5.1f} s   {tail}"
 
 
 def add_text(result: Addition) -> str:
-    """What adding the effect did."""
+    """The errors before and after adding the effect."""
     s, words = result.step, result.units.words
     lines = [
         f"added {s.effect} to axis {s.axis}",
-        f"  {words('force error on the fit logs'):29s} {s.fit_error_before:.4g} -> "
+        f"  {words('force error on the fit logs'):33s} {s.fit_error_before:.4g} -> "
         f"{s.fit_error_after:.4g} {s.unit}",
     ]
     if s.holdout_error_before is not None and s.holdout_error_after is not None:
         lines.append(
-            f"  {words('force error held out'):29s} {s.holdout_error_before:.4g} -> "
+            f"  {words('force error on the held-out logs'):33s} {s.holdout_error_before:.4g} -> "
             f"{s.holdout_error_after:.4g} {s.unit}"
         )
     (before, after), unit = result.position_error, result.units.position
     lines.append(
-        f"  {words('free-running position error'):29s} {before:.3g} -> {after:.3g} {unit} "
+        f"  {words('free-running position error'):33s} {before:.3g} -> {after:.3g} {unit} "
         f"(MuJoCo: {result.replayed:.3g} {unit})"
     )
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
-        lines.append("  the data do not support this effect: it does not help held out")
+        lines.append(
+            "  the data do not support this effect: evidence and held-out error do not both favour "
+            "it"
+        )
     return "\n".join(lines)
 
 
@@ -238,5 +249,5 @@ def check_text(reports: Mapping[str, CheckReport]) -> str:
     for name, report in reports.items():
         lines += [f"{name}: {f.severity.value}: {f}" for f in report.findings]
         if not report.findings:
-            lines.append(f"{name}: fit for identification")
+            lines.append(f"{name}: suitable for identification")
     return "\n".join(lines)

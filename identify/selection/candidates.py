@@ -1,4 +1,4 @@
-"""One catalogue effect as the explanation: search its shape, refit the model with it, score it."""
+"""One effect as a candidate: scan its shape, refit the model with it, score it against the base."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 
 Array = NDArray[np.float64]
 
-HEAD_EVALUATIONS = 12  # of a friction on the heads, twice
-RIDGE = 1e-4  # keeps the estimate of left-out blocks finite along directions nobody sees
+HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
+RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion does not excite
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,7 +57,7 @@ class Candidate:
 
     @property
     def supported(self) -> bool:
-        """Whether both the evidence and the held-out logs ask for the effect."""
+        """Whether both the evidence and the held-out logs support the effect."""
         return (
             self.delta_bic > RULE.least_bic and self.gain.t > RULE.least_t
             and (self.is_noise or self.gain.after < self.gain.before)
@@ -65,12 +65,12 @@ class Candidate:
 
     @property
     def is_noise(self) -> bool:
-        """Whether the effect lowers no error and says how large it must be."""
+        """Whether the effect lowers no error but raises the noise floor."""
         return is_noise(self.effect)
 
 
 def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
-    """Effects that could be added to the axis; another friction would take the old one's place."""
+    """Effects that could be added to the axis; another friction replaces the present one."""
     has_friction = any(f.effect.kind is Kind.FRICTION for f in axis.effects)
     return [
         e
@@ -89,8 +89,8 @@ def usable(catalogue: Catalogue, model: MachineModel) -> Catalogue:
 def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     """Refit the model together with the effect and score it against the base.
 
-    Where a first look (one linear step beside the base; a fit of the logs' heads for a friction)
-    is far from any evidence, that is scored and no refit made.
+    Where a cheap first estimate (one linear step beside the base; for a friction a fit to the heads
+    of the logs) is far from any evidence, the estimate is scored and no refit is made.
     """
     best, *others = starts(base, dataset, effect)
     if is_noise(effect):
@@ -106,7 +106,8 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     first = score(base, fit, dataset, effect)
     if first.fit.at_floor or first.delta_bic < RULE.least_bic:
         return first
-    # It helps but leaves structure: what is missing distorts the base, so begin where that did too.
+    # It helps but does not explain everything. The effect was missing when the base was fitted,
+    # which distorts its values, so the fit also starts from where the base started.
     fits = [first.fit, fit_axis(base.begun.with_effect(best.fitted), dataset.fit)]
     fits += [fit_axis(base.axis.with_effect(other.fitted), dataset.fit) for other in others]
     best_fit = min(fits, key=lambda f: f.error)
@@ -116,7 +117,7 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
 
 
 def _promising(base: Fit, start: Start) -> bool:
-    """Whether a refit could make evidence of what the linear step gains."""
+    """Whether the gain of the linear step is large enough that a refit may give evidence."""
     samples = effective_samples(base.residual)
     before = float(np.sum(base.residual**2))
     if before == 0.0:
@@ -127,7 +128,7 @@ def _promising(base: Fit, start: Start) -> bool:
 
 
 def _one_linear_step(base: Fit, dataset: Dataset, fitted: Fitted) -> Fit:
-    """The linear step as a fit, or the effect without strength where the step does harm."""
+    """The linear step as a fit; with zero strengths where the step raises the error."""
     fit = finished(
         stepped(base, fitted, dataset.fit), base.begun, dataset.fit, Outcome.NOT_CONVERGED
     )
@@ -140,7 +141,7 @@ def _one_linear_step(base: Fit, dataset: Dataset, fitted: Fitted) -> Fit:
 
 
 def _fitted_to_heads(base: Fit, dataset: Dataset, fitted: Fitted) -> Fit | None:
-    """Another friction fitted to the heads, where that shows it to be no better; else None."""
+    """Another friction fitted to the heads, if it is no better there than the present one."""
     if sum(map(len, dataset.heads)) > 0.5 * sum(map(len, dataset.fit)):
         return None
     old = _on_heads(base, dataset)
@@ -159,7 +160,7 @@ def _on_heads(base: Fit, dataset: Dataset) -> Fit:
 
 
 def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
-    """The fit with the effect in its simplest values, where that explains as much."""
+    """The fit with the simplest values of the effect, where they explain as much."""
     if effect.simplest is None:
         return fit
     fitted = fit.axis[effect.name]
@@ -171,13 +172,13 @@ def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
 
 
 def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
-    """Evidence for a fitted larger model over the base, on the windows that both can use."""
+    """Evidence for a fitted larger model over the base, on the test functions both can use."""
     if is_noise(effect):
         return _score_noise(base, fit, dataset, effect)
     shared = base.kept & fit.kept
 
     def both(left: Callable[[Fit], Array]) -> list[Array]:
-        # What makes the motor weak makes all forces small, and the error with them.
+        # An effect that makes the motor's force small makes every force and error small with it.
         return [left(f) / f.lessened for f in (base, fit)]
 
     before, after = both(lambda f: f.residual[shared[f.kept]])
@@ -186,14 +187,14 @@ def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     proof = evidence(before, after, added)
     if dataset.holdout:
         held = moving(dataset.holdout, sticks(base.axis) or sticks(fit.axis))
-        motions = [log.motion for log in dataset.holdout]  # a motor may be weak on those alone
+        motions = [log.motion for log in dataset.holdout]  # it may differ from the fit logs
         pair = [
             residual(f.axis, dataset.holdout)[held] / forces_lessened(f.axis, motions)
             for f in (base, fit)
         ]
     elif proof.delta_bic > RULE.least_bic:
         pair = both(lambda f: _cross_validated(f, shared[f.kept]))
-    else:  # not supported, whatever blocks left out would say
+    else:  # not supported, whatever cross-validation would give
         pair = [before, after]
     return Candidate(
         effect=effect,
@@ -205,19 +206,19 @@ def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
 
 
 def _score_noise(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
-    """Evidence for a noise that the effect makes, where with it the error is noise."""
+    """Evidence for an effect that is noise: it counts where the error is noise with it."""
     logs = dataset.holdout or dataset.fit
-    seen = error_on(fit.axis, logs)
+    error = error_on(fit.axis, logs)
     floors = [floor_of(f.axis, logs) for f in (base, fit)]
-    told = fit.at_floor and not base.at_floor and rms(seen) < RULE.at_floor * floors[1]
-    gain = noise_gain(fit.residual, base.floor, fit.floor) if told else 0.0
-    unseen = effective_samples(seen) * noise_gain(seen, *floors) if told else 0.0
+    explained = fit.at_floor and not base.at_floor and rms(error) < RULE.at_floor * floors[1]
+    gain = noise_gain(fit.residual, base.floor, fit.floor) if explained else 0.0
+    logs_gain = effective_samples(error) * noise_gain(error, *floors) if explained else 0.0
     return Candidate(
         effect=effect,
         axis=dataset.axis,
         fit=fit,
         evidence=Evidence(gain, 1, effective_samples(fit.residual)),
-        gain=Gain(rms(seen), rms(seen), float(np.sqrt(max(unseen, 0.0)))),
+        gain=Gain(rms(error), rms(error), float(np.sqrt(max(logs_gain, 0.0)))),
     )
 
 
@@ -227,10 +228,9 @@ def _cross_validated(fit: Fit, rows: NDArray[np.bool_]) -> Array:
 
 
 def on_equal_samples(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates with no more effective samples than the one that explains most.
+    """The candidates with at most the effective sample size of the one that explains most.
 
-    Each one's residual has a colour of its own; evidence on different numbers of samples would not
-    compare.
+    Each residual has its own colour, and evidence on different sample sizes is not comparable.
     """
     if not candidates:
         return []

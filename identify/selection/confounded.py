@@ -1,7 +1,7 @@
-"""What refitting changed: where a model as given disagrees with a machine by its values alone.
+"""Confounded parameters: values that a fit changed, and what may have caused the change.
 
-A fit takes over what its parameters can, so an effect that is one of them by another name (a tilt
-and the cable's constant, a payload and the mass) never shows as missing. It shows here.
+An effect whose force equals that of a parameter (a tilt and the constant of the cable, a payload
+and the mass) is absorbed by the fit and never found missing. It shows as a changed value here.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel, Fitted
 from twin.model.parameters import ParameterReference, read, write
-from twin.model.units import LINEAR, units_of
+from twin.model.units import LINEAR
 
 Array = NDArray[np.float64]
 
-LEAST_FORCE = 0.1  # of the error as given, that a parameter's change must make to be told
-SAME_FORCE = 0.01  # of a parameter's force at most, that an effect leaves which is it by other name
-MOST_TOLD = 3
+LEAST_FORCE = 0.1  # of the error before the fit: least force of a change that is reported
+SAME_FORCE = 0.01  # largest part of that force outside the span of an effect with the same force
+MOST_CHANGES = 3  # that are reported
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Change:
     """A parameter that a fit moved by more than its interval.
 
     before, after: in ``unit``. force: RMS force that the change makes, in ``force_unit``. alike:
-    absent effects that are the same force.
+    absent effects that can produce the same force.
     """
 
     label: str
@@ -46,42 +46,25 @@ class Change:
     alike: tuple[str, ...] = ()
     force_unit: str = LINEAR.force
 
-    def in_words(self) -> str:
-        """E.g. "mass 15 -> 15.6 kg makes 0.57 N (payload_mass would be the same force)"."""
-        force = units_of(self.force_unit).words("force")
-        same = f" ({' and '.join(self.alike)} would be the same {force})" if self.alike else ""
-        values = f"{self.before:.4g} -> {self.after:.4g} {self.unit}"
-        return f"{self.label} {values} makes {self.force:.3g} {self.force_unit}{same}"
-
 
 @dataclass(frozen=True)
 class Refit:
-    """The RMS force errors of an axis as given and refitted, in ``unit``, and what told most."""
+    """RMS force errors of an axis before and after a fit, in ``unit``, and the main changes."""
 
     given: float
     refitted: float
     changes: tuple[Change, ...]
     unit: str = LINEAR.force
 
-    def in_words(self) -> str | None:
-        """A sentence, or None where the values given were good."""
-        if not self.changes:
-            return None
-        told = ", ".join(c.in_words() for c in self.changes)
-        return (
-            f"as given the model misses by {self.given:.3g} {self.unit}, refitted by "
-            f"{self.refitted:.3g} {self.unit}: {told}"
-        )
-
 
 def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
-    """What a fit changed of the model given, where that stood above the noise floor."""
+    """What a fit changed of the given model; nothing where its error was at the noise floor."""
     error, units = rms(residual(given, fit.logs)[fit.kept]), fit.axis.units
     if not error > RULE.at_floor * max(fit.floor, fit.error):
         return Refit(error, fit.error, (), units.force)
     where = fit.scaling.where
     values = zip(where, read(given, where), read(fit.axis, where), half_widths(fit), strict=True)
-    told: list[tuple[Change, Array]] = []
+    found: list[tuple[Change, Array]] = []
     for c, before, after, half in values:
         if abs(after - before) > half:
             back = residual(write(fit.axis, [c], [before]), fit.logs)[fit.kept] - fit.residual
@@ -89,19 +72,19 @@ def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
                 c.label, float(before), float(after), units(c.parameter.unit), rms(back),
                 force_unit=units.force,
             )  # fmt: skip
-            told.append((change, back))
-    told = [t for t in told if t[0].force > LEAST_FORCE * error]
-    told = sorted(told, key=lambda t: -t[0].force)[:MOST_TOLD]
-    bases = _bases(fit, catalogue) if told else {}
+            found.append((change, back))
+    found = [t for t in found if t[0].force > LEAST_FORCE * error]
+    found = sorted(found, key=lambda t: -t[0].force)[:MOST_CHANGES]
+    bases = _bases(fit, catalogue) if found else {}
     changes = tuple(
         replace(change, alike=tuple(name for name, basis in bases.items() if _within(back, basis)))
-        for change, back in told
+        for change, back in found
     )
     return Refit(error, fit.error, changes, units.force)
 
 
 def _bases(fit: Fit, catalogue: Catalogue) -> dict[str, Array]:
-    """Orthonormal basis (n, k) of what each absent effect without a shape can be, by name."""
+    """Orthonormal basis (n, k) of the force of each absent effect that is linear, by name."""
     out = {}
     for effect in absent_effects(fit.axis, catalogue):
         if effect.kind is Kind.FRICTION or len(effect.strengths) < len(effect.parameters):
@@ -116,8 +99,23 @@ def _within(force: Array, basis: Array) -> bool:
     return rms(unabsorbed(force, basis)) < SAME_FORCE * rms(force)
 
 
-def moved_parameters(before: Fit, after: Fit) -> tuple[str, ...]:
-    """Sentences on parameters that moved by more than their interval when the effect came."""
+@dataclass(frozen=True)
+class MovedParameter:
+    """A parameter that an added effect changed by more than its interval.
+
+    before, after: in ``unit``. collapsed: whether hardly any of a linear parameter is left, so that
+    it had taken over the force of the effect that was missing.
+    """
+
+    label: str
+    before: float
+    after: float
+    unit: str
+    collapsed: bool
+
+
+def moved_parameters(before: Fit, after: Fit) -> tuple[MovedParameter, ...]:
+    """The parameters of the smaller model that changed when the effect was added."""
     shared = [c for c in before.scaling.where if c in after.scaling.where]
     old, new = read(before.axis, shared), read(after.axis, shared)
     index = [after.scaling.where.index(c) for c in shared]
@@ -127,13 +125,11 @@ def moved_parameters(before: Fit, after: Fit) -> tuple[str, ...]:
     out = []
     for c, a, b, limit, first in zip(shared, old, new, allowed, earlier, strict=True):
         p = c.parameter
-        # Its own new interval does not matter here: what stood in for the effect may be collinear.
+        # Its new interval does not matter here: a confounded parameter may be collinear with the
+        # effect.
         collapsed = p.strength and abs(b) < RULE.collapse * abs(a) and abs(a) > first
         if not collapsed and not abs(b - a) > limit:
             continue
-        verb = "collapsed" if collapsed else "moved"
-        tail = (
-            "it stood in for the effect that was missing" if collapsed else "more than its interval"
-        )
-        out.append(f"{c.label} {verb} from {a:.4g} to {b:.4g} {after.axis.units(p.unit)}: {tail}")
+        unit = after.axis.units(p.unit)
+        out.append(MovedParameter(c.label, float(a), float(b), unit, bool(collapsed)))
     return tuple(out)

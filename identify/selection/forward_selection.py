@@ -1,4 +1,4 @@
-"""Which physical effect is missing: every absent effect is added in turn, refitted and judged."""
+"""Forward selection with backward elimination: which physical effects a model lacks."""
 
 from __future__ import annotations
 
@@ -23,22 +23,20 @@ from twin.effects import Catalogue
 
 
 class Verdict(Enum):
-    """The answer of a diagnosis, as a sentence."""
+    """The answer of a diagnosis."""
 
-    MISSING_EFFECT = "One effect explains what the model lacks, on the fit logs and held out."
-    NOTHING_MISSING = "Nothing is missing: the force error is at its noise floor."
-    AMBIGUOUS = "Several effects explain the error equally well; this data cannot tell them apart."
-    UNEXPLAINED = (
-        "The error stands above the noise floor, and no effect of the catalogue explains it."
-    )
+    MISSING_EFFECT = "missing effect"
+    NOTHING_MISSING = "nothing missing"
+    AMBIGUOUS = "ambiguous"
+    UNEXPLAINED = "unexplained"
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One effect that was added in turn, and the earlier ones it made needless.
+    """One added effect, and the earlier ones that are not needed any more beside it.
 
-    tied: effects that explain as well. beside: the effect without which it has no evidence.
-    rivals: candidates that explained about as much when it was added.
+    tied: effects that explain as much. beside: for a pair, the other effect, without which this one
+    has no evidence. rivals: candidates that explained about as much when it was added.
     """
 
     candidate: Candidate
@@ -49,8 +47,8 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
-    """All steps up to some moment, and the fit that they led to."""
+class SelectionState:
+    """The steps so far, and the fit with the effects that they added."""
 
     steps: tuple[Step, ...]
     fit: Fit
@@ -61,8 +59,8 @@ class AxisDiagnosis:
     """Diagnosis of one axis.
 
     base: the fitted model. ranking: candidates beside it, by falling evidence. steps: the effects
-    added in turn until evidence stopped. final: the fit with all that were kept. unexplained: what
-    the residual depends on where structure is left.
+    added one after another while there was evidence. final: the fit with those that were kept.
+    unexplained: what the residual depends on, where it is not noise.
     """
 
     dataset: Dataset
@@ -74,8 +72,8 @@ class AxisDiagnosis:
     unexplained: Dependence | None
 
     def __repr__(self) -> str:
-        told = f"{self.verdict.name.lower()} {list(self.answers)}"
-        return f"<AxisDiagnosis of {self.dataset.axis}: {told}>"
+        answer = f"{self.verdict.name.lower()} {list(self.answers)}"
+        return f"<AxisDiagnosis of {self.dataset.axis}: {answer}>"
 
     @cached_property
     def repeat(self) -> Repeat | None:
@@ -89,7 +87,7 @@ class AxisDiagnosis:
 
     @property
     def answers(self) -> tuple[tuple[str, ...], ...]:
-        """Each effect that is missing, and after it those that explain as well."""
+        """Each missing effect, followed by those that explain as much."""
         if self.verdict not in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS):
             return ()
         return tuple((s.candidate.effect.name, *s.tied) for s in _kept(self.steps))
@@ -101,7 +99,7 @@ class AxisDiagnosis:
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
-        """Effects that explain as well as the one named first."""
+        """Effects that explain as much as the one named first."""
         return _kept(self.steps)[0].tied if self.named else ()
 
 
@@ -118,21 +116,21 @@ def diagnose_axis(
     workers: int | None = None,
     shifts: int = RULE.most_shifts,
 ) -> AxisDiagnosis:
-    """Add effects to one fitted axis for as long as evidence asks for them, and decide.
+    """Add effects to one fitted axis while evidence supports them, and decide on the verdict.
 
-    workers: threads; one a core where None. shifts: how often the force channel may still be moved
-    and all begun anew, where an effect that was found shows when the force acted.
+    workers: threads; one a core where None. shifts: how often the diagnosis may still start again
+    because an added effect changes the channel delay.
     """
     ranked = partial(rank, catalogue=catalogue, progress=progress, workers=workers)
     base, ranking = ranked(base, dataset)
     steps: list[Step] = []
-    stages = [Stage((), base)]
+    states = [SelectionState((), base)]
     final, found = base, ranking
     while len(steps) < RULE.most_steps and (more := _next(final, dataset, found, ranked)):
         earlier = [s.candidate for s in _kept(steps)]
         final, dropped = _eliminated_backwards(base, more[-1].candidate.fit, dataset, earlier)
         steps += [*more[:-1], replace(more[-1], dropped=dropped)]
-        stages.append(Stage(tuple(steps), final))
+        states.append(SelectionState(tuple(steps), final))
         if final.at_floor and RULE.floor_sure[0] < final.ratio < RULE.floor_sure[1]:
             break
         if shifts and (moved := moved_by(final, dataset)):
@@ -140,8 +138,8 @@ def diagnose_axis(
             return diagnose_axis(again, moved, catalogue, progress, workers, shifts - 1)
         dataset, final = synchronised(final, dataset)
         final, found = ranked(final, dataset)
-        stages[-1] = replace(stages[-1], fit=final)
-    return _decided(dataset, ranking, stages)
+        states[-1] = replace(states[-1], fit=final)
+    return _decided(dataset, ranking, states)
 
 
 def _next(
@@ -150,8 +148,8 @@ def _next(
     ranking: Sequence[Candidate],
     ranked: Callable[[Fit, Dataset], tuple[Fit, tuple[Candidate, ...]]],
 ) -> list[Step]:
-    """What is to be added: the best effect, two that need each other, or nothing."""
-    if ranking and _asked_for(ranking[0], base):
+    """The next steps: the best effect, a pair that is needed together, or none."""
+    if ranking and _is_added(ranking[0], base):
         best = ranking[0]
         near = tuple(c for c in ranking[1:] if c.supported and _near(best, c))
         tied = tuple(c.effect.name for c in near if tie(dataset, best, c))
@@ -171,18 +169,19 @@ def _next(
     ]
 
 
-def _asked_for(best: Candidate, base: Fit) -> bool:
-    """Whether the best candidate is to be added; at the noise floor only by much evidence.
+def _is_added(best: Candidate, base: Fit) -> bool:
+    """Whether the best candidate is added; at the noise floor it needs far more evidence.
 
-    The floor is an estimate, so an error at it may still hold an effect that shows beyond doubt.
+    The noise floor is an estimate, so an effect may be significant although the error is at it.
     """
     return best.supported and (not base.at_floor or best.delta_bic > RULE.beyond_doubt)
 
 
 def _friction_instead(base: Fit, best: Candidate, ranking: Sequence[Candidate]) -> tuple[str, ...]:
-    """A friction that explains nearly all as well, where the best took over the dry friction.
+    """A friction that also explains nearly all, if the best candidate removes the dry friction.
 
-    No machine is without; a hysteresis that leaves none may as well be friction with a memory.
+    A machine always has dry friction. If adding a hysteresis removes all of it, the hysteresis is
+    probably friction with memory, so both are reported.
     """
     if not took_friction(base.axis, best.fit.axis):
         return ()
@@ -195,12 +194,12 @@ def _near(best: Candidate, other: Candidate) -> bool:
     return other.evidence.log_gain > RULE.near * best.evidence.log_gain and not other.is_noise
 
 
-def _compared_again(stages: Sequence[Stage], dataset: Dataset) -> tuple[Step, ...]:
-    """The steps with those tied that explain as well beside all the effects that were added.
+def _compared_again(states: Sequence[SelectionState], dataset: Dataset) -> tuple[Step, ...]:
+    """The steps, with ties decided beside all effects that were added.
 
-    When a first effect was compared, what the others explain was still in the way.
+    When an early effect was compared with its rivals, the later effects were still missing.
     """
-    base, (steps, final) = stages[0].fit, (stages[-1].steps, stages[-1].fit)
+    base, (steps, final) = states[0].fit, (states[-1].steps, states[-1].fit)
     kept = _kept(steps)
     if len(kept) < 2:
         return steps
@@ -211,20 +210,20 @@ def _compared_again(stages: Sequence[Stage], dataset: Dataset) -> tuple[Step, ..
         fit = fit_axis(axis.with_effect(rival.fit.axis[rival.effect.name]), dataset.fit)
         return tie(dataset, own, score(base, fit, dataset, rival.effect))
 
-    def told(step: Step) -> Step:
+    def compared(step: Step) -> Step:
         rivals = [r for r in step.rivals if r.effect.name not in named]
         if not rivals:
             return replace(step, tied=())
         own = score(base, final, dataset, step.candidate.effect)
         return replace(step, tied=tuple(r.effect.name for r in rivals if level(own, r)))
 
-    return tuple(told(s) if s in kept and s.beside is None else s for s in steps)
+    return tuple(compared(s) if s in kept and s.beside is None else s for s in steps)
 
 
 def _eliminated_backwards(
     base: Fit, fit: Fit, dataset: Dataset, earlier: Sequence[Candidate]
 ) -> tuple[Fit, tuple[str, ...]]:
-    """The fit less the earlier effects that it does not need any more, and their names."""
+    """The fit without the earlier effects that are not needed any more, and their names."""
     dropped = []
     for candidate in earlier:
         if candidate.effect.name not in fit.axis.names:  # a friction that another one replaced
@@ -233,7 +232,7 @@ def _eliminated_backwards(
         without = less(candidate.effect, fit, base, dataset)
         needed = score(without, fit, dataset, candidate.effect).supported
         if needed:
-            # The later effects' shapes were found beside it, and may have to be found anew.
+            # The shapes of later effects were found beside this one; they may differ without it.
             without = fit_thoroughly(without.axis, dataset)
             needed = score(without, fit, dataset, candidate.effect).supported
         if not needed:
@@ -243,30 +242,30 @@ def _eliminated_backwards(
 
 
 def _decided(
-    dataset: Dataset, ranking: tuple[Candidate, ...], stages: Sequence[Stage]
+    dataset: Dataset, ranking: tuple[Candidate, ...], states: Sequence[SelectionState]
 ) -> AxisDiagnosis:
-    """The verdict on what was added, as far as each stage explained what was left before it."""
-    base = stages[0].fit
-    told = list(stages)
-    while len(told) > 1 and not _convincing(told[-2], told[-1], dataset):
-        told.pop()
-    steps, final = _compared_again(told, dataset), told[-1].fit
-    if len(told) > 1 and _convincing(stages[0], told[-1], dataset):
+    """The verdict on the added effects, up to the last one that explained enough."""
+    base = states[0].fit
+    explained = list(states)
+    while len(explained) > 1 and not _convincing(explained[-2], explained[-1], dataset):
+        explained.pop()
+    steps, final = _compared_again(explained, dataset), explained[-1].fit
+    if len(explained) > 1 and _convincing(states[0], explained[-1], dataset):
         verdict = Verdict.AMBIGUOUS if _kept(steps)[0].tied else Verdict.MISSING_EFFECT
         done = final.at_floor or held_at_floor(final, dataset)
-        structure = None if done else find_dependence(final, dataset)
-    elif len(stages) == 1 and base.at_floor:
-        verdict, structure = Verdict.NOTHING_MISSING, None
+        dependence = None if done else find_dependence(final, dataset)
+    elif len(states) == 1 and base.at_floor:
+        verdict, dependence = Verdict.NOTHING_MISSING, None
     else:
-        steps, final = stages[-1].steps, stages[-1].fit
-        verdict, structure = Verdict.UNEXPLAINED, find_dependence(base, dataset)
-    return AxisDiagnosis(dataset, base, ranking, steps, final, verdict, structure)
+        steps, final = states[-1].steps, states[-1].fit
+        verdict, dependence = Verdict.UNEXPLAINED, find_dependence(base, dataset)
+    return AxisDiagnosis(dataset, base, ranking, steps, final, verdict, dependence)
 
 
-def _convincing(before: Stage, after: Stage, dataset: Dataset) -> bool:
-    """Whether effects bring the error to the floor, or explain nearly all or the foremost of it.
+def _convincing(before: SelectionState, after: SelectionState, dataset: Dataset) -> bool:
+    """Whether effects reach the noise floor, explain nearly all, or remove the foremost dependence.
 
-    What stands in for another effect leaves behind what the residual depended on most.
+    A wrong effect that imitates the missing one does not remove the foremost dependence.
     """
     added = after.steps[len(before.steps) :]
     return (
@@ -278,12 +277,12 @@ def _convincing(before: Stage, after: Stage, dataset: Dataset) -> bool:
 
 
 def _part(base: Fit, final: Fit) -> float:
-    """Part of the squared error above the floor that is explained."""
+    """Part of the squared error above the noise floor that is explained."""
     was, left = base.error**2 - base.floor**2, final.error**2 - final.floor**2
     return 1.0 - left / was if was > 0.0 else 0.0
 
 
 def _gone(base: Fit, final: Fit, steps: Sequence[Step], dataset: Dataset) -> bool:
-    """Whether effects with much evidence took away what the residual depended on most."""
+    """Whether effects with much evidence removed the dependence of the residual."""
     proven = all(s.candidate.delta_bic > RULE.partial_bic for s in steps[:1])
     return proven and _part(base, final) > RULE.least_part and explains(base, final, dataset)

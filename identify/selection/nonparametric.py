@@ -1,9 +1,10 @@
-"""A description of what no physical effect explains: smoothed, judged, and fitted with the rest.
+"""Nonparametric effects: smooth curves fitted to a force that no physical effect explains.
 
-A description (an Effect with ``parts``) is linear in its strengths. Beside the physics of a fitted
-base, linearised, every part is given the smoothing whose error on left-out blocks is least, or left
-out. Then the whole model is refitted: physics unsmoothed and pulled to where it was, so that what
-both could explain stays with the physics. It is kept where evidence and held-out logs ask for it.
+A nonparametric effect (an Effect with ``parts``) is linear in its strengths. Beside the linearised
+physics of a fitted base, each part gets the smoothing with the least cross-validated error, or is
+left out. Then the whole model is refitted. The physical effects have a prior at their values in the
+base, so that a force that both could explain stays with them. The nonparametric effect is kept if
+evidence and held-out logs support it.
 """
 
 from __future__ import annotations
@@ -32,19 +33,19 @@ from twin.model.parameters import ParameterReference
 Array = NDArray[np.float64]
 
 STIFFNESS = 10.0 ** np.arange(1.0, -5.1, -0.5)  # tried for each part
-WORTH = 0.99  # part of the squared left-out error that a further part must leave at most
-ROUNDS = 3  # of choosing the smoothing anew, at most
-BETTER = 0.95  # part of the error that another round must leave at most
+WORTH = 0.99  # a further part must lower the squared cross-validated error below this part
+ROUNDS = 3  # of choosing the smoothing again, at most
+BETTER = 0.95  # another round must lower the error below this part
 ROUNDING = 1e-12  # of a unit diagonal, keeps a system solvable
 RIDGE = 1e-4  # on the physics, in units of their columns
 
 
 @dataclass(frozen=True, eq=False)
 class _Linear:
-    """The residual about a base: force (n,) N, columns (n, k) of physics, then of the description.
+    """The residual linearised about a base: force (n,) N, columns (n, k) of physics, then of parts.
 
-    physics (k, k): the penalty that the base has already. parts: penalty (k, k) of each part at
-    unit stiffness, and its columns.
+    physics (k, k): penalty of the base. parts: penalty (k, k) of each part at unit stiffness, and
+    which columns belong to it.
     """
 
     where: Sequence[ParameterReference]
@@ -69,7 +70,7 @@ class _Linear:
         )  # fmt: skip
 
     def _chosen(self, stiffness: Mapping[str, float]) -> tuple[NDArray[np.bool_], Array]:
-        """Which columns take part, and the penalty (k, k), at the stiffness of some parts."""
+        """Which columns are used, and the penalty (k, k), with these parts and their stiffness."""
         used = ~np.any([mask for _, mask in self.parts.values()], axis=0)
         penalty = self.physics.copy()
         for name, value in stiffness.items():
@@ -80,7 +81,7 @@ class _Linear:
 
     @cached_property
     def blocks(self) -> tuple[list[slice], Array, Array]:
-        """Samples of each block, products of its columns (b, k, k) and with its force (b, k)."""
+        """Samples of each block, its Gram matrix (b, k, k), and columns times force (b, k)."""
         edges = np.linspace(0, len(self.force), BLOCKS + 1).astype(int)
         spans = [slice(a, b) for a, b in pairwise(edges)]
         columns = [self.columns[span] for span in spans]
@@ -96,7 +97,7 @@ class _Linear:
         return used, _solve(rest, (pulls.sum(axis=0) - pulls)[:, used, None])[..., 0]
 
     def left_out(self, stiffness: Mapping[str, float]) -> Array:
-        """Residual (n,) N of every block when the others alone were fitted."""
+        """Cross-validated residual (n,) N: each block predicted by a fit to the others."""
         used, changes = self._without(stiffness)
         out = self.force.copy()
         for span, change in zip(self.blocks[0], changes, strict=True):
@@ -112,7 +113,7 @@ class _Linear:
         return float(self.force @ self.force - 2.0 * crossed + square)
 
     def solution(self, stiffness: Mapping[str, float]) -> tuple[Array, float]:
-        """Change (k,) of all coordinates that fits best, and the degrees of freedom it takes."""
+        """Change (k,) of all parameters that fits best, and its effective degrees of freedom."""
         used, penalty = self._chosen(stiffness)
         columns = self.columns[:, used]
         gram = columns.T @ columns
@@ -131,7 +132,7 @@ def _penalty(
 
 
 def _solve(matrix: Array, right: Array) -> Array:
-    """Solution (..., k, m) of symmetric, positive systems whose unknowns have units of their own.
+    """Solution (..., k, m) of symmetric positive systems, scaled as their unknowns differ in unit.
 
     matrix (..., k, k), right (..., k, m).
     """
@@ -141,9 +142,9 @@ def _solve(matrix: Array, right: Array) -> Array:
 
 
 def choose_stiffness(linear: _Linear) -> dict[str, float]:
-    """Stiffness of each part that lowers the error on left-out blocks; a part may be missing.
+    """Stiffness of each part that lowers the cross-validated error; other parts are left out.
 
-    The part that helps most comes first; then those before are tuned again.
+    Parts are added one by one, the most helpful first; then the earlier ones are tuned again.
     """
     chosen: dict[str, float] = {}
     error = linear.left_out_error(chosen)
@@ -160,23 +161,23 @@ def choose_stiffness(linear: _Linear) -> dict[str, float]:
 
 
 def _best(linear: _Linear, chosen: Mapping[str, float], name: str) -> tuple[float, str, float]:
-    """Squared left-out error, name and stiffness of a part at its best beside the others."""
+    """Squared cross-validated error, name and best stiffness of a part beside the others."""
     errors = [linear.left_out_error({**chosen, name: v}) for v in STIFFNESS]
     least = int(np.argmin(errors))
     return errors[least], name, float(STIFFNESS[least])
 
 
-def describe(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
-    """Fit a description beside the physics of a base, and judge it on the held-out logs.
+def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
+    """Fit a nonparametric effect beside the physics of a base, and judge it on the held-out logs.
 
-    Without held-out logs it is judged on blocks left out of the fit. The curves reach as far as the
-    fit logs went. Evidence counts the degrees of freedom that the smoothing leaves.
+    Without held-out logs it is judged by cross-validation. The curves cover the motion of the fit
+    logs only. The evidence counts the effective degrees of freedom.
     """
     covered = effect.starts(excitation([log.motion for log in dataset.fit], None))
     empty = Fitted.at_start(effect, covered)
     best = _attempt(base, base, dataset, empty)
     for _ in range(ROUNDS):
-        # What is missing bent the physics of the base: choose anew beside what it is now.
+        # The missing force had distorted the physics of the base, so choose again beside the refit.
         again = _attempt(base, fit_without(best.fit, dataset, effect.name), dataset, empty)
         if not again.fit.error < BETTER * best.fit.error:
             break
@@ -207,18 +208,14 @@ def _attempt(base: Fit, ground: Fit, dataset: Dataset, empty: Fitted) -> Candida
     )
 
 
-def in_words(fitted: Fitted) -> str:
-    """What a description follows, and what it is not."""
-    used = [p.name for p in fitted.effect.parts if any(fitted.values[n] for n in p.strengths)]
-    what = f"follows {', '.join(used)}" if used else "found nothing to follow"
-    return (
-        f"{fitted.effect.name} is a description, not physics: it {what}, and holds only where the "
-        "fit logs went"
-    )
+def followed(fitted: Fitted) -> tuple[str, ...]:
+    """The parts of a nonparametric effect that are not zero: what its force depends on."""
+    parts = fitted.effect.parts
+    return tuple(p.name for p in parts if any(fitted.values[n] for n in p.strengths))
 
 
-def described_labels(axis: AxisModel) -> frozenset[str]:
-    """Labels of the strengths of descriptions, which mean nothing one by one."""
+def nonparametric_labels(axis: AxisModel) -> frozenset[str]:
+    """Labels of the strengths of nonparametric effects, which have no meaning one by one."""
     return frozenset(
         f"{f.effect.name}.{p.name}"
         for f in axis.effects
@@ -228,7 +225,7 @@ def described_labels(axis: AxisModel) -> frozenset[str]:
 
 
 def physics_alone(model: MachineModel) -> MachineModel:
-    """The stage without its descriptions: what they describe is to be explained anew."""
+    """The model without its nonparametric effects, so that physics can explain their force."""
     for name, axis in model.axes.items():
         kept = tuple(f for f in axis.effects if not f.effect.is_nonparametric)
         model = model.with_axis(name, replace(axis, effects=kept))
@@ -238,7 +235,7 @@ def physics_alone(model: MachineModel) -> MachineModel:
 def _filled(
     empty: Fitted, linear: _Linear, stiffness: Mapping[str, float], change: Array
 ) -> Fitted:
-    """The description with its strengths and stiffness; parts left out are zero and held."""
+    """The effect with its strengths and stiffness; parts left out are zero and fixed."""
     step = {(c.effect, c.parameter.name): x for c, x in zip(linear.where, change, strict=True)}
     values, fixed = dict(empty.values), set(empty.fixed)
     for part in empty.effect.parts:

@@ -1,8 +1,8 @@
-"""Two effects at once, where neither has evidence without the other.
+"""Pair search: two effects that have evidence only together.
 
-What is missing beside a candidate colours the residual and bends the base: its evidence is then
-counted on few independent samples, and it may do harm on held-out logs. Together the two can
-bring the error to the noise floor.
+While another effect is missing, the residual is coloured and the base distorted, so a candidate has
+a small effective sample size and may raise the held-out error. With both effects the error can
+reach the noise floor.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from identify.estimation.fit import Fit, error_on, rms
 from identify.selection.candidates import Candidate, score
 from identify.selection.ranking import less
 
-FIRSTS = 3  # candidates beside which a second is sought
+FIRSTS = 3  # candidates for the first effect of a pair
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +45,8 @@ def search_pairs(
 ) -> list[Pair]:
     """Pairs that bring the error to the noise floor, best first.
 
-    ranked: every absent effect tried beside a fit. Fit and held-out logs must ask for both
-    together, and for each beside the other.
+    ranked: ranks every absent effect beside a fit. Fit and held-out logs must support both effects
+    together, and each beside the other.
     """
     pairs: list[Pair] = []
     for first in sorted(ranking, key=lambda c: -c.evidence.log_gain)[:FIRSTS]:
@@ -62,7 +62,7 @@ def search_pairs(
 
 
 def _pair(base: Fit, dataset: Dataset, first: Candidate, second: Candidate) -> Pair | None:
-    """The two as a pair where they explain all but noise and each is needed, else None."""
+    """The pair, if both together reach the noise floor and each is needed; else None."""
     both = second.fit
     if not (both.at_floor or held_at_floor(both, dataset)):
         return None
@@ -74,7 +74,7 @@ def _pair(base: Fit, dataset: Dataset, first: Candidate, second: Candidate) -> P
 
 
 def held_at_floor(fit: Fit, dataset: Dataset) -> bool:
-    """Whether the logs that the fit did not see are explained down to noise."""
+    """Whether the error on the held-out logs is at the noise floor."""
     return (
         bool(dataset.holdout)
         and rms(error_on(fit.axis, dataset.holdout)) < RULE.at_floor * fit.floor

@@ -1,4 +1,4 @@
-"""Every effect that the model lacks tried beside a fit, ordered by evidence."""
+"""Candidates ranked: every absent effect is tried beside a fit and ordered by evidence."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def rank(
     progress: Progress | None = None,
     workers: int | None = None,
 ) -> tuple[Fit, tuple[Candidate, ...]]:
-    """Every absent effect tried beside a fitted axis: the base and candidates by falling merit.
+    """The base, and every absent effect tried beside it, by falling merit.
 
-    The base comes back refitted where a candidate's values, without its effect, suit it better: a
-    base short of its optimum would make evidence for every candidate.
+    If the values of the best candidate without its effect are a better start for the base, the base
+    is refitted from there: a base short of its optimum would give evidence to every candidate.
     """
     effects = absent_effects(base.axis, catalogue)
     candidates = []
-    # The laws run outside Python's lock, so candidates go side by side.
+    # The laws release Python's lock, so candidates run in parallel.
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         for candidate in pool.map(partial(try_effect, base, dataset), effects):
             candidates.append(candidate)
@@ -62,7 +62,7 @@ def rank(
 
 
 def less(effect: Effect, fit: Fit, base: Fit, dataset: Dataset) -> Fit:
-    """The fit refitted without an effect, the friction that it replaced put back."""
+    """The fit without an effect, refitted; a friction is replaced by that of the base."""
     if effect.kind is Kind.FRICTION:
         own = next((f for f in base.axis.effects if f.effect.kind is Kind.FRICTION), None)
         axis = fit.axis.with_effect(own) if own else fit.axis.without(effect.name)
@@ -72,14 +72,14 @@ def less(effect: Effect, fit: Fit, base: Fit, dataset: Dataset) -> Fit:
 
 
 def _ranked(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Supported first, and of these what lowers the error before what makes it noise."""
+    """Supported first, and among these the effects that lower the error before noise."""
     lowers = _ordered(on_equal_samples([c for c in candidates if not c.is_noise]))
     noise = _ordered([c for c in candidates if c.is_noise])
     return tuple(sorted([*lowers, *noise], key=lambda c: not c.supported))
 
 
 def _ordered(candidates: list[Candidate]) -> list[Candidate]:
-    """By falling merit; those within no evidence of the best come in the catalogue's order."""
+    """By falling merit; those that no evidence separates from the best are in order of name."""
     ranking = sorted(candidates, key=_merit)
     if not ranking or not ranking[0].supported:
         return ranking
@@ -106,12 +106,12 @@ def tie(dataset: Dataset, best: Candidate, other: Candidate) -> bool:
     pair = [residual(c.fit.axis, logs)[kept] for c in (other, best)]
     if held_out_gain(pair[0], pair[1], best.fit.floor).t < RULE.tie:
         return True
-    # What is significant may still be next to nothing: two delays differ by a part in a thousand.
+    # A significant difference may still be negligible, such as between two kinds of delay.
     return evidence(pair[0], pair[1], 0).delta_bic < RULE.no_evidence
 
 
 def took_friction(before: AxisModel, after: AxisModel) -> bool:
-    """Whether a friction is still there, but hardly any of its dry part (N) is left."""
+    """Whether the friction lost most of its dry part (N) between two models."""
     for old in before.effects:
         if old.effect.kind is not Kind.FRICTION or old.effect.name not in after.names:
             continue

@@ -46,17 +46,6 @@ class Repeat:
         size = max(self.amplitude.values())
         return all(abs(t - terms[0]) < SAME * size for t in terms)
 
-    def in_words(self) -> str:
-        """E.g. "a force repeats every 2.5 mm: 1.0 N in run, 0.9 N in pulses; ..."."""
-        sizes = ", ".join(f"{a:.3g} {self.units.force} in {n}" for n, a in self.amplitude.items())
-        turns = np.degrees(np.ptp(np.unwrap(list(self.phase.values()))))
-        words = self.units.words
-        return (
-            f"a {words('force')} repeats every {1e3 * self.period:.4g} m{self.units.position} of "
-            f"travel ({sizes}), but its phase differs between the logs by {turns:.0f} degrees: "
-            f"present in each run, not general, so no effect of {words('position')} is named for it"
-        )
-
 
 def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:
     """The strongest force that repeats in position in every log with another phase, if any."""

@@ -25,8 +25,8 @@ from twin.simulator import FineSimulator, ReducedSimulator
 
 AXIS = "x"
 DURATION = 12.0  # s of each log
-RUNS = ("tracking", "moves", "tracking")  # the last is held out
-HIDDEN = 0.9  # part of an effect's force from which it hides in the mass, which is then held
+EXPERIMENTS = ("tracking", "moves", "tracking")  # the last is held out
+HIDDEN = 0.9  # part of an effect's force, absorbed by a fit, from which the mass is held fixed
 ROUNDS = 2  # corrections of a friction's level
 SPREAD = 0.3  # of the logarithm of a friction's own parameters
 REACHED = 0.7  # part of the wanted force that an effect must reach within its bounds
@@ -34,9 +34,10 @@ REACHED = 0.7  # part of the wanted force that an effect must reach within its b
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """A machine that the analysis knows by its logs alone.
+    """A machine with planted effects, and its logs.
 
-    model: what the analysis begins with. true: the machine. planted: effects that the model lacks.
+    model: the model that the diagnosis starts from. true: the machine. planted: effects that the
+    model lacks.
     """
 
     model: MachineModel
@@ -55,16 +56,17 @@ def machine(
 ) -> Machine:
     """Draw a machine about a stage, plant effects of ``strength`` times the noise floor, log it.
 
-    The strength counts what the model's own parameters cannot take over. Values and motion are
-    drawn; the simulation steps ten times finer than the logs' samples. Raises NotShown.
+    Only the part of the force that the model's own parameters cannot reproduce counts for the
+    strength. Values and motion are random; the simulation steps ten times finer than the samples of
+    the logs. Raises NotShown.
     """
     true = stage
     for name, axis in stage.axes.items():
         true = true.with_axis(name, other_machine(axis, rng))
-    seeds = [int(s) for s in rng.integers(1 << 31, size=len(RUNS) + 1)]
+    seeds = [int(s) for s in rng.integers(1 << 31, size=len(EXPERIMENTS) + 1)]
     model = replace(stage, axes={AXIS: stage.axes[AXIS]})
     planted: list[Fitted] = []
-    # A friction first: its level is found beside a model that lacks nothing else.
+    # Friction first, as its level is found with a model that lacks nothing else.
     for effect in sorted(effects, key=lambda e: e.kind is not Kind.FRICTION):
         if effect.kind is Kind.FRICTION:
             model = model.with_axis(
@@ -77,7 +79,7 @@ def machine(
     held = replace(model.axes[AXIS], mass_fixed=true.axes[AXIS].mass_fixed)
     logs = {
         f"log {i}": simulate(true, run, seed=seed, duration=DURATION, simulator=FineSimulator)
-        for i, (run, seed) in enumerate(zip(RUNS, seeds, strict=False), start=1)
+        for i, (run, seed) in enumerate(zip(EXPERIMENTS, seeds, strict=False), start=1)
     }
     last = list(logs)[-1]
     return Machine(
@@ -112,7 +114,7 @@ def _with_friction(
     seed: int,
     rng: np.random.Generator,
 ) -> tuple[MachineModel, Fitted]:
-    """The machine with another friction, so strong that the model's falls short by the strength."""
+    """The machine with another friction, scaled until the model's error has that strength."""
     own = next(f for f in true.axes[AXIS].effects if f.effect.kind is Kind.FRICTION)
     free = [p for p in effect.parameters if not p.fixed]
     shared = {p.name: own.values[p.name] for p in free if p.name in own.values}
@@ -124,8 +126,10 @@ def _with_friction(
     fitted = Fitted.at_start(effect, {**effect.starts(), **drawn, **shared})
 
     def left(machine: MachineModel) -> float:
-        """Error of the model on that machine above the noise floor, in floors."""
-        trial = simulate(machine, RUNS[0], seed=seed, duration=DURATION, simulator=ReducedSimulator)
+        """Error of the model on that machine above the noise floor, as a multiple of it."""
+        trial = simulate(
+            machine, EXPERIMENTS[0], seed=seed, duration=DURATION, simulator=ReducedSimulator
+        )
         dataset = datasets(model, {"trial": trial}, {})[AXIS]
         base = fit_axis(model.axes[AXIS], dataset.fit)
         floor = floor_of(machine.axes[AXIS], dataset.fit)
@@ -145,8 +149,8 @@ def _with_friction(
 def _with_planted(
     true: MachineModel, effect: Effect, strength: float, seed: int, rng: np.random.Generator
 ) -> tuple[MachineModel, Fitted]:
-    """The machine with one effect more; its mass is held where the effect would hide in it."""
-    trial = simulate(true, RUNS[0], seed=seed, duration=DURATION, simulator=ReducedSimulator)
+    """The machine with one more effect; its mass is held where a fit would absorb the effect."""
+    trial = simulate(true, EXPERIMENTS[0], seed=seed, duration=DURATION, simulator=ReducedSimulator)
     dataset = datasets(replace(true, axes={AXIS: true.axes[AXIS]}), {"trial": trial}, {})[AXIS]
     base = fit_axis(true.axes[AXIS], dataset.fit)
     at_start = draw_effect(

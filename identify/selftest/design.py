@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from identify.selftest.cases import AXIS
-from identify.selftest.trial import STAGE, Case, Outcome, run
+from identify.selftest.trial import STAGE, Case, TrialResult, run
 from twin.effect import Kind
 from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model
@@ -22,7 +22,7 @@ PAIR_STRENGTH = 5.0  # times the noise floor, of each of two planted effects
 
 @dataclass(frozen=True)
 class Design:
-    """How much is tried: strengths (times the noise floor), and how many machines of each sort.
+    """The size of a self-test: strengths (times the noise floor), and machines of each sort.
 
     each: of every effect and strength. empty: with nothing planted. pairs: with two effects.
     left_out: of every effect, at PAIR_STRENGTH, with the effect taken out of the catalogue.
@@ -67,13 +67,13 @@ def plantable(catalogue: Catalogue) -> list[str]:
 def run_all(
     cases: Sequence[Case],
     workers: int | None = None,
-    progress: Callable[[Outcome, int, int], None] | None = None,
-) -> list[Outcome]:
+    progress: Callable[[TrialResult, int, int], None] | None = None,
+) -> list[TrialResult]:
     """Run cases in as many processes as there are cores; in the order given.
 
     Raises RuntimeError, with the machine named, where a diagnosis fails; no other is begun then.
     """
-    found: dict[Case, Outcome] = {}
+    found: dict[Case, TrialResult] = {}
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers or os.cpu_count(), mp_context=context) as pool:
         jobs = {pool.submit(run, case): case for case in cases}
@@ -81,8 +81,8 @@ def run_all(
             if error := done.exception():
                 pool.shutdown(cancel_futures=True)
                 raise RuntimeError(f"{jobs[done]}: {error!r}") from error
-            outcome = done.result()
-            found[outcome.case] = outcome
+            result = done.result()
+            found[result.case] = result
             if progress:
-                progress(outcome, len(found), len(cases))
+                progress(result, len(found), len(cases))
     return [found[case] for case in cases]

@@ -9,20 +9,20 @@ from pathlib import Path
 import numpy as np
 
 from identify.selftest.tally import AMBIGUOUS, NOTHING, UNEXPLAINED, confusion
-from identify.selftest.trial import Outcome
+from identify.selftest.trial import TrialResult
 from twin.errors import InputError
 from twin.model.file import write_atomically
 
 FORMATS = (".png", ".svg", ".pdf")
 
 
-def draw(outcomes: Sequence[Outcome], path: Path) -> None:
+def draw(results: Sequence[TrialResult], path: Path) -> None:
     """Write the picture. Raises InputError for another ending than .png, .svg or .pdf."""
     if path.suffix not in FORMATS:
         raise InputError(f"{path}: give a name that ends in {', '.join(FORMATS)}")
     from matplotlib.figure import Figure
 
-    table = confusion(outcomes)
+    table = confusion(results)
     rows = [*sorted(r for r in table if r != NOTHING), *([NOTHING] if NOTHING in table else [])]
     named = {a for row in table.values() for a in row} - {AMBIGUOUS, NOTHING, UNEXPLAINED}
     columns = [*sorted(named | (set(rows) - {NOTHING})), AMBIGUOUS, UNEXPLAINED, NOTHING]

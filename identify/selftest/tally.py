@@ -1,16 +1,16 @@
-"""What a self-test adds up to: rates with their counts."""
+"""The rates of a self-test, with their counts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from identify.selftest.trial import Outcome
+from identify.selftest.trial import TrialResult
 
 
 @dataclass(frozen=True)
 class Rate:
-    """How many of some trials came out so. asked: least and greatest rate wanted, 0..1, if any."""
+    """How many trials had an outcome. asked: the range of the rate that is the target, if any."""
 
     what: str
     count: int
@@ -18,34 +18,18 @@ class Rate:
     asked: tuple[float, float] | None = None
 
     @property
-    def target(self) -> str:
-        """E.g. "at least 95 %"."""
-        if self.asked is None:
-            return ""
-        low, high = self.asked
-        if high == 1.0:
-            return f"at least {100 * low:g} %"
-        return f"at most {100 * high:g} %" if low == 0.0 else f"{100 * low:g} to {100 * high:g} %"
-
-    @property
     def value(self) -> float:
         """0..1; not a number without trials."""
         return self.count / self.trials if self.trials else float("nan")
-
-    def in_words(self) -> str:
-        """E.g. "named, force 5 times the noise floor: 30 of 31 (97 %), asked: at least 95 %"."""
-        asked = f", asked: {self.target}" if self.asked else ""
-        share = f" ({100 * self.value:.0f} %)" if self.trials else ""
-        return f"{self.what}: {self.count} of {self.trials}{share}{asked}"
 
 
 ASKED = {5.0: (0.95, 1.0), 2.0: (0.80, 1.0)}  # by force over the noise floor
 ALARMS, PAIRS, OUTSIDE, COVERED = (0.0, 0.01), (0.85, 1.0), (0.80, 1.0), (0.85, 0.95)
 
 
-def rates(outcomes: Sequence[Outcome]) -> list[Rate]:
+def rates(results: Sequence[TrialResult]) -> list[Rate]:
     """All rates of a self-test."""
-    shown = [o for o in outcomes if o.shown]
+    shown = [o for o in results if o.shown]
     one = [o for o in shown if len(o.case.effects) == 1 and o.case.known]
     out = [
         _rate(
@@ -71,40 +55,40 @@ def rates(outcomes: Sequence[Outcome]) -> list[Rate]:
 
 def _rate(
     what: str,
-    trials: Sequence[Outcome],
-    good: Callable[[Outcome], bool],
+    trials: Sequence[TrialResult],
+    good: Callable[[TrialResult], bool],
     asked: tuple[float, float] | None = None,
 ) -> Rate:
     return Rate(what, sum(map(good, trials)), len(trials), asked)
 
 
-def _right(o: Outcome) -> bool:
+def _right(o: TrialResult) -> bool:
     return o.right
 
 
-def _alarm(o: Outcome) -> bool:
+def _alarm(o: TrialResult) -> bool:
     return not o.quiet
 
 
-def _wrong(o: Outcome) -> bool:
+def _wrong(o: TrialResult) -> bool:
     return not o.quiet and not o.right
 
 
-def coverage(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
+def coverage(results: Sequence[TrialResult]) -> dict[str, Rate]:
     """Coverage of the intervals by parameter, of machines with nothing planted."""
     found: dict[str, list[bool]] = {}
-    for o in outcomes:
+    for o in results:
         for label, inside in o.covered:
             found.setdefault(label, []).append(inside)
     return {k: Rate(k, sum(v), len(v), COVERED) for k, v in found.items()}
 
 
-def confusion(outcomes: Sequence[Outcome]) -> dict[str, dict[str, float]]:
+def confusion(results: Sequence[TrialResult]) -> dict[str, dict[str, float]]:
     """Planted effect -> answer -> part of the trials: a name, "ambiguous", or none.
 
     An ambiguity that holds the planted effect counts for it, in a column of its own.
     """
-    one = [o for o in outcomes if o.shown and o.case.known and len(o.case.effects) <= 1]
+    one = [o for o in results if o.shown and o.case.known and len(o.case.effects) <= 1]
     table: dict[str, dict[str, float]] = {}
     for o in one:
         planted = o.case.effects[0] if o.case.effects else NOTHING
@@ -119,7 +103,7 @@ def confusion(outcomes: Sequence[Outcome]) -> dict[str, dict[str, float]]:
 NOTHING, UNEXPLAINED, AMBIGUOUS = "nothing", "unexplained", "ambiguous with it"
 
 
-def _answer(o: Outcome) -> str:
+def _answer(o: TrialResult) -> str:
     if o.quiet:
         return UNEXPLAINED if o.verdict == "UNEXPLAINED" else NOTHING
     planted = o.case.effects[0] if o.case.effects else ""

@@ -1,4 +1,4 @@
-"""One trial: a machine with effects that the analysis is not told of, and what it answers."""
+"""One trial: a machine with planted effects, and the answer of the diagnosis."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What a trial found.
+class TrialResult:
+    """The result of a trial.
 
     answers: for each effect that was named, in order, its name and those declared as ambiguous
     with it. ratio, left: error over noise floor before and after. depends_on: of an unexplained
-    residual. coordinates: those that are right, from the planted force itself. covered: for each
-    parameter of an honest machine with an interval, whether it holds the truth. shown: whether the
-    effect could show at all.
+    residual. coordinates: the right ones, from the planted force. covered: with nothing planted,
+    for each parameter with an interval whether it holds the truth. shown: whether the effect
+    could reach its strength on this motion.
     """
 
     case: Case
@@ -76,17 +76,6 @@ class Outcome:
             for order in permutations(self.case.effects)
         )
 
-    def in_words(self) -> str:
-        """One line: what was planted, and what the diagnosis said."""
-        planted = " and ".join(self.case.effects) or "nothing"
-        if not self.shown:
-            return f"{planted} cannot show on this stage's motion at {self.case.strength:g} floors"
-        known = "" if self.case.known else ", left out of the catalogue"
-        answer = " and ".join(" or ".join(answer) for answer in self.answers)
-        return (
-            f"{planted} at {self.case.strength:g} floors{known}: {answer or self.verdict.lower()}"
-        )
-
     @property
     def quiet(self) -> bool:
         """Whether no name was given."""
@@ -100,10 +89,10 @@ class Outcome:
         return self.left < FLOOR
 
 
-FLOOR = 1.3  # error over noise floor that passes for noise
+FLOOR = 1.3  # error over noise floor below which the error counts as noise
 
 
-def run(case: Case) -> Outcome:
+def run(case: Case) -> TrialResult:
     """Make the machine, diagnose it with one thread, and compare with what was planted."""
     catalogue = load_catalogue()
     stage = load_model(STAGE, catalogue)
@@ -111,13 +100,13 @@ def run(case: Case) -> Outcome:
     try:
         built = machine(stage, [catalogue[e] for e in case.effects], case.strength, rng)
     except NotShown:
-        return Outcome(case, shown=False)
+        return TrialResult(case, shown=False)
     known = [e for e in catalogue.values() if case.known or e.name not in case.effects]
     begun = perf_counter()
     dataset = datasets(built.model, built.logs, built.holdout)[AXIS]
     dataset, base = fit_aligned(built.model.axes[AXIS], dataset)
     found = diagnose_axis(base, dataset, Catalogue(known), workers=1)
-    return Outcome(
+    return TrialResult(
         case=case,
         verdict=found.verdict.name,
         answers=found.answers,
@@ -151,7 +140,7 @@ def _planted_force(planted: tuple[Fitted, ...], base: Fit, dataset: Dataset) -> 
 
 
 def _covered(built: Machine, found: AxisDiagnosis) -> tuple[tuple[str, bool], ...]:
-    """Whether the 90 % intervals of an honest machine's fit hold its true values."""
+    """Whether the 90 % intervals of a fit hold the machine's true values."""
     fit = found.base
     truth = read(built.true.axes[AXIS], fit.scaling.where)
     out = []

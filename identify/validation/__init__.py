@@ -1,4 +1,4 @@
-"""How a model fails: misfit maps, free run, whiteness, error spectrum.
+"""Validation of a model: misfit maps, free run, whiteness tests, error spectrum.
 
 Nothing here chooses between models.
 """

@@ -1,4 +1,4 @@
-"""Force error by frequency in newtons, beside what measurement noise leaves in the same bands."""
+"""Force error by frequency in newtons, beside the noise floor in the same bands."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]
 
-SHORTEST = 8  # blocks of the windows taken here: as short as windows can be
+SHORTEST = 8  # blocks of the test functions used here, the fewest allowed
 SEGMENT = 4.0  # s of each part of a log that is transformed
-SEEN = 0.2  # of the force's power that the windows must pass
+LEAST_PASSED = 0.2  # of the force's power that the test functions must pass
 OCTAVE_PARTS = 2  # bands an octave
 
 
@@ -26,7 +26,7 @@ OCTAVE_PARTS = 2  # bands an octave
 class Bands:
     """RMS force by frequency band: low, high (k,) Hz; error, noise and to_explain (k,) N.
 
-    to_explain: command less inertia, what the effects must account for.
+    to_explain: command less inertia, the force that the effects must explain.
     """
 
     low: Array
@@ -39,9 +39,9 @@ class Bands:
 def bands(axis: AxisModel, logs: Sequence[PreparedLog]) -> Bands:
     """RMS force error of the model by band over some logs, and that of the noise alone.
 
-    The residual is taken in windows as short as can be, and what those take away of the higher
-    frequencies is given back, up to where they pass a fifth of the power. Windows in which a
-    sticking friction can be anything count as without error.
+    The test functions are the shortest possible, and the spectrum is divided by their power
+    response, up to the frequency at which they pass a fifth of the power. Where static friction is
+    undetermined the error counts as zero.
     """
     spectra = [_spectrum(axis, log) for log in logs]
     weights = [log.motion.time[-1] for log in logs]
@@ -69,10 +69,10 @@ def _spectrum(axis: AxisModel, log: PreparedLog) -> tuple[Array, Array, Array, A
     frequency, power = welch(both, 1.0 / period, nperseg=segment, detrend="constant")
     ratio = round(period / motion.sample_period)
     passed = short.window.response(motion.sample_period, segment * ratio)[: len(frequency)]
-    seen = (passed > SEEN) & (frequency > 0.0)
+    passed_band = (passed > LEAST_PASSED) & (frequency > 0.0)
     noise = noise_of(axis, motion)
-    frequency = frequency[seen]
-    error, explain = power[:, seen] / passed[seen]
+    frequency = frequency[passed_band]
+    error, explain = power[:, passed_band] / passed[passed_band]
     return frequency, error, np.interp(frequency, noise.frequency, noise.power), explain
 
 

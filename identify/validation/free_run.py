@@ -1,8 +1,8 @@
-"""Free-running position error: the model driven by the logged command, restarted now and then.
+"""Free-running position error: the model driven by the logged command, restarted at intervals.
 
-Each window starts from the measured motion, with the effects' states as they are after following
-the measured motion so far; then only the command acts, and the position drifts with every force
-that the model has wrong.
+Each prediction starts from the measured motion, with the states that the effects reach along the
+measured motion up to then. After that only the command acts, and the position drifts with every
+wrong force of the model.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from twin.mujoco.callback import passive_callback
 from twin.signals import Array, between, local_cubic, local_parabola
 from twin.simulator import MujocoSimulator, ReducedSimulator, Stepper
 
-WINDOW = 0.5  # s between restarts
-SEED = 0  # of the noise drawn anew
+HORIZON = 0.5  # s between restarts
+SEED = 0  # of the added noise
 START_FIT = 5e-3  # s on each side of a restart from which its position and velocity are taken
 
 
 @dataclass(frozen=True, eq=False)
 class FreeRun:
-    """Simulated minus measured position, axis -> (n,) m, with a restart every ``window`` s."""
+    """Simulated minus measured position, axis -> (n,) m, with a restart every ``horizon`` s."""
 
     error: dict[str, Array]
-    window: float
+    horizon: float
 
 
 def free_run(
@@ -44,12 +44,13 @@ def free_run(
 ) -> FreeRun:
     """Run the model on the commands of one log, prepared for each of its axes.
 
-    noise: adds the log's measurement noise, drawn anew, to its readings and commands.
+    noise: generator of measurement noise of the log's level, added to its readings and commands;
+    no noise is added where None.
     """
     model = _as_logged(model, logs)
     position, command = _signals(model, logs, noise)
     n, period = len(position), model.period
-    count = max(round(WINDOW / period), 2)
+    count = max(round(HORIZON / period), 2)
     side = max(round(START_FIT / period), 2)
     starts = np.arange(side, n - side, count)
     table = model.table()
@@ -68,17 +69,17 @@ def free_run(
             span = slice(start, min(start + count, n))
             simulated = _open_loop(model, table, simulation, int(start), command[span])
             out[span] = simulated - position[span]
-    return FreeRun({a: out[:, i] for i, a in enumerate(model.axes) if a in logs}, WINDOW)
+    return FreeRun({a: out[:, i] for i, a in enumerate(model.axes) if a in logs}, HORIZON)
 
 
 def drift_of_noise(model: MachineModel, logs: Mapping[str, PreparedLog], run: FreeRun) -> FreeRun:
-    """What the measurement noise of a log alone adds to a free run on it.
+    """The drift that measurement noise alone causes in a free run on a log.
 
-    A run drifts by every error of force, the noise of the measured one too: of the exactly true
-    model the error is this large.
+    Noise of the measured command drives the free run as well, so even the exact model has this
+    error.
     """
     noisy = free_run(model, logs, noise=np.random.default_rng(SEED))
-    return FreeRun({a: noisy.error[a] - run.error[a] for a in run.error}, run.window)
+    return FreeRun({a: noisy.error[a] - run.error[a] for a in run.error}, run.horizon)
 
 
 def _signals(
@@ -102,7 +103,7 @@ def _signals(
 
 
 def _time_origin(logs: Mapping[str, PreparedLog]) -> float:
-    """When the log began, s, by the phase of what repeats in time; the same for all axes."""
+    """Time origin of the log, s; the same for all axes."""
     return next((log.motion.time_origin for log in logs.values() if log.motion.time_origin), 0.0)
 
 
@@ -113,10 +114,10 @@ def rms_error(run: FreeRun, axis: str) -> float:
 
 
 def _as_logged(model: MachineModel, logs: Mapping[str, PreparedLog]) -> MachineModel:
-    """The axes at the log's rate, without what the log has already: sensors, force limit.
+    """The axes at the log's rate, without sensor errors and force limit, which the log contains.
 
-    Of two axes one that is not among the logs stands still at its place, for the other to see; of
-    more it is left out.
+    On a machine of two axes, one that is not among the logs stands still, because effects of the
+    other may depend on its position; on a machine of more it is left out.
     """
     axes = {
         name: replace(

@@ -1,4 +1,4 @@
-"""How far model and measurement are apart, in numbers, and where: misfit by region."""
+"""How large the error of a model is, and where: misfit maps by coordinate."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from identify.validation.error_spectrum import bands
 from identify.validation.free_run import drift_of_noise, free_run, rms_error
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
 from twin.model.machine import AxisModel, MachineModel
-from twin.model.units import LINEAR, AxisUnits, units_of
+from twin.model.units import LINEAR, AxisUnits
 
 Array = NDArray[np.float64]
 
@@ -29,8 +29,8 @@ ABOVE_FLOOR = 1.5  # error over noise floor from which a region counts as bad
 KNOWN_UNITS = {**UNITS, "command": LINEAR.force, "standstill": "1"}  # of a linear axis
 # Coordinates with two values only: their edges.
 TWO_SIDED = {"direction": np.array([-1.5, 0.0, 1.5]), "standstill": np.array([-0.5, 0.5, 1.5])}
-CHANCE = 0.01  # that noise alone makes any region of all maps count as bad
-LEAST_SHARE = 0.02  # part of the squared error, beyond that of the time, from which it is told
+CHANCE = 0.01  # probability that noise alone makes any region of all maps count as bad
+LEAST_SHARE = 0.02  # least excess of a region's share of squared error over its share of time
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,8 @@ class MisfitMap:
     """Misfit along one coordinate: bin centres (n,), mean and RMS force error (n,) in force_unit.
 
     share (n,): part of the whole squared force error in each bin; visited (n,): part of the time,
-    or by frequency of the squared force that is to be explained. floor (n,): RMS of what noise
-    alone leaves in each bin, N. By frequency there is no mean.
+    or for frequency part of the squared force to be explained. floor (n,): noise floor of each bin,
+    N RMS. For frequency the mean is not a number.
     """
 
     coordinate: str
@@ -57,7 +57,7 @@ class MisfitMap:
 
 @dataclass(frozen=True)
 class Region:
-    """A bad place: a bin of a coordinate with its error, ratio to floor and share of error.
+    """A bin of a coordinate with a large error: RMS, ratio to noise floor, share of squared error.
 
     rms: in ``force_unit``.
     """
@@ -71,26 +71,14 @@ class Region:
     share: float
     force_unit: str = LINEAR.force
 
-    def in_words(self) -> str:
-        """E.g. "position between 12 and 26 mm: 0.12 N, 14 times the noise floor, ..."."""
-        what = units_of(self.unit).words(self.coordinate.replace("_", " "))
-        span = f"{what} between {self.low:.4g} and {self.high:.4g} {self.unit}"
-        if self.coordinate == "standstill":
-            span = "at standstill" if self.low > 0.0 else "in motion"
-        if self.coordinate == "direction":
-            span = "moving forwards" if self.low > -0.5 else "moving backwards"
-        return (
-            f"{span}: {self.rms:.3g} {self.force_unit} RMS, {self.ratio:.1f} times the noise "
-            f"floor, {100 * self.share:.0f} % of the squared error"
-        )
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AxisComparison:
     """One axis over some logs.
 
-    force_error: N RMS of the windowed residual, by log. floor: N. position_error: m RMS of the free
-    run, by log. residual (n,) N, coordinates name -> (n,). maps, worst regions, residual tests.
+    force_error: N RMS of the force residual, by log. floor: N. position_error: m RMS of the free
+    run, by log; position_floor: the same from measurement noise alone. residual (n,) N, coordinates
+    name -> (n,).
     """
 
     axis: str
@@ -110,7 +98,7 @@ class AxisComparison:
 
     @property
     def units(self) -> AxisUnits:
-        """What the axis' quantities are given in."""
+        """The units of the axis."""
         return self.logs[0].motion.units
 
     @property
@@ -159,7 +147,7 @@ def compare_axis(
 
 
 def _coordinates(axis: AxisModel, logs: Sequence[PreparedLog]) -> dict[str, Array]:
-    """What the error is shown along, (n,) each: that of the motion, and what the model knows of."""
+    """Coordinates (n,) along which the error is shown: of the motion, and periods of the model."""
     where = gathered(logs)
     where["command"] = np.concatenate([log.command for log in logs])
     speeds = np.concatenate([np.abs(log.window.mean(log.motion.velocity)) for log in logs])
@@ -176,7 +164,7 @@ def _by_log(axis: AxisModel, dataset: Dataset) -> dict[str, float]:
 def position_errors(
     model: MachineModel, found: Mapping[str, Dataset], progress: Callable[[int, int], None]
 ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
-    """Free-running position error, and what noise alone makes of it: axis -> log -> m RMS."""
+    """Free-running position error, and that of noise alone: axis -> log -> m RMS."""
     errors: dict[str, dict[str, float]] = {a: {} for a in found}
     floors: dict[str, dict[str, float]] = {a: {} for a in found}
     logs = by_log(found)
@@ -260,10 +248,10 @@ def misfit_by_frequency(axis: AxisModel, logs: Sequence[PreparedLog]) -> MisfitM
 
 
 def worst_regions(maps: Sequence[MisfitMap], samples: float, count: int = 3) -> list[Region]:
-    """The regions with most error against the time spent there, one a coordinate.
+    """The regions whose share of the error most exceeds their share of time, one a coordinate.
 
-    samples: how many independent values the residual is worth. None where no region stands further
-    above the noise floor than the largest of as many regions of noise alone would.
+    samples: effective sample size of the residual. A region counts only where it exceeds the noise
+    floor by more than the largest of as many regions of pure noise would.
     """
     tried = sum(int(np.count_nonzero(m.visited)) for m in maps)
     found = []

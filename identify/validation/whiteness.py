@@ -1,9 +1,9 @@
-"""Tests of the residual: is what the model leaves noise, or does it know of the past and the input?
+"""Tests of the residual: is it white, and uncorrelated with command and speed?
 
-Tested is the force residual on windows that do not overlap, which is white where the model is
-right. Bounds are +-1.645/sqrt(n), n the number of those windows: 90 of 100 values of a white
-residual lie within (L. Jia 2023, residual analysis; L. Ljung, System Identification, 16.6). Which
-residual is tested and why depends on the loop, and is said in ``reason``.
+The force residual is tested on test functions that do not overlap, where it is white if the model
+is right. Bounds are +-1.645/sqrt(n) for n test functions: 90 of 100 values of a white residual lie
+within (L. Jia 2023, residual analysis; L. Ljung, System Identification, 16.6). The loop decides
+which lags are tested.
 """
 
 from __future__ import annotations
@@ -28,27 +28,11 @@ REACH = 5.0  # noise floors that the histogram spans at least
 
 
 class Loop(Enum):
-    """How the logs were taken; the value says which residual is tested, and why."""
+    """Whether the logs were recorded under feedback."""
 
-    CLOSED = (
-        "Closed loop: feedback carries position noise into the force, so the free run is done on "
-        "the logged command, and of command and speed only what came before the residual is tested "
-        "against it. Whiteness is asked of the force residual alone: a simulated-position residual "
-        "is coloured even when the model is right, and a one-step-ahead one is small even when it "
-        "is wrong."
-    )
-    OPEN = (
-        "Open loop: the command knows nothing of the measurement's noise, so it is tested against "
-        "the residual at all lags. Whiteness is asked of the force residual alone: a "
-        "simulated-position residual is coloured even when the model is right, and a "
-        "one-step-ahead one is small even when it is wrong."
-    )
-    UNKNOWN = (
-        "No setpoint was logged, so the loop is taken for closed: feedback may carry position "
-        "noise into the force, and of command and speed only what came before the residual is "
-        "tested against it. Whiteness is asked of the force residual alone: a simulated-position "
-        "residual is coloured even when the model is right."
-    )
+    CLOSED = "closed"
+    OPEN = "open"
+    UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,22 +60,13 @@ class Correlation:
         """Whether no tested value is beyond the limit."""
         return bool(np.all(np.abs(self.value[self.tested]) < self.limit))
 
-    def in_words(self) -> str:
-        """E.g. "force residual against command: 12 % of the lags beyond the 90 % bounds, ..."."""
-        other = "its own past" if self.signal == "residual" else self.signal
-        verdict = "no more than by chance" if self.passes else "structure is left"
-        return (
-            f"force residual against {other}: {100 * self.outside:.0f} % of the lags beyond the "
-            f"90 % bounds of ±{self.bound:.2g}, {verdict}"
-        )
-
 
 @dataclass(frozen=True, eq=False)
 class ResidualTests:
     """Residual tests of one axis.
 
-    samples: windows that do not overlap. floor: N. edges (b + 1,) N and density (b,) 1/N of the
-    histogram. within: part of the windows within 1.645 noise floors, 0.9 where all is noise.
+    samples: test functions that do not overlap. floor: N. edges (b + 1,) N and density (b,) 1/N of
+    the histogram. within: part of the samples within 1.645 noise floors, 0.9 for pure noise.
     """
 
     loop: Loop
@@ -103,13 +78,8 @@ class ResidualTests:
     correlations: tuple[Correlation, ...]
 
     @property
-    def reason(self) -> str:
-        """Which residual is tested, and why."""
-        return self.loop.value
-
-    @property
     def passes(self) -> bool:
-        """Whether the residual is white and knows nothing of command and speed."""
+        """Whether the residual is white and uncorrelated with command and speed."""
         return all(c.passes for c in self.correlations)
 
 
@@ -127,7 +97,7 @@ def loop_of(logs: Sequence[PreparedLog]) -> Loop:
 def residual_tests(
     logs: Sequence[PreparedLog], force: Array, kept: NDArray[np.bool_], floor: float, loop: Loop
 ) -> ResidualTests:
-    """Tests of the force residual (n,) N over the windows of some logs, of which some are kept."""
+    """Tests of the force residual (n,) N of some logs; kept (n,): which values are used."""
     parts = np.cumsum([len(log) for log in logs])[:-1]
     series = [
         _series(log, own, used)
@@ -155,12 +125,12 @@ def residual_tests(
 
 
 def _step(log: PreparedLog) -> int:
-    """Windows from one to the next that does not overlap with it."""
+    """Stride, in test functions, from one to the next that does not overlap with it."""
     return -(-len(log.window.weights) // log.window.stride)
 
 
 def _series(log: PreparedLog, force: Array, kept: NDArray[np.bool_]) -> dict[str, Array]:
-    """Residual (not a number where it tells nothing), command and speed on separate windows."""
+    """Residual (nan where it is not used), command and speed on separate test functions."""
     apart = slice(None, None, _step(log))
     return {
         "residual": np.where(kept, force, np.nan)[apart],
@@ -172,7 +142,7 @@ def _series(log: PreparedLog, force: Array, kept: NDArray[np.bool_]) -> dict[str
 def correlation(
     signal: str, residual: Sequence[Array], other: Sequence[Array], spacing: float, loop: Loop
 ) -> Correlation:
-    """Correlation of residual and signal, log by log (n_i,) each; values not numbers are left out.
+    """Correlation of residual and signal, log by log (n_i,) each; nan values are left out.
 
     spacing: s, from one value to the next.
     """
@@ -185,7 +155,7 @@ def correlation(
     products = sum(_products(x, y, lags) for x, y in zip(a, b, strict=True))
     tested = np.ones(len(lags), bool)
     if not own and loop is not Loop.OPEN:
-        tested = lags > 0  # feedback makes even the same instant's command know the noise
+        tested = lags > 0  # under feedback the command of the same instant depends on the noise
     count = int(tested.sum())
     root = np.sqrt(max(n, 1))
     return Correlation(

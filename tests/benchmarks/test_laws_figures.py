@@ -10,13 +10,13 @@ import pytest
 
 from benchmarks.figures import Figure, Target, write_results
 from identify.selftest.picture import _shares, draw
-from identify.selftest.trial import Case, Outcome
+from identify.selftest.trial import Case, TrialResult
 from twin.errors import InputError
 
 EVERY = [
-    Outcome(Case(("a",), 5.0, 1), "MISSING_EFFECT", (("a",),)),
-    Outcome(Case(("a",), 5.0, 2), "UNEXPLAINED"),
-    Outcome(Case((), 0.0, 1), "NOTHING_MISSING"),
+    TrialResult(Case(("a",), 5.0, 1), "MISSING_EFFECT", (("a",),)),
+    TrialResult(Case(("a",), 5.0, 2), "UNEXPLAINED"),
+    TrialResult(Case((), 0.0, 1), "NOTHING_MISSING"),
 ]
 
 
@@ -39,7 +39,7 @@ def test_the_share_of_an_answer_stands_in_its_row_and_column(tmp_path, monkeypat
 
     drawn = []
     monkeypatch.setattr(Drawing, "savefig", lambda self, out, format: drawn.append((self, format)))
-    other = Outcome(Case(("b",), 5.0, 3), "MISSING_EFFECT", (("c",),))
+    other = TrialResult(Case(("b",), 5.0, 3), "MISSING_EFFECT", (("c",),))
     draw([*EVERY, *EVERY[:2], other, EVERY[0]], tmp_path / "m.pdf")
     ((figure, kind),) = drawn
     (axes,) = figure.axes

@@ -22,7 +22,9 @@ import twin.model.file
 from identify import workflow
 from identify.cli.shared import checked
 from identify.output import as_json
+from identify.output import selftest as selftest_output
 from identify.output import text as as_text
+from identify.selftest.tally import Rate
 from twin.log.check import CheckReport, Fault, Finding, Severity
 from twin.model.units import LINEAR
 
@@ -43,7 +45,7 @@ def refuse(constant: str) -> None:
     raise AssertionError(f"{constant} is no JSON")
 
 
-COMMON = ("--window", "0.07", "--effects", "e1.py", "--effects", "e2.py")
+COMMON = ("--test-function", "0.07", "--effects", "e1.py", "--effects", "e2.py")
 HELD = ("--holdout", "h1.mcap", "--holdout", "h2.mcap")
 LOGS = {"a.mcap": "log a.mcap", "b.mcap": "log b.mcap"}
 HOLDOUT = {"h1.mcap": "log h1.mcap", "h2.mcap": "log h2.mcap"}
@@ -66,7 +68,7 @@ def test_the_loop_is_called_with_what_was_given(monkeypatch, cli, name):
     given, named = call.only
     assert given[0].name == NAME
     assert given[1:] == ((LOGS,) if name == "compare" else (LOGS, HOLDOUT))
-    assert named.pop("window") == 0.07
+    assert named.pop("test_function") == 0.07
     catalogue = named.pop("catalogue", None)
     assert (catalogue or {}).get("all") == (None if name == "compare" else ["e1.py", "e2.py"])
     assert named == {}
@@ -85,7 +87,7 @@ def test_the_loop_is_called_with_what_was_given(monkeypatch, cli, name):
     assert text.count("\n") == 1
     assert len(save.calls) + len(write.calls) == 1
     given, named = call.calls[-1]
-    assert named["window"] is None
+    assert named["test_function"] is None
     assert given[1:] == (({"a.mcap": "log a.mcap"},) if name == "compare" else (
         {"a.mcap": "log a.mcap"}, {},
     ))  # fmt: skip
@@ -102,7 +104,7 @@ def test_add(monkeypatch, cli, kept, code):
     assert (found, text.strip()) == (code, "text of add")
     given, named = call.only
     assert (given[0], given[1].name, *given[2:]) == ("W", NAME, LOGS, HOLDOUT)
-    assert named == {"axis": "y", "window": 0.07}
+    assert named == {"axis": "y", "test_function": 0.07}
     assert save.only == (("the new model", Path("n.toml")), {})
     found, text, _ = cli(*command, "--json")
     assert (found, json.loads(text)) == (code, {"json of": "add", "bad": None})
@@ -124,7 +126,7 @@ def test_plan(monkeypatch, cli, decides, code):
     first, second = named.pop("between")
     assert (first, second.name) == ("W", "other.toml")
     assert named.pop("catalogue")["all"] == ["e1.py", "e2.py"]
-    assert named == {"axis": "y", "duration": 7.5, "window": 0.07}
+    assert named == {"axis": "y", "duration": 7.5, "test_function": 0.07}
     saved = ("the experiment", Path("next.toml"), "one", "two", "three")
     assert save.calls == ([(saved, {"units": LINEAR})] if decides else [])
     assert ("twin simulate next.toml" in text) is decides
@@ -134,7 +136,7 @@ def test_plan(monkeypatch, cli, decides, code):
         code, {"json of": "plan", "bad": None, "file": "experiment.toml" if decides else None},
     )  # fmt: skip
     assert call.calls[-1][1] | {"catalogue": 0} == {
-        "between": [], "catalogue": 0, "axis": None, "duration": 20.0, "window": None,
+        "between": [], "catalogue": 0, "axis": None, "duration": 20.0, "test_function": None,
     }  # fmt: skip
     assert cli("plan", "m.toml", "-o", "next.mcap")[0] == 2
 
@@ -241,12 +243,15 @@ def test_selftest(monkeypatch, cli):
     cases = stub(monkeypatch, identify.selftest.Design, "cases", ["a case"])
     run = stub(monkeypatch, identify.selftest, "run_all", ["an outcome"])
     draw = stub(monkeypatch, identify.selftest, "draw")
-    line = SimpleNamespace(in_words=lambda: "mass: 1 of 2")
-    monkeypatch.setattr(identify.selftest, "rates", lambda outcomes: [line])
-    monkeypatch.setattr(identify.selftest, "coverage", lambda outcomes: {"mass": line})
-    monkeypatch.setattr(identify.selftest, "selftest_json", lambda outcomes: {"n": len(outcomes)})
+    rate = Rate("mass", 1, 2)
+    monkeypatch.setattr(selftest_output, "rates", lambda results: [rate])
+    monkeypatch.setattr(selftest_output, "coverage", lambda results: {"mass": rate})
+    monkeypatch.setattr(selftest_output, "selftest_json", lambda results: {"n": len(results)})
     code, text, _ = cli("selftest", "--seed", "4", "--only", "wear", "--only", "gms", "-o", "p.svg")
-    assert (code, text.splitlines()) == (0, ["mass: 1 of 2", "  interval of mass: 1 of 2"])
+    assert (code, text.splitlines()) == (
+        0,
+        ["mass: 1 of 2 (50 %)", "  interval of mass: 1 of 2 (50 %)"],
+    )
     assert cases.calls.pop()[0] == (4, ["wear", "gms"])
     assert run.calls.pop()[0] == (["a case"],)
     assert draw.only[0] == (["an outcome"], Path("p.svg"))

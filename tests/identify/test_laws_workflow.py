@@ -12,6 +12,7 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, fitted
 
 from identify import workflow
 from identify.output import results
+from identify.output.words.selection import moved_in_words
 from identify.selection import confounded
 from identify.selection.confounded import moved_parameters
 from identify.selection.forward_selection import Verdict
@@ -78,16 +79,18 @@ def test_a_parameter_moved_where_it_leaves_both_intervals(monkeypatch, f0, told)
     found = moved(monkeypatch, {"F0": 1.0}, {"F0": f0})
     assert bool(found) is told
     if told:
-        assert found == (
-            f"constant_force.F0 moved from 1 to {f0:.4g} N: more than its interval",
-        )  # fmt: skip
+        (only,) = found
+        assert moved_in_words(only) == (
+            f"constant_force.F0 moved from 1 to {f0:.4g} N: more than its interval"
+        )
 
 
 @pytest.mark.parametrize(("f0", "said"), [(0.29, "collapsed"), (0.31, "moved")])
 def test_a_strength_collapsed_where_less_than_a_third_is_left(monkeypatch, f0, said):
     (found,) = moved(monkeypatch, {"F0": 1.0}, {"F0": f0})
-    assert found.startswith(f"constant_force.F0 {said} from 1 to {f0} N")
-    assert ("stood in for" in found) is (said == "collapsed")
+    words = moved_in_words(found)
+    assert words.startswith(f"constant_force.F0 {said} from 1 to {f0} N")
+    assert ("had taken over" in words) is found.collapsed is (said == "collapsed")
     wide = moved(monkeypatch, {"F0": 1.0}, {"F0": f0}, width=5.0)
     assert bool(wide) is (said == "collapsed")
     assert moved(monkeypatch, {"F0": 0.039}, {"F0": 0.0}) == ()
@@ -122,7 +125,7 @@ def handed(monkeypatch):
 def test_a_fit_takes_over_the_values_and_the_shift_of_each_axis(monkeypatch):
     seen, bars = handed(monkeypatch), []
     found = workflow.fit(
-        made.MODEL, "logs", "held", catalogue="known", window=0.07,
+        made.MODEL, "logs", "held", catalogue="known", test_function=0.07,
         progress=lambda *done: bars.append(done),
     )  # fmt: skip
     assert seen["datasets"] == (made.MODEL, "logs", "held", 0.07)
@@ -155,7 +158,7 @@ def test_a_comparison_is_of_the_axes_that_move(monkeypatch):
     monkeypatch.setattr(workflow, "compare_axis", lambda *given: given)
     bars = []
     found = workflow.compare(
-        made.MODEL, "logs", window=0.07, progress=lambda *done: bars.append(done)
+        made.MODEL, "logs", test_function=0.07, progress=lambda *done: bars.append(done)
     )
     prepared = (7.9, "dataset y")
     assert found.axes == {"y": (made.MODEL, prepared, "errors of y", "floors of y")}
@@ -181,15 +184,15 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_study(monkeypatch):
     monkeypatch.setattr(workflow, "diagnose_axis", diagnose_axis)
     monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
     monkeypatch.setattr(
-        workflow, "next_experiment", lambda d, model, window: plans[d.axis] and (d, model, window)
+        workflow, "next_experiment", lambda d, model, length: plans[d.axis] and (d, model, length)
     )
     monkeypatch.setattr(workflow, "_compared", lambda *given: given)
     progress = lambda *done: bars.append(done)  # noqa: E731
     found = workflow.diagnose(
-        described, "logs", "held", catalogue="known", window=0.07, progress=progress
+        described, "logs", "held", catalogue="known", test_function=0.07, progress=progress
     )
     assert asked["given"] == (made.MODEL, "logs", "held")
-    assert asked["named"] == {"catalogue": "known", "window": 0.07, "progress": progress}
+    assert asked["named"] == {"catalogue": "known", "test_function": 0.07, "progress": progress}
     for axis in "xy":
         d = found.axes[axis]
         assert (d.axis, d.fit, d.catalogue) == (axis, result.fits[axis], "known")
@@ -230,12 +233,12 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
     monkeypatch.setattr(workflow, "try_effect", attempt)
     monkeypatch.setattr(workflow, "_addition", lambda best, before, given: (best, given))
     wear = CATALOGUE["wear"]
-    best, _ = add(wear, made.MODEL, "logs", "held", window=0.07)
+    best, _ = add(wear, made.MODEL, "logs", "held", test_function=0.07)
     assert best.axis == "y"
     assert [t[1:] for t in tried] == [("sx", "wear"), ("sy", "wear")]
     assert [t[0] for t in tried] == list(both.fits.values())
     assert seen[0][0][1:] == ("logs", "held")
-    assert seen[0][1]["window"] == 0.07
+    assert seen[0][1]["test_function"] == 0.07
     bars = []
     found = add(wear, made.MODEL, "logs", axis="x", progress=lambda *done: bars.append(done))
     assert (found[0].axis, bars) == ("x", [("adding", 1, 1)])
@@ -270,7 +273,11 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     monkeypatch.setattr(
         workflow, "holdout_error", lambda fit, s: {7.3: 8.1, 2.9: 3.3}[round(fit.error, 9)]
     )
-    monkeypatch.setattr(workflow, "moved_parameters", lambda a, b: (f"{a.error > b.error}",))
+    monkeypatch.setattr(
+        workflow,
+        "moved_parameters",
+        lambda a, b: (replace(made.MOVED, before=a.error, after=b.error),),
+    )
     whole = before.model.with_axis("x", axis_of(fitted("empirical_map")))
     found = _addition(best, before, whole)
     step = found.step
@@ -281,8 +288,10 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     assert all(r[1] == {"x": dataset.fit[0]} for r in runs)
     assert [r[2] for r in runs].count("MujocoSimulator") == 1
     assert next(r[0] for r in runs if r[2] == "MujocoSimulator") == 2
-    assert found.notes[0] == "True"
-    assert "empirical_map made way" in found.notes[1]
+    assert (found.moved[0].before, found.moved[0].after) == pytest.approx((7.3, 2.9))
+    assert found.notes[0] == moved_in_words(found.moved[0])
+    assert found.set_aside == ("empirical_map",)
+    assert "empirical_map was removed" in found.notes[1]
     assert found.model.axes["x"] is best.fit.axis
     assert found.model.history == (step,)
     assert found.kept is kept

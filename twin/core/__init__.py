@@ -1,5 +1,5 @@
 """The compiled core: calling convention, effect table, attached masses, control loop.
 
-Compiled functions are made with ``compiled``, never with numba's own decorators: their caches know
-what is compiled into them. A new effect needs no change here.
+Compiled functions are made with ``compiled``, not with numba's own decorators, because only its
+caches are keyed by everything that is compiled into a function. A new effect needs no change here.
 """

@@ -28,10 +28,10 @@ def answer(entry, p, s, io, net, acceleration):
 
 @compiled(inline=True)
 def answers(entries, first, last, p, s, io):
-    """How the structure effects would answer in this sample: (pushed, riding, moved, yielding).
+    """Linear response of the structure effects in this sample: (pushed, riding, moved, yielding).
 
-    What rides on the axis pushes it with pushed + riding * acceleration (N, kg); what it stands on
-    adds moved + yielding * NET (N, kg) to its motion.
+    Bodies on the axis push it with pushed + riding * acceleration (N, kg); the body that the axis
+    stands on adds moved + yielding * NET (N, kg) to its motion.
     """
     pushed, riding, moved, yielding = 0.0, 0.0, 0.0, 0.0
     when = io[WHEN]
@@ -53,7 +53,7 @@ def answers(entries, first, last, p, s, io):
 def settle(entries, first, last, p, s, io, net, answered, rows, k):
     """Force (N) that the structure effects add under a net force; their states advance.
 
-    With a the acceleration of what rides on the axis, q'' that of the axis over what it stands on:
+    With a the acceleration of the bodies on the axis, q'' that of the axis relative to its base:
     m a = net + pushed + riding a,  m q'' = m a + moved + yielding net/m, m the moved mass.
     """
     pushed, riding = answered[0], answered[1]
@@ -88,7 +88,7 @@ def along(entries, first, last, p, s, io, velocity, k, standing, rows):
     rise, bend = 0.5 * (after - before), 0.5 * (after - 2.0 * now + before)
     rows[0, first:last] = 0.0
     answered = (0.0, 0.0, 0.0, 0.0)
-    if standing:  # what an axis stands on is slow
+    if standing:  # the base is heavy and slow
         steps = 1
         answered = answers(entries, first, last, p, s, io)
     else:
@@ -106,7 +106,7 @@ def along(entries, first, last, p, s, io, velocity, k, standing, rows):
 
 @compiled(inline=True)
 def shared(answered, mass, measured):
-    """NET and ACC (m/s^2) behind an acceleration of the axis over what it stands on."""
+    """NET and ACC (m/s^2) for a measured acceleration of the axis relative to its base."""
     pushed, riding, moved, yielding = answered
     free = mass - riding
     net = (free * (measured - moved / mass) - pushed) / (1.0 + free * yielding / mass**2)

@@ -1,8 +1,8 @@
-"""Native functions whose cache on disk knows everything that was compiled into them.
+"""Native functions whose cache on disk is keyed by everything that was compiled into them.
 
-numba keys a function's cache by that function's own file. What it calls is compiled into it too,
-and so are the constants it reads; here they are part of the key, so that a change anywhere is seen
-at once.
+numba keys a function's cache by that function's own file. The functions that it calls and the
+constants that it reads are compiled into it too; here they are part of the key, so that a change of
+any of them compiles it again.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def digest(function: Any) -> str:
 
 
 def _parts(function: Any, seen: set[int]) -> Iterator[str]:
-    """Texts that change when what the function compiles to does."""
+    """Texts that change whenever the compiled code would change."""
     if id(function) in seen:
         return
     seen.add(id(function))

@@ -23,7 +23,8 @@ class Controller:
     """PID with filtered derivative and mass feedforward, for one axis.
 
     proportional N/m, integral N/(m s), derivative N s/m, filter_bandwidth Hz (of the speed taken
-    from the reading), mass kg (feedforward). All zero: open loop, only the setpoint's force acts.
+    from the reading), mass kg (feedforward). With all zero the loop is open: only the setpoint's
+    force acts.
     """
 
     proportional: float = 0.0
@@ -86,6 +87,6 @@ def command(gains, state, setpoint, reading, dt, first):
         + gains[KI] * state[INTEGRAL]
     )
     limited = min(max(force, -gains[LIMIT]), gains[LIMIT])
-    if limited == force:  # the integral waits while the force is saturated
+    if limited == force:  # anti-windup: no integration while the force is saturated
         state[INTEGRAL] += error * dt
     return limited

@@ -2,8 +2,8 @@
 
 The same loop drives MuJoCo and the reduced model; only the step differs. Both integrate as MuJoCo's
 Euler does: v += dt a, then x += dt v with the new v. That x leads the exact motion under a force
-held over the sample by dt v/2, so the true position at t_k is x - dt v/2: a log of the twin then
-shows no delay that the machine would not have.
+held over the sample by dt v/2, so the true position at t_k is x - dt v/2, and a log of the twin has
+no delay that the machine does not have.
 """
 
 from __future__ import annotations

@@ -131,8 +131,8 @@ def walk(
 
     motion (3, n): position m, velocity m/s, command N; others (3, n): position, velocity,
     acceleration of the other axis; mass: moved mass, kg; time_origin: s, when sample 0 was.
-    Friction slides wherever v != 0, by an infinite mass: what holds a measured axis at rest cannot
-    be told.
+    The mass that friction acts on is infinite, so that friction slides wherever v != 0: the force
+    that holds a measured axis at rest is not determined.
     rows (n_entries, n): N.
     """
     entries, parameters, states = borrow((entries, parameters, states))

@@ -1,6 +1,6 @@
-"""A user's own effect is tried before it is used: its mistakes are said in one line.
+"""Checks of a user's own effect before it is used; each mistake is an error of one line.
 
-Compiled code does not look where it writes, so the plain Python law runs first, on guarded arrays.
+Compiled code does not check array bounds, so the law first runs as plain Python on guarded arrays.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def _told(error: Exception) -> str:
 
 
 def _tried(start: float, lower: float, upper: float, strength: bool) -> float:
-    """The start, or a small strength where the start is absence."""
+    """The start value, or a small strength where the effect is absent at the start."""
     return start if start or not strength else min(max(0.1, lower), upper)
 
 

@@ -1,4 +1,4 @@
-"""THE CATALOGUE: every file in this folder is one physical effect; nothing else names it.
+"""The catalogue: every file in this folder is one effect, and no other file names it.
 
 A file defines ``EFFECT``, a twin.effect.Effect, and takes its name from the file.
 """

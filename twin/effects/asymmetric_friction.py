@@ -10,7 +10,7 @@ from twin.effect import DRY, DT, HOLD, MASS, VISCOUS, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
-    # At rest the axis has the speed that rounding left; what counts is the way it is being pushed.
+    # At rest the speed is rounding error, so the direction is that of the force on the axis.
     moves = abs(io[MASS] * io[V] / io[DT]) > 1e-9 * abs(io[HOLD])
     direction = io[V] if moves else io[HOLD]
     if direction > 0.0:

@@ -5,8 +5,8 @@ frame reads it, b the frame, M + m all mass on the isolator, recoil = m/(M + m),
 From m (q'' + b'') = F and M b'' + C b' + K b = -F: limited mass of the stationary machine part in
 A. M. Rankers, Machine Dynamics in Mechatronic Systems, PhD thesis, University of Twente (1997).
 ``frequency`` and ``damping`` are those of the isolator with everything aboard at rest.
-Seen by the encoder this is a load on a spring with load = recoil (same poles and zeros); what tells
-the two apart is the frequency.
+For the encoder this equals a load on a spring with load = recoil (same poles and zeros); only the
+frequency distinguishes the two.
 
 The step is MuJoCo's: spring from the position, damper implicit. Its spring and damper are those for
 which the whole, axis held, oscillates and decays over a sample exactly as the equation

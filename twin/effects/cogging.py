@@ -29,7 +29,7 @@ def pitches(e: Excitation) -> tuple[float, ...]:
 
 
 def simplest(values: Mapping[str, float]) -> dict[str, float]:
-    """A pitch whose fundamental is silent is a multiple of the true one."""
+    """The shorter pitch where only one higher harmonic of the pitch is present."""
     size = {k: hypot(values[f"a{k}"], values[f"b{k}"]) for k in (1, 2, 3)}
     for k in (2, 3):
         others = sum(size[j] for j in (1, 2, 3) if j != k)

@@ -1,8 +1,8 @@
-"""What no physical effect explains, as smooth curves of position, speed, direction and time.
+"""A force that no physical effect explains, as smooth curves of position, speed and time.
 
-F = A(x) + z D(x) + v/speed E(x) + B(v) + C(t/T). A description, not physics: it lowers the error
-and shows the shape of what is missing, but holds only where the logs went. A, D and E are piecewise
-linear over ``elements`` equal intervals along the track; B over 16 intervals of
+F = A(x) + z D(x) + v/speed E(x) + B(v) + C(t/T). It is not a physical law: it lowers the error and
+shows the shape of the missing force, but is valid only within the motion of the logs. A, D and E
+are piecewise linear over ``elements`` equal intervals along the track; B over 16 intervals of
 sgn(v) sqrt(|v|/speed), finer near standstill; C over 12 intervals of the period T, closed to a
 ring. z is the direction with a memory of the last ``turn`` metres, dz/dt = (v - |v| z)/turn, so
 that the force does not jump at a reversal. Beyond the covered travel A, D and E fade to zero within
@@ -12,7 +12,7 @@ Each curve is smoothed by its ``stiff``: a fit adds stiff^2 times the squared se
 its knots, and their squares over the square of their number, to the mean square of the residual
 (P-splines: P. H. C. Eilers, B. D. Marx, "Flexible smoothing with B-splines and penalties", Statist.
 Sci. 11, 1996). T is the strongest line in the spectrum of the force; t counts from the start of
-each log, so C only helps where what repeats keeps its phase from log to log.
+each log, so C only helps where the phase is the same in all logs.
 """
 
 from functools import cache
@@ -80,7 +80,7 @@ def smooth(knots: int) -> np.ndarray:
 
 
 def smooth_ring(knots: int) -> np.ndarray:
-    """The same of a closed curve."""
+    """The same for a closed curve."""
     own = np.eye(knots)
     bends = np.roll(own, 1, axis=0) - 2.0 * own + np.roll(own, -1, axis=0)
     return np.vstack([bends, own / knots])
@@ -93,9 +93,9 @@ def of_size(elements: int) -> Effect:
     own = {key: tuple(f"{key}_{i}" for i in range(1, n + 1)) for key, n in counts.items()}
     return Effect(
         kind=Kind.FORCE,
-        summary="a description, not physics: curves of position, direction, speed, time",
+        summary="fitted curves of position, direction, speed and time; not a physical law",
         equation="F = A(x) + z D(x) + v/speed E(x) + B(v) + C(t/T);  dz/dt = (v - |v| z)/turn",
-        source="no physics; smoothing after Eilers, Marx 1996",
+        source="none; smoothing after Eilers, Marx 1996",
         parameters=(
             *_shared(elements),
             *_knots(own["x"], "A, force by position"),

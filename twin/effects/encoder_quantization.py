@@ -2,8 +2,8 @@
 
 reading = step floor(x/step + 1/2).
 B. Widrow, I. Kollar, Quantization Noise (2008), section 1.1: uniform rounding quantizer.
-A reading rounded twice is the reading: no force on the measured motion tells the step, so it is
-read off the readings and not fitted.
+Rounding a reading again does not change it, so the force residual does not depend on the step: it
+is determined from the readings and not fitted.
 """
 
 from math import floor

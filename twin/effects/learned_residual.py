@@ -1,13 +1,14 @@
-"""A small data-driven model of what is left, for what curves of single coordinates cannot hold.
+"""A small data-driven model of a force that depends on several coordinates together.
 
 F = sum c_ijab cos(pi i q) T_j(v/speed) z1^a z2^b over the hyperbolic cross
 (1 + i)(1 + j)(1 + a)(1 + b) <= 24, j <= 3, a, b <= 1: fine in one coordinate or coarse in several,
-which is what few data can tell. q is the place along the covered travel, 0..1; T_j a Chebyshev
-polynomial; z1 and z2 the direction with a memory of the distance since the reversal, short and
-long, dz/dt = (v - |v| z)/reach. A description, not physics: it is learned from the logs, holds only
-where they went, and its numbers mean nothing one by one. Beyond the covered travel it fades to zero
-within a 24th of it; beyond the covered speed it holds its value. A fit adds ``stiff``^2 times the
-squares of the c_ijab, each times its product above, to the mean square of the residual (ridge).
+which is as much as few data determine. q is the place along the covered travel, 0..1; T_j a
+Chebyshev polynomial; z1 and z2 the direction with a memory of the distance since the reversal,
+short and long, dz/dt = (v - |v| z)/reach. It is not a physical law: it is learned from the logs, is
+valid only within their motion, and its coefficients have no meaning one by one. Beyond the covered
+travel it fades to zero within a 24th of it; beyond the covered speed it holds its value. A fit adds
+``stiff``^2 times the squares of the c_ijab, each times its product above, to the mean square of the
+residual (ridge).
 D. Dung, V. Temlyakov, T. Ullrich, Hyperbolic Cross Approximation, Birkhaeuser (2018).
 """
 
@@ -70,16 +71,16 @@ ORDERS = {
 
 
 def ridge(count: int) -> np.ndarray:
-    """Each coefficient by itself, the finer and the more involved the smaller."""
+    """Penalty of each coefficient, larger for finer and mixed terms."""
     return np.diag(list(ORDERS.values())[:count])
 
 
 EFFECT = Effect(
     kind=Kind.FORCE,
-    summary="a description, not physics: small learned model of position, speed and reversals",
+    summary="small learned model of position, speed and reversals; not a physical law",
     equation="F = sum c_ijab cos(pi i q) T_j(v/speed) z1^a z2^b,  "
     "(1+i)(1+j)(1+a)(1+b) <= 24;  dz/dt = (v - |v| z)/reach",
-    source="no physics; basis after Dung, Temlyakov, Ullrich, Hyperbolic Cross Approximation, 2018",
+    source="none; basis after Dung, Temlyakov, Ullrich, Hyperbolic Cross Approximation, 2018",
     parameters=(
         Parameter(
             "start", "m", -0.15, -1e3, 1e3, "where the covered travel begins", fixed=True,
@@ -106,7 +107,7 @@ EFFECT = Effect(
     ),
     states=("z1", "z2"),
     law=law,
-    fingerprint="what is left depends on several coordinates together",
+    fingerprint="residual depends on several coordinates together",
     excited_by="varied motion over the whole range of position, speed and reversals",
     parts=(Part("all coordinates", tuple(ORDERS), "stiff", ridge),),
 )  # fmt: skip

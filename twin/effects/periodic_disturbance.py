@@ -1,7 +1,7 @@
 """Force that is a sinusoid in time: floor vibration, a pump, the mains.
 
-F = a sin(2 pi f t) + b cos(2 pi f t), t from the start of the log. What acts is its mean over the
-sample: the value in the middle times sinc(f dt), so that steps of any length carry the same
+F = a sin(2 pi f t) + b cos(2 pi f t), t from the start of the log. Its mean over the
+sample acts: the value in the middle times sinc(f dt), so that steps of any length give the same
 impulse. One term of the Fourier series of a periodic force; D. J. Inman, Engineering Vibration,
 section 3.3 (response to an arbitrary periodic input).
 """
@@ -19,7 +19,7 @@ def law(p, s, io):
 
 
 def frequencies(e: Excitation) -> tuple[float, ...]:
-    """Lines seen in the force of the log; a coarse ladder where there are none."""
+    """Spectral lines in the force of the log; a coarse grid where there are none."""
     return e.lines or tuple(0.5 * 1.1**k for k in range(50))
 
 

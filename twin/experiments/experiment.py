@@ -53,7 +53,7 @@ class Experiment(ABC):
 
     @abstractmethod
     def setpoint(self, model: MachineModel, rng: np.random.Generator) -> Setpoint:
-        """The setpoint for this stage; CannotRun where it goes beyond the stage's limits."""
+        """The setpoint for this machine; CannotRun where it exceeds the machine's limits."""
 
 
 def _require(name: str, value: Any, unit: str, zero: bool) -> None:
@@ -142,7 +142,7 @@ def _with_other(
     names = list(model.axes)
     if len(names) != 2:
         which = "has no second axis" if len(names) < 2 else f"has {len(names)} axes, not two"
-        raise CannotRun(f"other = {span:g}: the stage {which}; leave it out")
+        raise CannotRun(f"other = {span:g}: the machine {which}; leave it out")
     index = 1 - names.index(axis)
     unit = model.axes[names[index]].units.position
     ends = np.tile(place, (4, 1))

@@ -1,7 +1,7 @@
 """The kinds of experiment.
 
 Passes, staircases, reversals and open-loop sines are those of L. Jia (2023); tracking is the rich
-motion on which models are fitted. Steps, sweeps and rests show what those leave in the dark.
+motion on which models are fitted. Steps, sweeps and rests excite effects that those do not.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The named experiments, run on the twin and logged.
 
 Setpoints follow the experiments of L. Jia (2023): cable pass, velocity map, reversals, open-loop
-sine; tracking is the rich motion on which models are fitted and held out.
+sine; tracking is the rich motion on which models are fitted and tested.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ EXPERIMENTS: Mapping[str, Named] = {
 def find_experiment(
     name: str, model: MachineModel, axis: str | None = None, duration: float = DURATION
 ) -> Experiment:
-    """The experiment of that name for this stage, on its first axis where None is given.
+    """The experiment of that name for this machine, on its first axis where None is given.
 
     duration: s. InputError names the nearest where there is none, and for an axis that is not
     there.
@@ -152,7 +152,7 @@ def simulate(
 
 def outside_travel(model: MachineModel, log: Log) -> tuple[str, ...]:
     """A sentence for each axis of the model that left its travel in a log of the twin."""
-    told = []
+    warnings = []
     for name, axis in model.axes.items():
         if axis.hardware.travel is None:
             continue
@@ -160,13 +160,13 @@ def outside_travel(model: MachineModel, log: Log) -> tuple[str, ...]:
         position = log.truth[name]["position"]
         farthest = position[np.argmax(np.maximum(low - position, position - high))]
         if not low <= farthest <= high:
-            told.append(
+            warnings.append(
                 f"axis {name} went to {farthest:.4g} {units.position}, outside its travel of "
                 f"{low:g} to {high:g} {units.position}: the drive does not hold it; move more "
                 f"gently, or check force_limit ({axis.hardware.force_limit:g} {units.force}), "
                 "bandwidth and the effects"
             )
-    return tuple(told)
+    return tuple(warnings)
 
 
 def _log(

@@ -1,4 +1,4 @@
-"""Series of samples -> Log: what belongs together, and what must be there."""
+"""Series of samples -> Log, with the checks that all topics fit together."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Extras:
         self.attachments: dict[str, bytes] = {}
 
     def add(self, record: Record) -> None:
-        """Take what a record holds of them; raises Damaged, InputError."""
+        """Take metadata or an attachment from a record; raises Damaged, InputError."""
         if record.opcode == Opcode.METADATA:
             metadata = record.parsed(Metadata)
             if metadata.name == METADATA_NAME:

@@ -1,4 +1,4 @@
-"""An MCAP file as records: framing, magic and checksums, nothing about what is in them."""
+"""An MCAP file as records: framing, magic and checksums, not their content."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ class AxisLog:
 
 @dataclass(frozen=True)
 class Log:
-    """A whole run: ``axes`` by name ("x", "y"), sampled at ``sample_rate`` (Hz) from t = 0.
+    """One log: ``axes`` by name ("x", "y"), sampled at ``sample_rate`` (Hz) from t = 0.
 
     truth: axis -> column name -> (n,) array, simulation only; identification never reads it.
     metadata: the MCAP metadata record "twin"; attachments: file name -> bytes.

@@ -1,4 +1,4 @@
-"""What a log becomes in the file: schemas, channels and rows; the log is verified on the way."""
+"""The layout of a log in the file: schemas, channels and rows; verifies the log as well."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from twin.log.schema import (
 from twin.log.series import seconds
 from twin.log.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_units
 
-_TRUTH_UNITS = ("position", "velocity")  # what truth columns of these names are measured in
+_TRUTH_UNITS = ("position", "velocity")  # truth columns of these names have the axis' units
 
 
 @dataclass(frozen=True)

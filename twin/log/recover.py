@@ -1,4 +1,4 @@
-"""Keep what is intact of a damaged log: the longest run of samples without a gap."""
+"""Recover a damaged log: the longest intact series of samples without a gap."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class Recovery:
 
 
 def recover_log(path: str | Path) -> tuple[Log, Recovery]:
-    """Read the longest run of intact chunks without a gap between them.
+    """Read the longest series of intact chunks without a gap between them.
 
     Chunks are kept only where their checksum holds. Metadata has no checksum of its own; where
-    it contradicts the chunks it gives way. Raises InputError where nothing is left.
+    it contradicts the chunks it is ignored. Raises InputError where nothing is left.
     """
     path = Path(path)
     try:
@@ -79,7 +79,7 @@ class _Salvage:
         self._report_absent_chunks()
 
     def log(self) -> Log:
-        """The longest run; raises InputError where it is empty or not fit to be a log."""
+        """The longest series; raises InputError where it is empty or no valid log."""
         count = self._count(self._best)
         if count == 0:
             raise InputError(f"nothing can be recovered ({'; '.join(self.lost)})")
@@ -126,7 +126,7 @@ class _Salvage:
             )
 
     def _close(self) -> None:
-        """Keep the longer of the run at hand and the best so far, and report the other."""
+        """Keep the longer of the present series and the best so far, and report the other."""
         best, other = self._best, self._run
         if best is other:
             return
@@ -177,7 +177,7 @@ def _record_at(data: bytes, offset: int) -> Record | None:
 
 
 def _next_chunk(data: bytes, start: int) -> int | None:
-    """Where the next compressed chunk record may begin; its checksum will tell."""
+    """Where the next compressed chunk record may begin; its checksum verifies it."""
     found = (data.find(c, start + _BEFORE_COMPRESSION) for c in _COMPRESSIONS)
     candidates = [f - _BEFORE_COMPRESSION for f in found if f >= 0]
     return min(candidates, default=None)

@@ -125,7 +125,7 @@ class Series:
         steps = np.diff(elapsed)
         if not (steps > 0).any():
             raise InputError(
-                f"{self.topic.name}: {len(elapsed)} samples do not tell the sample rate; "
+                f"{self.topic.name}: {len(elapsed)} samples do not determine the sample rate; "
                 "state sample_rate_hz (Hz) in the channel metadata"
             )
         period = float(np.median(steps[steps > 0]))

@@ -1,4 +1,4 @@
-"""Stage models as TOML files: values with their units in comments, and the model's history."""
+"""Machine models as TOML files: values with their units in comments, and the history."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ def find_model(name: str | Path) -> Path:
         path.name, [p.name for p in models_folder().glob("*.toml")], n=1, cutoff=0.3
     )
     hint = f"; the package has {near[0]}" if near else ""
-    raise InputError(f"{path}: no such model file{hint}; give the path of a .toml stage model")
+    raise InputError(f"{path}: no such model file{hint}; give the path of a .toml machine model")
 
 
 def load_model(name: str | Path, catalogue: Catalogue) -> MachineModel:
-    """Read a stage model. Raises InputError naming the file, the entry and what is allowed."""
+    """Read a machine model. Raises InputError naming the file, the entry and what is allowed."""
     path = find_model(name)
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -86,9 +86,9 @@ def _read_beside(path: Path, name: str) -> str:
 def parse_model(
     document: Mapping[str, Any], catalogue: Catalogue, mjcf: str | None, where: str
 ) -> MachineModel:
-    """A stage model from its TOML document; ``where`` names the file in messages."""
+    """A machine model from its TOML document; ``where`` names the file in messages."""
     if not document.get("axes"):
-        raise InputError(f"{where}: has no [axes.<name>] table; a stage model has at least one")
+        raise InputError(f"{where}: has no [axes.<name>] table; a machine model has at least one")
     rate = document.get("sample_rate", 10_000.0)
     if not (isinstance(rate, int | float) and math.isfinite(rate) and rate > 0):
         raise InputError(f"{where}: sample_rate = {rate}: must be a positive number of Hz")
@@ -176,7 +176,7 @@ def _history_step(entry: Mapping[str, Any]) -> HistoryStep:
 
 
 def format_model(model: MachineModel) -> str:
-    """The stage model as TOML text, each value with its unit in a comment."""
+    """The machine model as TOML text, each value with its unit in a comment."""
     document = tomlkit.document()
     document["name"] = model.name
     if model.mjcf_name:
@@ -234,7 +234,7 @@ def save_model(model: MachineModel, path: str | Path) -> None:
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write to a temporary name, then rename, so that nothing half written is ever seen."""
+    """Write to a temporary name, then rename, so that the file is never half written."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         temporary.write_bytes(content)

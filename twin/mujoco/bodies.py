@@ -1,4 +1,4 @@
-"""Where a structure effect attaches its bodies to the MuJoCo model of a stage."""
+"""How a structure effect attaches its bodies to the MuJoCo model of a machine."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from twin.errors import InputError
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 
-# A joint of its own: no limits, whatever the defaults of the stage's file.
+# A joint of its own: no limits, whatever the defaults of the machine's file.
 FREE = {
     "limited": mujoco.mjtLimited.mjLIMITED_FALSE,
     "actfrclimited": mujoco.mjtLimited.mjLIMITED_FALSE,
@@ -46,7 +46,7 @@ class Spring:
 
 @dataclass(frozen=True)
 class Mount:
-    """One axis of a stage's spec, for one effect.
+    """One axis of a machine's spec, for one effect.
 
     axis: name of its joint; joint: name of the joint to build, of the same type; mass: moved mass,
     kg, or moment of inertia, kg m^2, where ``rotary``.

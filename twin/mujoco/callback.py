@@ -1,6 +1,6 @@
 """MuJoCo's side of the native core: the passive-force callback and how it finds its model.
 
-The table of a stage travels inside the mjModel itself, as the last custom numeric, so model copies
+The table of a machine is stored in the mjModel itself, as the last custom numeric, so model copies
 and worker threads need nothing else. Its last number is a magic value; the callback
 returns at once for any other model. The states live in userdata: those at the start of the
 sample and those after it. The callback commits the second to the first when time has moved on,

@@ -1,4 +1,4 @@
-"""The MuJoCo model of a stage: its masses set and the bodies of structure effects attached."""
+"""The MuJoCo model of a machine: its masses set and the bodies of structure effects attached."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ DIRECTIONS = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])  # of plain axe
 
 
 def machine_spec(model: MachineModel) -> mujoco.MjSpec:
-    """The MuJoCo spec of a stage with its moved masses set and its structure effects attached.
+    """The MuJoCo spec of a machine with its moved masses set and its structure effects attached.
 
-    A stage without MJCF becomes plain slides and hinges. On a stacked stage the axis that carries
-    the other moves both masses. Raises InputError where the file lacks a joint or motor of an axis,
-    where a joint is of the other kind, and where a mass leaves nothing for a body.
+    A machine without MJCF becomes plain slides and hinges. Where one axis carries the other, it
+    moves both masses. Raises InputError where the file lacks a joint or motor of an axis, where a
+    joint is of the other kind, and where a mass leaves nothing for a body.
     """
     spec = _read_mjcf(model) if model.mjcf else _plain_joints(model)
     spec.option.timestep = model.period
@@ -95,7 +95,7 @@ def _read_mjcf(model: MachineModel) -> mujoco.MjSpec:
 def _require_bare(
     model: MachineModel, axis: str, joint: mujoco.MjsJoint, motor: mujoco.MjsActuator
 ) -> None:
-    """Friction, damping and springs belong in the stage model, where both simulations see them.
+    """Friction, damping and springs belong in the machine model, where both simulations see them.
 
     The joint must be of the axis' kind.
     """

@@ -94,14 +94,14 @@ def render(subject: Subject, shown: Sequence[Section]) -> str:
 
 
 def _facts(subject: Subject) -> list[tuple[str, str]]:
-    """The line under the title: model, logs, windows."""
+    """The line under the title: model, logs, test functions."""
     axes = subject.comparison.axes.values()
     logs = list(dict.fromkeys(log.motion.name for a in axes for log in a.logs))
-    windows = list(dict.fromkeys(quantity(a.logs[0].window.length, "s") for a in axes))
+    lengths = list(dict.fromkeys(quantity(a.logs[0].window.length, "s") for a in axes))
     facts = [("Model", subject.comparison.model.name), ("Logs", ", ".join(logs))]
     if held := _held_out(subject.diagnosis):
         facts.append(("Held out", ", ".join(held)))
-    return [*facts, ("Test function", ", ".join(windows))]
+    return [*facts, ("Test function", ", ".join(lengths))]
 
 
 def _held_out(diagnosis: Diagnosis | None) -> list[str]:

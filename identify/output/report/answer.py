@@ -1,4 +1,4 @@
-"""The answer in big words, an axis at a time: what is missing, and what it would change."""
+"""The answer for each axis: what is missing, and how much it would improve the model."""
 
 from __future__ import annotations
 
@@ -6,20 +6,26 @@ from identify.estimation.decision import RULE
 from identify.experiment_design.plan import Plan
 from identify.output.report.blocks import Answer, Section, Tile, Tone
 from identify.output.report.subject import Subject
-from identify.output.report.units import Scale, number, quantity, spaced
+from identify.output.report.units import SCALED, Scale, number, quantity, spaced
 from identify.output.results import Addition
-from identify.output.text import advice
+from identify.output.words.experiment_design import gap_in_words
+from identify.output.words.numbers import capitalised
+from identify.output.words.selection import (
+    advice,
+    dependence_in_words,
+    refit_in_words,
+    verdict_in_words,
+)
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
 from identify.selection.forward_selection import AxisDiagnosis, Verdict
-from identify.selection.residual_dependence import Dependence
 from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
-from twin.model.units import AxisUnits, units_of
+from twin.model.units import AxisUnits
 
 
 def section(subject: Subject) -> Section:
-    """A card for each axis; for a model that just got an effect, that first."""
+    """A card for each axis; a card for the latest addition first where nothing was diagnosed."""
     cards = []
     if subject.additions and subject.diagnosis is None:
         cards.append(_added(subject.additions[-1]))
@@ -37,9 +43,9 @@ def _diagnosed(
     axis: AxisComparison, found: AxisDiagnosis, following: Plan | None, refit: Refit | None
 ) -> Answer:
     remarks = []
-    sentence = axis.units.words(found.verdict.value)
+    sentence = axis.units.words(verdict_in_words(found.verdict))
     if found.unexplained is not None:
-        sentence = f"{sentence} {_dependence(found.unexplained)}"
+        sentence = f"{sentence} {dependence_in_words(found.unexplained, SCALED)}"
     if found.best is not None:
         remarks.append(_left_over(found.best))
     remarks.extend(_runner_up(found))
@@ -47,8 +53,8 @@ def _diagnosed(
         remarks.append(f"{advice()}.")
     if following is not None:
         remarks.append(_next_step(following))
-    if found.verdict is Verdict.NOTHING_MISSING and refit and (changed := refit.in_words()):
-        remarks.append(f"{changed[0].upper()}{changed[1:]}.")
+    if found.verdict is Verdict.NOTHING_MISSING and refit and (changed := refit_in_words(refit)):
+        remarks.append(capitalised(changed))
     return Answer(
         headline=f"Axis {axis.axis}: {_headline(found)}",
         sentence=sentence,
@@ -70,25 +76,14 @@ def _headline(found: AxisDiagnosis) -> str:
             return "nothing is missing"
 
 
-def _dependence(structure: Dependence) -> str:
-    depends_on = units_of(structure.unit).words(spaced(structure.depends_on))
-    period = ""
-    if structure.period is not None:
-        period = f", with a period of {quantity(structure.period, structure.unit)}"
-    return (
-        f"It depends most on {depends_on}, which accounts for "
-        f"{100 * structure.share_of_error:.0f} % of the squared error{period}."
-    )
-
-
 def _left_over(best: Candidate) -> str:
     name, fit = spaced(best.effect.name), best.fit
     error = fit.axis.units.words("force error")
     if fit.at_floor:
         return f"With {name} the {error} is at its noise floor."
     return (
-        f"With {name} the {error} still stands {number(fit.ratio)} times above its noise "
-        "floor: add it, then diagnose again."
+        f"With {name} the {error} is still {number(fit.ratio)} times its noise floor: add it, "
+        "then diagnose again."
     )
 
 
@@ -112,8 +107,8 @@ def _next_step(following: Plan) -> str:
     return (
         f"The experiment that {what} ({quantity(chosen.duration, 's')}; twin plan writes it): "
         f"{in_short(chosen.experiment, chosen.units)}. "
-        f"It leaves {quantity(chosen.difference, unit)} RMS to the rival, where noise is "
-        f"{quantity(chosen.floor, unit)}; {following.gap.in_words()}."
+        f"The rival leaves {quantity(chosen.difference, unit)} RMS unexplained, where noise is "
+        f"{quantity(chosen.floor, unit)}; {gap_in_words(following.gap)}."
     )
 
 
@@ -180,8 +175,8 @@ def _compared(axis: AxisComparison) -> Answer:
     sentence = (
         "The force error is at its noise floor."
         if at_floor
-        else "The model leaves force that noise does not explain; twin diagnose says which effect "
-        "is missing."
+        else "The force error is larger than noise explains; twin diagnose finds which effect is "
+        "missing."
     )
     return Answer(
         headline=f"Axis {axis.axis}: {headline}",
@@ -209,9 +204,11 @@ def _added(addition: Addition) -> Answer:
             f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo",
         )
     )
-    sentence = "The effect earned its place on data that the fit did not see."
+    sentence = "The evidence and the held-out logs support the effect."
     if not addition.kept:
-        sentence = "Data that the fit did not see does not ask for this effect; leave it out."
+        sentence = (
+            "The evidence and the held-out logs do not both support this effect; leave it out."
+        )
     return Answer(
         headline=f"Axis {step.axis}: {spaced(step.effect)} added",
         sentence=sentence,

@@ -1,4 +1,4 @@
-"""The law of each named effect: its equation, its source, its trace in the residual."""
+"""The law of each named effect: its equation, its source, its fingerprint in the residual."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from identify.output.report.units import title_case
 
 
 def section(subject: Subject) -> Section | None:
-    """The named effect of each axis, and those that the data cannot tell from it."""
+    """The named effect of each axis, and those that the data cannot separate from it."""
     blocks: list[Block] = []
     for axis in subject.axes:
         found = subject.diagnosed(axis.axis)
@@ -21,8 +21,8 @@ def section(subject: Subject) -> Section | None:
             blocks.append(Heading(f"{title_case(effect.name)} on {axis.axis}"))
             pairs = (
                 ("What it is", effect.summary),
-                ("Its trace", effect.fingerprint),
-                ("Shown by", effect.excited_by),
+                ("Fingerprint", effect.fingerprint),
+                ("Excited by", effect.excited_by),
                 ("Fitted", values_of(candidate)),
                 ("Source", effect.source),
             )

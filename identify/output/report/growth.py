@@ -1,4 +1,4 @@
-"""The error falling, effect by effect."""
+"""The force error after each added effect."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def section(subject: Subject) -> Section | None:
-    """A picture and a table for each axis that grew; position errors where they were taken."""
+    """A picture and a table for each axis with added effects; their position errors if known."""
     blocks: list[Block] = []
     for axis, steps in _by_axis(subject.steps).items():
         if len(_by_axis(subject.steps)) > 1 or subject.heading(axis):
@@ -44,8 +44,8 @@ def _by_axis(steps: Sequence[HistoryStep]) -> dict[str, list[HistoryStep]]:
 
 def _picture(steps: Sequence[HistoryStep], floor: float | None) -> Picture:
     caption = (
-        "Force error after each effect was added and the model refitted. An effect that is really "
-        "there lowers the held-out error as much as that of the fit."
+        "Force error after each effect was added and the model refitted. A real effect lowers the "
+        "held-out error as much as the error on the fit logs."
     )
     return Picture(_figure(steps, floor), units_of(steps[0].unit).words(caption))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from identify.output.report.blocks import Block, Column, Heading, Row, Section, Table
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, number, quantity
-from identify.validation.free_run import WINDOW
+from identify.validation.free_run import HORIZON
 from identify.validation.misfit_maps import AxisComparison
 
 
@@ -46,8 +46,9 @@ def _table(axis: AxisComparison) -> Table:
         Column("Of noise alone", numeric=True),
     )
     caption = (
-        f"Noise floor of the force {quantity(axis.floor, axis.units.force)} RMS in windows of "
-        f"{quantity(axis.logs[0].window.length, 's')}. The free run starts again from the measured "
-        f"motion every {WINDOW:g} s; every force drives it off, that of the noise too."
+        f"Noise floor of the force: {quantity(axis.floor, axis.units.force)} RMS with test "
+        f"functions of {quantity(axis.logs[0].window.length, 's')}. The free run restarts from the "
+        f"measured motion every {HORIZON:g} s; between restarts the position drifts with every "
+        "wrong force, measurement noise included."
     )
     return Table(columns, rows, words(caption))

@@ -28,8 +28,8 @@ NAMES = {
 def picture(axis: AxisComparison) -> Picture:
     """RMS force error against every coordinate of an axis."""
     caption = (
-        "RMS force error by region; the grey band is what noise alone leaves there. By frequency "
-        "it is the error in bands of half an octave, whatever the window."
+        "RMS force error by region; the grey band is the noise floor there. By frequency it is the "
+        "error in bands of half an octave, independent of the test function."
     )
     return Picture(_figure(axis), axis.units.words(caption))
 

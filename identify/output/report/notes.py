@@ -1,4 +1,4 @@
-"""What else the reader should know: fits that did not end well, parameters that jumped."""
+"""Notes: channel delays, fits that did not converge, parameters that an effect changed."""
 
 from __future__ import annotations
 

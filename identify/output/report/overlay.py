@@ -58,8 +58,8 @@ def _picture(subject: Subject, axis: AxisComparison) -> Picture:
     force = axis.units.words("force")
     caption = (
         f"Log {shown.name}: the {force} that the model must explain (command less inertia) and the "
-        f"{force} that it gives; look for where the two part. Above the whole log, below the "
-        "shaded stretch and what is left of it."
+        f"{force} of the model. Top: the whole log. Middle: the shaded part of it. Bottom: the "
+        "residual of that part."
     )
     return Picture(_figure(shown, span, axis.floor, named), caption)
 
@@ -70,12 +70,12 @@ def _error(forces: LogForces, part: slice) -> float:
 
 
 def representative(forces: LogForces, length: float) -> slice:
-    """The stretch of that length (s) whose error is nearest to that of the whole log."""
+    """The part of that length (s) whose error is nearest to that of the whole log."""
     step = forces.time[1] - forces.time[0] if len(forces.time) > 1 else length
     n = min(max(round(length / step), 2), len(forces.time))
     parts = [slice(a, a + n) for a in range(0, len(forces.time) - n + 1, max(n // 4, 1))]
     whole = _error(forces, slice(None))
-    # A stretch at rest has no error to compare: it comes last.
+    # A part at rest has no error to compare, so it is the last choice.
     distances = [abs(_error(forces, p) - whole) for p in parts]
     return parts[int(np.argmin(np.where(np.isfinite(distances), distances, np.inf)))]
 
@@ -117,7 +117,7 @@ class _Line:
 
 
 def _lines(forces: LogForces, named: str) -> list[_Line]:
-    """The measured force as a wide line, so that a model that hides it is seen to fit."""
+    """The measured force as a wide line, so that it shows behind a model that fits."""
     lines = [
         _Line("measured (command less inertia)", forces.explain, MEASURED, 3.0),
         _Line("model", forces.model, BLUE, 1.2),

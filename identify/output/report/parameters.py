@@ -10,8 +10,9 @@ from identify.estimation.intervals import Estimate, estimates, refusal
 from identify.output.report.blocks import Block, Column, Heading, Row, Section, Table, Tone
 from identify.output.report.subject import Subject
 from identify.output.report.units import NOTHING, Scale, number, quantity, spaced
+from identify.output.words.estimation import no_interval_in_words
 from identify.selection.forward_selection import AxisDiagnosis
-from identify.selection.nonparametric import described_labels
+from identify.selection.nonparametric import nonparametric_labels
 from twin.model.machine import AxisModel
 
 
@@ -27,11 +28,11 @@ def section(subject: Subject) -> Section:
 
 
 def _given(axis: AxisModel) -> Table:
-    """Values as the model has them."""
+    """Values of a model that was not fitted here."""
     meanings = _meanings(axis)
     units, mass = axis.units, axis.mass_parameter
     rows = [Row((mass.name, quantity(axis.mass, units(mass.unit)), meanings[mass.name]))]
-    hidden = described_labels(axis)
+    hidden = nonparametric_labels(axis)
     for fitted in axis.effects:
         for p in fitted.effect.parameters:
             label = f"{fitted.effect.name}.{p.name}"
@@ -40,7 +41,7 @@ def _given(axis: AxisModel) -> Table:
             value = quantity(fitted.values[p.name], units(p.unit))
             rows.append(Row((label, value, meanings[label])))
     columns = (Column("Parameter"), Column("Value", numeric=True), Column("Meaning"))
-    return Table(columns, rows, "Values of the model as it was given; twin fit adds intervals.")
+    return Table(columns, rows, "Values of the given model; twin fit adds intervals.")
 
 
 def _fitted(found: AxisDiagnosis) -> Table:
@@ -82,11 +83,11 @@ def _part(heading: str, fit: Fit, labels: Sequence[str]) -> _Part:
     columns = (Column(heading, numeric=True), Column("90 % interval"))
     if refusal(fit) is None:
         return _Part(columns, cells, "")
-    # The reason is the same for all: said once instead of in a column.
+    # All values have the same reason, so it is in the caption instead of a column.
     error, words = quantity(fit.error, fit.axis.units.force), fit.axis.units.words
     remark = (
-        f"{heading}: no intervals, because the {words('force error')} of {error} stands "
-        f"{number(fit.ratio)} times above the noise floor; the model is wrong by more than noise."
+        f"{heading}: no intervals, because the {words('force error')} of {error} is "
+        f"{number(fit.ratio)} times the noise floor; the model is wrong by more than noise."
     )
     return _Part(columns[:1], [c[:1] for c in cells], remark)
 
@@ -98,7 +99,8 @@ def _cells(estimate: Estimate | None) -> tuple[str, str]:
     if not estimate.free:
         return scale.text(estimate.value), ""
     if estimate.low is None or estimate.high is None:
-        return scale.text(estimate.value), estimate.reason or ""
+        reason = no_interval_in_words(estimate.reason) if estimate.reason else ""
+        return scale.text(estimate.value), reason
     low, value, high = scale.within(
         estimate.low, estimate.high, estimate.low, estimate.value, estimate.high
     )

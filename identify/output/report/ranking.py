@@ -1,4 +1,4 @@
-"""Every absent effect, ranked by how well it explains what the model leaves."""
+"""Every absent effect, ranked by how well it explains the force residual."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _table(found: AxisDiagnosis) -> Table:
     )
     caption = (
         f"Error: RMS force, {tested_on(found)}. Supported: the evidence (ΔBIC above 10) and the "
-        "data that the fit did not see both ask for the effect."
+        "data left out of the fit both favour the effect."
     )
     return Table(columns, rows, found.dataset.units.words(caption))
 

@@ -1,4 +1,4 @@
-"""Where the error is: the worst regions in words, and what the error depends on."""
+"""Where the error is: the worst regions, the misfit maps, and what the error depends on."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from identify.output.report import maps
 from identify.output.report.blocks import Block, Heading, Listing, Picture, Section
 from identify.output.report.drawing import BLUE, GREY, new_figure
 from identify.output.report.subject import Subject
-from identify.output.report.units import Scale, number, quantity, spaced, title_case
+from identify.output.report.units import SCALED, spaced
+from identify.output.words.numbers import capitalised
+from identify.output.words.validation import region_in_words
 from identify.selection.forward_selection import AxisDiagnosis
 from identify.selection.residual_dependence import Dependence
-from identify.validation.misfit_maps import AxisComparison, Region
+from identify.validation.misfit_maps import AxisComparison
 from twin.model.units import units_of
 
 
 def section(subject: Subject) -> Section | None:
-    """The worst regions of each axis above its noise; the dependence of what nothing explains."""
+    """The worst regions and maps of each axis above its noise floor, and the dependence found."""
     blocks: list[Block] = []
     for axis in subject.axes:
         own = _blocks(axis, subject.diagnosed(axis.axis)) if axis.ratio >= RULE.at_floor else []
@@ -33,46 +35,28 @@ def section(subject: Subject) -> Section | None:
 def _blocks(axis: AxisComparison, found: AxisDiagnosis | None) -> list[Block]:
     blocks: list[Block] = []
     if axis.worst:
-        blocks.append(Listing([in_words(region) for region in axis.worst]))
+        blocks.append(Listing([capitalised(region_in_words(r, SCALED)) for r in axis.worst]))
     blocks.append(maps.picture(axis))
     if found is not None and found.unexplained is not None:
         blocks.append(_picture(found.unexplained, {m.coordinate: m.unit for m in axis.maps}))
     return blocks
 
 
-def in_words(region: Region) -> str:
-    """E.g. "Position between 12.0 and 26.0 mm: 120 mN RMS, 14.0 times the noise floor, ..."."""
-    return (
-        f"{_span(region)}: {quantity(region.rms, region.force_unit)} RMS, "
-        f"{number(region.ratio)} times the noise floor, "
-        f"{100 * region.share:.0f} % of the squared error."
-    )
-
-
-def _span(region: Region) -> str:
-    if region.coordinate == "direction":
-        return "Moving forwards" if region.low > -0.5 else "Moving backwards"
-    scale = Scale.of(region.unit, [region.low, region.high])
-    low, high = scale.within(region.low, region.high, region.low, region.high)
-    coordinate = units_of(region.unit).words(title_case(region.coordinate))
-    return f"{coordinate} between {low} and {high} {scale.unit}"
-
-
-def _picture(structure: Dependence, units: Mapping[str, str]) -> Picture:
+def _picture(dependence: Dependence, units: Mapping[str, str]) -> Picture:
     caption = (
-        "Part of the squared error that a curve over each coordinate alone accounts for: the "
-        "longest bar says where to look for the missing physics."
+        "Part of the squared error that a curve over each coordinate alone accounts for; the "
+        "missing physics depends most on the coordinate with the longest bar."
     )
-    return Picture(_figure(structure, units), caption)
+    return Picture(_figure(dependence, units), caption)
 
 
-def _figure(structure: Dependence, units: Mapping[str, str]) -> Figure:
-    ordered = sorted(structure.shares.items(), key=lambda pair: -pair[1])
+def _figure(dependence: Dependence, units: Mapping[str, str]) -> Figure:
+    ordered = sorted(dependence.shares.items(), key=lambda pair: -pair[1])
     figure = new_figure(0.7 + 0.27 * len(ordered))
     axes = figure.subplots()
     names = [units_of(units.get(name)).words(spaced(name)) for name, _ in ordered]
     percent = [100.0 * share for _, share in ordered]
-    colors = [BLUE if name == structure.depends_on else GREY for name, _ in ordered]
+    colors = [BLUE if name == dependence.depends_on else GREY for name, _ in ordered]
     bars = axes.barh(names, percent, color=colors, height=0.62)
     axes.bar_label(bars, fmt="%.0f", padding=4, fontsize=8.5)
     axes.set_xlim(0.0, 1.1 * max(*percent, 1.0))

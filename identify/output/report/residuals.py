@@ -1,4 +1,4 @@
-"""What the model leaves unexplained, against time, speed, position and roller phase."""
+"""The force residual against time, speed, position and phase of the model's periods."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 PANELS = 4
 MOST_DOTS = 10_000  # more would fill the panel and the file; means are of all
-# The dots show a mean whose neighbours on both sides are missing.
+# Markers make a mean visible whose neighbours on both sides are missing.
 MEAN: dict[str, Any] = {"linewidth": 1.5, "markersize": 2.0}
 
 
@@ -80,7 +80,7 @@ def _picture(subject: Subject, axis: AxisComparison) -> Picture:
         label = f"mean with {spaced(best.effect.name)}"
     left = _Left(axis.residual, named, label, axis.floor, axis.units)
     caption = (
-        "Dots are single windows, lines the means. A mean that leaves the noise band shows what "
+        "Dots are single test functions, lines the means. A mean outside the noise band shows what "
         "the missing force depends on: a wave along the track, a step with direction, a drift."
     )
     return Picture(_figure(_views(subject, axis), left), axis.units.words(caption))
@@ -136,7 +136,7 @@ def _draw(axes: Axes, view: View, left: _Left, scale: Scale) -> None:
     shown = slice(None, None, -(-len(x) // MOST_DOTS))
     axes.plot(
         x[shown], scale(left.model[shown]), ".", color=GREY, markersize=2.4, alpha=0.5,
-        markeredgewidth=0, rasterized=True, label="single windows",
+        markeredgewidth=0, rasterized=True, label="single test functions",
     )  # fmt: skip
     noise_band(axes, float(scale(left.floor)))
     axes.plot(*binned_mean(x, scale(left.model)), ".-", color=BLUE, label="mean", **MEAN)

@@ -1,4 +1,4 @@
-"""The shape of what a description holds: its force by position and by speed."""
+"""The force of a nonparametric effect by position and by speed."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from identify.output.report.blocks import Block, Heading, Listing, Picture, Sect
 from identify.output.report.drawing import BLUE, ORANGE, binned_mean, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, spaced
-from identify.selection.nonparametric import in_words
+from identify.output.words.numbers import capitalised
+from identify.output.words.selection import nonparametric_in_words
 from identify.validation.misfit_maps import AxisComparison
 from twin.model.machine import AxisModel, Fitted
 
 
 def section(subject: Subject) -> Section | None:
-    """A picture for each description of the model; nothing where it has none."""
+    """A picture for each nonparametric effect of the model; None where it has none."""
     blocks: list[Block] = []
     for axis in subject.axes:
         for fitted in subject.model(axis.axis).effects:
@@ -24,14 +25,14 @@ def section(subject: Subject) -> Section | None:
                 continue
             blocks.append(Heading(f"{spaced(fitted.effect.name)} on {axis.axis}".capitalize()))
             blocks.append(_picture(axis, fitted))
-            blocks.append(Listing([f"{in_words(fitted)}."]))
-    return Section("shape", "What is described, not explained", blocks) if blocks else None
+            blocks.append(Listing([capitalised(nonparametric_in_words(fitted))]))
+    return Section("shape", "Fitted curves without physics", blocks) if blocks else None
 
 
 def _picture(axis: AxisComparison, fitted: Fitted) -> Picture:
     caption = (
-        "Mean force of the description along the logs, moving forwards and backwards. Its shape "
-        "is a hint at the physics that is missing."
+        "Mean force of the fitted curves along the logs, moving forwards and backwards. Its shape "
+        "is a hint at the missing physics."
     )
     return Picture(_figure(axis, fitted), axis.units.words(caption))
 
@@ -54,6 +55,6 @@ def _figure(axis: AxisComparison, fitted: Fitted) -> Figure:
             axes.plot(*binned_mean(x[mask], scale(force[mask])), color=color, label=label)
     left.set_xlabel(along.label(axis.units.words("Position")))
     right.set_xlabel(fast.label("Speed"))
-    left.set_ylabel(scale.label(axis.units.words("Force of the description")))
+    left.set_ylabel(scale.label(axis.units.words("Force of the curves")))
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper left", ncols=2)
     return figure

@@ -1,4 +1,4 @@
-"""What a report is about, and the forces that its pictures are drawn from."""
+"""The results that a report shows, and the forces that its pictures are drawn from."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """Everything that a report says something about."""
+    """The results that a report shows."""
 
     title: str
     diagnosis: Diagnosis | None
@@ -35,7 +35,7 @@ class Subject:
 
     @property
     def axes(self) -> list[AxisComparison]:
-        """The axes in the order of the model, the one that the answer is about first."""
+        """The axes in the order of the model, but the leading axis of the diagnosis first."""
         leading = self.diagnosis.leading if self.diagnosis else None
         first = (
             leading.dataset.axis
@@ -53,7 +53,7 @@ class Subject:
         return self.diagnosis.next_experiments.get(axis) if self.diagnosis else None
 
     def refit(self, axis: str) -> Refit | None:
-        """What fitting the model as given changed on one axis."""
+        """What fitting changed of the given model on one axis."""
         return self.diagnosis.refits.get(axis) if self.diagnosis else None
 
     def named(self, axis: str) -> Candidate | None:
@@ -62,12 +62,12 @@ class Subject:
         return found.best if found else None
 
     def model(self, axis: str) -> AxisModel:
-        """The model that the errors are those of."""
+        """The model of the comparison."""
         return self.comparison.model.axes[axis]
 
     @property
     def steps(self) -> Sequence[HistoryStep]:
-        """The model's growth, from its history or from the additions alone."""
+        """The added effects, from the model's history or else from the additions."""
         return self.history or tuple(a.step for a in self.additions)
 
     def heading(self, axis: str) -> str:
@@ -77,11 +77,10 @@ class Subject:
 
 @dataclass(frozen=True, eq=False)
 class LogForces:
-    """PreparedLog forces of one axis over one log, each (n,) in ``unit``; time (n,) s.
+    """Forces of one axis over one log, each (n,) in ``unit``; time (n,) s.
 
-    explain: command less inertia, what friction and the other effects must account for. model and
-    named: the same force by the model, and by the model with the named effect; not a number where
-    a friction at rest can be anything.
+    explain: command less inertia, the force that the effects must explain. model, named: that force
+    by the model, and by the model with the named effect; nan where static friction is undetermined.
     """
 
     name: str
@@ -106,5 +105,5 @@ def log_forces(log: PreparedLog, model: AxisModel, named: AxisModel | None) -> L
 
 
 def shown_residual(model: AxisModel, log: PreparedLog) -> Array:
-    """Force residual (n,) N, not a number where it carries no information."""
+    """Force residual (n,) N, nan where it carries no information."""
     return np.where(moving([log], sticks(model)), residual(model, [log]), np.nan)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from identify.output.words.numbers import Numbers
+
 PREFIXED = frozenset({"m", "m/s", "m/s^2", "N", "N m", "s", "A", "rad", "rad/s", "rad/s^2"})
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 LEAST = 0.5  # in its unit, of the largest value printed in it
@@ -73,6 +75,13 @@ def quantity(value: float | None, unit: str) -> str:
     return Scale.of(unit, [0.0 if value is None else value]).text(value)
 
 
+def span(low: float, high: float, unit: str) -> str:
+    """Two SI values in the unit that suits them, e.g. "12.0 and 26.0 mm"."""
+    scale = Scale.of(unit, [low, high])
+    first, second = scale.within(low, high, low, high)
+    return f"{first} and {second} {scale.unit}"
+
+
 def number(value: float) -> str:
     """Three significant digits, all digits of larger integers, a true minus sign."""
     if not math.isfinite(value):
@@ -97,3 +106,6 @@ def title_case(name: str) -> str:
 def spaced(name: str) -> str:
     """A name of the code with spaces: "constant_force" -> "constant force"."""
     return name.replace("_", " ")
+
+
+SCALED = Numbers(quantity, span, number)  # how the sentences of the report write numbers

@@ -1,4 +1,4 @@
-"""Is what the model leaves noise: its histogram, and its correlations with 90 % bounds."""
+"""Whiteness of the force residual: its histogram, and its correlations with 90 % bounds."""
 
 from __future__ import annotations
 
@@ -11,37 +11,40 @@ from identify.output.report.blocks import Block, Heading, Listing, Picture, Sect
 from identify.output.report.drawing import BLUE, FLOOR, GREY, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, inverse
+from identify.output.words.numbers import capitalised
+from identify.output.words.validation import correlation_in_words, loop_in_words
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import Correlation, ResidualTests
 from twin.model.units import AxisUnits
 
 
 def section(subject: Subject) -> Section:
-    """A picture for each axis, what it says, and why this residual is the one tested."""
+    """A picture for each axis, its numbers, and which lags are tested and why."""
     blocks: list[Block] = []
     for axis in subject.axes:
         if heading := subject.heading(axis.axis):
             blocks.append(Heading(heading))
         blocks += _blocks(axis)
     blocks.append(Listing(_reasons(subject)))
-    return Section("tests", "Is what is left noise?", blocks)
+    return Section("tests", "Is the residual noise?", blocks)
 
 
 def _reasons(subject: Subject) -> tuple[str, ...]:
     """How each axis was tested, each way once."""
-    return tuple(dict.fromkeys(axis.units.words(axis.tests.reason) for axis in subject.axes))
+    return tuple(
+        dict.fromkeys(axis.units.words(loop_in_words(axis.tests.loop)) for axis in subject.axes)
+    )
 
 
 def _blocks(axis: AxisComparison) -> list[Block]:
     tests = axis.tests
     caption = (
-        f"The force residual on {tests.samples} windows that do not overlap. Bars: its histogram "
-        "beside the normal distribution of the noise floor. Grey bands: 90 % bounds, ±1.645/√n "
-        "with n windows; a tenth of a white residual's values lie outside. Faint values are not "
-        "tested."
+        f"The force residual on {tests.samples} test functions that do not overlap. Bars: its "
+        "histogram beside the normal distribution of the noise floor. Grey bands: 90 % bounds, "
+        "±1.645/√n for n test functions; a tenth of a white residual's values lie outside. Faint "
+        "values are not tested."
     )
-    words = [axis.units.words(c.in_words()) for c in tests.correlations]
-    items = [f"{w[:1].upper()}{w[1:]}." for w in words]
+    items = [axis.units.words(capitalised(correlation_in_words(c))) for c in tests.correlations]
     return [Picture(_figure(tests, axis.units), axis.units.words(caption)), Listing(items)]
 
 

@@ -21,7 +21,7 @@ from identify.dataset.spectral_lines import (
     lines_in_time,
     ripples,
 )
-from identify.estimation.channel_delay import misalignment, realigned, shift_in_words
+from identify.estimation.channel_delay import misalignment, realigned
 from identify.estimation.time_origin import (
     _amplitude,
     depends_on_time_origin,
@@ -30,6 +30,8 @@ from identify.estimation.time_origin import (
     with_time_origins,
     without_timed_forces,
 )
+from identify.output.words.estimation import channel_delay_in_words
+from identify.output.words.selection import repeat_in_words
 from identify.selection.repeating_force import Repeat, _strongest, _term, not_general
 from twin.model.machine import AxisModel
 
@@ -179,7 +181,7 @@ def test_a_repeat_is_general_where_its_terms_are_alike():
     assert repeat(0.0, 0.51).general
     assert not repeat(0.0, 0.49).general
     assert repeat(2.0 * np.pi).general
-    words = repeat(1.0).in_words()
+    words = repeat_in_words(repeat(1.0))
     assert "repeats every 2.5 mm of travel (1 N in a, 1 N in b)" in words
     assert "by 57 degrees" in words
 
@@ -318,7 +320,7 @@ def test_a_force_that_acts_before_its_stamp_is_found_by_so_many_samples(samples)
     left = [fit_of(axis, *logs).error for logs in ((log,), dataset.fit, dataset.holdout)]
     assert left[1] < 0.15 * left[0]
     assert left[1] == left[2]
-    assert dataset.window == pytest.approx(0.02)
+    assert dataset.test_function_length == pytest.approx(0.02)
     back = realigned(dataset, 0.0)
     assert back.channel_delay == 0.0
     np.testing.assert_allclose(back.fit[0].command[9:-9], log.command[9:-9], atol=0.1)
@@ -336,6 +338,6 @@ def test_a_force_that_acts_late_or_hardly_early_is_no_fault_of_the_log():
 
 def test_a_shift_is_said_in_samples():
     log = aligned(0.0)
-    assert shift_in_words(dataset_of(log)) is None
-    said = shift_in_words(dataset_of(log, channel_delay=1.5e-3))
+    assert channel_delay_in_words(dataset_of(log)) is None
+    said = channel_delay_in_words(dataset_of(log, channel_delay=1.5e-3))
     assert said.startswith("axis x: the force acts 1500 us (1.50 samples) before")

@@ -13,9 +13,9 @@ from scipy.signal import welch
 
 from identify.dataset.dataset import (
     QUIET,
-    WINDOWS,
+    TEST_FUNCTIONS,
     Dataset,
-    choose_window,
+    choose_test_function,
     datasets,
     inertia,
 )
@@ -208,14 +208,14 @@ def test_the_shortest_window_that_is_quiet_is_chosen():
         signals = log.motion.signals.copy()
         signals[2] = pulled[1].reshape(len(log.motion.time), -1).mean(axis=1)
         motion = replace(log.motion, raw=pulled, signals=signals)
-        fine = [TestFunction.of_length(n, 1.0 / RATE) for n in WINDOWS]
+        fine = [TestFunction.of_length(n, 1.0 / RATE) for n in TEST_FUNCTIONS]
         calm = [passed(w, size, 0.0) < QUIET * 0.5 for w in fine]
-        wanted = WINDOWS[calm.index(True)] if any(calm) else WINDOWS[-1]
-        assert choose_window([motion]) == wanted, size
+        wanted = TEST_FUNCTIONS[calm.index(True)] if any(calm) else TEST_FUNCTIONS[-1]
+        assert choose_test_function([motion]) == wanted, size
         quiet = quiet or motion
     slow = replace(motion, period=6.3e-3)
-    assert choose_window([quiet]) == WINDOWS[0]
-    assert choose_window([quiet], [slow]) == WINDOWS[2]
+    assert choose_test_function([quiet]) == TEST_FUNCTIONS[0]
+    assert choose_test_function([quiet], [slow]) == TEST_FUNCTIONS[2]
 
 
 def test_an_axis_moves_where_its_noise_does_not_cover_its_travel():
@@ -241,7 +241,7 @@ def test_studies_are_of_the_axes_that_move():
     found = datasets(stage, {"a": log}, {"b": other}, 0.05)
     assert list(found) == ["x"]
     assert [w.motion.name for w in (*found["x"].fit, *found["x"].holdout)] == ["a", "b"]
-    assert found["x"].window == pytest.approx(0.05)
+    assert found["x"].test_function_length == pytest.approx(0.05)
     assert found["x"].excitation.position_high == found["x"].fit[0].motion.position.max()
     with pytest.raises(InputError, match=r"no axis of the model \(x, y\) moves"):
         datasets(stage, {"a": log_of(RATE, 0.0 * t, t)}, {})

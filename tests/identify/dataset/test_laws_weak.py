@@ -57,7 +57,9 @@ def test_weights_and_slope_are_those_of_the_bell():
 
 def test_a_window_of_too_few_blocks_is_refused():
     assert len(TestFunction.of_length(LEAST_BLOCKS * 1e-3, 1e-3).weights) == LEAST_BLOCKS
-    with pytest.raises(InputError, match=r"window = 0.007 s: shorter than 8 .* at least 0.008 s"):
+    with pytest.raises(
+        InputError, match=r"a test function of 0.007 s is shorter than 8 .* at least 0.008 s"
+    ):
         TestFunction.of_length(7e-3, 1e-3)
 
 

@@ -5,7 +5,7 @@ import pytest
 from foreign_machine import FORCE_CONSTANT, drawn, run
 
 from identify import workflow
-from identify.dataset.dataset import choose_window, datasets
+from identify.dataset.dataset import choose_test_function, datasets
 from identify.dataset.noise_floor import noise_of
 from twin.effects import load_catalogue
 from twin.model.file import load_model
@@ -43,4 +43,4 @@ def test_the_window_chosen_suits_the_held_out_logs_too():
     dataset = datasets(NOMINAL, {"fast": fast}, {"slow": slow})["x"]
     own, other = (log.motion for log in (*dataset.fit, *dataset.holdout))
     assert other.period > own.period
-    assert dataset.window > choose_window([own])
+    assert dataset.test_function_length > choose_test_function([own])

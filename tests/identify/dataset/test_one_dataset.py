@@ -20,7 +20,7 @@ from identify.estimation.force_balance import residual
 from identify.estimation.levenberg_marquardt import minimise
 from identify.output.as_json import fit_json
 from identify.output.text import fit_text
-from identify.validation.free_run import WINDOW, free_run, rms_error
+from identify.validation.free_run import HORIZON, free_run, rms_error
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import Loop, correlation
 from identify.workflow import compare, diagnose, fit
@@ -126,7 +126,7 @@ def test_a_restart_knows_the_other_axis_acceleration(name, values, simulator):
     bare = free_run(TWO, by_log(datasets(TWO, {"log": logged(TWO)}, {}))["log"], simulator).error[
         "x"
     ]
-    starts = 10 + np.arange(1, 7) * round(WINDOW * RATE)
+    starts = 10 + np.arange(1, 7) * round(HORIZON * RATE)
     jumps, usual = (np.abs(e[starts + 20]).max() for e in (found, bare))
     assert jumps < 3.0 * usual + 2e-8
     assert np.sqrt(np.nanmean(found**2)) < 3.0 * np.sqrt(np.nanmean(bare**2))
@@ -270,13 +270,16 @@ def one_line(command, *arguments, **options) -> str:
 def test_an_axis_that_rests_in_every_window_is_refused_in_one_line(tmp_path):
     log = log_of(RATE, halting(), halting())
     for command in (fit, compare):
-        told = one_line(command, PLAIN, {"log": log}, window=0.1)
-        assert told.startswith("axis x comes to rest within every window of 0.1 s of log")
-        assert "give a log in which it moves for longer at a time, or a shorter --window" in told
+        told = one_line(command, PLAIN, {"log": log}, test_function=0.1)
+        assert told.startswith("axis x comes to rest within every test function of 0.1 s of log")
+        assert (
+            "give a log in which it moves for longer at a time, or a shorter --test-function"
+            in told
+        )
     save_model(PLAIN, tmp_path / "model.toml")
     write_log(log, tmp_path / "log.mcap")
-    refusal("fit", "model.toml", "log.mcap", "--window", "0.1", folder=tmp_path)
-    short = fit(PLAIN, {"log": log}, window=0.02).fits["x"]
+    refusal("fit", "model.toml", "log.mcap", "--test-function", "0.1", folder=tmp_path)
+    short = fit(PLAIN, {"log": log}, test_function=0.02).fits["x"]
     assert np.isfinite(short.error)
 
 
@@ -325,7 +328,7 @@ def test_standstill_is_the_same_to_check_and_fit_and_told(kind):
     model = MachineModel("s", {**PLAIN.axes, "y": AxisModel(1.0)}, RATE)
     result = fit(model, {"run": moving, "rest": log}, {"held": log})
     assert result.datasets["x"].still == ("rest", "held")
-    assert "left out, as axis x stands still there: rest, held" in fit_text(result)
+    assert "not fitted on rest, held, where axis x stands still" in fit_text(result)
     assert "axis y: not fitted, as it moves in no log" in fit_text(result)
     told = fit_json(result)
     assert told["axes"]["x"]["left_out"] == ["rest", "held"]

@@ -11,7 +11,7 @@ from identify.dataset.dataset import datasets
 from identify.dataset.test_function import TestFunction
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
-from identify.estimation.intervals import estimates, refusal
+from identify.estimation.intervals import OpenSided, Side, estimates, refusal
 from identify.estimation.levenberg_marquardt import minimise
 from identify.selection.candidates import try_effect
 from identify.workflow import diagnose
@@ -89,7 +89,7 @@ def test_a_value_that_fits_as_well_farther_off_has_no_interval():
     fit = finished(begun, begun, dataset.fit, Outcome.CONVERGED)
     found = {e.label: e for e in estimates(fit)}
     assert found["end_stop.low"].low is None
-    assert "a smaller value fits as well" in found["end_stop.low"].reason
+    assert found["end_stop.low"].reason == OpenSided(Side.SMALLER)
     assert found["end_stop.high"].low <= highest <= found["end_stop.high"].high
 
 
@@ -130,7 +130,7 @@ def test_twice_the_noise_is_twice_the_floor():
     stage = STAGE.with_axis("x", replace(AXIS, hardware=loud))
     logs = [simulate(s, "tracking", seed=5, duration=8.0) for s in (STAGE, stage)]
     floors = [
-        fit_axis(AXIS, datasets(STAGE, {"log": log}, {}, window=0.05)["x"].fit).floor
+        fit_axis(AXIS, datasets(STAGE, {"log": log}, {}, test_function=0.05)["x"].fit).floor
         for log in logs
     ]
     assert floors[1] == pytest.approx(4.0 * floors[0], rel=0.3)

@@ -19,7 +19,7 @@ from identify.estimation.fit import (
     rms,
 )
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.smoothing import described, part_rows, smoothing
+from identify.estimation.smoothing import has_nonparametric, part_rows, smoothing
 from twin.effect import Parameter, Part
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters, read
@@ -86,8 +86,8 @@ MAPPED = AxisModel(1.7, effects=(*ODD.effects[:2], effect("empirical_map")))
 
 def test_a_description_is_smoothed_and_its_columns_are_those_of_the_jacobian():
     problem = _Problem(MAPPED, LOGS[:1], 10)
-    assert described(MAPPED)
-    assert not described(ODD)
+    assert has_nonparametric(MAPPED)
+    assert not has_nonparametric(ODD)
     where = problem.scaling.where
     np.testing.assert_allclose(problem.jacobian(MAPPED), jacobian(MAPPED, LOGS[:1], where))
     # beside a description the physics is pulled to where it was

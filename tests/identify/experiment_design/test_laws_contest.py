@@ -44,8 +44,8 @@ MOTION, OLD = (
 )
 
 
-def arena(*explanations: Explanation, logs=(OLD,), window=0.04) -> Arena:
-    return Arena(STAGE, "x", explanations, logs, window)
+def arena(*explanations: Explanation, logs=(OLD,), test_function=0.04) -> Arena:
+    return Arena(STAGE, "x", explanations, logs, test_function)
 
 
 def absorbed(force, columns):
@@ -181,7 +181,8 @@ def test_a_refit_of_one_model_or_of_what_cannot_run(monkeypatch):
     monkeypatch.setattr(Arena, "record", refuse)
     found = refitted(arena(FIRST, SECOND), trial)
     assert (found.gain, found.difference) == (0.0, 0.0)
-    assert "beyond the travel" in found.not_run
+    assert "beyond the travel" in found.not_run.reason
+    assert found.not_run.truth == "one"
 
 
 def test_trials_come_by_falling_gain_without_those_that_cannot_run(monkeypatch):
@@ -203,7 +204,7 @@ def test_trials_come_by_falling_gain_without_those_that_cannot_run(monkeypatch):
         )  # fmt: skip
         found, not_run = contest(arena(*explanations), tried, lambda *done: bars.append(done[1:]))
         assert len(not_run) == 1
-        assert "beyond the travel" in not_run[0]
+        assert "beyond the travel" in not_run[0].reason
         assert found[0].new[1].duration == 3.0
         assert [t.gain for t in found] == [0.0, -1.0, -4.0]
         assert {(t.k, t.new[0]) for t in found} == {(kind, "one")}
@@ -241,17 +242,17 @@ def test_what_cannot_run_or_is_too_slow_has_no_record(monkeypatch):
     (stage, _, keywords), = seen  # fmt: skip
     assert stage.axes["x"] is ONE
     assert (keywords["seed"], stage.axes["y"]) == (0, STAGE.axes["y"])
-    assert arena(FIRST, window=0.0081).record(FIRST, "e") is MOTION
+    assert arena(FIRST, test_function=0.0081).record(FIRST, "e") is MOTION
     with pytest.raises(CannotRun, match="too slowly"):
-        arena(FIRST, window=0.0079).record(FIRST, "e")
-    assert arena(FIRST, window=None).record(FIRST, "e") is MOTION
+        arena(FIRST, test_function=0.0079).record(FIRST, "e")
+    assert arena(FIRST, test_function=None).record(FIRST, "e") is MOTION
     monkeypatch.setattr(module, "moves", lambda log, axis: False)
     with pytest.raises(CannotRun, match="hardly moves"):
         arena(FIRST).record(FIRST, "e")
 
 
 def test_logs_are_windowed_alike():
-    longer = arena(FIRST, window=0.08).logs_with(MOTION)
+    longer = arena(FIRST, test_function=0.08).logs_with(MOTION)
     assert [w.window.length for w in longer] == pytest.approx([0.08, 0.08])
     same = arena(FIRST).logs_with(MOTION)
     assert same[0] is OLD

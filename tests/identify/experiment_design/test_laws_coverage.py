@@ -18,6 +18,7 @@ from identify.experiment_design.missing_excitation import (
     _weighted_quantiles,
     gap,
 )
+from identify.output.words.experiment_design import gap_in_words
 from twin.model.units import LINEAR
 
 LOG = windowed(SHORT)
@@ -126,8 +127,8 @@ def test_a_gap_weighs_how_much_is_missed_by_how_well_it_tells(monkeypatch, insid
 
 def test_a_gap_says_whether_motion_is_missing():
     def said(share):
-        return Gap("speed", "m/s", 0.1, 0.25, share).in_words()
+        return gap_in_words(Gap("speed", "m/s", 0.1, 0.25, share))
 
-    assert said(None) == "it shows most at speed 0.1 to 0.25 m/s"
+    assert said(None) == "the explanations differ most at speed 0.1 to 0.25 m/s"
     assert said(0.98 * RARE).startswith("missing motion: speed 0.1 to 0.25 m/s; 4.9 % of the data")
     assert said(RARE).startswith("no motion is missing, but more of it is needed at speed 0.1")

@@ -11,12 +11,14 @@ import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_motion, fitted
 
 from identify.dataset.prepared_log import PreparedLog
+from identify.experiment_design.candidate_experiments import NotRun
 from identify.experiment_design.discrimination import (
     Arena,
     Explanation,
 )
 from identify.selection.forward_selection import Verdict
 from twin.errors import CannotRun, InputError
+from twin.experiments.kinds import Tracking
 from twin.model.machine import MachineModel
 
 plans = importlib.import_module("identify.experiment_design.plan")
@@ -30,8 +32,8 @@ MOTION, OLD = (
 )
 
 
-def arena(*explanations: Explanation, logs=(OLD,), window=0.04) -> Arena:
-    return Arena(STAGE, "x", explanations, logs, window)
+def arena(*explanations: Explanation, logs=(OLD,), test_function=0.04) -> Arena:
+    return Arena(STAGE, "x", explanations, logs, test_function)
 
 
 def absorbed(force, columns):
@@ -76,16 +78,20 @@ def test_an_experiment_decides_by_more_evidence_than_separates(gain, decides):
     assert made.plan_of("a", ranking=(trial(gain),)).decides
 
 
+TOO_LONG = NotRun(Tracking(50.0), "too long")
+TOO_FAR = NotRun(Tracking(70.0), "too far")
+
+
 @pytest.mark.parametrize(("proof", "refuted"), [(10.0, False), (10.1, True)])
 def test_what_the_logs_refute_already_is_planned_without_them(monkeypatch, proof, refuted):
     asked = {}
 
     def tried(arena, experiments, progress):
         asked.update(logs=arena.logs, experiments=experiments)
-        return [trial(50.0)], ("a sweep: too far",)
+        return [trial(50.0)], (TOO_FAR,)
 
     monkeypatch.setattr(plans, "favoured", lambda arena: ("two", proof))
-    monkeypatch.setattr(plans, "proposals", lambda *given: (given, ("a map: too long",)))
+    monkeypatch.setattr(plans, "proposals", lambda *given: (given, (TOO_LONG,)))
     monkeypatch.setattr(plans, "contest", tried)
     monkeypatch.setattr(plans, "refitted", lambda arena, t: t)
     monkeypatch.setattr(plans, "gap", lambda motion, where, logs: logs)
@@ -97,8 +103,8 @@ def test_what_the_logs_refute_already_is_planned_without_them(monkeypatch, proof
     assert (found.gap, found.between, found.axis) == ((OLD,), ("one", "two"), "x")
     assert found.excited_by == {"one": CATALOGUE["wear"].excited_by}
     assert found.supposed
-    assert set(found.not_run) == {"a map: too long", "a sweep: too far"}
-    monkeypatch.setattr(plans, "contest", lambda *_: ([], ("a pass: too far",)))
+    assert set(found.not_run) == {TOO_LONG, TOO_FAR}
+    monkeypatch.setattr(plans, "contest", lambda *_: ([], (TOO_FAR,)))
     with pytest.raises(InputError, match="none of the experiments"):
         plans._planned(arena(FIRST, SECOND), 7.0, 3, True, effects)
 
@@ -107,7 +113,9 @@ def test_an_ambiguous_diagnosis_asks_for_an_experiment_between_its_rivals(monkey
     asked = []
 
     def planned(arena, *given):
-        asked.append((tuple(e.name for e in arena.explanations), arena.logs, arena.window, given))
+        asked.append(
+            (tuple(e.name for e in arena.explanations), arena.logs, arena.test_function, given)
+        )
         return "the plan"
 
     monkeypatch.setattr(plans, "_planned", planned)
@@ -155,14 +163,14 @@ def test_a_plan_between_rivals_hands_on_what_it_was_asked(monkeypatch, logs):
     rivals, bar = [CATALOGUE["wear"], CATALOGUE["cogging"]], object()
     found = plans.plan(
         STAGE, logs, {"h": "held"}, catalogue={"gms": 1}, between=rivals, axis="x", duration=7.0,
-        window=0.07, progress=bar,
+        test_function=0.07, progress=bar,
     )  # fmt: skip
     assert found == "the plan"
     assert asked["dataset"] == (STAGE, logs or {}, {"h": "held"}, rivals, "x", 0.07)
     effects = {"gms": 1, **{r.name: r for r in rivals}}
     assert asked["given"] == (7.0, 6, not logs, effects, bar)
     chosen = asked["arena"]
-    assert (chosen.stage, chosen.name, chosen.window) == (STAGE, "x", 0.07)
+    assert (chosen.machine, chosen.name, chosen.test_function) == (STAGE, "x", 0.07)
     assert chosen.explanations == (rivals, STAGE, made.STUDY, bool(logs))
     assert chosen.logs == (made.STUDY.fit if logs else ())
     with pytest.raises(InputError, match="no axis"):
@@ -197,7 +205,7 @@ def test_without_rivals_a_plan_asks_what_the_diagnosis_leaves_open(monkeypatch, 
 def test_the_study_is_that_of_the_axis_in_question(monkeypatch):
     every = {"y": "dataset y", "x": "dataset x"}
     monkeypatch.setattr(plans, "datasets", lambda *given: every)
-    monkeypatch.setattr(plans, "trial_dataset", lambda stage, axis: f"trial {axis}")
+    monkeypatch.setattr(plans, "simulated_dataset", lambda stage, axis: f"trial {axis}")
     other = replace(STAGE, name="o", axes={"x": PLAIN, "y": PLAIN})
     differ = [STAGE, other]  # on y
     assert plans._dataset(STAGE, {"a": 1}, {}, [], "x", None) == "dataset x"

@@ -34,8 +34,8 @@ from identify.experiment_design.planting import (
     visible_force,
 )
 from identify.validation.free_run import (
+    HORIZON,
     START_FIT,
-    WINDOW,
     FreeRun,
     _as_logged,
     _states_at,
@@ -186,7 +186,7 @@ def test_the_exact_model_reproduces_the_motion_and_a_wrong_force_drifts_as_its_p
     log = prepared(x, PUSH)
     model = MachineModel("s", {"x": AxisModel(1.7)}, 999.0)
     run = free_run(model, log)
-    assert run.window == WINDOW
+    assert run.horizon == HORIZON
     assert rms_error(run, "x") < 1e-7
     side = round(START_FIT * RATE)
     known = np.isfinite(run.error["x"])
@@ -199,7 +199,7 @@ def test_the_exact_model_reproduces_the_motion_and_a_wrong_force_drifts_as_its_p
         "s", {"x": AxisModel(1.7, effects=(effect("constant_force", {"F0": 0.34}),))}
     )
     error = free_run(pushed, log).error["x"]
-    count = round(WINDOW * RATE)
+    count = round(HORIZON * RATE)
     for start in (side, side + count, side + 2 * count):
         t = np.arange(count) / RATE
         np.testing.assert_allclose(error[start : start + count], 0.5 * 0.2 * t**2, atol=2e-6)

@@ -44,8 +44,8 @@ MOTION, OLD = (
 )
 
 
-def arena(*explanations: Explanation, logs=(OLD,), window=0.04) -> Arena:
-    return Arena(STAGE, "x", explanations, logs, window)
+def arena(*explanations: Explanation, logs=(OLD,), test_function=0.04) -> Arena:
+    return Arena(STAGE, "x", explanations, logs, test_function)
 
 
 def absorbed(force, columns):

@@ -23,6 +23,7 @@ from identify.output.report import sections
 from identify.output.report.drawing import drawing_style
 from identify.output.report.subject import Subject
 from identify.output.text import diagnose_text, plan_text
+from identify.output.words.experiment_design import not_run_in_words
 from identify.selection.forward_selection import Verdict
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
@@ -107,7 +108,7 @@ def test_what_a_weak_motor_cannot_do_is_not_planned():
         low, high = stage.axes["x"].hardware.travel
         assert low < log.truth["x"]["position"].min() < log.truth["x"]["position"].max() < high
         assert np.abs(log.axes["x"].force).max() < stage.axes["x"].hardware.force_limit
-    assert all(told.count(": ") >= 2 for told in not_run)
+    assert all(not_run_in_words(n).count(": ") >= 2 for n in not_run)
     wild = Passes("x", span=0.3, speed=0.2, repeats=1)
     with pytest.raises(CannotRun, match=r"axis x (went to|asks for)"):
         require_within_limits(stage, simulate(stage, wild, simulator=ReducedSimulator))
@@ -116,19 +117,20 @@ def test_what_a_weak_motor_cannot_do_is_not_planned():
 def test_what_cannot_run_is_told_with_its_reason_and_a_mistake_is_not_passed_over():
     """A window too short for slow motion beside a loud encoder, and passes that take too long."""
     stage = replace(one_axis(with_limits(encoder_noise=2e-7)), sample_rate=RATE)
-    found = plan(stage, catalogue=CATALOGUE, duration=2.0, window=0.02)
+    found = plan(stage, catalogue=CATALOGUE, duration=2.0, test_function=0.02)
     assert found.not_run
-    kinds = {told.split(":")[0] for told in found.not_run}
+    told = [not_run_in_words(n) for n in found.not_run]
+    kinds = {line.split(":")[0] for line in told}
     assert kinds <= set(KINDS)
-    assert any("too slowly for a window of 0.02 s" in told for told in found.not_run)
-    assert plan_json(found)["not_run"] == list(found.not_run)
-    assert f"not run: {found.not_run[0]}" in plan_text(found)
-    arena = Arena(stage, "x", (Explanation("as it is", stage.axes["x"]),), window=0.02)
+    assert any("too slowly for a test function of 0.02 s" in line for line in told)
+    assert plan_json(found)["not_run"] == told
+    assert f"not run: {told[0]}" in plan_text(found)
+    arena = Arena(stage, "x", (Explanation("as it is", stage.axes["x"]),), test_function=0.02)
     asked = [Passes("x", span=9.0, speed=0.2, repeats=1)]
     trials, not_run = contest(arena, asked)
     assert trials == []
-    assert not_run[0].startswith("passes: axis x, span 9 m")
-    assert "outside its travel" in not_run[0]
+    assert not_run_in_words(not_run[0]).startswith("passes: axis x, span 9 m")
+    assert "outside its travel" in not_run[0].reason
     with pytest.raises(InputError, match="effort"):
         contest(arena, [Passes("x", span=0.1, speed=0.1, repeats=1, effort=2.0)])
 
@@ -237,7 +239,7 @@ def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
     # logs in a row that do are one case in 64.
     for seed in range(1, 7):
         poor, held = poorly_logged(case, machine, seed)
-        before = diagnose(case.stage, poor, held, catalogue=catalogue, window=WINDOW)
+        before = diagnose(case.stage, poor, held, catalogue=catalogue, test_function=WINDOW)
         if abs(separation(before.axes["x"].ranking)) < RULE.least_separation:
             break
     else:
@@ -247,13 +249,18 @@ def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
         assert found is None
         rivals = [CATALOGUE[e] for e in case.pair]
         found = plan(
-            case.stage, poor, between=rivals, catalogue=catalogue, duration=DURATION, window=WINDOW
+            case.stage,
+            poor,
+            between=rivals,
+            catalogue=catalogue,
+            duration=DURATION,
+            test_function=WINDOW,
         )
     assert found.decides
     assert set(found.between) == set(case.pair)
     new = {"new": simulate(machine, found.chosen.experiment, seed=3, simulator=ReducedSimulator)}
     logs = {**poor, **new}
-    after = diagnose(case.stage, logs, held, catalogue=catalogue, window=WINDOW).axes["x"]
+    after = diagnose(case.stage, logs, held, catalogue=catalogue, test_function=WINDOW).axes["x"]
     assert after.verdict is Verdict.MISSING_EFFECT
     assert after.ranking[0].effect.name == truth
     assert separation(after.ranking) > RULE.least_separation
@@ -265,14 +272,16 @@ def test_the_same_among_the_whole_catalogue(name, truth):
     machine, case = CASES[name].machine(truth), CASES[name]
     poor, _ = poorly_logged(case, machine, 1)
     rivals = [CATALOGUE[e] for e in case.pair]
-    found = plan(case.stage, poor, between=rivals, catalogue=CATALOGUE, window=WINDOW)
+    found = plan(case.stage, poor, between=rivals, catalogue=CATALOGUE, test_function=WINDOW)
     new = {
         f"new {seed}": simulate(
             machine, found.chosen.experiment, seed=seed, simulator=ReducedSimulator
         )
         for seed in (3, 4)
     }
-    after = diagnose(case.stage, {**poor, **new}, catalogue=CATALOGUE, window=WINDOW).axes["x"]
+    after = diagnose(case.stage, {**poor, **new}, catalogue=CATALOGUE, test_function=WINDOW).axes[
+        "x"
+    ]
     ranks = [c.effect.name for c in after.ranking]
     (other,) = set(case.pair) - {truth}
     assert ranks.index(truth) < ranks.index(other)
@@ -286,7 +295,7 @@ def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
         {"log": simulate(machine, case.poor, seed=s, simulator=ReducedSimulator)} for s in (1, 2)
     ]
     catalogue = Catalogue([CATALOGUE[e] for e in case.pair])
-    found = diagnose(case.stage, *logs, catalogue=catalogue, window=WINDOW)
+    found = diagnose(case.stage, *logs, catalogue=catalogue, test_function=WINDOW)
     assert found.axes["x"].verdict is Verdict.AMBIGUOUS
     following = diagnose_json(found)["next_experiment"]
     assert following["decides"]
@@ -328,7 +337,7 @@ def assert_only_what_a_refit_leaves_counts() -> None:
     x = stage.axes["x"]
     lugre = {**x["lugre"].values, "Fc": 0.3, "Fs": 0.36, "sigma2": 0.03}
     other = replace(x.with_effect(effect("lugre", **lugre)), mass=15.2)
-    arena = Arena(stage, "x", (Explanation("a", x), Explanation("b", other)), window=WINDOW)
+    arena = Arena(stage, "x", (Explanation("a", x), Explanation("b", other)), test_function=WINDOW)
     for trial in contest(arena, proposals(stage, "x", 4.0)[0])[0]:
         assert trial.gain < RULE.least_separation
 

@@ -22,6 +22,10 @@ from identify.output.as_json import (
     plain,
     plan_json,
 )
+from identify.output.words.estimation import no_interval_in_words, outcome_in_words
+from identify.output.words.experiment_design import gap_in_words
+from identify.output.words.selection import verdict_in_words
+from identify.output.words.validation import loop_in_words, region_in_words
 from identify.selection.forward_selection import Verdict
 from twin.log.check import CheckReport, Fault, Finding, Severity
 
@@ -62,14 +66,16 @@ def test_a_fit():
         told = found[axis]
         parameters, refit = told.pop("parameters"), told.pop("refit")
         assert told == {
-            "outcome": fit.ended.value, "converged": True, "at_bound": [], "left_out": [],
+            "outcome": outcome_in_words(fit.ended), "converged": True, "at_bound": [],
+            "left_out": [],
             "force_error": pytest.approx(fit.error), "noise_floor": fit.floor, "unit": "N",
             "holdout_force_error": result.holdout_error[axis],
             "force_shift": result.datasets[axis].channel_delay, "force_shift_unit": "s",
         }  # fmt: skip
         assert parameters == {
             e.label: {
-                "value": e.value, "unit": e.unit, "free": e.free, "interval_refused": e.reason,
+                "value": e.value, "unit": e.unit, "free": e.free,
+                "interval_refused": e.reason and no_interval_in_words(e.reason),
                 "interval_90": None if e.low is None else [e.low, e.high],
             }
             for e in result.estimates[axis]
@@ -97,7 +103,7 @@ def test_a_comparison():
     for axis, c in result.axes.items():
         told = found[axis]
         assert (told["noise_floor"], told["position_drift_of_noise"]) == (c.floor, c.position_floor)
-        assert told["worst"] == [r.in_words() for r in c.worst]
+        assert told["worst"] == [region_in_words(r) for r in c.worst]
         for name in ("run 1", "run 2"):
             force, position = c.force_error[name], c.position_error[name]
             assert told["logs"][name] == {
@@ -114,7 +120,8 @@ def test_a_comparison():
         }  # fmt: skip
         tests = told["residual_tests"]
         assert tests == {
-            "tested": "force residual", "loop": "open", "reason": c.tests.reason, "samples": 387,
+            "tested": "force residual", "loop": "open", "reason": loop_in_words(c.tests.loop),
+            "samples": 387,
             "passed": all(t.passes for t in c.tests.correlations),
             "histogram": {
                 "edges": list(c.tests.edges), "unit": "N", "density": list(c.tests.density),
@@ -156,7 +163,7 @@ def test_a_diagnosis():
     assert list(axes) == ["y", "x"]
     assert found == axes["x"]
     assert found == {
-        "verdict": "ambiguous", "explanation": Verdict.AMBIGUOUS.value, "axis": "x",
+        "verdict": "ambiguous", "explanation": verdict_in_words(Verdict.AMBIGUOUS), "axis": "x",
         "effect": "cogging", "ranking": [expected_candidate(c) for c in x.ranking],
         "ambiguous_with": ["quadratic_drag"], "missing": ["cogging", "lugre"],
         "steps": [
@@ -220,7 +227,7 @@ def test_a_plan(names):
     gain = "delta_bic" if len(names) > 1 else "information"
     assert strict(plan_json(plan)) == {
         "axis": "x", "between": list(names), "decides": True, "favoured_by_the_logs": "wear",
-        "refitted_on_logs": len(names) > 1, "missing_motion": plan.gap.in_words(),
+        "refitted_on_logs": len(names) > 1, "missing_motion": gap_in_words(plan.gap),
         "excited_by": {names[0]: "slow passes"}, "not_run": [],
         **expected_trial(plan.chosen, gain),
         "ranking": [expected_trial(t, gain) for t in plan.ranking],

@@ -24,8 +24,11 @@ from identify.output.report import (
 )
 from identify.output.report.blocks import Heading, Picture, Table, Tone
 from identify.output.report.subject import Subject
-from identify.output.report.units import Scale, number, quantity, spaced, title_case
-from identify.output.text import advice
+from identify.output.report.units import SCALED, Scale, number, quantity, spaced, title_case
+from identify.output.words.experiment_design import gap_in_words
+from identify.output.words.numbers import capitalised
+from identify.output.words.selection import advice, refit_in_words, verdict_in_words
+from identify.output.words.validation import region_in_words
 from identify.selection.forward_selection import Verdict
 
 
@@ -67,7 +70,7 @@ def cards(diagnosis=None, **changes):
 def test_the_answer_for_an_ambiguity():
     first, second = cards(made.diagnosed())
     assert first.headline == "Axis x: cogging or quadratic drag and lugre are missing"
-    assert (first.sentence, first.tone) == (Verdict.AMBIGUOUS.value, Tone.STRONG)
+    assert (first.sentence, first.tone) == (verdict_in_words(Verdict.AMBIGUOUS), Tone.STRONG)
     tiles = [(t.name, t.value, t.remark) for t in first.tiles]
     ratio = f"{number(8.37 / 2.11)} → {number(1.19 / 1.03)}"
     assert tiles == [
@@ -80,12 +83,13 @@ def test_the_answer_for_an_ambiguity():
         "With cogging the force error is at its noise floor.",
         "Runner-up: quadratic drag, ΔBIC 423, held-out error 7.34 → 2.38 N, supported.",
         "The experiment that decides (8.30 s; twin plan writes it): passes: axis x, span 0.0831 m, "
-        "speed 0.0127 m/s, repeats 7. It leaves 41.2 mN RMS to the rival, where noise is 11.3 mN; "
-        f"{made.plan_of('a').gap.in_words()}.",
+        "speed 0.0127 m/s, repeats 7. The rival leaves 41.2 mN RMS unexplained, where noise is "
+        "11.3 mN; "
+        f"{gap_in_words(made.plan_of('a').gap)}.",
     ]
     assert second.headline == "Axis y: nothing is missing"
     assert second.tone is Tone.PLAIN
-    words = made.refit_of(0.01).in_words()
+    words = refit_in_words(made.refit_of(0.01))
     assert second.remarks[-1] == f"{words[0].upper()}{words[1:]}."
     assert second.remarks[0].startswith("Nearest candidate: constant force, ΔBIC 66.0")
     assert second.remarks[0].endswith("not supported.")
@@ -100,8 +104,8 @@ def test_the_answer_for_what_nothing_explains():
     card, _ = cards(made.diagnosed(lost))
     assert card.headline == "Axis x: something outside the catalogue is missing"
     assert card.sentence == (
-        f"{Verdict.UNEXPLAINED.value} It depends most on other axis position, which accounts for "
-        "63 % of the squared error, with a period of 27.3 mm."
+        f"{verdict_in_words(Verdict.UNEXPLAINED)} The error depends most on other axis position, "
+        "which accounts for 63 % of the squared error, with a period of 27.3 mm."
     )
     assert f"{advice()}." in card.remarks
     assert card.remarks[0].startswith("Nearest candidate: cogging")
@@ -119,7 +123,7 @@ def test_the_answer_for_one_effect_that_leaves_more():
     card, _ = cards(replace(found, next_experiments={"x": made.plan_of("a", "b", ranking=(
         replace(made.TRIALS[0], gain=1.0),))}))  # fmt: skip
     assert card.headline == "Axis x: cogging is missing"
-    assert "still stands 3.10 times above its noise floor" in card.remarks[0]
+    assert "is still 3.10 times its noise floor" in card.remarks[0]
     assert "cross-validated error" in card.remarks[1]
     assert "comes nearest to deciding, but is too short" in card.remarks[2]
     assert [t.name for t in card.tiles][1] == "Cross-validated force error"
@@ -149,26 +153,30 @@ def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
     ]  # fmt: skip
     assert "1.97 µm replayed by MuJoCo" in first.tiles[2].remark
     assert (first.tone is Tone.STRONG) is kept
-    assert ("earned its place" in first.sentence) is kept
+    assert ("held-out logs support" in first.sentence) is kept
     assert len(cards(made.diagnosed(), additions=(made.addition(),))) == 2
 
 
 # --- regions, notes, facts ------------------------------------------------------------------
 
 
+def scaled(region) -> str:
+    return capitalised(region_in_words(region, SCALED))
+
+
 def test_the_worst_regions_in_words():
     near, back = made.comparison_of().worst
-    assert regions.in_words(near) == (
+    assert scaled(near) == (
         "Position between 12.3 and 25.7 mm: 121 mN RMS, 14.3 times the noise floor, 37 % of the "
         "squared error."
     )
-    assert regions.in_words(back).startswith("Moving backwards: 87.0 mN RMS, 7.70 times")
-    assert regions.in_words(replace(back, low=0.0, high=1.5)).startswith("Moving forwards")
+    assert scaled(back).startswith("Moving backwards: 87.0 mN RMS, 7.70 times")
+    assert scaled(replace(back, low=0.0, high=1.5)).startswith("Moving forwards")
 
 
 def test_a_narrow_region_has_the_digits_of_its_width():
     near, _ = made.comparison_of().worst
-    narrow = regions.in_words(replace(near, low=0.01131, high=0.01157))
+    narrow = scaled(replace(near, low=0.01131, high=0.01157))
     assert narrow.startswith("Position between 11.31 and 11.57 mm:")
 
 

@@ -21,6 +21,7 @@ from identify.output.report.drawing import (
 )
 from identify.output.report.subject import LogForces, Subject, log_forces, shown_residual
 from identify.output.report.units import Scale
+from identify.output.words.validation import correlation_in_words, loop_in_words
 from twin.model.machine import Fitted
 from twin.model.units import LINEAR
 
@@ -151,8 +152,8 @@ def test_dots_and_means_of_the_residual():
     assert len(figure.axes) == 3
     axes = figure.axes[0]
     lines = lines_of(axes)
-    np.testing.assert_allclose(lines["single windows"].get_xdata(), 1e3 * x)
-    np.testing.assert_allclose(lines["single windows"].get_ydata(), 20.0 * np.sign(x))
+    np.testing.assert_allclose(lines["single test functions"].get_xdata(), 1e3 * x)
+    np.testing.assert_allclose(lines["single test functions"].get_ydata(), 20.0 * np.sign(x))
     mean = lines["mean"]
     np.testing.assert_allclose(mean.get_ydata(), 20.0 * np.sign(mean.get_xdata()), atol=1e-9)
     np.testing.assert_allclose(lines["mean with it"].get_ydata(), 7.0)
@@ -161,7 +162,7 @@ def test_dots_and_means_of_the_residual():
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("Position (mm)", "Unexplained force (mN)")
     many = residuals._Left(RNG.standard_normal(25_000), None, "", 1.0)
     wide = residuals.View(RNG.uniform(size=25_000), "Time", "s")
-    dots = lines_of(residuals._figure([wide], many).axes[0])["single windows"]
+    dots = lines_of(residuals._figure([wide], many).axes[0])["single test functions"]
     assert len(dots.get_xdata()) == -(-25_000 // 3)
 
 
@@ -217,13 +218,13 @@ def test_the_tests_of_each_axis_are_in_words_and_their_reason_once(monkeypatch):
     monkeypatch.setattr(whiteness, "_figure", lambda tests, unit: tests)
     compared = made.compared()
     *blocks, reason = whiteness.section(subject_of(comparison=compared)).blocks
-    assert reason.items == (made.whiteness_of().reason,)
+    assert reason.items == (loop_in_words(made.whiteness_of().loop),)
     for axis, (heading, picture, listing) in zip("xy", (blocks[:3], blocks[3:]), strict=True):
         tests = compared.axes[axis].tests
         assert heading.text == f"Axis {axis}"
         assert picture.figure is tests
-        assert "The force residual on 387 windows" in picture.caption
-        words = [c.in_words() for c in tests.correlations]
+        assert "The force residual on 387 test functions" in picture.caption
+        words = [correlation_in_words(c) for c in tests.correlations]
         assert listing.items == [f"F{w[1:]}." for w in words]
 
 

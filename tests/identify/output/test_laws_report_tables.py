@@ -9,6 +9,7 @@ import pytest
 from built_fits import CATALOGUE, axis_of, fitted
 from built_results import Page
 
+from identify.estimation.intervals import NotExcited
 from identify.output import remarks as remarks_module
 from identify.output.report import (
     answer,
@@ -25,6 +26,7 @@ from identify.output.report import (
 from identify.output.report.blocks import Picture
 from identify.output.report.subject import Subject
 from identify.output.report.units import number, title_case
+from identify.output.words.estimation import no_interval_in_words
 
 
 @pytest.fixture(autouse=True)
@@ -150,7 +152,7 @@ def test_errors_log_by_log():
     assert second["run 1"]["Force error, RMS"] == "53.6 mN"
     assert second["run 1"]["Over noise floor"] == number(0.0536 / 0.0132)
     text = page.texts["logs"]
-    assert "Noise floor of the force 11.3 mN RMS in windows of 40.0 ms" in text
+    assert "Noise floor of the force: 11.3 mN RMS with test functions of 40.0 ms" in text
 
 
 # --- candidates -----------------------------------------------------------------------------
@@ -186,7 +188,7 @@ def test_the_law_of_what_is_named_and_what_ties_with_it():
     last = CATALOGUE["quadratic_drag"]
     facts = page.facts
     assert facts["What it is"] == last.summary
-    assert (facts["Its trace"], facts["Shown by"]) == (last.fingerprint, last.excited_by)
+    assert (facts["Fingerprint"], facts["Excited by"]) == (last.fingerprint, last.excited_by)
     assert facts["Source"] == last.source
     assert facts["Fitted"] == ranking.values_of(made.RIVAL)
 
@@ -204,7 +206,7 @@ def test_fitted_values_stand_beside_those_without_the_effect():
     }  # fmt: skip
     assert table["cogging.p"] == {
         "Without cogging": "–", "With cogging": "24.1 mm",
-        "90 % interval": "no interval: not shown", "Meaning": "magnet pitch",
+        "90 % interval": no_interval_in_words(NotExcited()), "Meaning": "magnet pitch",
     }  # fmt: skip
     assert table["coulomb_viscous.Fs"] == {
         "Without cogging": "0.837 N", "With cogging": "337 mN", "90 % interval": "",
@@ -212,7 +214,7 @@ def test_fitted_values_stand_beside_those_without_the_effect():
     }  # fmt: skip
     page = page_of(subject_of(made.diagnosed(x)), parameters)
     assert (
-        "Without cogging: no intervals, because the force error of 8.37 N stands 3.97 times"
+        "Without cogging: no intervals, because the force error of 8.37 N is 3.97 times"
         in (page.texts["parameters"])
     )
     assert page.tones["parameters"][:4] == ["head", "plain", "strong", "plain"]

@@ -10,13 +10,13 @@ import pytest
 from built_fits import CATALOGUE, NOISE, built, built_fit, fitted
 
 from identify.estimation.fit import Outcome
+from identify.estimation.intervals import NotExcited
 from identify.experiment_design.missing_excitation import Gap
 from identify.output import remarks as remarks_module
 from identify.output.remarks import remarks
 from identify.output.text import (
     _step_line,
     add_text,
-    advice,
     check_text,
     compare_text,
     diagnose_text,
@@ -26,6 +26,17 @@ from identify.output.text import (
     in_short,
     plan_text,
 )
+from identify.output.words.estimation import no_interval_in_words, outcome_in_words
+from identify.output.words.experiment_design import gap_in_words
+from identify.output.words.selection import (
+    advice,
+    change_in_words,
+    moved_in_words,
+    refit_in_words,
+    repeat_in_words,
+    verdict_in_words,
+)
+from identify.output.words.validation import loop_in_words
 from identify.selection.confounded import Change, Refit
 from identify.selection.forward_selection import Step, Verdict
 from twin.experiments.kinds import Rests
@@ -44,17 +55,17 @@ def test_a_fit():
         "axis x: force error 0.0513 N, held out 0.0611 N, noise floor 0.0127 N (ratio 4.04)"
     )
     second = lines.index("axis y: force error 0.0317 N, noise floor 0.0131 N (ratio 2.42)")
-    assert lines[1].strip() == Outcome.AT_BOUND.value
+    assert lines[1].strip() == outcome_in_words(Outcome.AT_BOUND)
     x, y = lines[:second], lines[second:]
     assert any("acts 217 us (0.22 samples)" in line for line in x)
     assert not any("samples)" in line for line in y)
-    assert sum(made.refit_of(0.0).in_words() in line for line in x) == 1
-    assert not any("as given" in line for line in y)
-    reason = [line for line in x if "stands 4.0 times above the noise floor 0.0127 N" in line]
+    assert sum(refit_in_words(made.refit_of(0.0)) in line for line in x) == 1
+    assert not any("with the given values" in line for line in y)
+    reason = [line for line in x if "is 4.0 times the noise floor 0.0127 N" in line]
     assert len(reason) == 1
     mass, hidden, held = (line.split() for line in y[-3:])
     assert mass == ["mass", "5.33", "kg", "90", "%", "in", "[5.25,", "5.49]"]
-    assert hidden == ["cogging.p", "0.0441", "m", "no", "interval:", "not", "shown"]
+    assert hidden == ["cogging.p", "0.0441", "m", *no_interval_in_words(NotExcited()).split()]
     assert held == ["coulomb_viscous.Fs", "0.357", "N", "fixed"]
 
 
@@ -67,7 +78,7 @@ def test_a_reason_that_holds_for_all_is_said_once():
     again = replace(result, estimates={"x": (own,), "y": made.estimates(0.0)})
     again.__dict__["refits"] = result.refits
     text = fit_text(again)
-    assert text.count(reason) == 1
+    assert text.count(no_interval_in_words(reason)) == 1
     label = next(line for line in text.splitlines() if "cogging.p" in line)
     assert label.split() == ["cogging.p", "0.0241", "m"]
 
@@ -82,7 +93,7 @@ def test_the_strengths_of_a_description_are_one_sentence():
     )  # fmt: skip
     again.__dict__["refits"] = result.refits
     lines = fit_text(again).splitlines()
-    told = [line.strip() for line in lines if "is a description" in line]
+    told = [line.strip() for line in lines if "is a fitted curve" in line]
     assert len(told) == 1
     assert told[0].startswith("empirical_map")
     assert not any(strength.label in line for line in lines)
@@ -103,11 +114,11 @@ def test_a_comparison():
     assert lines[3].strip().startswith("worst: moving backwards: 0.087 N RMS, 7.7 times")
     tested = [line for line in lines if line.startswith("  force residual against")]
     assert len(tested) == 6
-    assert lines[-1] == made.whiteness_of().reason
+    assert lines[-1] == loop_in_words(made.whiteness_of().loop)
     assert lines.count(lines[-1]) == 1
     quiet = made.Comparison(made.MODEL, {"x": replace(made.comparison_of(), worst=[])})
-    assert "nowhere does the error stand above the noise" in compare_text(quiet)
-    assert "nowhere" not in compare_text(made.compared())
+    assert "in no region is the error above the noise" in compare_text(quiet)
+    assert "in no region" not in compare_text(made.compared())
 
 
 def test_a_diagnosis():
@@ -117,14 +128,16 @@ def test_a_diagnosis():
     text = diagnose_text(result)
     y, lines = text.split("axis x: ", 1)
     lines = lines.splitlines()
-    assert lines[0] == f"{Verdict.AMBIGUOUS.value} cogging."
+    assert lines[0] == f"{verdict_in_words(Verdict.AMBIGUOUS)} cogging."
     assert lines[1] == "  force error 8.37 N, noise floor 2.11 N (ratio 3.97)"
-    assert lines[2] == "  cannot be told apart from: quadratic_drag"
+    assert lines[2] == "  these data cannot separate it from: quadratic_drag"
     planned = [f"  {line}" for line in plan_text(result.next_experiments["x"]).splitlines()]
     assert lines[3 : 3 + len(planned)] == planned
     rest = [" ".join(line.split()) for line in lines[3 + len(planned) :]]
     assert rest[:2] == [
-        "63 % of the squared error depends on other axis position, period 0.0273 m", advice(),
+        "The error depends most on other axis position, which accounts for 63 % of the squared "
+        "error, with a period of 0.0273 m.",
+        advice(),
     ]  # fmt: skip
     assert rest[2:5] == [
         "cogging evidence 510.0 held-out error 7.13 -> 2.17 N",
@@ -133,8 +146,8 @@ def test_a_diagnosis():
     ]
     assert rest[5:7] == [
         "step 1: with cogging the held-out error falls from 7.13 to 2.17 N",
-        "step 2: with lugre beside cogging the held-out error falls from 7.57 to 2.61 N; needless "
-        "then: wear",
+        "step 2: with lugre beside cogging the held-out error falls from 7.57 to 2.61 N; no "
+        "longer needed: wear",
     ]
     assert rest[7:] == [f"note: {r}" for r in remarks(x, result.refits["x"])]
     assert "axis y: Nothing is missing" in y
@@ -146,11 +159,11 @@ def test_a_diagnosis():
 
 def test_a_step_that_makes_the_rest_noise_has_no_errors():
     line = _step_line(3, Step(built(NOISE), ()))
-    assert line.strip() == f"step 3: {NOISE.name} makes the rest of the error noise"
+    assert line.strip() == f"step 3: {NOISE.name} explains the remaining error as noise"
 
 
 def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
-    moved = ("a moved", "b moved")
+    moved = (made.MOVED, replace(made.MOVED, label="b"))
     asked = []
     monkeypatch.setattr(
         remarks_module, "moved_parameters", lambda *fits: asked.append(fits) or moved
@@ -158,9 +171,9 @@ def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
     x = made.diagnosis_of()
     found = remarks(x, made.refit_of(0.0))
     assert asked == [(x.base, made.BEST.fit)]
-    assert found[0] == made.refit_of(0.0).in_words()
+    assert found[0] == refit_in_words(made.refit_of(0.0))
     assert "217 us" in found[1]
-    assert found[2:] == ("with cogging, a moved", "with cogging, b moved")
+    assert found[2:] == tuple(f"with cogging, {moved_in_words(m)}" for m in moved)
     bad = built_fit(2.0, outcome=Outcome.NOT_CONVERGED)
     best = replace(made.BEST, fit=replace(made.BEST.fit, outcome=Outcome.AT_BOUND))
     steps = (Step(best, ()),)
@@ -169,8 +182,11 @@ def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
     )
     loose.__dict__["repeat"] = made.REPEAT
     found = remarks(loose, None)
-    assert found[:2] == (Outcome.NOT_CONVERGED.value, f"with cogging: {Outcome.AT_BOUND.value}")
-    assert found[-2] == made.REPEAT.in_words()
+    assert found[:2] == (
+        outcome_in_words(Outcome.NOT_CONVERGED),
+        f"with cogging: {outcome_in_words(Outcome.AT_BOUND)}",
+    )
+    assert found[-2] == repeat_in_words(made.REPEAT)
     assert "no log was held out" in found[-1]
     quiet = made.diagnosed().axes["y"]
     assert remarks(quiet, None) == ()
@@ -179,15 +195,18 @@ def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
 
 def test_a_change_has_its_values_and_force_in_place():
     change = Change("mass", 15.1, 15.7, "kg", 0.572, ("payload_mass", "cogging"))
-    assert change.in_words() == (
-        "mass 15.1 -> 15.7 kg makes 0.572 N (payload_mass and cogging would be the same force)"
+    assert change_in_words(change) == (
+        "mass 15.1 -> 15.7 kg changes the force by 0.572 N (payload_mass and cogging give the same "
+        "force)"
     )
+    one = change_in_words(replace(change, alike=("payload_mass",)))
+    assert one.endswith("(payload_mass gives the same force)")
     refit = Refit(0.913, 0.127, (change, replace(change, alike=())))
-    assert refit.in_words() == (
-        "as given the model misses by 0.913 N, refitted by 0.127 N: "
-        f"{change.in_words()}, mass 15.1 -> 15.7 kg makes 0.572 N"
+    assert refit_in_words(refit) == (
+        "with the given values the force error is 0.913 N, after the fit 0.127 N: "
+        f"{change_in_words(change)}, mass 15.1 -> 15.7 kg changes the force by 0.572 N"
     )
-    assert Refit(0.913, 0.127, ()).in_words() is None
+    assert refit_in_words(Refit(0.913, 0.127, ())) is None
 
 
 def test_a_plan_between_two():
@@ -195,12 +214,12 @@ def test_a_plan_between_two():
     assert lines[0] == "axis x: cogging or wear, decided by"
     assert lines[1] == "  passes: axis x, span 0.0831 m, speed 0.0127 m/s, repeats 7"
     assert lines[2] == "  missing motion: speed 0.0137 to 0.0591 m/s; 1.2 % of the data is there"
-    assert lines[3] == "  cogging shows in slow passes"
-    assert lines[4] == "  the logs at hand favour wear already"
-    assert lines[5] == "  without logs: effects at start values, 10 times the noise floor"
+    assert lines[3] == "  cogging is excited by slow passes"
+    assert lines[4] == "  the existing logs already favour wear"
+    assert lines[5] == "  no logs given: each effect is assumed at 10 times the noise floor"
     assert [" ".join(line.split()) for line in lines[6:]] == [
-        "passes 8.3 s 0.0412 N left to the rival (3.6 x noise floor), evidence 57.3",
-        "tracking 9.9 s 0.0287 N left to the rival (2.7 x noise floor), evidence 31.9",
+        "passes 8.3 s 0.0412 N unexplained by the rival (3.6 x noise floor), evidence 57.3",
+        "tracking 9.9 s 0.0287 N unexplained by the rival (2.7 x noise floor), evidence 31.9",
     ]
     weak = replace(made.TRIALS[0], gain=10.0)
     text = plan_text(made.plan_of("cogging", "wear", ranking=(weak,)))
@@ -211,7 +230,7 @@ def test_a_plan_between_two():
 
 def test_a_plan_for_one_model():
     lines = plan_text(made.plan_of("the stage", supposed=True)).splitlines()
-    assert lines[0] == "axis x: the parameters of the stage, best shown by"
+    assert lines[0] == "axis x: the parameters of the stage, best constrained by"
     assert [" ".join(line.split()) for line in lines[4:]] == [
         "passes 8.3 s 57.3 nats on the parameters", "tracking 9.9 s 31.9 nats on the parameters",
     ]  # fmt: skip
@@ -226,10 +245,14 @@ def test_an_experiment_in_short_has_the_units_of_its_parameters():
 
 @pytest.mark.parametrize(
     ("share", "said"),
-    [(None, "it shows most at"), (0.049, "missing motion: speed"), (0.051, "no motion is missing")],
+    [
+        (None, "the explanations differ most at"),
+        (0.049, "missing motion: speed"),
+        (0.051, "no motion is missing"),
+    ],
 )
 def test_a_gap_is_missing_where_few_of_the_data_are(share, said):
-    assert Gap("speed", "m/s", 0.01, 0.05, share).in_words().startswith(said)
+    assert gap_in_words(Gap("speed", "m/s", 0.01, 0.05, share)).startswith(said)
 
 
 @pytest.mark.parametrize("kept", [True, False])
@@ -237,14 +260,14 @@ def test_an_addition(kept):
     lines = [" ".join(line.split()) for line in add_text(made.addition(kept)).splitlines()]
     assert lines[:5] == [
         "added cogging to axis x", "force error on the fit logs 7.31 -> 4.57 N",
-        "force error held out 7.83 -> 4.91 N",
+        "force error on the held-out logs 7.83 -> 4.91 N",
         "free-running position error 3.71e-06 -> 1.93e-06 m (MuJoCo: 1.97e-06 m)",
-        "a note of what moved",
+        moved_in_words(made.MOVED),
     ]  # fmt: skip
     assert ("do not support" in lines[-1]) is not kept
     assert len(lines) == (5 if kept else 6)
     unheld = add_text(replace(made.addition(), step=made.STEPS[2]))
-    assert "held out" not in unheld
+    assert "held-out" not in unheld
     assert "added wear to axis y" in unheld
 
 
@@ -272,5 +295,5 @@ def test_a_check():
     finding = Finding(Severity.WARNING, Fault.LAG, "y", "the what", "the where", "the remedy")
     reports = {"a": CheckReport((finding,)), "b": CheckReport(())}
     assert check_text(reports).splitlines() == [
-        "a: warning: axis y, the where: the what; the remedy", "b: fit for identification",
+        "a: warning: axis y, the where: the what; the remedy", "b: suitable for identification",
     ]  # fmt: skip

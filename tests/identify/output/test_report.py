@@ -17,6 +17,7 @@ import identify.output.report
 from identify.output.report import residuals
 from identify.output.report.drawing import data_uri, drawing_style
 from identify.output.report.units import Scale, number, quantity
+from identify.output.words.selection import verdict_in_words
 from identify.selection.forward_selection import Verdict
 from identify.selection.residual_dependence import Dependence
 from twin.errors import InputError
@@ -87,7 +88,7 @@ def test_page_says_the_verdict(case: Case, page: str) -> None:
     best = case.x.best
     assert best is not None
     assert "Axis x: cogging is missing" in text
-    assert Verdict.MISSING_EFFECT.value in text
+    assert verdict_in_words(Verdict.MISSING_EFFECT) in text
     assert "Runner-up: quadratic drag" in text
     scale = Scale.of("N", [case.x.base.error])
     before = number(case.x.base.error / scale.size)

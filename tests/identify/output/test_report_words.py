@@ -26,6 +26,7 @@ from identify.output.report.overlay import representative
 from identify.output.report.subject import LogForces, Subject
 from identify.output.report.units import Scale, number, quantity
 from identify.output.results import Diagnosis
+from identify.output.words.selection import verdict_in_words
 from identify.selection.forward_selection import AxisDiagnosis, Verdict
 from identify.selection.residual_dependence import Dependence
 from twin.effects import Catalogue, load_catalogue
@@ -75,7 +76,7 @@ def test_every_verdict_has_its_words(case: Case) -> None:
     for headline, found in expected.items():
         (card,) = answers(case.subject(case.concluding(found)))
         assert card.headline == headline
-        assert card.sentence.startswith(found.verdict.value)
+        assert card.sentence.startswith(verdict_in_words(found.verdict))
         assert ("27.0 mm" in card.sentence) == (found is lost)
         assert ("63 %" in card.sentence) == (found is lost)
 

@@ -50,12 +50,12 @@ RIVALS = Catalogue(
 
 @pytest.fixture(scope="module")
 def found(model, emps):
-    return diagnose(model, *emps, catalogue=RIVALS, window=WINDOW)
+    return diagnose(model, *emps, catalogue=RIVALS, test_function=WINDOW)
 
 
 @pytest.fixture(scope="module")
 def added(found, emps):
-    return add(CATALOGUE["asymmetric_friction"], found.model, *emps, window=WINDOW)
+    return add(CATALOGUE["asymmetric_friction"], found.model, *emps, test_function=WINDOW)
 
 
 def test_the_four_parameter_fit_is_near_the_published_one(found):
@@ -110,14 +110,14 @@ def test_it_adds_nothing_more(found):
 
 @pytest.mark.slow
 def test_then_it_stops_adding(added, emps):
-    again = diagnose(added.model, *emps, catalogue=CATALOGUE, window=WINDOW)
+    again = diagnose(added.model, *emps, catalogue=CATALOGUE, test_function=WINDOW)
     assert again.effect is None
     assert again.leading.verdict is Verdict.UNEXPLAINED
 
 
 @pytest.mark.slow
 def test_the_answer_among_the_whole_catalogue_is_the_same(model, emps, found):
-    whole = diagnose(model, *emps, catalogue=CATALOGUE, window=WINDOW)
+    whole = diagnose(model, *emps, catalogue=CATALOGUE, test_function=WINDOW)
     assert whole.leading.verdict is found.leading.verdict
     assert whole.leading.named == found.leading.named
     assert whole.leading.unexplained is not None
@@ -136,4 +136,4 @@ def test_the_term_of_a_screw_turn_is_present_in_each_run_but_not_general(found):
     final = found.leading.final
     for amplitude in repeat.amplitude.values():
         assert final.floor < amplitude < 2.0 * final.error
-    assert any("not general" in note for note in remarks(found.leading, None))
+    assert any("no function of position" in note for note in remarks(found.leading, None))

@@ -11,6 +11,7 @@ from scipy.stats import norm
 from identify.dataset.motion import _follows, motion_of
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
+from identify.output.words.validation import correlation_in_words
 from identify.selection.residual_dependence import (
     BINS,
     _foremost,
@@ -203,8 +204,12 @@ def test_what_is_outside_and_passes_counts_the_tested_lags_alone():
     assert found.passes
     assert not Correlation("command", found.lag, value, tested, 0.1, 0.205).passes
     assert not Correlation("command", found.lag, -value, tested, 0.1, 0.205).passes
-    assert "against command: 50 % of the lags beyond the 90 % bounds of ±0.1" in found.in_words()
-    assert "its own past" in Correlation("residual", found.lag, value, tested, 0.1, 1).in_words()
+    assert (
+        "against command: 50 % of the lags beyond the 90 % bounds of ±0.1"
+        in correlation_in_words(found)
+    )
+    own = Correlation("residual", found.lag, value, tested, 0.1, 1)
+    assert "its own past" in correlation_in_words(own)
 
 
 def test_residual_tests_take_windows_that_do_not_overlap():
@@ -239,7 +244,7 @@ def test_residual_tests_take_windows_that_do_not_overlap():
     assert found.edges[-1] == -found.edges[0] == pytest.approx(1.0)  # five floors
     wide = residual_tests(logs, 4.0 * force, kept, 0.2, Loop.OPEN)
     assert wide.edges[-1] == pytest.approx(np.quantile(4.0 * np.abs(left), 0.995))
-    assert (found.floor, found.loop, found.reason) == (0.2, Loop.OPEN, Loop.OPEN.value)
+    assert (found.floor, found.loop) == (0.2, Loop.OPEN)
     assert found.passes == all(c.passes for c in found.correlations)
 
 

@@ -10,10 +10,10 @@ import pytest
 from built_fits import NOISE, PLAIN, built, built_fit, stage, step, study_stub
 
 from identify.selection.forward_selection import (
-    _asked_for,
     _convincing,
     _friction_instead,
     _gone,
+    _is_added,
     _near,
     _part,
 )
@@ -57,7 +57,7 @@ def test_no_part_is_explained_of_an_error_within_its_floor():
     ],
 )
 def test_at_the_floor_only_much_evidence_asks_for_an_effect(bic, t, base, asked):
-    assert _asked_for(built(bic=bic, t=t), base) is asked
+    assert _is_added(built(bic=bic, t=t), base) is asked
 
 
 def test_a_rival_gains_more_than_four_fifths_of_the_best():

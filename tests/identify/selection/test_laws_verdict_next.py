@@ -9,7 +9,7 @@ import pytest
 from built_fits import built, built_fit, step, study_stub
 
 from identify.selection.forward_selection import (
-    Stage,
+    SelectionState,
     _next,
     diagnose_axis,
 )
@@ -131,4 +131,4 @@ def test_all_begins_anew_after_a_shift_as_often_as_allowed(monkeypatch):
 
 
 def test_a_stage_knows_the_fit_it_led_to():
-    assert Stage((), HIGH).fit is HIGH
+    assert SelectionState((), HIGH).fit is HIGH

@@ -12,27 +12,29 @@ import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_study, fitted
 
-from identify.estimation.fit import Outcome as FitOutcome
-from identify.estimation.fit import finished
+from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import Estimate
+from identify.output.words.selftest import rate_in_words, target_in_words, trial_in_words
 from identify.selection.forward_selection import AxisDiagnosis, Verdict
 from identify.selftest import cases, design, trial
 from identify.selftest.design import FULL, PAIR_STRENGTH, QUICK, Design, plantable
 from identify.selftest.tally import COVERED, Rate, confusion, coverage, rates
-from identify.selftest.trial import Case, Outcome, _covered, _right_coordinates
+from identify.selftest.trial import Case, TrialResult, _covered, _right_coordinates
 from twin.effect import Kind
 
 
-def outcomes_of(counts: dict[Outcome, int]) -> list[Outcome]:
+def outcomes_of(counts: dict[TrialResult, int]) -> list[TrialResult]:
     """Each outcome as often as asked, in an order that is drawn."""
     every = [o for o, n in counts.items() for _ in range(n)]
     return [every[i] for i in np.random.default_rng(2).permutation(len(every))]
 
 
-def one(strength: float, *answers: tuple[str, ...], verdict="MISSING_EFFECT", **changes) -> Outcome:
+def one(
+    strength: float, *answers: tuple[str, ...], verdict="MISSING_EFFECT", **changes
+) -> TrialResult:
     known = changes.pop("known", True)
-    return Outcome(Case(("a",), strength, 1, known), verdict, answers, **changes)
+    return TrialResult(Case(("a",), strength, 1, known), verdict, answers, **changes)
 
 
 RIGHT, TIED = one(5.0, ("a",)), one(5.0, ("b", "a"), verdict="AMBIGUOUS")
@@ -47,10 +49,10 @@ LOST = one(
 )
 SEEN = replace(LOST, depends_on="position", left=9.0)
 COVERING = (("mass", True), ("Fc", False), ("Fs", True))
-QUIET = Outcome(Case((), 0.0, 1), "NOTHING_MISSING", covered=COVERING)
-ALARM = Outcome(Case((), 0.0, 2), "AMBIGUOUS", (("c", "d"),), covered=(("mass", False),))
-BOTH = Outcome(Case(("a", "b"), 5.0, 1), "MISSING_EFFECT", (("b",), ("a",)))
-HALF = Outcome(Case(("a", "b"), 5.0, 2), "MISSING_EFFECT", (("b",),))
+QUIET = TrialResult(Case((), 0.0, 1), "NOTHING_MISSING", covered=COVERING)
+ALARM = TrialResult(Case((), 0.0, 2), "AMBIGUOUS", (("c", "d"),), covered=(("mass", False),))
+BOTH = TrialResult(Case(("a", "b"), 5.0, 1), "MISSING_EFFECT", (("b",), ("a",)))
+HALF = TrialResult(Case(("a", "b"), 5.0, 2), "MISSING_EFFECT", (("b",),))
 COUNTS = {
     RIGHT: 11, TIED: 5, WRONG: 3, MISSED: 2, SILENT: 1, TOO_MANY: 1, WEAK: 7, WEAK_WRONG: 4,
     HIDDEN: 6, FOUND: 9, FAR: 8, LOST: 10, SEEN: 13, QUIET: 17, ALARM: 12, BOTH: 19, HALF: 14,
@@ -59,7 +61,7 @@ EVERY = outcomes_of(COUNTS)
 
 
 def test_every_outcome_is_counted_once_in_its_own_row():
-    found = {r.what: (r.count, r.trials, r.target) for r in rates(EVERY)}
+    found = {r.what: (r.count, r.trials, target_in_words(r)) for r in rates(EVERY)}
     named = "named or in a declared ambiguity, force {} times the noise floor"
     assert found == {
         named.format(2): (7, 11, "at least 80 %"),
@@ -100,27 +102,28 @@ def test_the_confusion_matrix_has_shares_of_each_row():
 def test_an_outcome_is_right_where_names_and_planted_effects_match_one_to_one():
     for planted in (("a",), ("a", "b"), ()):
         for named in product([("a",), ("b",), ("c", "a"), ("b", "c")], repeat=len(planted)):
-            o = Outcome(Case(planted, 5.0, 1), "MISSING_EFFECT", named)
+            o = TrialResult(Case(planted, 5.0, 1), "MISSING_EFFECT", named)
             used = [set(answer) & set(planted) for answer in named]
             matched = all(used) and len(set().union(*used)) == len(planted)
             assert o.right is matched, o
-    assert not Outcome(Case((), 0.0, 1), "AMBIGUOUS", (("a",),)).right
+    assert not TrialResult(Case((), 0.0, 1), "AMBIGUOUS", (("a",),)).right
 
 
 def test_rates_in_words():
     rate = Rate("what", 3, 4, (0.2, 0.9))
-    assert rate.in_words() == "what: 3 of 4 (75 %), asked: 20 to 90 %"
-    assert Rate("what", 0, 0).in_words() == "what: 0 of 0"
+    assert rate_in_words(rate) == "what: 3 of 4 (75 %), target: 20 to 90 %"
+    assert rate_in_words(Rate("what", 0, 0)) == "what: 0 of 0"
     assert math.isnan(Rate("what", 0, 0).value)
     assert rate.value == 0.75
 
 
 def test_an_outcome_in_words():
-    assert TIED.in_words() == "a at 5 floors: b or a"
-    assert BOTH.in_words() == "a and b at 5 floors: b and a"
-    assert LOST.in_words() == "a at 5 floors, left out of the catalogue: unexplained"
-    assert QUIET.in_words() == "nothing at 0 floors: nothing_missing"
-    assert "a cannot show" in HIDDEN.in_words()
+    level = "at 5 times the noise floor"
+    assert trial_in_words(TIED) == f"a {level}: b or a"
+    assert trial_in_words(BOTH) == f"a and b {level}: b and a"
+    assert trial_in_words(LOST) == f"a {level}, left out of the catalogue: unexplained"
+    assert trial_in_words(QUIET) == "nothing: nothing missing"
+    assert "a cannot reach 5 times the noise floor" in trial_in_words(HIDDEN)
 
 
 # --- the design -----------------------------------------------------------------------------
@@ -178,7 +181,7 @@ class Inline:
 def test_outcomes_come_in_the_order_of_the_cases_with_their_progress(monkeypatch):
     monkeypatch.setattr(design, "ProcessPoolExecutor", Inline)
     monkeypatch.setattr(design, "as_completed", lambda jobs: reversed(list(jobs)))
-    monkeypatch.setattr(design, "run", lambda case: Outcome(case, str(case.seed)))
+    monkeypatch.setattr(design, "run", lambda case: TrialResult(case, str(case.seed)))
     wanted = [Case(("a",), 5.0, seed) for seed in (3, 1, 2)]
     told = []
     found = design.run_all(wanted, progress=lambda *given: told.append(given))
@@ -210,7 +213,7 @@ def dataset():
 
 
 def test_the_right_coordinates_are_those_near_the_strongest_dependence(monkeypatch, dataset):
-    base = finished(PLAIN, PLAIN, dataset.fit, FitOutcome.CONVERGED)
+    base = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
     planted = (fitted("constant_force", F0=0.7), fitted("quadratic_drag", c=2.0))
     built_machine = SimpleNamespace(planted=planted)
     seen = []
@@ -292,4 +295,6 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
         raise cases.NotShown("cogging")
 
     monkeypatch.setattr(trial, "machine", refused)
-    assert trial.run(Case(("cogging",), 3.0, 7)) == Outcome(Case(("cogging",), 3.0, 7), shown=False)
+    assert trial.run(Case(("cogging",), 3.0, 7)) == TrialResult(
+        Case(("cogging",), 3.0, 7), shown=False
+    )

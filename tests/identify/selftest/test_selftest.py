@@ -7,16 +7,16 @@ import pytest
 
 from identify.cli import main
 from identify.output.as_json import plain
+from identify.output.selftest import selftest_json
 from identify.selftest import (
     Case,
     Design,
-    Outcome,
+    TrialResult,
     confusion,
     coverage,
     draw,
     rates,
     run_all,
-    selftest_json,
 )
 from identify.selftest.design import plantable
 from identify.selftest.trial import FLOOR, STAGE, run
@@ -109,13 +109,13 @@ def test_a_design_plants_every_physical_effect_the_stage_lacks():
 
 # --- the tally, on invented outcomes --------------------------------------------------------
 
-NAMED = Outcome(Case(("a",), 5.0, 1), "MISSING_EFFECT", (("a",),), ratio=5.0, left=1.0)
+NAMED = TrialResult(Case(("a",), 5.0, 1), "MISSING_EFFECT", (("a",),), ratio=5.0, left=1.0)
 TIED = replace(NAMED, verdict="AMBIGUOUS", answers=(("b", "a"),))
 WRONG = replace(NAMED, answers=(("b",),))
 MISSED = replace(NAMED, verdict="UNEXPLAINED", answers=())
-ALARM = Outcome(Case((), 0.0, 1), "MISSING_EFFECT", (("b",),), covered=(("mass", False),))
-QUIET = Outcome(Case((), 0.0, 2), "NOTHING_MISSING", covered=(("mass", True),))
-LOST = Outcome(
+ALARM = TrialResult(Case((), 0.0, 1), "MISSING_EFFECT", (("b",),), covered=(("mass", False),))
+QUIET = TrialResult(Case((), 0.0, 2), "NOTHING_MISSING", covered=(("mass", True),))
+LOST = TrialResult(
     Case(("a",), 5.0, 1, known=False), "UNEXPLAINED", left=5.0, depends_on="time",
     coordinates=("position",),
 )  # fmt: skip

@@ -11,6 +11,7 @@ from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import rms
 from identify.estimation.force_balance import residual
+from identify.output.words.validation import region_in_words
 from identify.selection.residual_dependence import (
     UNITS,
     coordinates_of,
@@ -109,14 +110,14 @@ def test_a_direction_has_two_bins():
     found = misfit_map("direction", r, v, 0.1)
     np.testing.assert_allclose(found.mean, [2.0, 5.0])
     np.testing.assert_allclose(found.visited, [2.0 / 6.0, 4.0 / 6.0])
-    words = [r.in_words() for r in worst_regions([found], MANY)]
+    words = [region_in_words(r) for r in worst_regions([found], MANY)]
     assert words[0].startswith("moving forwards: 5.34 N RMS, 53.4 times the noise floor, 92 %")
     turned = misfit_map("direction", r[::-1] * [9, 9, 1, 1, 1, 1], -v[::-1], 0.1)
     behind = worst_regions([turned], MANY)
-    assert behind[0].in_words().startswith("moving")
+    assert region_in_words(behind[0]).startswith("moving")
     turned = misfit_map("direction", np.array([9.0, 8.0, 1, 1, 1, 1]), v, 0.1)
     swapped = worst_regions([turned], MANY)
-    assert swapped[0].in_words().startswith("moving backwards")
+    assert region_in_words(swapped[0]).startswith("moving backwards")
 
 
 def test_an_error_planted_in_a_bin_is_the_worst_region():
@@ -132,8 +133,8 @@ def test_an_error_planted_in_a_bin_is_the_worst_region():
     assert found.ratio == pytest.approx(found.rms / 0.01)
     assert found.share > 0.9
     assert found.unit == "m"
-    assert "position between 0.05" in found.in_words()
-    assert f"{100 * found.share:.0f} % of the squared error" in found.in_words()
+    assert "position between 0.05" in region_in_words(found)
+    assert f"{100 * found.share:.0f} % of the squared error" in region_in_words(found)
 
 
 def bare_map(name, rms_, share_, visited, floor=1.0) -> MisfitMap:

@@ -7,7 +7,7 @@ import pytest
 from machines import one_axis
 
 from identify.output import as_json
-from identify.output.report.regions import in_words
+from identify.output.words.validation import region_in_words
 from identify.validation.error_spectrum import bands
 from identify.workflow import compare, fit
 from twin.effects import load_catalogue
@@ -39,7 +39,7 @@ def by_frequency(compared):
 
 @pytest.mark.parametrize("window", [0.02, 0.1])
 def test_noise_alone_fills_the_noise_band_whatever_the_window(window):
-    result = fit(STAGE, logs(3), window=window)
+    result = fit(STAGE, logs(3), test_function=window)
     found = bands(result.fits["x"].axis, result.datasets["x"].fit)
     assert found.high[-1] > 100.0
     wide = found.low > 2.0
@@ -59,8 +59,8 @@ def test_the_worst_region_names_the_band(pumped):
     worst = pumped.axes["x"].worst[0]
     assert worst.coordinate == "frequency"
     assert worst.low <= LINE < worst.high
-    assert "Frequency between" in in_words(worst)
-    assert "Hz" in worst.in_words()
+    assert "frequency between" in region_in_words(worst)
+    assert "Hz" in region_in_words(worst)
 
 
 def test_the_bands_are_in_the_json(pumped):

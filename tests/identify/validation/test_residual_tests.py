@@ -13,6 +13,7 @@ from identify.estimation.force_balance import residual
 from identify.output import as_json
 from identify.output import text as as_text
 from identify.output.results import Comparison
+from identify.output.words.validation import loop_in_words
 from identify.validation.whiteness import Loop, correlation, loop_of, residual_tests
 from identify.workflow import compare, fit
 from twin.effects import load_catalogue
@@ -129,7 +130,7 @@ def test_the_loop_is_told_from_the_log(logs):
     bare = replace(logs["run"], axes={"x": AxisLog(columns)})
     assert told(bare) is Loop.UNKNOWN
     for loop in Loop:
-        assert "coloured" in loop.value
+        assert "coloured" in loop_in_words(loop)
 
 
 @pytest.fixture(scope="module")
@@ -142,11 +143,11 @@ def test_the_reason_and_the_bounds_are_said(compared):
     tests = found["axes"]["x"]["residual_tests"]
     assert tests["loop"] == "closed"
     assert tests["tested"] == "force residual"
-    assert tests["reason"] == Loop.CLOSED.value
+    assert tests["reason"] == loop_in_words(Loop.CLOSED)
     assert set(tests["correlations"]) == {"residual", "command", "velocity"}
     for part in tests["correlations"].values():
         assert len(part["lag"]) == len(part["value"]) == len(part["tested"])
         assert part["bound_90"] == pytest.approx(1.645 / np.sqrt(tests["samples"]), rel=1e-3)
     text = as_text.compare_text(compared)
-    assert Loop.CLOSED.value in text
+    assert loop_in_words(Loop.CLOSED) in text
     assert "beyond the 90 % bounds" in text

@@ -224,7 +224,7 @@ def test_an_unknown_ending_or_format_is_refused(tmp_path: Path) -> None:
 
 def test_a_log_without_a_rate_is_refused(tmp_path: Path) -> None:
     write_mat(tmp_path / "log.mat", table())
-    with pytest.raises(InputError, match=r"log\.mat: does not tell its sample rate"):
+    with pytest.raises(InputError, match=r"log\.mat: does not state its sample rate"):
         import_log(tmp_path / "log.mat", mapping(tmp_path, MAP.replace("sample_rate = 2000.0", "")))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from twin.errors import InputError
-from twin.log.importers.clock import rate_of
+from twin.log.importers.sample_rate import rate_of
 from twin.log.importers.units import find_unit
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}

@@ -149,7 +149,7 @@ FAULTS = [
         lambda p: _protobuf(p, same_fields(), metadata={"unit.position": "mm"}),
         "/axis/x: unit of position is 'mm', allowed is m or rad",
     ),
-    (lambda p: _protobuf(p, same_fields(1)), "1 samples do not tell the sample rate"),
+    (lambda p: _protobuf(p, same_fields(1)), "1 samples do not determine the sample rate"),
     (
         lambda p: _protobuf(p, same_fields(), schema=("twin.AxisSample", "protobuf", b"\xff")),
         "/axis/x: the protobuf schema 'twin.AxisSample' cannot be used",

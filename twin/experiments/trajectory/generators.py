@@ -2,7 +2,7 @@
 
 Every generator returns a Setpoint that starts and ends at rest, so that setpoints can be put one
 after the other with `concatenate`. Sample k is the setpoint at t = k / sample_rate. Positions are
-absolute positions on the stage in metres; `at` is the place of the experiment, one position per
+absolute positions on the machine in metres; `at` is the place of the experiment, one position per
 axis, where the axes that do not take part rest.
 
 Source of the experiments: L. Jia, Friction Identification on the Gantry Stage, TU Delft 2023.
@@ -50,7 +50,7 @@ def point_to_point(
 
     Args:
         limits: one per axis.
-        waypoints: m, shape (k, n_axes), k >= 2; the stage starts at rest at the first.
+        waypoints: m, shape (k, n_axes), k >= 2; the machine starts at rest at the first.
         dwell: rest at every waypoint, the first and the last included, s.
         sample_rate: Hz.
 
@@ -192,7 +192,7 @@ def open_loop_sine(
     at: npt.ArrayLike = (0.0, 0.0),
     sample_rate: float = SAMPLE_RATE,
 ) -> Setpoint:
-    """Open-loop sine: force offset + amplitude sin(2 pi t / period) on one axis, no motion asked.
+    """Open-loop sine: force offset + amplitude sin(2 pi t / period) on one axis, without feedback.
 
     Args:
         axis: index of the driven axis.

@@ -4,7 +4,7 @@ A move is a straight line on which all axes start and end together. One scalar p
 line, 0 at the start and 1 at the target, is planned under the limits of every axis and scaled by
 each axis's displacement. It is planned with the path length as unit of length and
 (path length / jerk)^(1/3) as unit of time, because Ruckig's tolerances are absolute: in metres
-they amount to 10 nm, which a move of micrometres would feel.
+they amount to 10 nm, too much for a move of micrometres.
 
 Source of the planner: L. Berscheid and T. Kroeger, "Jerk-limited Real-time Trajectory Generation
 with Arbitrary Target States", Robotics: Science and Systems XVII, 2021.
@@ -26,7 +26,7 @@ _BLOCK = 16_384
 
 @dataclass(frozen=True, eq=False)
 class Phases:
-    """Stretches of constant jerk, one after the other.
+    """Phases of constant jerk, one after the other.
 
     Attributes:
         duration: length of each phase, s, shape (n_phases,).
@@ -56,7 +56,7 @@ def move(limits: Sequence[Limits], start: FloatArray, target: FloatArray) -> Pha
     """Fastest straight move from rest at `start` to rest at `target`, all axes together.
 
     Args:
-        limits: one per axis; travel is not looked at, a move never leaves the box of its ends.
+        limits: one per axis; travel is not checked, as a move stays between its ends.
         start, target: m, shape (n_axes,).
 
     Returns:

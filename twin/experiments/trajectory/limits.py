@@ -1,4 +1,4 @@
-"""What an axis may do, and the checks that keep a setpoint within it."""
+"""Motion limits of an axis, and the checks that keep a setpoint within them."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ _SAME_PLACE = 1e-9  # m, rounding of a position that lies on the end of the trav
 
 @dataclass(frozen=True)
 class Limits:
-    """What the setpoint of one axis may do.
+    """Motion limits of the setpoint of one axis.
 
     Attributes:
         travel: lowest and highest position, m.
@@ -119,7 +119,7 @@ def travel_box(limits: Sequence[Limits]) -> tuple[FloatArray, FloatArray]:
 def inside_travel(limits: Sequence[Limits], positions: FloatArray) -> FloatArray:
     """The positions (m, shape (..., n_axes)), or CannotRun if one lies outside the travel.
 
-    What lies outside by rounding alone is put on the end of the travel.
+    A position outside by rounding alone is set to the end of the travel.
     """
     low, high = travel_box(limits)
     if positions.ndim == 0 or positions.shape[-1] != low.size:

@@ -1,4 +1,4 @@
-"""Random tracking: the rich motion on which models are fitted and held out."""
+"""Random tracking: the rich motion on which models are fitted and tested."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -96,7 +96,7 @@ def _require_motion(
 def _drawn_limits(
     limits: Sequence[Limits], slowest: float, rng: np.random.Generator
 ) -> list[Limits]:
-    """Limits of one random move; the draws are shared, so that no axis holds up the others."""
+    """Limits of one random move; all axes share the draws, so that none slows down the others."""
     pace = min(1.0, 1.25 * rng.random())
     effort = 10.0 ** rng.uniform(-1.0, 0.0)
     return [

@@ -1,4 +1,4 @@
-"""The sampled setpoint: what the controller is asked to do at every sample."""
+"""The sampled setpoint of the controller."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ _AT_REST = 1e-9  # m/s
 
 @dataclass(frozen=True, eq=False)
 class Setpoint:
-    """What the controller is asked to do, sampled.
+    """Setpoint of all axes, sampled.
 
     Attributes:
         position, velocity, acceleration: m, m/s, m/s^2, shape (n, n_axes).
@@ -67,7 +67,7 @@ def closed_loop(phases: Phases, samples: int, sample_rate: float) -> Setpoint:
 
 
 def whole_motion(parts: Sequence[Phases], sample_rate: float) -> Setpoint:
-    """All parts in a row; the last sample stands at the end of the last part.
+    """All parts in a row; the last sample is at the end of the last part.
 
     Raises:
         CannotRun: the motion is too long to hold in memory, or takes no time at all.

@@ -1,4 +1,4 @@
-"""Is a log fit for identification? What is wrong with it, before anything is fitted."""
+"""Checks whether a log is suitable for identification, before anything is fitted."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def moves(log: Log, axis: str) -> bool:
 
 
 def check_log(log: Log) -> CheckReport:
-    """Look for what spoils an identification; the log is not changed.
+    """Look for faults that spoil an identification; the log is not changed.
 
     Where an axis lacks something that every other check needs, only that is reported.
     """

@@ -1,4 +1,4 @@
-"""One axis of a log as the checks see it; everything is computed when first asked for."""
+"""One axis of a log with the quantities that the checks need, each computed at first use."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ class Axis:
 
     @cached_property
     def position_step(self) -> float:
-        """Smallest change of the position in m: the encoder's step, where it is seen."""
+        """Smallest change of the position in m; for a coarse encoder its resolution."""
         steps = np.abs(np.diff(self.log.position))
         return float(steps[steps > 0.0].min(initial=np.inf)) if steps.any() else 0.0
 
     @cached_property
     def position_noise(self) -> float:
-        """Noise of the position in m rms: the white part of it, or what its step makes."""
+        """Noise of the position in m rms: its white part, or the rounding to its step."""
         return max(white_noise(self.log.position), self.position_step / 12**0.5)
 
     @cached_property
@@ -112,12 +112,12 @@ class Axis:
 
     @cached_property
     def lag(self) -> Lag:
-        """By how much the command is late against the motion that it causes."""
+        """Lag of the command behind the motion that it causes."""
         return find_lag(self.force, self._regressors, self.kept, self.smoother.block)
 
     @cached_property
     def dynamics(self) -> Dynamics:
-        """The command explained by the motion, the lag between them undone."""
+        """The command explained by the motion, with the lag between them removed."""
         shift = round(self.lag.seconds / self.smoother.block) if self.lag.clear else 0
         span = slice(max(-shift, 0), len(self.force) - max(shift, 0))
         force = self.force[span.start + shift : span.stop + shift]
@@ -125,7 +125,7 @@ class Axis:
 
     @cached_property
     def _regressors(self) -> Array:
-        """(m, 5): what a command is spent on: mass, damping, Coulomb friction, bias, stiffness."""
+        """(m, 5) regressors of a command: mass, damping, Coulomb friction, bias, stiffness."""
         fast = float(np.quantile(np.abs(self.velocity), 0.99))
         position = self.smoother.position(self.log.position)
         return np.column_stack(

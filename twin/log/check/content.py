@@ -1,4 +1,4 @@
-"""Is there anything to check: signals, numbers, time, change."""
+"""Whether a log can be checked at all: signals, finite numbers, duration, motion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from twin.log.check.axis import Axis
 from twin.log.check.report import Fault, Finding, Severity
 from twin.signals import Array
 
-SHORTEST = 1.0  # s, what identification needs at the least
+SHORTEST = 1.0  # s, least duration for identification
 
 
 def check(axis: Axis) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""A rough model of the axis, good enough to see that something is wrong with its signals."""
+"""A rough model of the axis, to find faults of its signals."""
 
 from __future__ import annotations
 

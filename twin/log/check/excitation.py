@@ -1,4 +1,4 @@
-"""Does the motion tell enough: both directions, several speeds, more than the encoder's noise."""
+"""Whether the motion excites enough: both directions, several speeds, above encoder noise."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from twin.log.check.axis import Axis
 from twin.log.check.report import Fault, Finding, Severity
 
 _COARSE = 0.3  # acceleration noise as a part of the acceleration
-_CREEP = 0.02  # of the highest speed: slower counts as standing
+_CREEP = 0.02  # of the highest speed; slower motion counts as standstill
 _ONE_WAY = 0.02  # share of the moving time
 _SAME_SPEED = 0.05  # spread of the speeds as a part of their median
 

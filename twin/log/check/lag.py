@@ -1,4 +1,4 @@
-"""By how much one signal is late against others that explain it."""
+"""Lag of a signal behind others that explain it."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from scipy.signal import correlate
 from twin.signals import Array
 
 LONGEST = 0.25  # s, searched both ways
-_MOTION = 20  # the log is so many times longer than the longest lag, to hold several moves
-_CLEAR = 0.5  # residual at the best lag at the most, as a part of the signal
-_WRONG = 0.03  # residual without a lag at the least, likewise
-_BETTER = 0.6  # residual at the best lag at the most, as a part of that without a lag
-_AS_GOOD = 1.5  # a residual so many times the least may be the right one too
+_MOTION = 20  # least length of the log over the longest lag, so that it holds several moves
+_CLEAR = 0.5  # largest residual at the best lag, as a part of the signal
+_WRONG = 0.03  # least residual without a lag, as a part of the signal
+_BETTER = 0.6  # largest residual at the best lag, as a part of that without a lag
+_AS_GOOD = 1.5  # times the least residual: lags up to it count as equally good
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Short pieces of a log that no machine makes."""
+"""Outliers: short pieces of a log that no machine can produce."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from twin.signals import Array
 
 _APART = 0.05  # s without an outlier ends a burst
 _UNUSUAL = 5.0  # times the level that 99 % of the samples stay below
-_CONTRADICTION = 0.1  # of the command, at the least
-_ROUGH = 0.1  # of the command, at the least
+_CONTRADICTION = 0.1  # least contradiction, as a part of the command
+_ROUGH = 0.1  # least roughness, as a part of the command
 _ROUGH_SPAN = 10e-3  # s, in which half of the samples are rough; a commanded step is only a few
 _FEWEST_ROUGH = 5
 
@@ -52,7 +52,7 @@ def _rough_command(axis: Axis) -> Array:
 
 
 def _contradictions(axis: Axis) -> Iterator[Finding]:
-    """Where command and motion do not go together, jumps of the position aside."""
+    """Where command and motion contradict each other, except at jumps of the position."""
     if not axis.dynamics.explains:
         return
     fit = axis.dynamics

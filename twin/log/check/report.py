@@ -1,4 +1,4 @@
-"""What a check finds, as sentences."""
+"""The findings of a check, as sentences."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from enum import Enum
 
 
 class Severity(Enum):
-    """ERROR: do not fit this log. WARNING: it limits what a fit can tell."""
+    """ERROR: do not fit this log. WARNING: it limits what a fit can identify."""
 
     ERROR = "error"
     WARNING = "warning"
 
 
 class Fault(Enum):
-    """The kinds of fault that are looked for."""
+    """The kinds of fault."""
 
     INCOMPLETE = "a signal is missing"
     NOT_FINITE = "a sample is no number"
@@ -26,7 +26,7 @@ class Fault(Enum):
     OUTLIERS = "samples that cannot be"
     SATURATION = "the command is limited"
     COARSE_POSITION = "the position is too coarse"
-    WEAK_EXCITATION = "the motion tells too little"
+    WEAK_EXCITATION = "the motion excites too little"
 
 
 @dataclass(frozen=True)

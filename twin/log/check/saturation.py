@@ -1,4 +1,4 @@
-"""A command that stays at its extreme: the limit of the drive, not what the controller asked."""
+"""Saturation: a command that stays at its extreme, the limit of the drive."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LEVEL_BLOCKS = 10
 _NEAR = 10.0  # times the noise
 _WIDE = 40.0
 _EDGE_BLOCKS = 3  # a limited command leaves its level at once, a smooth one slowly
-_LIVELY = 200.0  # range of a command worth the name, times the noise
+_LIVELY = 200.0  # least range of a command, times the noise
 
 
 def check(axis: Axis) -> Iterator[Finding]:
@@ -37,12 +37,12 @@ def check(axis: Axis) -> Iterator[Finding]:
                 f"the force stays at its extreme of {extreme:.4g} {axis.log.units['force']} for "
                 f"{seconds:.3g} s in all",
                 f"from {first:.6g} s",
-                "move more gently if the drive was at its limit, and record what it really gives",
+                "move more gently if the drive was at its limit, and record its actual force",
             )
 
 
 def _exactly(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | None:
-    """Start of the first stretch and length of all, s."""
+    """Start of the first interval at the extreme and length of all, s."""
     starts, lengths = _runs(np.abs(force - extreme) <= 1e-9 * np.ptp(force))
     stuck = lengths >= max(_STUCK * axis.sample_rate, _STUCK_SAMPLES)
     if not stuck.any():
@@ -67,6 +67,6 @@ def _but_for_noise(axis: Axis, height: Array) -> tuple[float, float] | None:
 
 
 def _runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Starts and lengths of the runs of True."""
+    """Starts and lengths of the intervals of True."""
     edges = np.flatnonzero(np.diff(mask, prepend=False, append=False))
     return edges[::2], edges[1::2] - edges[::2]

@@ -1,4 +1,4 @@
-"""Channels that are late against each other."""
+"""Lags between the channels of a log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Signals that state the same thing must agree in size and sign."""
+"""Wrong units and signs: signals of the same quantity must agree in size and sign."""
 
 from __future__ import annotations
 

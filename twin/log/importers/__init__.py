@@ -1,4 +1,4 @@
-"""Logs of other programs -> Log: one file a format, and a map that says which column is what."""
+"""Logs of other programs -> Log: one module for each format, and a map that names the columns."""
 
 from twin.log.importers.importer import import_log
 from twin.log.importers.mapping import AxisMap, ColumnMap, CsvLayout, ImportMap, load_mapping

@@ -1,6 +1,6 @@
 """Text tables: delimiter, decimal sign, header and first row of numbers are found in the file.
 
-Lines above the header and a line of units below it are passed over. Where there is no header the
+Lines above the header and a line of units below it are ignored. Where there is no header the
 columns are called "1", "2", ...
 """
 

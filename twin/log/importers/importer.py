@@ -1,4 +1,4 @@
-"""Foreign file + map -> Log: SI units, one clock, delays undone, nothing left unsaid."""
+"""Foreign file + map -> Log: SI units, one time base, delays removed."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numpy as np
 from twin.errors import InputError
 from twin.log.container import at, reading
 from twin.log.importers import csv_text, hdf5, mat, parquet, tdms
-from twin.log.importers.clock import rate_of
 from twin.log.importers.mapping import ImportMap
+from twin.log.importers.sample_rate import rate_of
 from twin.log.importers.table import Table, numbers
 from twin.log.log import Array, AxisLog, Log
 
@@ -86,7 +86,7 @@ def _common_length(columns: Mapping[str, Array]) -> int:
         if len(other) != len(values):
             raise InputError(
                 f"column '{first}' has {len(values)} rows, '{name}' has {len(other)}; "
-                "export them with one clock"
+                "export them with one time base"
             )
     if len(values) < 2:
         raise InputError(f"has {len(values)} rows; a log has at least 2")
@@ -103,7 +103,7 @@ def _sample_rate(table: Table, mapping: ImportMap, columns: Mapping[str, Array])
     rate = mapping.sample_rate or table.sample_rate
     if rate is None:
         raise InputError(
-            "does not tell its sample rate; state sample_rate (Hz) or time "
+            "does not state its sample rate; give sample_rate (Hz) or time "
             '({column = "t", unit = "s"}) in the map'
         )
     if table.sample_rate is not None and abs(table.sample_rate - rate) > 1e-6 * rate:

@@ -7,8 +7,8 @@
     force = {column = "drive", unit = "V", scale = 35.15}     # N a volt
 
 SI value = sign x (scale x raw + offset) x unit. A quantity in volts or counts is brought to SI by
-its scale, and its offset is in SI. ``delay_samples``: so much later than it happened is the column
-recorded, in whole samples; it is moved back.
+its scale, and its offset is in SI. ``delay_samples``: by how many whole samples the column was
+recorded too late; it is moved back by as many.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What every format is read into: the columns that the map names, and what goes wrong with them."""
+"""The table that every format is read into, and the errors that all formats share."""
 
 from __future__ import annotations
 

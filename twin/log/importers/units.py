@@ -1,4 +1,4 @@
-"""Units as people write them in a map, and what one of each is in SI."""
+"""Units as they are written in a map, and their values in SI."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ _SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "·": "", "*": "",
 
 @dataclass(frozen=True)
 class Unit:
-    """One of the unit in SI, and the SI unit; ``si`` is None where only a scale can tell."""
+    """One of the unit in SI, and the SI unit; ``si`` is None where the map must give a scale."""
 
     size: float
     si: str | None

@@ -16,7 +16,7 @@ from identify.dataset.prepared_log import on_blocks, total_force
 from identify.estimation.fit import fit_axis
 from identify.output.results import Addition, FitResult
 from identify.selection.candidates import absent_effects
-from identify.selection.nonparametric import describe
+from identify.selection.nonparametric import fit_nonparametric
 from identify.workflow import add, fit
 from twin.effect import Effect
 from twin.effects import load_catalogue
@@ -59,7 +59,7 @@ def test_descriptions_are_marked_and_never_a_diagnosis() -> None:
     offered = {e.name for e in absent_effects(STAGE.axes["x"], CATALOGUE)}
     assert not marked & offered
     for name in marked:
-        assert "not physics" in CATALOGUE[name].summary
+        assert "not a physical law" in CATALOGUE[name].summary
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_a_force_of_no_known_effect_is_described(
     assert added.step.holdout_error_before is not None
     assert added.step.holdout_error_after is not None
     assert added.step.holdout_error_after * fall < added.step.holdout_error_before
-    assert "not physics" in added.notes[0]
+    assert "not a physical law" in added.notes[0]
     assert added.position_error[1] < added.position_error[0]
     assert added.replayed == pytest.approx(added.position_error[1], rel=0.02)
 
@@ -118,7 +118,7 @@ def test_adding_a_map_lowers_the_errors_of_force_and_position(mapped: Addition) 
     assert mapped.step.holdout_error_after is not None
     # All but what lies at the ends of the travel, which the short logs hardly reach.
     assert mapped.step.holdout_error_after * 5.0 < mapped.step.holdout_error_before
-    assert "not physics" in mapped.notes[0]
+    assert "not a physical law" in mapped.notes[0]
     assert mapped.position_error[1] < mapped.position_error[0]
     assert mapped.replayed == pytest.approx(mapped.position_error[1], rel=0.02)
 
@@ -144,7 +144,7 @@ def test_the_shape_is_recovered_and_the_physics_keeps_its_values(
 @pytest.mark.parametrize("seed", [11, pytest.param(21, marks=SLOW)])
 def test_nothing_is_kept_on_an_honest_machine(name: str, seed: int) -> None:
     before = honest(seed)
-    found = describe(before.fits["x"], before.datasets["x"], CATALOGUE[name])
+    found = fit_nonparametric(before.fits["x"], before.datasets["x"], CATALOGUE[name])
     assert not found.supported
     assert found.gain.after < 1.01 * found.gain.before
 
@@ -171,7 +171,7 @@ def noisy(judged: str) -> FitResult:
 )
 def test_pure_noise_is_not_described(name: str, judged: str) -> None:
     before = noisy(judged)
-    found = describe(before.fits["x"], before.datasets["x"], CATALOGUE[name])
+    found = fit_nonparametric(before.fits["x"], before.datasets["x"], CATALOGUE[name])
     assert not found.supported
 
 

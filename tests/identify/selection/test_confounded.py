@@ -9,6 +9,7 @@ import pytest
 
 from identify import workflow
 from identify.output.results import FitResult
+from identify.output.words.selection import refit_in_words
 from identify.selection.confounded import Refit
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
@@ -58,14 +59,14 @@ def test_the_value_that_was_off_is_told_first(label: str, value: float) -> None:
     assert first.after == pytest.approx(value, rel=0.02)
     assert found.refitted < 0.2 * found.given
     assert first.alike == ((SAME_FORCE[label],) if label in SAME_FORCE else ())
-    assert label in str(found.in_words())
+    assert label in str(refit_in_words(found))
 
 
 def test_a_model_with_the_machines_values_is_not_complained_of() -> None:
     true = nominal().axes["x"]["cable_slab"].values["offset"]
     found = refit("cable_slab.offset", true)
     assert found.changes == ()
-    assert found.in_words() is None
+    assert refit_in_words(found) is None
 
 
 def test_what_is_said_to_be_the_same_force_is() -> None:

@@ -12,6 +12,7 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_study,
 from identify.estimation.evidence import BLOCKS, effective_samples
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import jacobian, residual
+from identify.output.words.selection import nonparametric_in_words
 from identify.selection import nonparametric as module
 from identify.selection.nonparametric import (
     RIDGE,
@@ -22,8 +23,7 @@ from identify.selection.nonparametric import (
     _Linear,
     _solve,
     choose_stiffness,
-    described_labels,
-    in_words,
+    nonparametric_labels,
     physics_alone,
 )
 from twin.model.machine import Fitted, MachineModel
@@ -173,7 +173,7 @@ def test_rounds_go_on_while_the_error_falls(monkeypatch, ratio, rounds):
 
     monkeypatch.setattr(module, "_attempt", attempt)
     monkeypatch.setattr(module, "fit_without", lambda fit, dataset, name: (fit.error, name))
-    found = module.describe(base, dataset, MAP)
+    found = module.fit_nonparametric(base, dataset, MAP)
     assert len(grounds) == rounds
     assert grounds[:2] == [base, (4.0, MAP.name)]
     assert found.fit.error == pytest.approx(4.0 if rounds == 2 else 4.0 * ratio**ROUNDS)
@@ -227,8 +227,8 @@ def test_parts_that_were_not_chosen_are_zero_and_held(about):
             assert (name in filled.fixed) is (part.name != chosen)
     stiffness = next(p.stiffness for p in MAP.parts if p.name == chosen)
     assert filled.values[stiffness] == 0.125
-    assert f"it follows {chosen}, and holds" in in_words(filled)
-    assert "found nothing to follow" in in_words(empty)
+    assert f"it depends on {chosen}, and is valid only" in nonparametric_in_words(filled)
+    assert "found nothing to depend on" in nonparametric_in_words(empty)
 
 
 @pytest.mark.parametrize("held", [False, True])
@@ -262,9 +262,9 @@ def test_an_attempt_is_judged_by_the_degrees_of_freedom_it_takes(monkeypatch, ab
 
 def test_descriptions_are_told_from_physics():
     axis = axis_of(fitted("cogging"), Fitted.at_start(MAP))
-    labels = described_labels(axis)
+    labels = nonparametric_labels(axis)
     assert labels == {f"{MAP.name}.{p.name}" for p in MAP.strengths}
-    assert described_labels(PLAIN) == frozenset()
+    assert nonparametric_labels(PLAIN) == frozenset()
     stage = MachineModel("s", {"x": axis, "y": replace(PLAIN, mass=7.0)})
     found = physics_alone(stage)
     assert found.axes["x"].names == ("coulomb_viscous", "cogging")

@@ -1,0 +1,64 @@
+"""Sentences about fits: how one ended, why a value has no interval, a channel delay."""
+
+from __future__ import annotations
+
+from identify.dataset.dataset import Dataset
+from identify.estimation.fit import Outcome
+from identify.estimation.intervals import (
+    AlwaysAtRest,
+    Inseparable,
+    ModelWrong,
+    NoInterval,
+    NotExcited,
+    OpenSided,
+)
+from twin.model.units import units_of
+
+OUTCOMES = {
+    Outcome.CONVERGED: "The fit converged: no parameter change lowers the force error further.",
+    Outcome.NOT_CONVERGED: (
+        "The fit did not converge within the allowed number of evaluations; start from nearer "
+        "values or fix some parameters."
+    ),
+    Outcome.AT_BOUND: (
+        "The fit converged with a parameter at its bound; the data favour a value beyond it."
+    ),
+}
+
+
+def outcome_in_words(outcome: Outcome) -> str:
+    """How a fit ended."""
+    return OUTCOMES[outcome]
+
+
+def no_interval_in_words(reason: NoInterval) -> str:
+    """Why a value has no interval."""
+    match reason:
+        case AlwaysAtRest():
+            why = "the axis comes to rest within every test function of these logs"
+        case ModelWrong(error, floor, unit):
+            words = units_of(unit).words
+            why = (
+                f"the {words('force error')} {error:.3g} {unit} is {error / floor:.1f} times the noise floor "
+                f"{floor:.3g} {unit}, so the model is wrong by more than noise"
+            )
+        case NotExcited():
+            why = "the motion in these logs does not excite the parameter"
+        case Inseparable(label):
+            why = f"these data cannot separate it from {label}"
+        case OpenSided(side):
+            why = f"a {side.name.lower()} value fits as well; the motion does not reach it"
+    return f"no interval: {why}"
+
+
+def channel_delay_in_words(dataset: Dataset) -> str | None:
+    """By how much the force channel was corrected, or None."""
+    if dataset.channel_delay == 0.0:
+        return None
+    samples = dataset.channel_delay / dataset.fit[0].motion.sample_period
+    words = dataset.units.words
+    return (
+        f"axis {dataset.axis}: the {words('force')} acts {1e6 * dataset.channel_delay:.0f} us "
+        f"({samples:.2f} samples) before its time stamp, which no drive can do; the log was "
+        f"corrected. Check how {words('force and position')} are sampled"
+    )

@@ -1,0 +1,128 @@
+"""Sentences about a diagnosis: its verdict, what a fit changed, what repeats, what is described."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identify.output.words.numbers import PLAIN, Numbers
+from identify.selection.candidates import Candidate
+from identify.selection.confounded import Change, MovedParameter, Refit
+from identify.selection.forward_selection import Verdict
+from identify.selection.nonparametric import followed
+from identify.selection.repeating_force import Repeat
+from identify.selection.residual_dependence import Dependence
+from twin.effects import load_catalogue
+from twin.model.machine import Fitted
+from twin.model.units import units_of
+
+VERDICTS = {
+    Verdict.MISSING_EFFECT: (
+        "One effect explains what the model lacks, on the fit logs and on the held-out logs."
+    ),
+    Verdict.NOTHING_MISSING: "Nothing is missing: the force error is at its noise floor.",
+    Verdict.AMBIGUOUS: (
+        "Several effects explain the error equally well; these data cannot separate them."
+    ),
+    Verdict.UNEXPLAINED: (
+        "The error is above the noise floor, and no effect of the catalogue explains it."
+    ),
+}
+
+
+def verdict_in_words(verdict: Verdict) -> str:
+    """The answer of a diagnosis."""
+    return VERDICTS[verdict]
+
+
+def change_in_words(change: Change) -> str:
+    """E.g. "mass 15 -> 15.6 kg changes the force by 0.57 N (payload_mass gives the same force)"."""
+    force = units_of(change.force_unit).words("force")
+    same = ""
+    if change.alike:
+        verb = "give" if len(change.alike) > 1 else "gives"
+        same = f" ({' and '.join(change.alike)} {verb} the same {force})"
+    values = f"{change.before:.4g} -> {change.after:.4g} {change.unit}"
+    return f"{change.label} {values} changes the {force} by {change.force:.3g} {change.force_unit}{same}"
+
+
+def refit_in_words(refit: Refit) -> str | None:
+    """What fitting changed of the given model, or None where its values were good."""
+    if not refit.changes:
+        return None
+    changes = ", ".join(change_in_words(c) for c in refit.changes)
+    error = units_of(refit.unit).words("force error")
+    return (
+        f"with the given values the {error} is {refit.given:.3g} {refit.unit}, after the fit "
+        f"{refit.refitted:.3g} {refit.unit}: {changes}"
+    )
+
+
+def moved_in_words(moved: MovedParameter) -> str:
+    """How a parameter of the base changed when an effect was added."""
+    values = f"from {moved.before:.4g} to {moved.after:.4g} {moved.unit}"
+    if moved.collapsed:
+        return f"{moved.label} collapsed {values}: it had taken over the missing effect's force"
+    return f"{moved.label} moved {values}: more than its interval"
+
+
+def repeat_in_words(repeat: Repeat) -> str:
+    """E.g. "a force repeats every 2.5 mm: 1.0 N in run, 0.9 N in pulses; ..."."""
+    units = repeat.units
+    sizes = ", ".join(f"{a:.3g} {units.force} in {n}" for n, a in repeat.amplitude.items())
+    turns = np.degrees(np.ptp(np.unwrap(list(repeat.phase.values()))))
+    words = units.words
+    return (
+        f"a {words('force')} repeats every {1e3 * repeat.period:.4g} m{units.position} of travel "
+        f"({sizes}), but its phase differs between the logs by {turns:.0f} degrees: it is present "
+        f"in each log, but no function of {words('position')} holds for all of them, so no effect is "
+        "named"
+    )
+
+
+def dependence_in_words(dependence: Dependence, numbers: Numbers = PLAIN) -> str:
+    """On which coordinate an unexplained error depends, and its period where it has one."""
+    period = ""
+    if dependence.period is not None:
+        period = f", with a period of {numbers.amount(dependence.period, dependence.unit)}"
+    on = units_of(dependence.unit).words(dependence.depends_on.replace("_", " "))
+    return (
+        f"The error depends most on {on}, which accounts for "
+        f"{100 * dependence.share_of_error:.0f} % of the squared error{period}."
+    )
+
+
+def nonparametric_in_words(fitted: Fitted) -> str:
+    """What a nonparametric effect depends on, and that it is no physical law."""
+    used = followed(fitted)
+    what = f"depends on {', '.join(used)}" if used else "found nothing to depend on"
+    return (
+        f"{fitted.effect.name} is a fitted curve, not a physical law: it {what}, and is valid only "
+        "within the motion of the fit logs"
+    )
+
+
+def advice() -> str:
+    """What lowers the error where no physical effect explains it."""
+    known = [e.name for e in load_catalogue().values() if e.is_nonparametric]
+    return f"twin add {' or '.join(known)} lowers the error by fitted curves, without explaining it"
+
+
+def addition_notes(
+    added: Candidate, moved: Sequence[MovedParameter], set_aside: Sequence[str]
+) -> tuple[str, ...]:
+    """What a reader should know of an added effect, one sentence each.
+
+    set_aside: nonparametric effects that were removed so that the physical effect explains what
+    they had taken over.
+    """
+    notes = [moved_in_words(m) for m in moved]
+    if added.effect.is_nonparametric:
+        notes.insert(0, nonparametric_in_words(added.fit.axis[added.effect.name]))
+    if set_aside:
+        notes.append(
+            f"{', '.join(set_aside)} was removed before {added.effect.name} was added; add it "
+            "again for the error that is left"
+        )
+    return tuple(notes)
