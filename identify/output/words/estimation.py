@@ -39,8 +39,8 @@ def no_interval_in_words(reason: NoInterval) -> str:
         case ModelWrong(error, floor, unit):
             words = units_of(unit).words
             why = (
-                f"the {words('force error')} {error:.3g} {unit} is {error / floor:.1f} times the noise floor "
-                f"{floor:.3g} {unit}, so the model is wrong by more than noise"
+                f"the {words('force error')} {error:.3g} {unit} is {error / floor:.1f} times the "
+                f"noise floor {floor:.3g} {unit}, so the model is wrong by more than noise"
             )
         case NotExcited():
             why = "the motion in these logs does not excite the parameter"

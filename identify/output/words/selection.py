@@ -44,7 +44,8 @@ def change_in_words(change: Change) -> str:
         verb = "give" if len(change.alike) > 1 else "gives"
         same = f" ({' and '.join(change.alike)} {verb} the same {force})"
     values = f"{change.before:.4g} -> {change.after:.4g} {change.unit}"
-    return f"{change.label} {values} changes the {force} by {change.force:.3g} {change.force_unit}{same}"
+    by = f"{change.force:.3g} {change.force_unit}"
+    return f"{change.label} {values} changes the {force} by {by}{same}"
 
 
 def refit_in_words(refit: Refit) -> str | None:
@@ -76,8 +77,8 @@ def repeat_in_words(repeat: Repeat) -> str:
     return (
         f"a {words('force')} repeats every {1e3 * repeat.period:.4g} m{units.position} of travel "
         f"({sizes}), but its phase differs between the logs by {turns:.0f} degrees: it is present "
-        f"in each log, but no function of {words('position')} holds for all of them, so no effect is "
-        "named"
+        f"in each log, but no function of {words('position')} holds for all of them, so no effect "
+        "is named"
     )
 
 
