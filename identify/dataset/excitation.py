@@ -7,8 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.motion import Motion
-from identify.dataset.spectral_lines import lines, ripples
+from identify.dataset.spectral_lines import FINEST_CYCLES, Record, find_lines, lines_in_time
 from twin.effect import Excitation
+from twin.signals import Array
+
+FEWEST_CYCLES = 20  # over the travel, of an error of the reading
+MOST_RIPPLES = 24
 
 
 def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) -> Excitation:
@@ -36,3 +40,35 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
         ripples=ripples(motions),
         resolution=max(m.resolution for m in motions),
     )
+
+
+def lines(motions: Sequence[Motion]) -> tuple[float, ...]:
+    """Frequencies (Hz) at which the force of logs repeats in time, the surest first.
+
+    The force is the command less what acceleration, direction, speed and position explain.
+    """
+    return lines_in_time([(_rest(m), m.period) for m in motions])
+
+
+def ripples(motions: Sequence[Motion]) -> tuple[float, ...]:
+    """Periods (m) at which an error of the reading would repeat in position, strongest first.
+
+    An error A sin(2 pi x/p) looks like a force m A (2 pi v/p)^2 sin(2 pi x/p), so the force weighed
+    by v^2 has a line in position.
+    """
+    position = np.concatenate([m.position for m in motions])
+    record = Record(position, np.concatenate([_rest(m) * m.velocity**2 for m in motions]))
+    if record.span <= 0.0:
+        return ()
+    lowest, highest = FEWEST_CYCLES / record.span, FINEST_CYCLES / record.span
+    found = find_lines([record], lowest, highest, most=MOST_RIPPLES)
+    return tuple(line.period for line in found)
+
+
+def _rest(motion: Motion) -> Array:
+    """Command that a rough model leaves, (n,) N."""
+    x, v = motion.position, motion.velocity
+    rows = np.stack([motion.acceleration, np.sign(v), v, np.ones_like(x), x, x**2, x**3], axis=1)
+    rows /= np.maximum(np.abs(rows).max(axis=0), 1e-300)
+    solution = np.linalg.lstsq(rows, motion.command, rcond=None)[0]
+    return np.asarray(motion.command - rows @ solution)

@@ -10,29 +10,27 @@ independent ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
-from scipy.ndimage import maximum_filter1d, median_filter
+from scipy.ndimage import median_filter
 from scipy.signal import lombscargle
 from scipy.special import betainc
-
-from identify.dataset.motion import Motion
 
 Array = NDArray[np.float64]
 
 MOST_LINES = 60
 CHANCE = 0.1  # false-alarm probability of what is worth a try
 HIGHEST = 0.4  # of the sample rate
-FEWEST_CYCLES = 20  # over the travel, of an error of the reading
-MOST_RIPPLES = 24
 CELLS_A_PERIOD = 4  # of the highest frequency
-FINEST = 1 << 17  # cells of a record at most
+FINEST_CYCLES = 1 << 15  # over the span of a record at most
 AROUND, STEEP = 61, 21  # resolutions that are taken for what surrounds a line; where it is steep
-LEVEL_FREEDOM = 30.0  # independent powers that the median of so many correlated ones is worth
+LEVEL_FREEDOM = 20.0  # independent powers that the median of so many correlated ones is worth
 WIDTH = 2  # resolutions from a line's top to its foot, with Hann's window
+HOPELESS = 0.5  # false-alarm probability in white noise from which a frequency is passed over
+MOST_REFUSED = 4  # such frequencies, after which the search ends
 PARTS = 64  # of the span, over which samples are counted
 MOST_WEIGHT = 4.0  # of a sample among few, over that of a typical one
 EQUAL = 1e-6  # of a spacing, by which equal ones may differ
@@ -80,64 +78,122 @@ def find_lines(
 ) -> tuple[SpectralLine, ...]:
     """Lines from ``lowest`` to ``highest`` (cycles per unit), the least likely by chance first.
 
-    chance: highest false-alarm probability of those returned, ``most`` in number.
+    chance: highest false-alarm probability of those returned, ``most`` in number. Each line is
+    subtracted before the next is sought, as unevenly spaced samples spread one over all others.
     """
     records = [r for r in records if len(r.values) > 3 and r.span > 0.0 and np.ptp(r.values) > 0.0]
     if not records or not 0.0 <= lowest < highest:
         return ()
-    span = max(r.span for r in records)
-    highest = min(highest, FINEST / (CELLS_A_PERIOD * span))
-    frequencies, powers = _spectra(records, span, highest)
-    inside = np.flatnonzero((frequencies >= lowest) & (frequencies <= highest))
+    grid = _Grid.of(records, highest)
+    inside = np.flatnonzero((grid.frequencies >= lowest) & (grid.frequencies <= highest))
     if len(inside) < 3:
         return ()
-    height = np.sum([p / np.maximum(_level(p), EMPTY * p.max()) for p in powers], axis=0)
-    alone = _by_chance(height, len(records))
-    tried = max((highest - lowest) * span, 1.0)
-    false_alarm = -np.expm1(tried * np.log1p(-np.minimum(alone, 1.0 - 1e-12)))
-    foot = int(np.ceil(WIDTH * span / min(r.span for r in records)))
-    top = height == maximum_filter1d(height, 2 * foot + 1)
-    found = inside[top[inside] & (false_alarm[inside] < chance)]
-    best = found[np.argsort(height[found])[::-1]][:most]
-    step = frequencies[1] - frequencies[0]
-    refined = [_refined(records, frequencies[k], step) for k in best]
-    return tuple(
-        SpectralLine(f, share, float(false_alarm[k]))
-        for (f, share), k in zip(refined, best, strict=True)
+    left = [replace(r, values=r.values - r.values.mean()) for r in records]
+    tried, energy = len(inside), _energy(left)
+    powers = grid.powers(left)
+    empty = EMPTY * powers.max(axis=1, keepdims=True)
+    found: list[tuple[int, float, float, Array]] = []
+    refused = 0
+    while len(found) < most and refused < MOST_REFUSED and powers.max() > 0.0:
+        k = int(inside[np.argmax(np.sum(powers / _level(powers, empty), axis=0)[inside])])
+        frequency, share = _refined(left, grid.frequencies[k], grid.step)
+        if _is_hopeless(share, tried, left):
+            inside, refused = inside[inside != k], refused + 1
+            continue
+        if all(abs(frequency - f) > WIDTH * grid.step for _, f, _, _ in found):
+            found.append((k, frequency, share * _energy(left) / energy, powers[:, k]))
+        else:  # what an error of that line's frequency left
+            inside, refused = inside[inside != k], refused + 1
+        left = [_without(r, frequency) for r in left]
+        powers = grid.powers(left)
+    level = _level(powers, empty)
+    heights = [float(np.sum(top / level[:, k])) for k, _, _, top in found]
+    alarms = [_false_alarm(height, len(records), tried) for height in heights]
+    told = [
+        (height, SpectralLine(frequency, share, alarm))
+        for height, alarm, (_, frequency, share, _) in zip(heights, alarms, found, strict=True)
+        if alarm < chance
+    ]
+    return tuple(line for _, line in sorted(told, key=lambda pair: -pair[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Frequencies (m,) a resolution apart, at which the power of records is taken.
+
+    Less those near zero, which the removal of the mean empties. cell: of the coordinate, ``cells``
+    of them. places, tapers: of each record's samples, (n,) cells and (n,) 1.
+    """
+
+    frequencies: Array
+    cells: int
+    places: Sequence[Array]
+    tapers: Sequence[Array]
+
+    @classmethod
+    def of(cls, records: Sequence[Record], highest: float) -> _Grid:
+        span = max(r.span for r in records)
+        highest = min(highest, FINEST_CYCLES / span)
+        cell = _common_spacing(records) or 1.0 / (CELLS_A_PERIOD * highest)
+        cells = next_fast_len(int(np.ceil(span / cell)) + 1, real=True)
+        along = [(r.coordinate - r.coordinate.min()) / r.span for r in records]
+        return cls(
+            np.asarray(np.fft.rfftfreq(cells, cell)[WIDTH:], dtype=float),
+            cells,
+            [a * (r.span / cell) for a, r in zip(along, records, strict=True)],
+            [np.sin(np.pi * a) ** 2 * _sparseness(a) for a in along],
+        )
+
+    @property
+    def step(self) -> float:
+        """Resolution, cycles per unit."""
+        return float(self.frequencies[1] - self.frequencies[0])
+
+    def powers(self, records: Sequence[Record]) -> Array:
+        """Power of each record at the frequencies, (records, m)."""
+        spread = [
+            _spread(place, r.values * taper, self.cells)
+            for r, place, taper in zip(records, self.places, self.tapers, strict=True)
+        ]
+        return np.abs(np.fft.rfft(spread)[:, WIDTH:]) ** 2
+
+
+def _level(powers: Array, empty: Array) -> Array:
+    """Mean power (records, m) of noise about each frequency, from medians; at least ``empty``."""
+    near, far = (
+        median_filter(powers, (1, width), mode="reflect") / np.log(2.0) for width in (STEEP, AROUND)
     )
+    return np.maximum(np.maximum(near, far), np.maximum(empty, np.finfo(float).tiny))
 
 
-def _level(power: Array) -> Array:
-    """Mean power (m,) of noise about each frequency, from medians; near for a steep spectrum."""
-    medians = [median_filter(power, width, mode="reflect") for width in (AROUND, STEEP)]
-    return np.asarray(np.maximum(*medians) / np.log(2.0))
-
-
-def _by_chance(height: Array, records: int) -> Array:
-    """Probability that noise at one frequency is as high, (m,).
+def _false_alarm(height: float, records: int, tried: int) -> float:
+    """Probability that noise is as high at any of the frequencies tried.
 
     height: power over the level around, summed over records; as both are estimated, it follows the
     F distribution.
     """
     freedom = LEVEL_FREEDOM * records
-    return np.asarray(betainc(freedom, records, freedom / (freedom + height)))
+    alone = betainc(freedom, records, freedom / (freedom + height))
+    return float(-np.expm1(tried * np.log1p(-min(alone, 1.0 - 1e-12))))
 
 
-def _spectra(records: Sequence[Record], span: float, highest: float) -> tuple[Array, list[Array]]:
-    """Frequencies (m,) a resolution apart, and the power (m,) of each record at them.
+def _is_hopeless(share: float, tried: int, records: Sequence[Record]) -> bool:
+    """Whether even white noise, which shows the weakest lines, would show one as strong."""
+    samples = sum(len(r.values) for r in records)
+    log_alone = 0.5 * samples * np.log1p(-min(max(share, 0.0), 1.0 - 1e-12))
+    return bool(np.log(tried) + log_alone > np.log(HOPELESS))
 
-    Less those near zero, which the removal of the mean empties.
-    """
-    cell = _common_spacing(records) or 1.0 / (CELLS_A_PERIOD * highest)
-    cells = next_fast_len(int(np.ceil(span / cell)) + 1, real=True)
-    powers = []
-    for r in records:
-        along = (r.coordinate - r.coordinate.min()) / r.span
-        taper = np.sin(np.pi * along) ** 2 * _sparseness(along)
-        values = (r.values - r.values.mean()) * taper
-        spread = _spread(along * (r.span / cell), values, cells)
-        powers.append(np.abs(np.fft.rfft(spread)[WIDTH:]) ** 2)
-    return np.asarray(np.fft.rfftfreq(cells, cell)[WIDTH:], dtype=float), powers
+
+def _energy(records: Sequence[Record]) -> float:
+    return float(sum(np.sum(r.values**2) for r in records))
+
+
+def _without(record: Record, frequency: float) -> Record:
+    """The record less its best sine of a frequency and its mean."""
+    turn = 2.0 * np.pi * frequency * record.coordinate
+    columns = np.stack([np.cos(turn), np.sin(turn), np.ones_like(turn)], axis=1)
+    gains = np.linalg.lstsq(columns.T @ columns, columns.T @ record.values, rcond=None)[0]
+    return replace(record, values=record.values - columns @ gains)
 
 
 def _sparseness(along: Array) -> Array:
@@ -195,30 +251,20 @@ def _refined(records: Sequence[Record], frequency: float, step: float) -> tuple[
 
 def _share(records: Sequence[Record], frequencies: Array) -> Array:
     """Share of the records' variance that a sine of each frequency (m,) takes, (m,) 0..1."""
-    taken, energy = np.zeros(len(frequencies)), 0.0
+    taken = np.zeros(len(frequencies))
     turns = 2.0 * np.pi * np.maximum(frequencies, 1e-300)
     for r in records:
-        own = float(np.sum((r.values - r.values.mean()) ** 2))
         power = lombscargle(
             r.coordinate, r.values, turns, normalize="normalize", floating_mean=True
         )
-        taken += own * np.asarray(power)
-        energy += own
-    return taken / energy
-
-
-def lines(motions: Sequence[Motion]) -> tuple[float, ...]:
-    """Frequencies (Hz) at which the force of logs repeats in time, the surest first.
-
-    The force is the command less what acceleration, direction, speed and position explain.
-    """
-    return lines_in_time([(_rest(m), m.period) for m in motions])
+        taken += np.var(r.values) * len(r.values) * np.asarray(power)
+    return taken / _energy(records)
 
 
 def lines_in_time(
     forces: Sequence[tuple[Array, float]], most: int = MOST_LINES
 ) -> tuple[float, ...]:
-    """The same of forces (n,) N with their sample periods (s)."""
+    """Frequencies (Hz) at which forces (n,) N repeat, with their sample periods (s)."""
     if not forces:
         return ()
     records = [
@@ -228,27 +274,3 @@ def lines_in_time(
     highest = HIGHEST / max(step for _, step in forces)
     found = find_lines(records, WIDTH / max(longest, 1e-300), highest, most=most)
     return tuple(line.frequency for line in found)
-
-
-def ripples(motions: Sequence[Motion]) -> tuple[float, ...]:
-    """Periods (m) at which an error of the reading would repeat in position, strongest first.
-
-    An error A sin(2 pi x/p) looks like a force m A (2 pi v/p)^2 sin(2 pi x/p), so the force weighed
-    by v^2 has a line in position.
-    """
-    position = np.concatenate([m.position for m in motions])
-    record = Record(position, np.concatenate([_rest(m) * m.velocity**2 for m in motions]))
-    if record.span <= 0.0:
-        return ()
-    lowest, highest = FEWEST_CYCLES / record.span, FINEST / (CELLS_A_PERIOD * record.span)
-    found = find_lines([record], lowest, highest, most=MOST_RIPPLES)
-    return tuple(line.period for line in found)
-
-
-def _rest(motion: Motion) -> Array:
-    """Command that a rough model leaves, (n,) N."""
-    x, v = motion.position, motion.velocity
-    rows = np.stack([motion.acceleration, np.sign(v), v, np.ones_like(x), x, x**2, x**3], axis=1)
-    rows /= np.maximum(np.abs(rows).max(axis=0), 1e-300)
-    solution = np.linalg.lstsq(rows, motion.command, rcond=None)[0]
-    return np.asarray(motion.command - rows @ solution)

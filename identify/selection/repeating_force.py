@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 FEWEST_CYCLES = 10  # over the travel
 MOST_CYCLES = 4096  # over the travel
+TRIED = 6  # lines that are no chance, of which the strongest counts
 SHARED = 0.02  # relative difference of two periods that are one
 SAME = 0.5  # difference of two terms over the larger, below which they are one
 
@@ -89,7 +90,8 @@ def _strongest(records: Sequence[Record]) -> SpectralLine | None:
     if span <= 0.0:
         return None
     lowest, highest = FEWEST_CYCLES / span, MOST_CYCLES / span
-    return next(iter(find_lines(records, lowest, highest, most=1, chance=RULE.line_chance)), None)
+    found = find_lines(records, lowest, highest, most=TRIED, chance=RULE.line_chance)
+    return max(found, key=lambda line: line.share, default=None)
 
 
 def _term(force: Array, position: Array, period: float) -> complex:

@@ -11,15 +11,13 @@ import pytest
 from constructed import SHORT, dataset_of, effect, fit_of, log_of, waves, windowed
 from scipy.signal import lfilter
 
+from identify.dataset.excitation import _rest, lines, ripples
 from identify.dataset.motion import motion_of
 from identify.dataset.spectral_lines import (
     MOST_LINES,
     Record,
-    _rest,
     find_lines,
-    lines,
     lines_in_time,
-    ripples,
 )
 from identify.estimation.channel_delay import misalignment, realigned
 from identify.estimation.time_origin import (
