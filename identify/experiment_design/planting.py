@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 SPREAD = 0.2  # relative spread of a machine's values about the model's
 SHAPE_SPREAD = 0.3  # of the logarithm of nonlinear parameters that are not scanned
+HALVINGS = 12  # to within a hundredth
 TINY = 1e-300
 
 
@@ -124,19 +125,25 @@ def _direction(lower: float, rng: np.random.Generator | None) -> float:
 
 
 def _scale(size: Callable[[float], float], wanted: float) -> float:
-    """Scale at which a growing size is the wanted one; the nearer end where none within 1e+-9 is.
+    """Scale between 1e-9 and 1e9 at which a size that grows with it is the wanted one.
 
-    On logarithms, on which a force in proportion to its strengths is a straight line.
+    On logarithms, on which a force in proportion to its strengths is a straight line. A size need
+    not grow all the way (a dead zone wider than every command leaves nothing), so that halving
+    finds the rise first.
     """
 
     def error(log_scale: float) -> float:
         return float(np.log(max(size(float(np.exp(log_scale))), TINY) / max(wanted, TINY)))
 
-    low, high = np.log(1e-9), np.log(1e9)
-    if error(low) > 0.0:
-        return 1e-9
-    if error(high) < 0.0:
-        return 1e9
+    low, high, risen = float(np.log(1e-9)), float(np.log(1e9)), False
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if error(middle) < 0.0:
+            low = middle
+        else:
+            high, risen = middle, True
+    if not risen or error(low) >= 0.0:
+        return float(np.exp(low))
     return float(np.exp(brentq(error, low, high, xtol=1e-12)))
 
 
