@@ -26,11 +26,12 @@ CHANCE = 0.1  # false-alarm probability of what is worth a try
 HIGHEST = 0.4  # of the sample rate
 CELLS_A_PERIOD = 4  # of the highest frequency
 FINEST_CYCLES = 1 << 15  # over the span of a record at most
-AROUND, STEEP = 61, 21  # resolutions that are taken for what surrounds a line; where it is steep
-LEVEL_FREEDOM = 20.0  # independent powers that the median of so many correlated ones is worth
+BAND = 20  # resolutions over which the level of the spectrum is taken
+BANDS_AROUND = 3
+LEVEL_FREEDOM = 30.0  # independent powers that the median of so many correlated ones is worth
 WIDTH = 2  # resolutions from a line's top to its foot, with Hann's window
 HOPELESS = 0.5  # false-alarm probability in white noise from which a frequency is passed over
-MOST_REFUSED = 4  # such frequencies, after which the search ends
+MOST_REFUSED = 12  # such frequencies, after which the search ends
 PARTS = 64  # of the span, over which samples are counted
 MOST_WEIGHT = 4.0  # of a sample among few, over that of a typical one
 EQUAL = 1e-6  # of a spacing, by which equal ones may differ
@@ -89,32 +90,51 @@ def find_lines(
     if len(inside) < 3:
         return ()
     left = [replace(r, values=r.values - r.values.mean()) for r in records]
-    tried, energy = len(inside), _energy(left)
-    powers = grid.powers(left)
-    empty = EMPTY * powers.max(axis=1, keepdims=True)
-    found: list[tuple[int, float, float, Array]] = []
-    refused = 0
-    while len(found) < most and refused < MOST_REFUSED and powers.max() > 0.0:
-        k = int(inside[np.argmax(np.sum(powers / _level(powers, empty), axis=0)[inside])])
-        frequency, share = _refined(left, grid.frequencies[k], grid.step)
-        if _is_hopeless(share, tried, left):
-            inside, refused = inside[inside != k], refused + 1
-            continue
-        if all(abs(frequency - f) > WIDTH * grid.step for _, f, _, _ in found):
-            found.append((k, frequency, share * _energy(left) / energy, powers[:, k]))
-        else:  # what an error of that line's frequency left
-            inside, refused = inside[inside != k], refused + 1
-        left = [_without(r, frequency) for r in left]
-        powers = grid.powers(left)
-    level = _level(powers, empty)
-    heights = [float(np.sum(top / level[:, k])) for k, _, _, top in found]
-    alarms = [_false_alarm(height, len(records), tried) for height in heights]
-    told = [
-        (height, SpectralLine(frequency, share, alarm))
-        for height, alarm, (_, frequency, share, _) in zip(heights, alarms, found, strict=True)
-        if alarm < chance
+    empty = EMPTY * grid.powers(left).max(axis=1, keepdims=True)
+    found, rest = _peeled(grid, left, inside, empty, most)
+    level = _level(grid.powers(rest), empty)
+    heights = [float(np.sum(line.powers / level[:, line.at])) for line in found]
+    out = [
+        (height, SpectralLine(line.frequency, line.energy / _energy(left), alarm))
+        for height, line in zip(heights, found, strict=True)
+        if (alarm := _false_alarm(height, len(records), len(inside))) < chance
     ]
-    return tuple(line for _, line in sorted(told, key=lambda pair: -pair[0]))
+    return tuple(line for _, line in sorted(out, key=lambda pair: -pair[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A line before it was subtracted: its place in the grid, its powers (records,), its energy."""
+
+    at: int
+    frequency: float
+    powers: Array
+    energy: float
+
+
+def _peeled(
+    grid: _Grid, left: list[Record], inside: NDArray[np.int64], empty: Array, most: int
+) -> tuple[list[_Found], list[Record]]:
+    """Lines at places ``inside`` a grid, one after the other, and the records less all of them."""
+    found: list[_Found] = []
+    tried, refused = len(inside), 0
+    powers = grid.powers(left)
+    while len(found) < most and refused < MOST_REFUSED and len(inside) and powers.max() > 0.0:
+        # In turn by height over the level, and by power: few cycles are a part of their own level.
+        by_height = (len(found) + refused) % 2 == 0
+        order = np.sum(powers / _level(powers, empty) if by_height else powers, axis=0)
+        k = int(inside[np.argmax(order[inside])])
+        frequency, share = _refined(left, grid.frequencies[k], grid.step)
+        hopeless = _is_hopeless(share, tried, left)
+        if hopeless or any(abs(frequency - f.frequency) <= WIDTH * grid.step for f in found):
+            # What an error of a line's frequency left of it is no other line.
+            inside, refused = inside[np.abs(inside - k) > WIDTH], refused + 1
+        else:
+            found.append(_Found(k, frequency, powers[:, k], share * _energy(left)))
+        if not hopeless:
+            left = [_without(r, frequency) for r in left]
+            powers = grid.powers(left)
+    return found, left
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,11 +179,21 @@ class _Grid:
 
 
 def _level(powers: Array, empty: Array) -> Array:
-    """Mean power (records, m) of noise about each frequency, from medians; at least ``empty``."""
-    near, far = (
-        median_filter(powers, (1, width), mode="reflect") / np.log(2.0) for width in (STEEP, AROUND)
-    )
-    return np.maximum(np.maximum(near, far), np.maximum(empty, np.finfo(float).tiny))
+    """Mean power (records, m) of noise about each frequency, from medians; at least ``empty``.
+
+    Medians of bands, and of bands with those around: the higher, as a steep spectrum is at its foot
+    far above its wider surroundings. At the lowest frequencies, where it may be steep within a
+    band, each has a band of its own.
+    """
+    m = powers.shape[1]
+    padded = np.pad(powers, [(0, 0), (0, -m % BAND)], mode="reflect" if m > BAND else "edge")
+    near = np.median(padded.reshape(len(powers), -1, BAND), axis=2)
+    far = median_filter(near, (1, BANDS_AROUND), mode="reflect")
+    level = np.repeat(np.maximum(near, far), BAND, axis=1)[:, :m]
+    low = median_filter(powers[:, : 5 * BAND], (1, BAND + 1), mode="reflect")[:, : 4 * BAND]
+    level[:, : low.shape[1]] = np.maximum(level[:, : low.shape[1]], low)
+    level /= np.log(2.0)
+    return np.maximum(level, np.maximum(empty, np.finfo(float).tiny))
 
 
 def _false_alarm(height: float, records: int, tried: int) -> float:
@@ -238,15 +268,14 @@ def _spread(place: Array, values: Array, cells: int) -> Array:
 
 def _refined(records: Sequence[Record], frequency: float, step: float) -> tuple[float, float]:
     """Frequency of highest power within a resolution of one, and the share of variance there."""
-    about = frequency + step * np.array([-0.5, 0.0, 0.5])
-    for width in (0.5, 0.2, 0.05):
-        a, b, c = _share(records, about)
+    best, share = frequency, 0.0
+    for width in (0.5 * step, 0.1 * step):
+        a, b, c = _share(records, best + width * np.array([-1.0, 0.0, 1.0]))
         bend = a - 2.0 * b + c
-        shift = 0.5 * (a - c) / bend if bend < 0.0 else np.sign(c - a)
-        middle = about[1] + width * step * float(np.clip(shift, -1.0, 1.0))
-        middle = float(np.clip(middle, frequency - step, frequency + step))
-        about = middle + 0.4 * width * step * np.array([-1.0, 0.0, 1.0])
-    return middle, float(_share(records, np.array([middle]))[0])
+        shift = float(np.clip(0.5 * (a - c) / bend, -1.0, 1.0)) if bend < 0.0 else np.sign(c - a)
+        best += width * shift
+        share = b - 0.25 * (a - c) * shift  # of the parabola's top
+    return float(best), float(min(max(share, 0.0), 1.0))
 
 
 def _share(records: Sequence[Record], frequencies: Array) -> Array:
