@@ -12,7 +12,7 @@ from twin.effect import Excitation
 from twin.signals import Array
 
 FEWEST_CYCLES = 20  # over the travel, of an error of the reading
-MOST_RIPPLES = 24
+MOST_RIPPLES = 8
 
 
 def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) -> Excitation:

@@ -21,7 +21,7 @@ from scipy.special import betainc
 
 Array = NDArray[np.float64]
 
-MOST_LINES = 60
+MOST_LINES = 24
 CHANCE = 0.1  # false-alarm probability of what is worth a try
 HIGHEST = 0.4  # of the sample rate
 CELLS_A_PERIOD = 4  # of the highest frequency
@@ -31,9 +31,10 @@ BANDS_AROUND = 3
 LEVEL_FREEDOM = 30.0  # independent powers that the median of so many correlated ones is worth
 WIDTH = 2  # resolutions from a line's top to its foot, with Hann's window
 HOPELESS = 0.5  # false-alarm probability in white noise from which a frequency is passed over
-MOST_REFUSED = 12  # such frequencies, after which the search ends
+MOST_REFUSED = 5  # such frequencies, after which the search ends
 PARTS = 64  # of the span, over which samples are counted
 MOST_WEIGHT = 4.0  # of a sample among few, over that of a typical one
+NEAR = 0.15  # resolutions, within which a line's frequency is refined
 EQUAL = 1e-6  # of a spacing, by which equal ones may differ
 EMPTY = 1e-24  # of the highest power, below which there is but rounding
 
@@ -92,7 +93,8 @@ def find_lines(
     left = [replace(r, values=r.values - r.values.mean()) for r in records]
     empty = EMPTY * grid.powers(left).max(axis=1, keepdims=True)
     found, rest = _peeled(grid, left, inside, empty, most)
-    level = _level(grid.powers(rest), empty)
+    # Evenly spaced samples spread no line; then what was subtracted is a part of the level.
+    level = _level(grid.powers(left if grid.even else rest), empty)
     heights = [float(np.sum(line.powers / level[:, line.at])) for line in found]
     out = [
         (height, SpectralLine(line.frequency, line.energy / _energy(left), alarm))
@@ -121,10 +123,10 @@ def _peeled(
     powers = grid.powers(left)
     while len(found) < most and refused < MOST_REFUSED and len(inside) and powers.max() > 0.0:
         # In turn by height over the level, and by power: few cycles are a part of their own level.
-        by_height = (len(found) + refused) % 2 == 0
+        by_height = grid.even or (len(found) + refused) % 2 == 0
         order = np.sum(powers / _level(powers, empty) if by_height else powers, axis=0)
         k = int(inside[np.argmax(order[inside])])
-        frequency, share = _refined(left, grid.frequencies[k], grid.step)
+        frequency, share = _refined(left, grid.top(powers, k), grid.step)
         hopeless = _is_hopeless(share, tried, left)
         if hopeless or any(abs(frequency - f.frequency) <= WIDTH * grid.step for f in found):
             # What an error of a line's frequency left of it is no other line.
@@ -142,19 +144,22 @@ class _Grid:
     """Frequencies (m,) a resolution apart, at which the power of records is taken.
 
     Less those near zero, which the removal of the mean empties. cell: of the coordinate, ``cells``
-    of them. places, tapers: of each record's samples, (n,) cells and (n,) 1.
+    of them. places, tapers: of each record's samples, (n,) cells and (n,) 1. even: whether all
+    samples are equally spaced.
     """
 
     frequencies: Array
     cells: int
     places: Sequence[Array]
     tapers: Sequence[Array]
+    even: bool
 
     @classmethod
     def of(cls, records: Sequence[Record], highest: float) -> _Grid:
         span = max(r.span for r in records)
         highest = min(highest, FINEST_CYCLES / span)
-        cell = _common_spacing(records) or 1.0 / (CELLS_A_PERIOD * highest)
+        spacing = _common_spacing(records)
+        cell = spacing or 1.0 / (CELLS_A_PERIOD * highest)
         cells = next_fast_len(int(np.ceil(span / cell)) + 1, real=True)
         along = [(r.coordinate - r.coordinate.min()) / r.span for r in records]
         return cls(
@@ -162,12 +167,22 @@ class _Grid:
             cells,
             [a * (r.span / cell) for a, r in zip(along, records, strict=True)],
             [np.sin(np.pi * a) ** 2 * _sparseness(a) for a in along],
+            spacing is not None,
         )
 
     @property
     def step(self) -> float:
         """Resolution, cycles per unit."""
         return float(self.frequencies[1] - self.frequencies[0])
+
+    def top(self, powers: Array, k: int) -> float:
+        """Frequency of the top at place k: by a parabola through logarithms of three powers."""
+        if not 0 < k < len(self.frequencies) - 1:
+            return float(self.frequencies[k])
+        a, b, c = np.log(np.maximum(powers[:, k - 1 : k + 2].sum(axis=0), np.finfo(float).tiny))
+        bend = a - 2.0 * b + c
+        shift = float(np.clip(0.5 * (a - c) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
+        return float(self.frequencies[k] + shift * self.step)
 
     def powers(self, records: Sequence[Record]) -> Array:
         """Power of each record at the frequencies, (records, m)."""
@@ -267,15 +282,13 @@ def _spread(place: Array, values: Array, cells: int) -> Array:
 
 
 def _refined(records: Sequence[Record], frequency: float, step: float) -> tuple[float, float]:
-    """Frequency of highest power within a resolution of one, and the share of variance there."""
-    best, share = frequency, 0.0
-    for width in (0.5 * step, 0.1 * step):
-        a, b, c = _share(records, best + width * np.array([-1.0, 0.0, 1.0]))
-        bend = a - 2.0 * b + c
-        shift = float(np.clip(0.5 * (a - c) / bend, -1.0, 1.0)) if bend < 0.0 else np.sign(c - a)
-        best += width * shift
-        share = b - 0.25 * (a - c) * shift  # of the parabola's top
-    return float(best), float(min(max(share, 0.0), 1.0))
+    """Frequency of highest power near one, and the share of variance there."""
+    width = NEAR * step
+    a, b, c = _share(records, frequency + width * np.array([-1.0, 0.0, 1.0]))
+    bend = a - 2.0 * b + c
+    shift = float(np.clip(0.5 * (a - c) / bend, -2.0, 2.0)) if bend < 0.0 else np.sign(c - a)
+    share = b - 0.25 * (a - c) * shift  # of the parabola's top
+    return float(frequency + width * shift), float(min(max(share, 0.0), 1.0))
 
 
 def _share(records: Sequence[Record], frequencies: Array) -> Array:

@@ -70,8 +70,8 @@ def test_a_line_of_several_logs_is_told_once_and_a_near_one_apart():
     apart = np.array(lines_in_time([(sines([0.05, 0.05 + 8.0 / N]), 1.0)]))
     assert np.abs(apart - 0.05).min() < 0.1 / N
     assert np.abs(apart - 0.05 - 8.0 / N).min() < 0.1 / N
-    many = [(np.random.default_rng(s).normal(size=N), 1.0) for s in range(40)]
-    assert len(lines_in_time(many)) <= MOST_LINES
+    many = [(sines(np.arange(0.01, 0.4, 0.01), seed=s), 1.0) for s in range(2)]
+    assert len(lines_in_time(many)) == MOST_LINES
 
 
 @pytest.mark.parametrize("records", [1, 3])
