@@ -133,4 +133,4 @@ def built_study(*names: str, held: Sequence[str] = (), window: float = 0.04) -> 
         )
 
     seen = Excitation(-0.05, 0.05, 0.4, 0.3, 3.0, PERIOD)
-    return Dataset("x", logs(names or ("run",), 1), logs(held, 11), seen)
+    return Dataset("x", logs(names or ("run",), 1), logs(held, 11), lambda: seen)

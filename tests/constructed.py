@@ -77,7 +77,7 @@ def dataset_of(
     *fit: PreparedLog, holdout: tuple[PreparedLog, ...] = (), channel_delay: float = 0.0
 ) -> Dataset:
     """A dataset of some logs of axis x."""
-    return Dataset("x", fit, holdout, COVERED, channel_delay)
+    return Dataset("x", fit, holdout, lambda: COVERED, channel_delay)
 
 
 SHORT = moved(np.random.default_rng(1), 1.0).head(0.4)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,14 +34,15 @@ class Dataset:
     """One axis: its prepared fit logs and held-out logs (may be none), and what they cover.
 
     The held-out logs take part in the choice of effects; no parameter is fitted on them.
-    channel_delay: s, by which the force of the logs was shifted to earlier samples. still: names of
-    logs that were left out because the axis stands still in them.
+    covered: gives what the fit logs cover, which takes a while. channel_delay: s, by which the
+    force of the logs was shifted to earlier samples. still: names of logs that were left out
+    because the axis stands still in them.
     """
 
     axis: str
     fit: tuple[PreparedLog, ...]
     holdout: tuple[PreparedLog, ...]
-    excitation: Excitation
+    covered: Callable[[], Excitation]
     channel_delay: float = 0.0
     still: tuple[str, ...] = ()
 
@@ -49,6 +50,11 @@ class Dataset:
         return (
             f"<Dataset of {self.axis}: {len(self.fit)} logs to fit, {len(self.holdout)} held out>"
         )
+
+    @property
+    def excitation(self) -> Excitation:
+        """What the motions of the fit logs cover."""
+        return self.covered()
 
     @property
     def logs(self) -> tuple[PreparedLog, ...]:
@@ -103,7 +109,7 @@ def datasets(
             axis=name,
             fit=tuple(PreparedLog.of(m, length) for m in fit),
             holdout=tuple(PreparedLog.of(m, length) for m in held),
-            excitation=excitation(fit, axis.hardware.travel),
+            covered=cache(partial(excitation, fit, axis.hardware.travel)),
             still=(*still, *still_held),
         )
     if not out:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.motion import Motion
-from identify.dataset.spectral_lines import FINEST_CYCLES, Record, find_lines, lines_in_time
+from identify.dataset.spectral_lines import find_lines, lines_in_time
+from identify.dataset.spectrum import FINEST_CYCLES, Record
 from twin.effect import Excitation
 from twin.signals import Array
 

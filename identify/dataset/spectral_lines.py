@@ -1,10 +1,9 @@
 """Spectral lines: frequencies, in time or along the track, at which a signal repeats.
 
-One finder for all. A first look by fast Fourier transform of each record, tapered by Hann's window,
-against the level of the spectrum around; what stands out is refined and weighed by the periodogram
-of N. R. Lomb (1976) and J. D. Scargle (1982) for unequally spaced samples. The false-alarm
-probability is that of exponentially distributed noise power at as many frequencies as the range has
-independent ones.
+One finder for all. A first look at the spectrum of each record, against the level around; what
+stands out is refined and weighed by the periodogram of N. R. Lomb (1976) and J. D. Scargle (1982)
+for unequally spaced samples. The false-alarm probability is that of noise whose power follows an
+exponential distribution, at as many frequencies as the range has independent ones.
 """
 
 from __future__ import annotations
@@ -14,42 +13,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
-from scipy.ndimage import median_filter
 from scipy.signal import lombscargle
 from scipy.special import betainc
+
+from identify.dataset.spectrum import EMPTY, WIDTH, Grid, Record, level
 
 Array = NDArray[np.float64]
 
 MOST_LINES = 24
 CHANCE = 0.1  # false-alarm probability of what is worth a try
 HIGHEST = 0.4  # of the sample rate
-CELLS_A_PERIOD = 4  # of the highest frequency
-FINEST_CYCLES = 1 << 15  # over the span of a record at most
-BAND = 20  # resolutions over which the level of the spectrum is taken
-BANDS_AROUND = 3
 LEVEL_FREEDOM = 30.0  # independent powers that the median of so many correlated ones is worth
-WIDTH = 2  # resolutions from a line's top to its foot, with Hann's window
 HOPELESS = 0.5  # false-alarm probability in white noise from which a frequency is passed over
 MOST_REFUSED = 5  # such frequencies, after which the search ends
-PARTS = 64  # of the span, over which samples are counted
-MOST_WEIGHT = 4.0  # of a sample among few, over that of a typical one
 NEAR = 0.15  # resolutions, within which a line's frequency is refined
-EQUAL = 1e-6  # of a spacing, by which equal ones may differ
-EMPTY = 1e-24  # of the highest power, below which there is but rounding
-
-
-@dataclass(frozen=True, eq=False)
-class Record:
-    """A signal over a coordinate, in any order and spacing: coordinate (n,), values (n,)."""
-
-    coordinate: Array
-    values: Array
-
-    @property
-    def span(self) -> float:
-        """Range of the coordinate, in its unit."""
-        return float(np.ptp(self.coordinate)) if len(self.coordinate) else 0.0
 
 
 @dataclass(frozen=True)
@@ -86,16 +63,15 @@ def find_lines(
     records = [r for r in records if len(r.values) > 3 and r.span > 0.0 and np.ptp(r.values) > 0.0]
     if not records or not 0.0 <= lowest < highest:
         return ()
-    grid = _Grid.of(records, highest)
+    grid = Grid.of(records, highest)
     inside = np.flatnonzero((grid.frequencies >= lowest) & (grid.frequencies <= highest))
     if len(inside) < 3:
         return ()
     left = [replace(r, values=r.values - r.values.mean()) for r in records]
     empty = EMPTY * grid.powers(left).max(axis=1, keepdims=True)
     found, rest = _peeled(grid, left, inside, empty, most)
-    # Evenly spaced samples spread no line; then what was subtracted is a part of the level.
-    level = _level(grid.powers(left if grid.even else rest), empty)
-    heights = [float(np.sum(line.powers / level[:, line.at])) for line in found]
+    noise = level(grid.powers(rest), empty)
+    heights = [float(np.sum(line.powers / noise[:, line.at])) for line in found]
     out = [
         (height, SpectralLine(line.frequency, line.energy / _energy(left), alarm))
         for height, line in zip(heights, found, strict=True)
@@ -115,7 +91,7 @@ class _Found:
 
 
 def _peeled(
-    grid: _Grid, left: list[Record], inside: NDArray[np.int64], empty: Array, most: int
+    grid: Grid, left: list[Record], inside: NDArray[np.int64], empty: Array, most: int
 ) -> tuple[list[_Found], list[Record]]:
     """Lines at places ``inside`` a grid, one after the other, and the records less all of them."""
     found: list[_Found] = []
@@ -124,7 +100,7 @@ def _peeled(
     while len(found) < most and refused < MOST_REFUSED and len(inside) and powers.max() > 0.0:
         # In turn by height over the level, and by power: few cycles are a part of their own level.
         by_height = grid.even or (len(found) + refused) % 2 == 0
-        order = np.sum(powers / _level(powers, empty) if by_height else powers, axis=0)
+        order = np.sum(powers / level(powers, empty) if by_height else powers, axis=0)
         k = int(inside[np.argmax(order[inside])])
         frequency, share = _refined(left, grid.top(powers, k), grid.step)
         hopeless = _is_hopeless(share, tried, left)
@@ -137,78 +113,6 @@ def _peeled(
             left = [_without(r, frequency) for r in left]
             powers = grid.powers(left)
     return found, left
-
-
-@dataclass(frozen=True, eq=False)
-class _Grid:
-    """Frequencies (m,) a resolution apart, at which the power of records is taken.
-
-    Less those near zero, which the removal of the mean empties. cell: of the coordinate, ``cells``
-    of them. places, tapers: of each record's samples, (n,) cells and (n,) 1. even: whether all
-    samples are equally spaced.
-    """
-
-    frequencies: Array
-    cells: int
-    places: Sequence[Array]
-    tapers: Sequence[Array]
-    even: bool
-
-    @classmethod
-    def of(cls, records: Sequence[Record], highest: float) -> _Grid:
-        span = max(r.span for r in records)
-        highest = min(highest, FINEST_CYCLES / span)
-        spacing = _common_spacing(records)
-        cell = spacing or 1.0 / (CELLS_A_PERIOD * highest)
-        cells = next_fast_len(int(np.ceil(span / cell)) + 1, real=True)
-        along = [(r.coordinate - r.coordinate.min()) / r.span for r in records]
-        return cls(
-            np.asarray(np.fft.rfftfreq(cells, cell)[WIDTH:], dtype=float),
-            cells,
-            [a * (r.span / cell) for a, r in zip(along, records, strict=True)],
-            [np.sin(np.pi * a) ** 2 * _sparseness(a) for a in along],
-            spacing is not None,
-        )
-
-    @property
-    def step(self) -> float:
-        """Resolution, cycles per unit."""
-        return float(self.frequencies[1] - self.frequencies[0])
-
-    def top(self, powers: Array, k: int) -> float:
-        """Frequency of the top at place k: by a parabola through logarithms of three powers."""
-        if not 0 < k < len(self.frequencies) - 1:
-            return float(self.frequencies[k])
-        a, b, c = np.log(np.maximum(powers[:, k - 1 : k + 2].sum(axis=0), np.finfo(float).tiny))
-        bend = a - 2.0 * b + c
-        shift = float(np.clip(0.5 * (a - c) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
-        return float(self.frequencies[k] + shift * self.step)
-
-    def powers(self, records: Sequence[Record]) -> Array:
-        """Power of each record at the frequencies, (records, m)."""
-        spread = [
-            _spread(place, r.values * taper, self.cells)
-            for r, place, taper in zip(records, self.places, self.tapers, strict=True)
-        ]
-        return np.abs(np.fft.rfft(spread)[:, WIDTH:]) ** 2
-
-
-def _level(powers: Array, empty: Array) -> Array:
-    """Mean power (records, m) of noise about each frequency, from medians; at least ``empty``.
-
-    Medians of bands, and of bands with those around: the higher, as a steep spectrum is at its foot
-    far above its wider surroundings. At the lowest frequencies, where it may be steep within a
-    band, each has a band of its own.
-    """
-    m = powers.shape[1]
-    padded = np.pad(powers, [(0, 0), (0, -m % BAND)], mode="reflect" if m > BAND else "edge")
-    near = np.median(padded.reshape(len(powers), -1, BAND), axis=2)
-    far = median_filter(near, (1, BANDS_AROUND), mode="reflect")
-    level = np.repeat(np.maximum(near, far), BAND, axis=1)[:, :m]
-    low = median_filter(powers[:, : 5 * BAND], (1, BAND + 1), mode="reflect")[:, : 4 * BAND]
-    level[:, : low.shape[1]] = np.maximum(level[:, : low.shape[1]], low)
-    level /= np.log(2.0)
-    return np.maximum(level, np.maximum(empty, np.finfo(float).tiny))
 
 
 def _false_alarm(height: float, records: int, tried: int) -> float:
@@ -239,46 +143,6 @@ def _without(record: Record, frequency: float) -> Record:
     columns = np.stack([np.cos(turn), np.sin(turn), np.ones_like(turn)], axis=1)
     gains = np.linalg.lstsq(columns.T @ columns, columns.T @ record.values, rcond=None)[0]
     return replace(record, values=record.values - columns @ gains)
-
-
-def _sparseness(along: Array) -> Array:
-    """Weights (n,) that make up for samples more dense in one part of the span than in another.
-
-    along: 0..1. An axis dwells where it turns; unweighed, that would widen every line.
-    """
-    part = np.minimum((along * PARTS).astype(int), PARTS - 1)
-    count = np.bincount(part, minlength=PARTS)
-    typical = np.median(count[count > 0])
-    return np.asarray(np.minimum(typical / count[part], MOST_WEIGHT))
-
-
-def _common_spacing(records: Sequence[Record]) -> float | None:
-    """Spacing of records that are all sampled equally, and alike; else None."""
-    first = float(records[0].coordinate[1] - records[0].coordinate[0])
-    for r in records:
-        if np.abs(np.diff(r.coordinate) - first).max() > EQUAL * abs(first):
-            return None
-    return first if first > 0.0 else None
-
-
-def _spread(place: Array, values: Array, cells: int) -> Array:
-    """Values (n,) at places (n,) between cells, spread over the four cells about each, (cells,).
-
-    With the weights of cubic interpolation (W. H. Press, G. B. Rybicki, "Fast algorithm for
-    spectral analysis of unevenly sampled data", Astrophys. J. 338, 1989).
-    """
-    first = np.floor(place).astype(int)
-    t = place - first
-    weights = (
-        -t * (t - 1.0) * (t - 2.0) / 6.0,
-        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-        -(t + 1.0) * t * (t - 2.0) / 2.0,
-        (t + 1.0) * t * (t - 1.0) / 6.0,
-    )
-    out = np.zeros(cells)
-    for k, weight in enumerate(weights):
-        out += np.bincount((first + k - 1) % cells, values * weight, cells)
-    return out
 
 
 def _refined(records: Sequence[Record], frequency: float, step: float) -> tuple[float, float]:

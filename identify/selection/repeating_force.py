@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, on_blocks, total_force
-from identify.dataset.spectral_lines import Record, SpectralLine, find_lines
+from identify.dataset.spectral_lines import SpectralLine, find_lines
+from identify.dataset.spectrum import Record
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
 from twin.model.units import LINEAR, AxisUnits

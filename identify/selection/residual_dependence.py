@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog
-from identify.dataset.spectral_lines import Record, find_lines
+from identify.dataset.spectral_lines import find_lines
+from identify.dataset.spectrum import Record
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit

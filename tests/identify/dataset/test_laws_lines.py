@@ -15,10 +15,10 @@ from identify.dataset.excitation import _rest, lines, ripples
 from identify.dataset.motion import motion_of
 from identify.dataset.spectral_lines import (
     MOST_LINES,
-    Record,
     find_lines,
     lines_in_time,
 )
+from identify.dataset.spectrum import Record
 from identify.estimation.channel_delay import misalignment, realigned
 from identify.estimation.time_origin import (
     _amplitude,

@@ -268,7 +268,7 @@ def test_a_tone_in_the_residual_is_among_the_first_lines_tried(dataset):
     base = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
     tone = np.concatenate([np.sin(2.0 * np.pi * 7.3 * w.time) for w in dataset.fit])
     loud = replace(base, residual=tone[base.kept])
-    known = replace(dataset, excitation=replace(SEEN, lines=(3.21, 4.56)))
+    known = replace(dataset, covered=lambda: replace(SEEN, lines=(3.21, 4.56)))
     found = _with_lines_left(loud, known)
     assert found.lines[-2:] == (3.21, 4.56)
     assert abs(found.lines[0] - 7.3) < 0.5

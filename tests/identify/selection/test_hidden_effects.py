@@ -30,6 +30,7 @@ WEAK, STRONG = 5.0 * FLOOR, 40.0 * FLOOR
 LATER = [pytest.param(seed, 8.0, marks=SLOW) for seed in (15, 16, 17)]
 
 
+@SLOW  # the README's loop in small and the self-test in small show it too
 def test_a_hidden_effect_is_named_among_a_few():
     few = Catalogue([CATALOGUE[n] for n in ("cogging", "quadratic_drag")])
     assert_named("cogging", STRONG, few, 5.0, replace(STAGE, sample_rate=2500.0))

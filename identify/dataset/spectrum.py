@@ -1,0 +1,152 @@
+"""Power of a signal over a coordinate, by frequency, and its level about each.
+
+Records may be sampled at any instants or places: the samples are spread over the cells of a grid,
+tapered by Hann's window and transformed by FFT, in a time of n log n.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+from scipy.ndimage import median_filter
+
+Array = NDArray[np.float64]
+
+FINEST_CYCLES = 1 << 15  # over the span of a record at most
+CELLS_A_PERIOD = 4  # of the highest frequency
+BAND = 20  # resolutions over which the level of the spectrum is taken
+BANDS_AROUND = 3
+EMPTY = 1e-24  # of the highest power, below which there is but rounding
+PARTS = 64  # of the span, over which samples are counted
+MOST_WEIGHT = 4.0  # of a sample among few, over that of a typical one
+EQUAL = 1e-6  # of a spacing, by which equal ones may differ
+WIDTH = 2  # resolutions from a line's top to its foot, with Hann's window
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A signal over a coordinate, in any order and spacing: coordinate (n,), values (n,)."""
+
+    coordinate: Array
+    values: Array
+
+    @property
+    def span(self) -> float:
+        """Range of the coordinate, in its unit."""
+        return float(np.ptp(self.coordinate)) if len(self.coordinate) else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Frequencies (m,) a resolution apart, at which the power of records is taken.
+
+    Less those near zero, which the removal of the mean empties. cell: of the coordinate, ``cells``
+    of them. places, tapers: of each record's samples, (n,) cells and (n,) 1. even: whether all
+    samples are equally spaced.
+    """
+
+    frequencies: Array
+    cells: int
+    places: Sequence[Array]
+    tapers: Sequence[Array]
+    even: bool
+
+    @classmethod
+    def of(cls, records: Sequence[Record], highest: float) -> Grid:
+        span = max(r.span for r in records)
+        highest = min(highest, FINEST_CYCLES / span)
+        spacing = _common_spacing(records)
+        cell = spacing or 1.0 / (CELLS_A_PERIOD * highest)
+        cells = next_fast_len(int(np.ceil(span / cell)) + 1, real=True)
+        along = [(r.coordinate - r.coordinate.min()) / r.span for r in records]
+        return cls(
+            np.asarray(np.fft.rfftfreq(cells, cell)[WIDTH:], dtype=float),
+            cells,
+            [a * (r.span / cell) for a, r in zip(along, records, strict=True)],
+            [np.sin(np.pi * a) ** 2 * _sparseness(a) for a in along],
+            spacing is not None,
+        )
+
+    @property
+    def step(self) -> float:
+        """Resolution, cycles per unit."""
+        return float(self.frequencies[1] - self.frequencies[0])
+
+    def top(self, powers: Array, k: int) -> float:
+        """Frequency of the top at place k: by a parabola through logarithms of three powers."""
+        if not 0 < k < len(self.frequencies) - 1:
+            return float(self.frequencies[k])
+        a, b, c = np.log(np.maximum(powers[:, k - 1 : k + 2].sum(axis=0), np.finfo(float).tiny))
+        bend = a - 2.0 * b + c
+        shift = float(np.clip(0.5 * (a - c) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
+        return float(self.frequencies[k] + shift * self.step)
+
+    def powers(self, records: Sequence[Record]) -> Array:
+        """Power of each record at the frequencies, (records, m)."""
+        spread = [
+            _spread(place, r.values * taper, self.cells)
+            for r, place, taper in zip(records, self.places, self.tapers, strict=True)
+        ]
+        return np.abs(np.fft.rfft(spread)[:, WIDTH:]) ** 2
+
+
+def level(powers: Array, empty: Array) -> Array:
+    """Mean power (records, m) of noise about each frequency, from medians; at least ``empty``.
+
+    Medians of bands, and of bands with those around: the higher, as a steep spectrum is at its foot
+    far above its wider surroundings. At the lowest frequencies, where it may be steep within a
+    band, each has a band of its own.
+    """
+    m = powers.shape[1]
+    padded = np.pad(powers, [(0, 0), (0, -m % BAND)], mode="reflect" if m > BAND else "edge")
+    near = np.median(padded.reshape(len(powers), -1, BAND), axis=2)
+    far = median_filter(near, (1, BANDS_AROUND), mode="reflect")
+    out = np.repeat(np.maximum(near, far), BAND, axis=1)[:, :m]
+    low = median_filter(powers[:, : 5 * BAND], (1, BAND + 1), mode="reflect")[:, : 4 * BAND]
+    out[:, : low.shape[1]] = np.maximum(out[:, : low.shape[1]], low)
+    out /= np.log(2.0)
+    return np.maximum(out, np.maximum(empty, np.finfo(float).tiny))
+
+
+def _sparseness(along: Array) -> Array:
+    """Weights (n,) that make up for samples more dense in one part of the span than in another.
+
+    along: 0..1. An axis dwells where it turns; unweighed, that would widen every line.
+    """
+    part = np.minimum((along * PARTS).astype(int), PARTS - 1)
+    count = np.bincount(part, minlength=PARTS)
+    typical = np.median(count[count > 0])
+    return np.asarray(np.minimum(typical / count[part], MOST_WEIGHT))
+
+
+def _common_spacing(records: Sequence[Record]) -> float | None:
+    """Spacing of records that are all sampled equally, and alike; else None."""
+    first = float(records[0].coordinate[1] - records[0].coordinate[0])
+    for r in records:
+        if np.abs(np.diff(r.coordinate) - first).max() > EQUAL * abs(first):
+            return None
+    return first if first > 0.0 else None
+
+
+def _spread(place: Array, values: Array, cells: int) -> Array:
+    """Values (n,) at places (n,) between cells, spread over the four cells about each, (cells,).
+
+    With the weights of cubic interpolation (W. H. Press, G. B. Rybicki, "Fast algorithm for
+    spectral analysis of unevenly sampled data", Astrophys. J. 338, 1989).
+    """
+    first = np.floor(place).astype(int)
+    t = place - first
+    weights = (
+        -t * (t - 1.0) * (t - 2.0) / 6.0,
+        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+        -(t + 1.0) * t * (t - 2.0) / 2.0,
+        (t + 1.0) * t * (t - 1.0) / 6.0,
+    )
+    out = np.zeros(cells)
+    for k, weight in enumerate(weights):
+        out += np.bincount((first + k - 1) % cells, values * weight, cells)
+    return out
