@@ -42,7 +42,7 @@ class Setting:
     friction: str
     values: dict[str, float]
     experiment: str = "tracking"
-    duration: float = 8.0
+    duration: float = 6.0
     velocity: float = 0.25
     mass_known: bool = False
 

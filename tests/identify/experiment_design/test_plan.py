@@ -214,8 +214,8 @@ def separation(ranking) -> float:
     return ranking[0].delta_bic - ranking[1].delta_bic
 
 
-# One case where the explanations differ in the actuator, and one where they do in the friction.
-QUICK = (("delay", "actuator_delay"), ("asymmetry", "asymmetric_friction"))
+# The cheapest; those that differ in the actuator or the cable are in the long set.
+QUICK = (("asymmetry", "asymmetric_friction"),)
 
 
 @pytest.mark.parametrize(

@@ -70,7 +70,8 @@ def test_nothing_is_named_where_nothing_is_hidden(seed):
 
 
 @pytest.mark.parametrize(
-    ("seed", "duration"), [(14, 6.0), pytest.param(14, 12.0, marks=SLOW), *LATER]
+    ("seed", "duration"),
+    [pytest.param(14, 6.0, marks=SLOW), pytest.param(14, 12.0, marks=SLOW), *LATER],
 )
 def test_a_force_channel_of_another_machine_is_not_a_weak_motor(seed, duration):
     """With a motor that gives nothing all forces are zero, and so is the error.

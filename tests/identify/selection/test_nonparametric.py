@@ -164,7 +164,7 @@ def noisy(judged: str) -> FitResult:
     ("name", "judged"),
     [
         (MAP, "by held-out logs"),
-        (LEARNED, "by left-out blocks"),
+        pytest.param(LEARNED, "by left-out blocks", marks=SLOW),
         pytest.param(MAP, "by left-out blocks", marks=SLOW),
         pytest.param(LEARNED, "by held-out logs", marks=SLOW),
     ],
