@@ -66,7 +66,12 @@ def ahead(monkeypatch, made, seconds, *, base=None, needed=True, together=True, 
 
     monkeypatch.setattr(lookahead, "score", score)
     monkeypatch.setattr(lookahead, "less", less_of)
-    monkeypatch.setattr(lookahead, "held_at_floor", lambda fit, dataset: held)
+
+    def at_floor(fit, dataset):
+        assert (dataset, fit.axis.names[-1]) == (STUDY, last)
+        return held
+
+    monkeypatch.setattr(lookahead, "held_at_floor", at_floor)
     return search_pairs(base, STUDY, made, ranked), beside, calls
 
 

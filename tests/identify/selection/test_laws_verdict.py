@@ -101,7 +101,7 @@ def told(monkeypatch, *, held=False, explains=False):
         asked.append((before, after))
         return explains
 
-    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held)
+    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is STUDY)
     monkeypatch.setattr(module, "explains", explained)
     return asked
 

@@ -47,7 +47,7 @@ def test_the_best_is_added_with_the_supported_rivals_that_tie(monkeypatch):
 
 @pytest.mark.parametrize(("base", "held"), [(LOW, False), (HIGH, True)])
 def test_no_pair_is_sought_at_the_floor(monkeypatch, base, held):
-    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held)
+    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is STUDY)
     monkeypatch.setattr(module, "search_pairs", lambda *_: pytest.fail("sought"))
     assert _next(base, STUDY, [built(t=1.0)], None) == []
     assert _next(base, STUDY, [], None) == []

@@ -165,7 +165,7 @@ def decided(monkeypatch, stages, convinced, held=False):
     )
     monkeypatch.setattr(module, "_compared_again", lambda stages, dataset: stages[-1].steps)
     monkeypatch.setattr(module, "find_dependence", structure)
-    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held)
+    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is STUDY)
     found = _decided(STUDY, (built("wear"),), stages)
     return found, sought
 

@@ -21,6 +21,7 @@ from twin.experiments.trajectory import (
 )
 from twin.experiments.trajectory.limits import inside_travel, require_plateau
 from twin.experiments.trajectory.random_tracking import random_tracking
+from twin.experiments.trajectory.setpoint import require_length
 from twin.model.machine import AxisModel, Hardware, MachineModel
 
 RATE = 2000.0
@@ -132,3 +133,12 @@ def test_setpoints_join_only_where_one_ends_and_the_other_begins() -> None:
     begins.velocity[0, 0] = -1.1e-9
     with pytest.raises(InputError, match="moves at"):
         concatenate(there(0.05), begins)
+
+
+def test_a_setpoint_holds_one_sample_to_one_hour_of_them() -> None:
+    hour = 3600.0 * 1e4
+    for samples in (1.0, 1.0 - 1e-10, 7.0, hour):
+        require_length(samples / RATE, RATE)
+    for samples in (1.0 - 1e-8, 0.6, hour + 1.0):
+        with pytest.raises(InputError, match="samples, allowed are 1 to 36000000"):
+            require_length(samples / RATE, RATE)
