@@ -11,17 +11,16 @@ import numpy as np
 import pytest
 from built_fits import CATALOGUE, NOISE, built_fit
 
-from identify.output import as_json, remarks
+from identify.output import remarks
 from identify.output.as_json import (
     add_json,
-    check_json,
     compare_json,
     diagnose_json,
-    effect_json,
     fit_json,
     plain,
     plan_json,
 )
+from identify.output.machine_json import check_json, effect_json
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
 from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.selection import verdict_in_words
@@ -293,4 +292,4 @@ def test_a_check():
         "severity", "fault", "axis", "what", "where", "remedy",
     ]  # fmt: skip
     assert strict(check_json({"a": CheckReport((mild,))}))["ok"] is True
-    assert as_json.check_json({}) == {"ok": True, "logs": {}}
+    assert check_json({}) == {"ok": True, "logs": {}}
