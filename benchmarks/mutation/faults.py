@@ -181,12 +181,12 @@ def _idle_lines(source: str) -> frozenset[int]:
 
 
 def is_native(source: str, line: int) -> bool:
-    """Whether a line is in a compiled function: a law, a function that it calls, the core."""
+    """Whether a line is in a law, a compiled function, or what one compiles to."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.FunctionDef) and node.lineno <= line <= (node.end_lineno or 0):
             law = [a.arg for a in node.args.args] == ["p", "s", "io"]
             made = " ".join(ast.dump(d) for d in node.decorator_list)
-            if law or "compiled" in made or "jit" in made:
+            if law or any(word in made for word in ("compiled", "jit", "intrinsic")):
                 return True
     return False
 

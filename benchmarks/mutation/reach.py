@@ -28,7 +28,10 @@ def environment(root: Path) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Reach:
-    """seconds: of each test by its id. contexts: path -> line -> the tests that run it."""
+    """seconds: of each test by its id. contexts: path -> line -> the tests that run it.
+
+    A file in place of a test: a fixture of that file ran the line, so any of its tests may tell.
+    """
 
     seconds: Mapping[str, float]
     contexts: Mapping[str, Mapping[int, frozenset[str]]]
@@ -41,9 +44,9 @@ class Reach:
         """
         by_line = self.contexts.get(fault.path, {})
         chosen = by_line.get(fault.line) or frozenset().union(*by_line.values())
-        chosen &= self.seconds.keys()
+        chosen = {t for t in self.seconds if t in chosen or t.partition("::")[0] in chosen}
         if native or not chosen:
-            chosen = frozenset(self.seconds)
+            chosen = set(self.seconds)
         subject = Path(fault.path).stem
         out, spent = [], 0.0
         for test in sorted(chosen, key=lambda t: (subject not in t, self.seconds[t], t)):
@@ -87,6 +90,12 @@ def _contexts(data: Path, root: Path) -> dict[str, dict[int, frozenset[str]]]:
     out: dict[str, dict[int, frozenset[str]]] = {}
     for file in measured.measured_files():
         lines = measured.contexts_by_lineno(file).items()
-        tests = {line: frozenset(c.partition("|")[0] for c in names if c) for line, names in lines}
+        tests = {line: frozenset(map(_teller, filter(None, names))) for line, names in lines}
         out[os.path.relpath(file, root)] = {line: t for line, t in tests.items() if t}
     return out
+
+
+def _teller(context: str) -> str:
+    """The test of a context such as "tests/test_a.py::test_b|run"; of a set-up its file."""
+    test, _, phase = context.partition("|")
+    return test.partition("::")[0] if phase == "setup" else test

@@ -12,7 +12,7 @@ pytest.importorskip("cosmic_ray", reason="comes with the extra `bench`")
 
 from benchmarks.mutation.faults import Fault, draw, faults_on, is_native, operators
 from benchmarks.mutation.noticed import figures
-from benchmarks.mutation.reach import Reach
+from benchmarks.mutation.reach import Reach, _teller
 from benchmarks.mutation.trial import Trial
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -62,6 +62,9 @@ def test_tests_of_a_line_come_quickest_first_and_within_the_budget() -> None:
     assert known.tests_for(Fault("x.py", 9, "k", 0), 10.0) == ["b", "c", "a"]  # native or import
     assert known.tests_for(Fault("y.py", 1, "k", 0), 1.0) == ["d"]
     assert known.tests_for(Fault("x.py", 7, "k", 0), 1.0, native=True) == ["d"]
+    shared = Reach({"t.py::a": 1.0, "t.py::b": 2.0, "c": 0.1}, {"x.py": {7: frozenset({"t.py"})}})
+    assert shared.tests_for(Fault("x.py", 7, "k", 0), 10.0) == ["t.py::a", "t.py::b"]
+    assert [_teller(f"t.py::a|{phase}") for phase in ("run", "setup")] == ["t.py::a", "t.py"]
     named = Reach({"a": 0.1, "b[gms]": 2.0}, {"gms.py": {1: frozenset({"a", "b[gms]"})}})
     assert named.tests_for(Fault("gms.py", 1, "k", 0), 9.0) == ["b[gms]", "a"]
 
@@ -71,6 +74,7 @@ def test_laws_and_compiled_functions_are_native() -> None:
     assert [is_native(law, n) for n in (2, 6)] == [True, False]
     core = "@compiled(inline=True)\ndef f(x):\n    return x\n"
     assert is_native(core, 3)
+    assert is_native("@intrinsic\ndef f(t, a):\n    def codegen(c):\n        return c\n", 4)
 
 
 def test_shares_are_counted_by_folder() -> None:

@@ -130,6 +130,8 @@ def test_what_cannot_run_is_told_with_its_reason_and_a_mistake_is_not_passed_ove
     trials, not_run = contest(arena, asked)
     assert trials == []
     assert not_run_in_words(not_run[0]).startswith("passes: axis x, span 9 m")
+    assert "(with" not in not_run_in_words(replace(not_run[0], truth=None))
+    assert not_run_in_words(replace(not_run[0], truth="wear")).endswith("(with wear)")
     assert "outside its travel" in not_run[0].reason
     with pytest.raises(InputError, match="effort"):
         contest(arena, [Passes("x", span=0.1, speed=0.1, repeats=1, effort=2.0)])

@@ -198,6 +198,22 @@ def test_a_demonstration_holds_out_its_third_log_and_writes_what_it_found(monkey
         demo.demo(model, CATALOGUE, Path(tmp_path / "file" / "in"), 4, said.append)
 
 
+def test_a_recording_is_written_to_its_file_and_given_back(monkeypatch, tmp_path):
+    written, seen = [], []
+
+    def simulate(machine, experiment, seed, duration, progress):
+        progress(3, 4)
+        return machine, experiment, seed, duration
+
+    monkeypatch.setattr(demo, "simulate", simulate)
+    monkeypatch.setattr(demo, "write_log", lambda log, path: written.append((log, path)))
+    path = tmp_path / "machine_1.mcap"
+    log = demo._record("machine", "moves", path, 7, lambda *given: seen.append(given))
+    assert log == ("machine", "moves", 7, demo.DURATION)
+    assert written == [(log, path)]
+    assert seen == [("simulating machine_1.mcap", 3, 4)]
+
+
 def test_only_what_shows_is_hidden(monkeypatch):
     monkeypatch.setattr(demo, "simulate", lambda *a, **k: "trial")
     monkeypatch.setattr(

@@ -52,6 +52,7 @@ from mcap_bytes import (
     records,
 )
 
+from twin.errors import InputError
 from twin.log import FIELDS, AxisLog, Log, encode, read_log, write_log
 
 RATE, COUNT = 3000.0, 45
@@ -297,3 +298,15 @@ def test_a_chunk_holds_a_row_though_it_is_larger_than_a_chunk(tmp_path, monkeypa
     monkeypatch.setattr(encode, "CHUNK_BYTES", ROW // 2)
     write_log(LOG, tmp_path / "a.mcap")
     assert len(of((tmp_path / "a.mcap").read_bytes(), CHUNK)) == COUNT
+
+
+def test_a_record_that_claims_more_than_follows_it_is_called_so(data, tmp_path):
+    """At whatever place in the file: what counts is what follows, not what lies before."""
+    for piece in (of(data, CHUNK)[0], of(data, CHUNK)[-1]):
+        too_long = len(data) - piece.start
+        at = piece.start + 1
+        (tmp_path / "a.mcap").write_bytes(
+            data[:at] + too_long.to_bytes(8, "little") + data[at + 8 :]
+        )
+        with pytest.raises(InputError, match=f"at byte {piece.start} claims {too_long} bytes"):
+            read_log(tmp_path / "a.mcap")
