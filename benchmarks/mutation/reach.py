@@ -39,7 +39,8 @@ class Reach:
     def tests_for(self, fault: Fault, budget: float, native: bool = False) -> list[str]:
         """Tests that can notice a fault, of ``budget`` seconds together.
 
-        Tests that name the subject of its file, such as an effect, come first, then the quickest.
+        Tests that name the subject of its file, such as an effect, come first, then those of its
+        folder, the quickest first.
         Coverage does not record native code and code that runs at import; there any test counts.
         """
         by_line = self.contexts.get(fault.path, {})
@@ -47,9 +48,13 @@ class Reach:
         chosen = {t for t in self.seconds if t in chosen or t.partition("::")[0] in chosen}
         if native or not chosen:
             chosen = set(self.seconds)
-        subject = Path(fault.path).stem
+        subject, room = Path(fault.path).stem, f"tests/{Path(fault.path).parent.as_posix()}/"
         out, spent = [], 0.0
-        for test in sorted(chosen, key=lambda t: (subject not in t, self.seconds[t], t)):
+
+        def order(test: str) -> tuple[bool, bool, float, str]:
+            return subject not in test, not test.startswith(room), self.seconds[test], test
+
+        for test in sorted(chosen, key=order):
             spent += self.seconds[test]
             if out and spent > budget:
                 break

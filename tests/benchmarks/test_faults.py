@@ -65,6 +65,8 @@ def test_tests_of_a_line_come_quickest_first_and_within_the_budget() -> None:
     shared = Reach({"t.py::a": 1.0, "t.py::b": 2.0, "c": 0.1}, {"x.py": {7: frozenset({"t.py"})}})
     assert shared.tests_for(Fault("x.py", 7, "k", 0), 10.0) == ["t.py::a", "t.py::b"]
     assert [_teller(f"t.py::a|{phase}") for phase in ("run", "setup")] == ["t.py::a", "t.py"]
+    rooms = Reach({"tests/a/t.py::x": 2.0, "tests/b/t.py::y": 1.0}, {})
+    assert rooms.tests_for(Fault("a/m.py", 1, "k", 0), 2.5) == ["tests/a/t.py::x"]
     named = Reach({"a": 0.1, "b[gms]": 2.0}, {"gms.py": {1: frozenset({"a", "b[gms]"})}})
     assert named.tests_for(Fault("gms.py", 1, "k", 0), 9.0) == ["b[gms]", "a"]
 
