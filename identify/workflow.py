@@ -159,13 +159,13 @@ def diagnose(
 
 
 def _next_experiments(
-    axes: Mapping[str, AxisDiagnosis], model: MachineModel, window: float | None
+    axes: Mapping[str, AxisDiagnosis], model: MachineModel, test_function: float | None
 ) -> tuple[dict[str, Plan], dict[str, str]]:
     """By axis, the experiment that decides an ambiguous diagnosis, or why there is none."""
     plans, not_planned = {}, {}
     for axis, found in axes.items():
         try:
-            following = next_experiment(found, model, window)
+            following = next_experiment(found, model, test_function)
         except CannotRun as why:
             not_planned[axis] = str(why)
         else:

@@ -65,7 +65,7 @@ class Dataset:
     def heads(self) -> tuple[PreparedLog, ...]:
         """The beginnings of the fit logs, long enough together to scan nonlinear parameters on."""
         each = max(TRIED / len(self.fit), SHORTEST_HEAD)
-        return tuple(PreparedLog.of(w.motion.head(each), w.window.length) for w in self.fit)
+        return tuple(PreparedLog.of(w.motion.head(each), w.test_function.length) for w in self.fit)
 
     @cached_property
     def in_heads(self) -> NDArray[np.bool_]:
@@ -81,7 +81,7 @@ class Dataset:
     @property
     def test_function_length(self) -> float:
         """Length of the test functions, s."""
-        return self.fit[0].window.length
+        return self.fit[0].test_function.length
 
 
 def datasets(

@@ -60,7 +60,7 @@ class Noise:
 
 def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     """RMS noise floor in N of the force residual of these logs."""
-    return noise_floor(axis, [(log.motion, log.window) for log in logs])
+    return noise_floor(axis, [(log.motion, log.test_function) for log in logs])
 
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
@@ -70,12 +70,12 @@ def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) ->
     return float(np.sqrt(np.average(parts, weights=weights)))
 
 
-def _variance(axis: AxisModel, motion: Motion, window: TestFunction) -> float:
+def _variance(axis: AxisModel, motion: Motion, test_function: TestFunction) -> float:
     noise = noise_of(axis, motion)
     passed = noise.power
     if any(is_noise(f.effect) for f in axis.effects):
         passed = passed + _rounding(axis, motion, noise.segment)
-    response = window.response(motion.sample_period, noise.segment)
+    response = test_function.response(motion.sample_period, noise.segment)
     return float(np.trapezoid(passed * response, noise.frequency))
 
 

@@ -24,12 +24,12 @@ REST_SPEED = 1e-3  # of the highest speed; below it the force of a friction that
 class PreparedLog:
     """One log's motion of an axis with its weak form.
 
-    window, fine: the test function over the motion's blocks, and over the log's samples. command
-    (n,) N and acceleration (n,) m/s^2 are means by test functions.
+    test_function, fine: over the motion's blocks, and the same over the log's samples. command (n,)
+    N and acceleration (n,) m/s^2 are means by test functions.
     """
 
     motion: Motion
-    window: TestFunction
+    test_function: TestFunction
     fine: TestFunction
     command: Array
     acceleration: Array
@@ -37,22 +37,22 @@ class PreparedLog:
     def __repr__(self) -> str:
         return (
             f"<PreparedLog {self.motion.name}: {len(self)} test functions of "
-            f"{self.window.length:g} s>"
+            f"{self.test_function.length:g} s>"
         )
 
     @classmethod
     def of(cls, motion: Motion, length: float) -> PreparedLog:
         """The log with test functions of that length (s)."""
-        window = TestFunction.of_length(length, motion.period)
+        test_function = TestFunction.of_length(length, motion.period)
         samples = round(motion.period / motion.sample_period)
-        fine, window = window.refined(samples), window.sharpened(samples)
+        fine, test_function = test_function.refined(samples), test_function.sharpened(samples)
         velocity, command = motion.raw
-        return cls(motion, window, fine, fine.mean(command), fine.acceleration(velocity))
+        return cls(motion, test_function, fine, fine.mean(command), fine.acceleration(velocity))
 
     @property
     def time(self) -> Array:
         """(n,) s, middle of each test function."""
-        return self.window.mean(self.motion.time)
+        return self.test_function.mean(self.motion.time)
 
     def __len__(self) -> int:
         return len(self.command)
@@ -93,5 +93,5 @@ def moving(logs: Sequence[PreparedLog], sticks: bool) -> NDArray[np.bool_]:
     for log in logs:
         speed = np.abs(log.motion.velocity)
         still = (speed < REST_SPEED * speed.max()).astype(float)
-        masks.append(log.window.mean(still) < 0.02 if sticks else np.ones(len(log), bool))
+        masks.append(log.test_function.mean(still) < 0.02 if sticks else np.ones(len(log), bool))
     return np.concatenate(masks)

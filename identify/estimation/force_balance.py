@@ -30,7 +30,7 @@ def averaged_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
     parts = []
     for log in logs:
         driven, added = _driven(axis, log)
-        parts.append(log.window.mean(total_force(table, driven)) + added)
+        parts.append(log.test_function.mean(total_force(table, driven)) + added)
     return np.concatenate(parts)
 
 
@@ -125,7 +125,7 @@ def _differences(
     parts = []
     for log in logs:
         forces = total_forces(table, sets, _driven(group, log)[0])
-        parts.append(log.window.mean(forces if absent else forces[1:] - forces[0]))
+        parts.append(log.test_function.mean(forces if absent else forces[1:] - forces[0]))
     return np.concatenate(parts, axis=1)
 
 

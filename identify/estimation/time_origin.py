@@ -106,7 +106,7 @@ def _own_line(axis: AxisModel, rest: AxisModel, log: PreparedLog) -> tuple[float
     """Frequency (Hz) and phase (rad) of the forces of an axis that read the clock, if any."""
     own = replace(axis, effects=tuple(f for f in axis.effects if f.effect.name not in rest.names))
     force = averaged_force(own, [_set(log, 0.0)]) if own.effects else np.zeros(0)
-    tried = lines_in_time([(force, log.window.stride * log.window.period)], most=1)
+    tried = lines_in_time([(force, log.test_function.stride * log.test_function.period)], most=1)
     if not tried:
         return None
     # A residual is what the model's force is to cancel.
@@ -118,7 +118,7 @@ def _common_line(logs: Sequence[PreparedLog], left: Sequence[Array]) -> tuple[fl
 
     None where it may be chance.
     """
-    steps = [log.window.stride * log.window.period for log in logs]
+    steps = [log.test_function.stride * log.test_function.period for log in logs]
     tried = lines_in_time(list(zip(left, steps, strict=True)), most=TRIED)
     if not tried:
         return None

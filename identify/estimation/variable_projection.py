@@ -128,7 +128,7 @@ def _with_lines_left(base: Fit, dataset: Dataset) -> Excitation:
     every[base.kept] = base.residual
     ends = np.cumsum([len(w) for w in dataset.fit])[:-1]
     parts = zip(np.split(every, ends), dataset.fit, strict=True)
-    forces = [(part, w.window.stride * w.window.period) for part, w in parts]
+    forces = [(part, w.test_function.stride * w.test_function.period) for part, w in parts]
     left = lines_in_time(forces, most=RESIDUAL_LINES)
     return replace(dataset.excitation, lines=(*left, *dataset.excitation.lines))
 

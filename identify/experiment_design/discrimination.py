@@ -120,7 +120,9 @@ class Arena:
             [*(log.motion for log in self.logs), new]
         )
         old = (
-            log if np.isclose(log.window.length, length) else PreparedLog.of(log.motion, length)
+            log
+            if np.isclose(log.test_function.length, length)
+            else PreparedLog.of(log.motion, length)
             for log in self.logs
         )
         return (*old, PreparedLog.of(new, length))

@@ -59,7 +59,7 @@ class Gap:
 
 
 def _speed(log: PreparedLog) -> Array:
-    return np.abs(log.window.mean(log.motion.velocity))
+    return np.abs(log.test_function.mean(log.motion.velocity))
 
 
 def _rest(log: PreparedLog) -> Array:
@@ -70,15 +70,15 @@ def _rest(log: PreparedLog) -> Array:
     begun = np.maximum.accumulate(np.where(still, 0, index + 1))
     stood = np.where(still, index + 1 - begun, 0.0)
     ended = np.maximum.accumulate(np.where(still, index, 0))
-    return np.round(log.window.mean(stood[ended] * m.period), 1)
+    return np.round(log.test_function.mean(stood[ended] * m.period), 1)
 
 
 def _force_rate(log: PreparedLog) -> Array:
-    return np.abs(log.window.acceleration(log.motion.command))
+    return np.abs(log.test_function.acceleration(log.motion.command))
 
 
 def _reversal(log: PreparedLog) -> Array:
-    return log.window.mean(since_reversal(log.motion.velocity, log.motion.period))
+    return log.test_function.mean(since_reversal(log.motion.velocity, log.motion.period))
 
 
 FEATURES = (
@@ -91,13 +91,13 @@ FEATURES = (
     Feature(
         "speed of the other axis",
         LINEAR.velocity,
-        lambda log: np.abs(log.window.mean(log.motion.others[1])),
+        lambda log: np.abs(log.test_function.mean(log.motion.others[1])),
         other=True,
     ),
     Feature(
         "acceleration of the other axis",
         LINEAR.acceleration,
-        lambda log: np.abs(log.window.mean(log.motion.others[2])),
+        lambda log: np.abs(log.test_function.mean(log.motion.others[2])),
         other=True,
     ),
 )

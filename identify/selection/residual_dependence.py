@@ -79,26 +79,26 @@ QUANTITIES = ("position", "velocity", "acceleration")
 
 
 def coordinates_of(log: PreparedLog) -> dict[str, Array]:
-    """Coordinates of each window (n_windows,) in SI units, by the names of UNITS.
+    """Coordinates of each test function (n,) in SI units, by the names of UNITS.
 
     On a machine with more than two axes each other axis has coordinates of its own name.
     """
     m = log.motion
-    velocity = log.window.mean(m.velocity)
+    velocity = log.test_function.mean(m.velocity)
     out = {
-        "position": log.window.mean(m.position),
+        "position": log.test_function.mean(m.position),
         "velocity": velocity,
         "direction": np.sign(velocity),
         "acceleration": log.acceleration,
         "time": log.time,
-        "distance_since_reversal": log.window.mean(since_reversal(m.velocity, m.period)),
+        "distance_since_reversal": log.test_function.mean(since_reversal(m.velocity, m.period)),
     }
     if m.others.any():
         for name, row in zip(QUANTITIES, m.others, strict=True):
-            out[f"{OTHER}{name}"] = log.window.mean(row)
+            out[f"{OTHER}{name}"] = log.test_function.mean(row)
     for axis, other in m.beside.items():
         for name, row in zip(QUANTITIES, other.signals, strict=True):
-            out[beside(axis, name)] = log.window.mean(row)
+            out[beside(axis, name)] = log.test_function.mean(row)
     return out
 
 

@@ -63,12 +63,12 @@ def _spectrum(axis: AxisModel, log: PreparedLog) -> tuple[Array, Array, Array, A
     motion = log.motion
     short = PreparedLog.of(motion, SHORTEST * motion.period)
     force = np.where(moving([short], sticks(axis)), residual(axis, [short]), 0.0)
-    period = short.window.stride * motion.period
+    period = short.test_function.stride * motion.period
     segment = min(round(SEGMENT / period), len(force))
     both = np.stack([force, short.command - axis.mass * short.acceleration])
     frequency, power = welch(both, 1.0 / period, nperseg=segment, detrend="constant")
     ratio = round(period / motion.sample_period)
-    passed = short.window.response(motion.sample_period, segment * ratio)[: len(frequency)]
+    passed = short.test_function.response(motion.sample_period, segment * ratio)[: len(frequency)]
     passed_band = (passed > LEAST_PASSED) & (frequency > 0.0)
     noise = noise_of(axis, motion)
     frequency = frequency[passed_band]

@@ -150,7 +150,7 @@ def _coordinates(axis: AxisModel, logs: Sequence[PreparedLog]) -> dict[str, Arra
     """Coordinates (n,) along which the error is shown: of the motion, and periods of the model."""
     where = gathered(logs)
     where["command"] = np.concatenate([log.command for log in logs])
-    speeds = np.concatenate([np.abs(log.window.mean(log.motion.velocity)) for log in logs])
+    speeds = np.concatenate([np.abs(log.test_function.mean(log.motion.velocity)) for log in logs])
     where["standstill"] = (speeds < REST_SPEED * speeds.max()).astype(float)
     for name, period in periods(axis).items():
         where[phase_name(name)] = np.mod(where["position"], period)

@@ -106,7 +106,7 @@ def residual_tests(
     residual = [s["residual"] for s in series]
     left = np.concatenate(residual)
     left = left[np.isfinite(left)]
-    spacing = logs[0].window.stride * _step(logs[0]) * logs[0].motion.period
+    spacing = logs[0].test_function.stride * _step(logs[0]) * logs[0].motion.period
     reach = max(REACH * floor, float(np.quantile(np.abs(left), 0.995)))
     edges = np.linspace(-reach, reach, BINS + 1)
     count, _ = np.histogram(left, edges)
@@ -126,7 +126,7 @@ def residual_tests(
 
 def _step(log: PreparedLog) -> int:
     """Stride, in test functions, from one to the next that does not overlap with it."""
-    return -(-len(log.window.weights) // log.window.stride)
+    return -(-len(log.test_function.weights) // log.test_function.stride)
 
 
 def _series(log: PreparedLog, force: Array, kept: NDArray[np.bool_]) -> dict[str, Array]:
@@ -135,7 +135,7 @@ def _series(log: PreparedLog, force: Array, kept: NDArray[np.bool_]) -> dict[str
     return {
         "residual": np.where(kept, force, np.nan)[apart],
         "command": log.command[apart],
-        "velocity": log.window.mean(log.motion.velocity)[apart],
+        "velocity": log.test_function.mean(log.motion.velocity)[apart],
     }
 
 

@@ -97,7 +97,7 @@ def _facts(subject: Subject) -> list[tuple[str, str]]:
     """The line under the title: model, logs, test functions."""
     axes = subject.comparison.axes.values()
     logs = list(dict.fromkeys(log.motion.name for a in axes for log in a.logs))
-    lengths = list(dict.fromkeys(quantity(a.logs[0].window.length, "s") for a in axes))
+    lengths = list(dict.fromkeys(quantity(a.logs[0].test_function.length, "s") for a in axes))
     facts = [("Model", subject.comparison.model.name), ("Logs", ", ".join(logs))]
     if held := _held_out(subject.diagnosis):
         facts.append(("Held out", ", ".join(held)))

@@ -47,8 +47,8 @@ def _table(axis: AxisComparison) -> Table:
     )
     caption = (
         f"Noise floor of the force: {quantity(axis.floor, axis.units.force)} RMS with test "
-        f"functions of {quantity(axis.logs[0].window.length, 's')}. The free run restarts from the "
-        f"measured motion every {HORIZON:g} s; between restarts the position drifts with every "
+        f"functions of {quantity(axis.logs[0].test_function.length, 's')}. The free run restarts "
+        f"from the measured motion every {HORIZON:g} s; between restarts the position drifts with every "
         "wrong force, measurement noise included."
     )
     return Table(columns, rows, words(caption))

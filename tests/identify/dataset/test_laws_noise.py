@@ -93,7 +93,7 @@ def test_the_square_of_a_floor_of_logs_is_the_mean_of_theirs_weighed_by_their_le
     parts = [len(log.motion.time) for log in logs]
     wanted = (own[0] * parts[0] + own[1] * parts[1]) / sum(parts)
     assert floor_of(axis, logs) ** 2 == pytest.approx(wanted, rel=1e-9)
-    pairs = [(log.motion, log.window) for log in logs]
+    pairs = [(log.motion, log.test_function) for log in logs]
     assert noise_floor(axis, pairs[::-1]) == pytest.approx(floor_of(axis, logs))
 
 

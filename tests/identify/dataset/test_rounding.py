@@ -154,4 +154,4 @@ def _with_more_force(log: PreparedLog) -> PreparedLog:
     signals = log.motion.signals + np.stack([0.0 * beat, 0.0 * beat, beat])
     samples = log.motion.raw.shape[1] // len(beat)
     raw = log.motion.raw + np.stack([np.zeros(log.motion.raw.shape[1]), np.repeat(beat, samples)])
-    return PreparedLog.of(replace(log.motion, signals=signals, raw=raw), log.window.length)
+    return PreparedLog.of(replace(log.motion, signals=signals, raw=raw), log.test_function.length)

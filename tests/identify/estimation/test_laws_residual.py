@@ -224,8 +224,8 @@ def test_blocks_take_what_acts_between_actuator_and_encoder():
 
 def test_a_log_in_windows_has_the_time_of_their_middles():
     log = LOGS[0]
-    step = log.window.stride * log.window.period
-    first = SHORT.time[0] + 0.5 * (len(log.window.weights) - 1) * SHORT.period
+    step = log.test_function.stride * log.test_function.period
+    first = SHORT.time[0] + 0.5 * (len(log.test_function.weights) - 1) * SHORT.period
     np.testing.assert_allclose(log.time, first + step * np.arange(len(log)))
     assert len(log) == len(log.time) == len(log.acceleration)
 

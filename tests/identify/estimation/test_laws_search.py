@@ -143,7 +143,7 @@ def test_a_friction_is_tried_in_the_place_of_the_old_one(dataset, base):
 
 def test_a_ground_on_the_heads_is_that_part_of_the_whole(base, monkeypatch):
     dataset = built_study("one", "two")
-    heads = tuple(type(w).of(w.motion.head(1.1), w.window.length) for w in dataset.fit)
+    heads = tuple(type(w).of(w.motion.head(1.1), w.test_function.length) for w in dataset.fit)
     dataset.__dict__["heads"] = heads
     head = _Ground.of(base, dataset, CATALOGUE["cogging"], SEEN, on_heads=True)
     whole = _Ground.of(base, dataset, CATALOGUE["cogging"], SEEN, on_heads=False)

@@ -12,7 +12,7 @@ from twin.model.machine import AxisModel
 
 LOGS = [windowed(moved(np.random.default_rng(s), 6.0, 1000.0), 0.02) for s in range(4)]
 N = len(LOGS[0])
-STEP = LOGS[0].window.stride * LOGS[0].window.period
+STEP = LOGS[0].test_function.stride * LOGS[0].test_function.period
 F = 23.7  # Hz
 
 
@@ -46,7 +46,9 @@ def test_a_line_of_less_evidence_than_its_phases_cost_is_chance():
 def test_a_fit_is_synchronised_unless_it_reads_the_clock():
     axis = AxisModel(1.7)
     pushed = [
-        w.__class__(w.motion, w.window, w.fine, w.command - residual(axis, [w]) + r, w.acceleration)
+        w.__class__(
+            w.motion, w.test_function, w.fine, w.command - residual(axis, [w]) + r, w.acceleration
+        )
         for w, r in zip(LOGS, left([0.8, 0.5, 0.7, 0.6], 0.01), strict=True)
     ]
     dataset = dataset_of(*pushed)

@@ -104,5 +104,5 @@ def test_a_model_with_the_pump_meets_each_log_at_its_phase(logs):
 def test_moving_a_log_keeps_its_clock(dataset):
     known = with_time_origins(STAGE.axes["x"], dataset)
     log = known.fit[1]
-    again = PreparedLog.of(log.motion.with_force_ahead(1e-5).head(5.0), log.window.length)
+    again = PreparedLog.of(log.motion.with_force_ahead(1e-5).head(5.0), log.test_function.length)
     assert again.motion.time_origin == log.motion.time_origin != 0.0

@@ -253,7 +253,7 @@ def test_what_cannot_run_or_is_too_slow_has_no_record(monkeypatch):
 
 def test_logs_are_windowed_alike():
     longer = arena(FIRST, test_function=0.08).logs_with(MOTION)
-    assert [w.window.length for w in longer] == pytest.approx([0.08, 0.08])
+    assert [w.test_function.length for w in longer] == pytest.approx([0.08, 0.08])
     same = arena(FIRST).logs_with(MOTION)
     assert same[0] is OLD
     assert [w.motion.name for w in same] == ["old", "new"]

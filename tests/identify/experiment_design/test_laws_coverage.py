@@ -26,7 +26,7 @@ FEATURE = {f.name: f for f in FEATURES}
 
 
 def test_features_are_windowed_properties_of_the_motion():
-    m, w = SHORT, LOG.window
+    m, w = SHORT, LOG.test_function
     for name, wanted in {
         "speed": np.abs(w.mean(m.velocity)),
         "acceleration": np.abs(LOG.acceleration),
@@ -53,7 +53,7 @@ def test_a_rest_is_the_time_stood_before_the_motion():
             stood = stood + 1 if abs(v) < REST_SPEED * 0.2 else 0
             last = stood * motion.period if stood else last
             rest.append(last)
-        wanted = np.round(log.window.mean(np.array(rest)), 1)
+        wanted = np.round(log.test_function.mean(np.array(rest)), 1)
         np.testing.assert_allclose(FEATURE["rest before the motion"].of(log), wanted)
         assert wanted.max() == pytest.approx(rounded)
     assert FEATURE["distance since the last reversal"].unit == "m"

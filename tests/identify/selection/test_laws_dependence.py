@@ -219,7 +219,7 @@ def test_residual_tests_take_windows_that_do_not_overlap():
     kept[10:60] = False
     found = residual_tests(logs, force, kept, 0.2, Loop.OPEN)
     apart, begin = [], 0
-    w = logs[0].window
+    w = logs[0].test_function
     step = next(k for k in range(1, 99) if k * w.stride >= len(w.weights))
     for log in logs:
         own = np.arange(begin, begin + len(log))[::step]
@@ -234,7 +234,7 @@ def test_residual_tests_take_windows_that_do_not_overlap():
     np.testing.assert_allclose(found.correlations[0].value, own.value)
     np.testing.assert_allclose(found.correlations[0].lag, own.lag)
     commands = [log.command[::step] for log in logs]
-    speeds = [log.window.mean(log.motion.velocity)[::step] for log in logs]
+    speeds = [log.test_function.mean(log.motion.velocity)[::step] for log in logs]
     for k, signal in ((1, commands), (2, speeds)):
         wanted = correlation("", apart, signal, spacing, Loop.OPEN)
         np.testing.assert_allclose(found.correlations[k].value, wanted.value)

@@ -59,7 +59,7 @@ def test_the_distance_since_a_reversal_is_that_of_a_loop():
 
 
 def test_coordinates_are_windowed_means_in_their_units():
-    found, m, w = coordinates_of(LOG), SHORT, LOG.window
+    found, m, w = coordinates_of(LOG), SHORT, LOG.test_function
     assert list(found) == list(UNITS)
     for name, wanted in {
         "position": w.mean(m.position),
