@@ -48,7 +48,7 @@ def _table(axis: AxisComparison) -> Table:
     caption = (
         f"Noise floor of the force: {quantity(axis.floor, axis.units.force)} RMS with test "
         f"functions of {quantity(axis.logs[0].test_function.length, 's')}. The free run restarts "
-        f"from the measured motion every {HORIZON:g} s; between restarts the position drifts with every "
-        "wrong force, measurement noise included."
+        f"from the measured motion every {HORIZON:g} s; between restarts the position drifts with "
+        "every wrong force, measurement noise included."
     )
     return Table(columns, rows, words(caption))
