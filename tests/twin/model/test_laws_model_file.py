@@ -216,3 +216,12 @@ def test_a_name_without_a_folder_is_that_of_the_package_and_a_file_goes_first(
     with pytest.raises(InputError) as caught:
         find_model("qqqqqqqq.xyz")
     assert "the package has" not in str(caught.value)
+
+
+def test_every_section_of_a_saved_file_holds_values(tmp_path):
+    """No empty header between an axis and its effects, so that the file reads as one written."""
+    save_model(load_model("proton_xy", CATALOGUE), tmp_path / "a.toml")
+    lines = (tmp_path / "a.toml").read_text(encoding="utf-8").splitlines()
+    headers = [i for i, line in enumerate(lines) if line.startswith("[")]
+    assert len(headers) > 2
+    assert all("=" in lines[i + 1] for i in headers)
