@@ -78,18 +78,18 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
     return replace(motion, signals=blocks, raw=raw), rate
 
 
-def reading_error(sensing: AxisModel, motion: Motion) -> tuple[Array, Array]:
+def reading_error(sensing: AxisModel, motion: Motion, passes: int = PASSES) -> tuple[Array, Array]:
     """The error that these sensing effects add to the readings, (n,) m, and its rate, m/s.
 
     The error depends on the true position, which is the reading less the error: a fixed-point
-    iteration that starts from the reading. The readings are smoothed first, because inverting a
-    delay would amplify their noise.
+    iteration that starts from the reading, of which one pass is exact to first order in the error.
+    The readings are smoothed first, because inverting a delay would amplify their noise.
     """
     table = axis_table({motion.axis: sensing})
     _, _, _, first, last = table.axes[0]
     true = motion.smoothed.copy()
     path, reading = motion.smoothed[0], np.empty(true.shape[1])
-    for _ in range(PASSES):
+    for _ in range(passes):
         walk_sensing(
             table.entries, first, last, table.parameters, np.zeros(table.n_states), true,
             motion.sample_period, reading,

@@ -14,6 +14,9 @@ from twin.signals import Array
 
 FEWEST_CYCLES = 20  # over the travel, of an error of the reading
 MOST_RIPPLES = 8
+FEWEST_PITCHES = 3  # over the travel, of a force that repeats
+MOST_PITCHES = 6
+LISTENED = 40.0  # s of all logs together, that lines are sought in before there is a model
 
 
 def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) -> Excitation:
@@ -29,6 +32,7 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
         gap = np.median(ahead) - np.median(behind)
     else:
         gap = 2.0 * np.median(np.abs(command))
+    heard = _heads(motions)
     return Excitation(
         position_low=float(position.min()),
         position_high=float(position.max()),
@@ -37,10 +41,15 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
         duration=float(sum(len(m.time) * m.period for m in motions)),
         period=motions[0].period,
         force_max=float(np.abs(command).max()),
-        lines=lines(motions),
-        ripples=ripples(motions),
+        lines=lines(heard),
+        ripples=ripples(heard),
         resolution=max(m.resolution for m in motions),
     )
+
+
+def _heads(motions: Sequence[Motion]) -> list[Motion]:
+    """The beginnings of motions, long enough together to show what repeats."""
+    return [m.head(LISTENED / len(motions)) for m in motions]
 
 
 def lines(motions: Sequence[Motion]) -> tuple[float, ...]:
@@ -64,6 +73,19 @@ def ripples(motions: Sequence[Motion]) -> tuple[float, ...]:
     lowest, highest = FEWEST_CYCLES / record.span, FINEST_CYCLES / record.span
     found = find_lines([record], lowest, highest, most=MOST_RIPPLES)
     return tuple(line.period for line in found)
+
+
+def pitches(position: Array, values: Array) -> tuple[float, ...]:
+    """Periods (m) at which values (n,) repeat along positions (n,) m, strongest first.
+
+    Where none stands out, one that fits the travel ten times: there is always one to try.
+    """
+    record = Record(position, values)
+    if record.span <= 0.0:
+        return ()
+    highest = min(0.25 * len(position), FINEST_CYCLES) / record.span
+    found = find_lines([record], FEWEST_PITCHES / record.span, highest, most=MOST_PITCHES)
+    return tuple(line.period for line in found) or (0.1 * record.span,)
 
 
 def _rest(motion: Motion) -> Array:

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
-from scipy.signal import welch
 from scipy.signal.windows import hann
 
 from identify.dataset.drive import actual_force, is_noise
@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 
 SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
 LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
+MOST_SEGMENTS = 64  # whose median is sure enough: with as many frequencies, to 1 % of the power
 ROUNDS = 12
 TOLERATED = 0.5  # log of power over fit at which a frequency has half its weight
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
@@ -84,10 +85,8 @@ def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
 
     At speed rounding is white and already in the median spectrum; its slow steps are added here.
     """
-    frequency, power = welch(
-        motion.rounding, 1.0 / motion.sample_period, nperseg=segment, detrend="linear"
-    )
-    return np.asarray(_bend(axis, motion, frequency) * power)
+    frequency, power = _spectra(_pieces(motion.rounding, segment), motion.sample_period)
+    return np.asarray(_bend(axis, motion, frequency) * power.mean(axis=0))
 
 
 def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
@@ -140,14 +139,31 @@ def _median_spectrum(
 ) -> tuple[Array, Array]:
     """Welch's one-sided density with medians: frequency Hz, power unit^2/Hz, (segment // 2 + 1,).
 
-    At least a quarter of the segments is used, those with the fewest left-out samples.
-    The same as scipy.signal.welch with average="median" and linear detrending, but faster: its
-    detrending of one segment after another took a third of a fit. P. D. Welch (1967); bias of the
-    median: B. Allen et al., Phys. Rev. D 85, 122006 (2012).
+    At least a quarter of the segments is used, those with the fewest left-out samples, and of very
+    many as many as make the median sure.
     """
-    step = max(segment - segment // 2, 1)
-    out = sliding_window_view(left_out, segment)[::step].mean(axis=1)
-    pieces = sliding_window_view(signal, segment)[::step][out <= np.quantile(out, LEAST_KEPT)]
+    out = _pieces(left_out, segment).mean(axis=1)
+    usable = np.flatnonzero(out <= np.quantile(out, LEAST_KEPT))
+    pieces = _pieces(signal, segment)[usable[:: -(-len(usable) // MOST_SEGMENTS)]]
+    frequency, power = _spectra(pieces, dt)
+    odd = np.arange(2, (len(pieces) - 1) // 2 * 2 + 1, 2)
+    bias = 1.0 + np.sum(1.0 / (odd + 1.0) - 1.0 / odd)
+    return frequency, np.asarray(np.median(power, axis=0) / bias)
+
+
+def _pieces(signal: NDArray[Any], segment: int) -> NDArray[Any]:
+    """Segments (m, segment) of a signal (n,), each half over the next."""
+    return sliding_window_view(signal, segment)[:: max(segment - segment // 2, 1)]
+
+
+def _spectra(pieces: Array, dt: float) -> tuple[Array, Array]:
+    """One-sided densities of segments (m, n): frequency Hz, power (m, n // 2 + 1) unit^2/Hz.
+
+    As scipy.signal.welch takes them with linear detrending, but faster: its detrending of one
+    segment after another took a third of a fit. P. D. Welch (1967); bias of the median: B. Allen et
+    al., Phys. Rev. D 85, 122006 (2012).
+    """
+    segment = pieces.shape[1]
     ramp = np.linspace(-1.0, 1.0, segment)
     slope = (pieces @ ramp) / (ramp @ ramp)
     level = pieces.mean(axis=1, keepdims=True) + slope[:, None] * ramp
@@ -156,9 +172,7 @@ def _median_spectrum(
     power[:, 0] /= 2.0
     if segment % 2 == 0:
         power[:, -1] /= 2.0
-    odd = np.arange(2, (len(pieces) - 1) // 2 * 2 + 1, 2)
-    bias = 1.0 + np.sum(1.0 / (odd + 1.0) - 1.0 / odd)
-    return np.asarray(np.fft.rfftfreq(segment, dt)), np.asarray(np.median(power, axis=0) / bias)
+    return np.asarray(np.fft.rfftfreq(segment, dt)), np.asarray(power)
 
 
 def _fit_levels(shapes: Array, power: Array) -> Array:
