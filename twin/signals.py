@@ -8,6 +8,8 @@ scipy is imported where it is used, as checking a log, which needs none of it, s
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,12 +43,16 @@ def local_parabola(
 
 def local_cubic(signal: Array, period: float) -> tuple[Array, Array, Array]:
     """Value, rate and second rate (...) in the middle of a signal (n, ...), n odd, by one cubic."""
+    value, first, second = _cubic(len(signal), period) @ signal
+    return value, first, second
+
+
+@lru_cache(maxsize=8)
+def _cubic(samples: int, period: float) -> Array:
+    """Weights (3, samples) of value, rate and second rate in the middle of one cubic."""
     from scipy.signal import savgol_coeffs
 
-    value, first, second = (
-        savgol_coeffs(len(signal), 3, deriv=k, delta=period, use="dot") @ signal for k in range(3)
-    )
-    return value, first, second
+    return np.stack([savgol_coeffs(samples, 3, deriv=k, delta=period, use="dot") for k in range(3)])
 
 
 def usual_size(noise: Array) -> float:

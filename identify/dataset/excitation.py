@@ -14,8 +14,6 @@ from twin.signals import Array
 
 FEWEST_CYCLES = 20  # over the travel, of an error of the reading
 MOST_RIPPLES = 8
-FEWEST_PITCHES = 3  # over the travel, of a force that repeats
-MOST_PITCHES = 6
 LISTENED = 40.0  # s of all logs together, that lines are sought in before there is a model
 
 
@@ -73,19 +71,6 @@ def ripples(motions: Sequence[Motion]) -> tuple[float, ...]:
     lowest, highest = FEWEST_CYCLES / record.span, FINEST_CYCLES / record.span
     found = find_lines([record], lowest, highest, most=MOST_RIPPLES)
     return tuple(line.period for line in found)
-
-
-def pitches(position: Array, values: Array) -> tuple[float, ...]:
-    """Periods (m) at which values (n,) repeat along positions (n,) m, strongest first.
-
-    Where none stands out, one that fits the travel ten times: there is always one to try.
-    """
-    record = Record(position, values)
-    if record.span <= 0.0:
-        return ()
-    highest = min(0.25 * len(position), FINEST_CYCLES) / record.span
-    found = find_lines([record], FEWEST_PITCHES / record.span, highest, most=MOST_PITCHES)
-    return tuple(line.period for line in found) or (0.1 * record.span,)
 
 
 def _rest(motion: Motion) -> Array:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.drive import forces_lessened
-from identify.dataset.excitation import pitches
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.spectral_lines import lines_in_time
@@ -22,6 +21,7 @@ from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.levenberg_marquardt import minimise
+from identify.estimation.pitches import pitches
 from identify.estimation.scaling import Scaling
 from identify.estimation.smoothing import has_nonparametric, smoothing
 from identify.estimation.subspace import orthonormal
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 PRIOR_FORCE = 0.1  # expected force of an effect beside the friction, over the force to explain
 PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
 MOST_EVALUATIONS = 40
-NEGLIGIBLE = 1e-3  # twice a gain in log likelihood, below which a fit has converged
+NEGLIGIBLE = 1e-2  # twice a gain in log likelihood, below which a fit has converged
 PUSHED = 3.0  # standard errors by which the gradient must point beyond a bound
 RESIDUAL_LINES = 6  # spectral lines of the residual that are told
 AT_EDGE = 1e-6  # of a bound, within which a value is at it
@@ -111,7 +111,11 @@ class Fit:
                 strict=True,
             )
         )
-        return pitches(place, self.residual), pitches(place, self.residual * command)
+        alike = np.ones(len(place))
+        plain, thrust = (
+            pitches(place, self.residual, weight, self.jacobian) for weight in (alike, command)
+        )
+        return plain, thrust
 
     @cached_property
     def at_bound(self) -> tuple[str, ...]:

@@ -129,7 +129,8 @@ def fit_thoroughly(axis: AxisModel, dataset: Dataset) -> Fit:
             continue
         rest = fit_without(best, dataset, name)
         found = starts(rest, dataset, effect)[0]
-        if _is_nearest(found.shape, best.axis[name], _with_what_repeats(rest, dataset)):
+        known = _with_what_repeats(rest, dataset)
+        if not _promises(found, best, dataset) and _is_nearest(found.shape, best.axis[name], known):
             continue
         first = found.fitted
         held = {n: best.axis[name].values[n] for n in best.axis[name].fixed}
@@ -138,6 +139,13 @@ def fit_thoroughly(axis: AxisModel, dataset: Dataset) -> Fit:
         if other.error < BETTER * best.error:
             best = replace(other, begun=best.begun)
     return best
+
+
+def _promises(start: Start, fit: Fit, dataset: Dataset) -> bool:
+    """Whether a start leaves less than a fit, on the heads where it was found on them."""
+    whole = len(start.left) == len(fit.residual)
+    there = fit.residual if whole else fit.residual[dataset.in_heads[fit.kept]]
+    return bool(np.mean(start.left**2) < np.mean(there**2))
 
 
 def _is_nearest(shape: dict[str, float], present: Fitted, excitation: Excitation) -> bool:
@@ -239,15 +247,18 @@ def _bounded_step(
 ) -> Array:
     """Change of the strengths (k,) within bounds that minimises the force outside a base's span."""
     left, own = unabsorbed(force, basis), unabsorbed(columns, basis)
-    norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    norms = np.linalg.norm(columns, axis=0)
+    norms[norms == 0.0] = 1.0
     start = np.array([first.values[c.parameter.name] for c in where])
-    low = np.array([c.parameter.lower for c in where]) - start
-    high = np.array([c.parameter.upper for c in where]) - start
-    ridge = RIDGE * np.eye(len(where))
-    scaled = np.vstack([own / norms, ridge])
-    target = np.concatenate([-left, np.zeros(len(where))])
-    step = np.linalg.lstsq(scaled, target, rcond=None)[0] / norms
+    low = (np.array([c.parameter.lower for c in where]) - start) * norms
+    high = (np.array([c.parameter.upper for c in where]) - start) * norms
+    normal = own.T @ own / np.outer(norms, norms) + RIDGE**2 * np.eye(len(where))
+    wanted = -(own.T @ left) / norms
+    step = np.linalg.solve(normal, wanted)
     if ((step < low) | (step > high)).any():
-        low, high = low * norms, np.maximum(high * norms, low * norms + 1e-12)
-        step = lsq_linear(scaled, target, bounds=(low, high)).x / norms
-    return np.asarray(step)
+        if len(step) == 1:
+            return np.clip(step, low, high) / norms
+        factor = np.linalg.cholesky(normal)
+        bounds = (low, np.maximum(high, low + 1e-12))
+        step = lsq_linear(factor.T, np.linalg.solve(factor, wanted), bounds=bounds).x
+    return np.asarray(step / norms)

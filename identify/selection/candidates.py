@@ -23,7 +23,7 @@ from identify.estimation.evidence import (
     left_out,
     noise_gain,
 )
-from identify.estimation.fit import Fit, error_on, finished, fit_axis, rms
+from identify.estimation.fit import Fit, Outcome, error_on, finished, fit_axis, rms
 from identify.estimation.force_balance import residual
 from identify.estimation.time_origin import phases_found
 from identify.estimation.variable_projection import Start, fit_thoroughly, one_linear_step, starts
@@ -33,6 +33,7 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 
 Array = NDArray[np.float64]
 
+FIRST_EVALUATIONS = 12  # of a refit, after which it must show some evidence to go on
 HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
 RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion does not excite
 
@@ -102,8 +103,13 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
             return score(base, looked, dataset, effect)
     elif not _promising(base, best):
         return score(base, one_linear_step(base, best), dataset, effect)
-    fit = simplified(fit_axis(base.axis.with_effect(best.fitted), dataset.fit), dataset, effect)
+    fit = fit_axis(base.axis.with_effect(best.fitted), dataset.fit, FIRST_EVALUATIONS)
     first = score(base, fit, dataset, effect)
+    if first.delta_bic < 0.0:
+        return first
+    if fit.outcome is Outcome.NOT_CONVERGED:
+        fit = fit_axis(fit.axis, dataset.fit)
+    first = score(base, simplified(fit, dataset, effect), dataset, effect)
     if first.fit.at_floor or first.delta_bic < RULE.least_bic:
         return first
     # It helps but does not explain everything. The effect was missing when the base was fitted,
