@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -51,9 +52,14 @@ def run(command: Sequence[str]) -> Cost:
     """The cost of a command, whose output is not shown; RuntimeError where it ends in an error."""
     done = subprocess.run(
         [sys.executable, "-I", "-S", "-c", LAUNCHER, *command],
-        cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True,
+        cwd=ROOT, env=_environment(), stdout=subprocess.PIPE, text=True, check=True,
     )  # fmt: skip
     cpu, wall, memory, code = json.loads(done.stdout)
     if code not in (0, 1):  # 1: the answer of the command is "no"
         raise RuntimeError(f"{' '.join(command)} ended with {code}")
     return Cost(cpu, wall, memory)
+
+
+def _environment() -> dict[str, str]:
+    """That of a user, whose Python keeps the modules that it has compiled."""
+    return {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}

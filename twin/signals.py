@@ -60,3 +60,10 @@ def white_noise(signal: Array) -> float:
     The fourth difference of white noise is sqrt(70) times as large.
     """
     return usual_size(np.diff(signal, 4)) / 70**0.5
+
+
+def sliding_products(signal: Array, pattern: Array) -> Array:
+    """Product of a pattern (m,) with every stretch of a signal (n,), m <= n: (n - m + 1,)."""
+    size = 1 << (len(signal) - 1).bit_length()
+    spectrum = np.fft.rfft(signal, size) * np.conj(np.fft.rfft(pattern, size))
+    return np.fft.irfft(spectrum, size)[: len(signal) - len(pattern) + 1]
