@@ -3,10 +3,13 @@
 ``between`` is exact: over a sample the mean velocity is the difference of the positions at its
 ends. ``rate`` keeps the instants. Local polynomials are for signals whose noise both would blow up.
 The weak form (identify.dataset.test_function) differentiates its weight, not the signal.
-scipy is imported where it is used, as checking a log, which needs none of it, starts without.
+scipy is imported where it is used, as checking a log, which needs none of it, starts without;
+scipy.signal and scipy.stats nowhere, as they take longer to load than a fit takes.
 """
 
 from __future__ import annotations
+
+from math import perm
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,22 +34,35 @@ def local_parabola(
 ) -> Array:
     """Signal (..., n), or its derivative per s, of the parabola through ``samples`` around each.
 
-    samples: odd, at most n; 1 takes each value as it is.
+    samples: odd, at most n; 1 takes each value as it is. At the ends it is the parabola through the
+    first, or the last, ``samples`` (A. Savitzky, M. J. E. Golay, 1964).
     """
-    from scipy.signal import savgol_filter
+    from scipy.ndimage import correlate1d
 
-    order = min(2, samples - 1)
-    return np.asarray(savgol_filter(signal, samples, order, deriv=derivative, delta=period))
+    weights = _local_fit(samples, min(2, samples - 1), derivative) / period**derivative
+    half = samples // 2
+    out = correlate1d(signal, weights[half], axis=-1)
+    out[..., :half] = signal[..., :samples] @ weights[:half].T
+    out[..., signal.shape[-1] - half :] = signal[..., -samples:] @ weights[half + 1 :].T
+    return np.asarray(out)
 
 
 def local_cubic(signal: Array, period: float) -> tuple[Array, Array, Array]:
     """Value, rate and second rate (...) in the middle of a signal (n, ...), n odd, by one cubic."""
-    from scipy.signal import savgol_coeffs
-
+    n = len(signal)
     value, first, second = (
-        savgol_coeffs(len(signal), 3, deriv=k, delta=period, use="dot") @ signal for k in range(3)
+        np.tensordot(_local_fit(n, 3, k)[n // 2] / period**k, signal, 1) for k in range(3)
     )
     return value, first, second
+
+
+def _local_fit(samples: int, order: int, derivative: int) -> Array:
+    """Weights (samples, samples) of the values in the fitted polynomial's derivative at each."""
+    at = np.arange(samples) - samples // 2
+    powers = np.arange(order + 1)
+    falls = np.array([perm(k, derivative) for k in powers])
+    derived = falls * at[:, None].astype(float) ** np.maximum(powers - derivative, 0)
+    return np.asarray(derived @ np.linalg.pinv(at[:, None].astype(float) ** powers))
 
 
 def usual_size(noise: Array) -> float:

@@ -13,16 +13,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
-from scipy.signal import welch
-from scipy.signal.windows import hann
 
 from identify.dataset.drive import actual_force, is_noise
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, on_blocks, sticks, total_force
+from identify.dataset.spectrum import densities, pieces_of
 from identify.dataset.test_function import TestFunction
 from twin.model.machine import AxisModel
 from twin.signals import between
@@ -84,10 +82,9 @@ def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
 
     At speed rounding is white and already in the median spectrum; its slow steps are added here.
     """
-    frequency, power = welch(
-        motion.rounding, 1.0 / motion.sample_period, nperseg=segment, detrend="linear"
-    )
-    return np.asarray(_bend(axis, motion, frequency) * power)
+    dt = motion.sample_period
+    power = densities(_less_lines(pieces_of(motion.rounding, segment)), dt).mean(axis=0)
+    return np.asarray(_bend(axis, motion, np.fft.rfftfreq(segment, dt)) * power)
 
 
 def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
@@ -141,24 +138,21 @@ def _median_spectrum(
     """Welch's one-sided density with medians: frequency Hz, power unit^2/Hz, (segment // 2 + 1,).
 
     At least a quarter of the segments is used, those with the fewest left-out samples.
-    The same as scipy.signal.welch with average="median" and linear detrending, but faster: its
-    detrending of one segment after another took a third of a fit. P. D. Welch (1967); bias of the
-    median: B. Allen et al., Phys. Rev. D 85, 122006 (2012).
+    Medians are biased, see B. Allen et al., Phys. Rev. D 85, 122006 (2012).
     """
-    step = max(segment - segment // 2, 1)
-    out = sliding_window_view(left_out, segment)[::step].mean(axis=1)
-    pieces = sliding_window_view(signal, segment)[::step][out <= np.quantile(out, LEAST_KEPT)]
-    ramp = np.linspace(-1.0, 1.0, segment)
-    slope = (pieces @ ramp) / (ramp @ ramp)
-    level = pieces.mean(axis=1, keepdims=True) + slope[:, None] * ramp
-    taper = hann(segment, sym=False)
-    power = np.abs(np.fft.rfft((pieces - level) * taper)) ** 2 * (2.0 * dt / (taper @ taper))
-    power[:, 0] /= 2.0
-    if segment % 2 == 0:
-        power[:, -1] /= 2.0
+    out = pieces_of(left_out, segment).mean(axis=1)
+    pieces = pieces_of(signal, segment)[out <= np.quantile(out, LEAST_KEPT)]
+    power = densities(_less_lines(pieces), dt)
     odd = np.arange(2, (len(pieces) - 1) // 2 * 2 + 1, 2)
     bias = 1.0 + np.sum(1.0 / (odd + 1.0) - 1.0 / odd)
     return np.asarray(np.fft.rfftfreq(segment, dt)), np.asarray(np.median(power, axis=0) / bias)
+
+
+def _less_lines(pieces: Array) -> Array:
+    """Pieces (k, n) less the straight line through each."""
+    ramp = np.linspace(-1.0, 1.0, pieces.shape[1])
+    slope = (pieces @ ramp) / (ramp @ ramp)
+    return np.asarray(pieces - (pieces.mean(axis=1, keepdims=True) + slope[:, None] * ramp))
 
 
 def _fit_levels(shapes: Array, power: Array) -> Array:

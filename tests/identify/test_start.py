@@ -71,3 +71,17 @@ def test_the_package_gives_its_calls_by_name() -> None:
     ]
     with pytest.raises(AttributeError, match="no attribute 'guess'"):
         _ = identify.guess
+
+
+def test_a_fit_is_not_slower_to_load_than_to_run(tmp_path: Path) -> None:
+    """scipy.signal and scipy.stats take a second to load; SciPy's smaller parts hold what is used.
+
+    Drawing takes another, and only a report draws.
+    """
+    script = "import json, sys, identify.workflow; print(json.dumps([*sys.modules]))"
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    loaded = set(json.loads(done.stdout))
+    assert "identify.workflow" in loaded
+    assert not {"scipy.signal", "scipy.stats", "matplotlib", "jinja2"} & loaded
