@@ -84,7 +84,8 @@ def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
     """
     dt = motion.sample_period
     power = densities(_less_lines(pieces_of(motion.rounding, segment)), dt).mean(axis=0)
-    return np.asarray(_bend(axis, motion, np.fft.rfftfreq(segment, dt)) * power)
+    frequency = np.asarray(np.fft.rfftfreq(segment, dt), dtype=float)
+    return np.asarray(_bend(axis, motion, frequency) * power)
 
 
 def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -95,7 +96,7 @@ class Grid:
         return np.abs(np.fft.rfft(spread)[:, WIDTH:]) ** 2
 
 
-def pieces_of(signal: Array, samples: int) -> Array:
+def pieces_of(signal: NDArray[Any], samples: int) -> NDArray[Any]:
     """Pieces (..., k, samples) of a signal (..., n), each half over the next; they are views."""
     step = max(samples - samples // 2, 1)
     return sliding_window_view(signal, samples, axis=-1)[..., ::step, :]

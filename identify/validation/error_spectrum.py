@@ -68,7 +68,7 @@ def _spectrum(axis: AxisModel, log: PreparedLog) -> tuple[Array, Array, Array, A
     both = np.stack([force, short.command - axis.mass * short.acceleration])
     pieces = pieces_of(both, segment)
     power = densities(pieces - pieces.mean(axis=-1, keepdims=True), period).mean(axis=1)
-    frequency = np.fft.rfftfreq(segment, period)
+    frequency = np.asarray(np.fft.rfftfreq(segment, period), dtype=float)
     ratio = round(period / motion.sample_period)
     passed = short.test_function.response(motion.sample_period, segment * ratio)[: len(frequency)]
     passed_band = (passed > LEAST_PASSED) & (frequency > 0.0)
