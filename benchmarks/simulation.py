@@ -84,15 +84,19 @@ def measure() -> list[Figure]:
     return [
         Figure(
             "twin.simulator.run in MuJoCo over a bare compiled mj_step loop of the same mjModel",
-            ratio(bare, whole), "steps/s ratio", Target(low=0.8),
+            ratio(bare, whole), "steps/s ratio", Target(low=0.92),
             "whole run: set-up, noise, control, effects, logging",
         ),
-        Figure("the same, its stepping alone", ratio(bare, steps), "steps/s ratio"),
         Figure(
-            "reduced model over MuJoCo, stepping the same setpoint",
-            ratio(steps, reduced_steps), "steps/s ratio", Target(low=15.0),
+            "the same, its stepping alone", ratio(bare, steps), "steps/s ratio", Target(low=0.95),
+            "above 1 as MuJoCo's own timers stand still in it",
+        ),
+        Figure(
+            "reduced model over that bare loop, stepping the same setpoint",
+            ratio(bare, reduced_steps), "steps/s ratio", Target(low=15.0),
             f"control, effects, logging; million steps/s: {rates}",
         ),
+        Figure("the same, over the stage in MuJoCo", ratio(steps, reduced_steps), "steps/s ratio"),
         Figure(
             "the same, whole runs", ratio(whole, reduced), "steps/s ratio",
             note="both draw the encoder noise and make the arrays, which the ratio dilutes",
