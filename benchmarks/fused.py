@@ -12,6 +12,8 @@ import numba
 import numpy as np
 
 from benchmarks.timing import Array
+from twin.core.control import RESOLUTION, command, measure
+from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
 from twin.model.machine import AxisModel
 
 EFFECTS = ("lugre", "cable_slab", "roller_spikes")
@@ -28,7 +30,10 @@ def constants(axis: AxisModel) -> Array:
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
 def force(c, state, x, v, dt, when):
-    """Force on the axis, N. c (16,): see ``constants``; state: z m, direction; when: see WHEN."""
+    """Cable, spikes and friction on the axis, N.
+
+    c (16,): see ``constants``; state: z m, direction; when: see twin.effect.WHEN.
+    """
     speed = abs(v)
     q = speed / c[2]
     depth = q * q
@@ -56,7 +61,7 @@ def force(c, state, x, v, dt, when):
     r = 2.0 * (turns - floor(turns + 0.5)) * c[11] / c[12]
     bump = (1.0 - r * r) * (1.0 - r * r) if abs(r) < 1.0 else 0.0
     spikes = -0.5 * ((c[14] + c[15]) * direction + (c[14] - c[15])) * bump
-    return cable + spikes, friction
+    return cable, spikes, friction
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -64,5 +69,35 @@ def along(c, position, velocity, dt, out):
     """Force (n,) N of the laws along a measured motion, at its own rate: one pass."""
     state = np.zeros(2)
     for k in range(position.shape[0]):
-        forward, friction = force(c, state, position[k], velocity[k], dt, 0.5)
-        out[k] = forward - friction
+        cable, spikes, friction = force(c, state, position[k], velocity[k], dt, 0.5)
+        out[k] = cable + spikes - friction
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def stepped(
+    c, masses, dt, motion, state, first, gains, controllers, setpoints, noise,
+    signals, forces, states,
+):  # fmt: skip
+    """Run the reduced model of some axes: what twin.core.loop.run_reduced does, for these laws.
+
+    c (n_axes, 16); motion (n_axes, 2): x m, v m/s; state (n_axes, 2): z m, direction. The other
+    arguments are those of run_reduced.
+    """
+    n, n_axes = noise.shape
+    for k in range(n):
+        for a in range(n_axes):
+            x, v = motion[a, 0], motion[a, 1]
+            position = x - 0.5 * dt * v
+            reading = measure(position, noise[k, a], gains[a, RESOLUTION])
+            u = command(gains[a], controllers[a], setpoints[k, a], reading, dt, first + k == 0)
+            signals[k, a, READING_COLUMN] = reading
+            signals[k, a, COMMAND_COLUMN] = u
+            signals[k, a, POSITION_COLUMN] = position
+            signals[k, a, VELOCITY_COLUMN] = v
+            cable, spikes, friction = force(c[a], state[a], x, v, dt, 1.0)
+            forces[k, 3 * a] = cable
+            forces[k, 3 * a + 1] = spikes
+            forces[k, 3 * a + 2] = -friction
+            v += dt / masses[a] * (cable + spikes - friction + u)
+            motion[a, 0], motion[a, 1] = x + dt * v, v
+            states[k, 2 * a], states[k, 2 * a + 1] = state[a, 1], state[a, 0]
