@@ -15,17 +15,19 @@ from benchmarks import (
     effect_cost,
     import_time,
     mcap_logs,
+    passes,
     peer_fits,
     second_start,
     selftest,
     simulation,
+    stages,
 )
 from benchmarks.figures import Figure, write_results
 from benchmarks.mutation import noticed
 
 ALL = (
-    simulation, second_start, peer_fits, diagnosis, mcap_logs, effect_cost, import_time, selftest,
-    noticed,
+    simulation, second_start, peer_fits, diagnosis, passes, stages, mcap_logs, effect_cost,
+    import_time, selftest, noticed,
 )  # fmt: skip
 
 

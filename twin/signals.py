@@ -3,12 +3,14 @@
 ``between`` is exact: over a sample the mean velocity is the difference of the positions at its
 ends. ``rate`` keeps the instants. Local polynomials are for signals whose noise both would blow up.
 The weak form (identify.dataset.test_function) differentiates its weight, not the signal.
-scipy is imported where it is used, as checking a log, which needs none of it, starts without.
+scipy is imported where it is used, as checking a log, which needs none of it, starts without;
+scipy.signal and scipy.stats nowhere, as they take longer to load than a fit takes.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
+from math import perm
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,26 +35,36 @@ def local_parabola(
 ) -> Array:
     """Signal (..., n), or its derivative per s, of the parabola through ``samples`` around each.
 
-    samples: odd, at most n; 1 takes each value as it is.
+    samples: odd, at most n; 1 takes each value as it is. At the ends it is the parabola through the
+    first, or the last, ``samples`` (A. Savitzky, M. J. E. Golay, 1964).
     """
-    from scipy.signal import savgol_filter
+    from scipy.ndimage import correlate1d
 
-    order = min(2, samples - 1)
-    return np.asarray(savgol_filter(signal, samples, order, deriv=derivative, delta=period))
+    weights = _local_fit(samples, min(2, samples - 1), derivative) / period**derivative
+    half = samples // 2
+    out = correlate1d(signal, weights[half], axis=-1)
+    out[..., :half] = signal[..., :samples] @ weights[:half].T
+    out[..., signal.shape[-1] - half :] = signal[..., -samples:] @ weights[half + 1 :].T
+    return np.asarray(out)
 
 
 def local_cubic(signal: Array, period: float) -> tuple[Array, Array, Array]:
     """Value, rate and second rate (...) in the middle of a signal (n, ...), n odd, by one cubic."""
-    value, first, second = _cubic(len(signal), period) @ signal
+    n = len(signal)
+    value, first, second = (
+        np.tensordot(_local_fit(n, 3, k)[n // 2] / period**k, signal, 1) for k in range(3)
+    )
     return value, first, second
 
 
-@lru_cache(maxsize=8)
-def _cubic(samples: int, period: float) -> Array:
-    """Weights (3, samples) of value, rate and second rate in the middle of one cubic."""
-    from scipy.signal import savgol_coeffs
-
-    return np.stack([savgol_coeffs(samples, 3, deriv=k, delta=period, use="dot") for k in range(3)])
+@lru_cache(maxsize=16)
+def _local_fit(samples: int, order: int, derivative: int) -> Array:
+    """Weights (samples, samples) of the values in the fitted polynomial's derivative at each."""
+    at = np.arange(samples) - samples // 2
+    powers = np.arange(order + 1)
+    falls = np.array([perm(k, derivative) for k in powers])
+    derived = falls * at[:, None].astype(float) ** np.maximum(powers - derivative, 0)
+    return np.asarray(derived @ np.linalg.pinv(at[:, None].astype(float) ** powers))
 
 
 def usual_size(noise: Array) -> float:
@@ -66,3 +78,10 @@ def white_noise(signal: Array) -> float:
     The fourth difference of white noise is sqrt(70) times as large.
     """
     return usual_size(np.diff(signal, 4)) / 70**0.5
+
+
+def sliding_products(signal: Array, pattern: Array) -> Array:
+    """Product of a pattern (m,) with every stretch of a signal (n,), m <= n: (n - m + 1,)."""
+    size = 1 << (len(signal) - 1).bit_length()
+    spectrum = np.fft.rfft(signal, size) * np.conj(np.fft.rfft(pattern, size))
+    return np.fft.irfft(spectrum, size)[: len(signal) - len(pattern) + 1]

@@ -16,8 +16,10 @@ INTERRUPTED = 130  # exit code that typer makes of Ctrl-C, without a word
 
 def main() -> None:
     """Entry point of `twin`: errors are one line, exit code 2."""
-    # Candidates go side by side, one a core; the matrices of each are too small to share out.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Candidates go side by side, one a core; the matrices of each are too small to share out, and
+    # threads that wait for work cost CPU time. Read once, as NumPy is imported by a command.
+    for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(threads, "1")
     try:
         code = app(standalone_mode=False)
         if code == INTERRUPTED:

@@ -84,12 +84,11 @@ def import_(
 @app.command()
 def check(logs: Logs, as_json_: Json = False) -> None:
     """Say whether logs are fit for identification, and what is wrong with them."""
-    from identify.output import machine_json
-    from identify.output import text as as_text
+    from identify.output import machine_json, machine_text
     from twin.log.check import check_log
 
     reports = {name: check_log(log) for name, log in read_logs(logs).items()}
-    say(as_text.check_text(reports), machine_json.check_json(reports), as_json_)
+    say(machine_text.check_text(reports), machine_json.check_json(reports), as_json_)
     if not all(report.ok for report in reports.values()):
         raise typer.Exit(1)
 
@@ -123,8 +122,7 @@ def effects(
     as_json_: Json = False,
 ) -> None:
     """Print the catalogue, or one effect with its equation, units and source; or check it."""
-    from identify.output import machine_json
-    from identify.output import text as as_text
+    from identify.output import machine_json, machine_text
 
     catalogue = catalogue_with(files)
     if check_:
@@ -140,11 +138,11 @@ def effects(
 
             require_folder(plot)
             draw(chosen, catalogue, plot)
-        say(as_text.effect_text(chosen), machine_json.effect_json(chosen), as_json_)
+        say(machine_text.effect_text(chosen), machine_json.effect_json(chosen), as_json_)
         return
     everything = list(catalogue.values())
     say(
-        as_text.effects_text(everything),
+        machine_text.effects_text(everything),
         {"effects": [machine_json.effect_json(e) for e in everything]},
         as_json_,
     )

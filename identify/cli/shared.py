@@ -92,7 +92,7 @@ def bars_on_stderr() -> Iterator[Progress]:
 
 def say(text: str, result: dict[str, Any], as_json: bool, warnings: Sequence[str] = ()) -> None:
     """Print the warnings on standard error, and the result as text or as one JSON object."""
-    from identify.output.as_json import plain
+    from identify.output.plain import plain
 
     for warning in warnings:
         print(f"twin: {warning}", file=sys.stderr)

@@ -11,18 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
-from scipy.signal.windows import hann
 
 from identify.dataset.drive import actual_force, is_noise
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, on_blocks, sticks, total_force
+from identify.dataset.spectrum import densities, pieces_of
 from identify.dataset.test_function import TestFunction
 from twin.model.machine import AxisModel
 from twin.signals import between
@@ -85,8 +83,10 @@ def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
 
     At speed rounding is white and already in the median spectrum; its slow steps are added here.
     """
-    frequency, power = _spectra(_pieces(motion.rounding, segment), motion.sample_period)
-    return np.asarray(_bend(axis, motion, frequency) * power.mean(axis=0))
+    dt = motion.sample_period
+    power = densities(_less_lines(pieces_of(motion.rounding, segment)), dt).mean(axis=0)
+    frequency = np.asarray(np.fft.rfftfreq(segment, dt), dtype=float)
+    return np.asarray(_bend(axis, motion, frequency) * power)
 
 
 def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
@@ -141,38 +141,22 @@ def _median_spectrum(
 
     At least a quarter of the segments is used, those with the fewest left-out samples, and of very
     many as many as make the median sure.
+    Medians are biased, see B. Allen et al., Phys. Rev. D 85, 122006 (2012).
     """
-    out = _pieces(left_out, segment).mean(axis=1)
+    out = pieces_of(left_out, segment).mean(axis=1)
     usable = np.flatnonzero(out <= np.quantile(out, LEAST_KEPT))
-    pieces = _pieces(signal, segment)[usable[:: -(-len(usable) // MOST_SEGMENTS)]]
-    frequency, power = _spectra(pieces, dt)
+    pieces = pieces_of(signal, segment)[usable[:: -(-len(usable) // MOST_SEGMENTS)]]
+    power = densities(_less_lines(pieces), dt)
     odd = np.arange(2, (len(pieces) - 1) // 2 * 2 + 1, 2)
     bias = 1.0 + np.sum(1.0 / (odd + 1.0) - 1.0 / odd)
-    return frequency, np.asarray(np.median(power, axis=0) / bias)
+    return np.asarray(np.fft.rfftfreq(segment, dt)), np.asarray(np.median(power, axis=0) / bias)
 
 
-def _pieces(signal: NDArray[Any], segment: int) -> NDArray[Any]:
-    """Segments (m, segment) of a signal (n,), each half over the next."""
-    return sliding_window_view(signal, segment)[:: max(segment - segment // 2, 1)]
-
-
-def _spectra(pieces: Array, dt: float) -> tuple[Array, Array]:
-    """One-sided densities of segments (m, n): frequency Hz, power (m, n // 2 + 1) unit^2/Hz.
-
-    As scipy.signal.welch takes them with linear detrending, but faster: its detrending of one
-    segment after another took a third of a fit. P. D. Welch (1967); bias of the median: B. Allen et
-    al., Phys. Rev. D 85, 122006 (2012).
-    """
-    segment = pieces.shape[1]
-    ramp = np.linspace(-1.0, 1.0, segment)
+def _less_lines(pieces: Array) -> Array:
+    """Pieces (k, n) less the straight line through each."""
+    ramp = np.linspace(-1.0, 1.0, pieces.shape[1])
     slope = (pieces @ ramp) / (ramp @ ramp)
-    level = pieces.mean(axis=1, keepdims=True) + slope[:, None] * ramp
-    taper = hann(segment, sym=False)
-    power = np.abs(np.fft.rfft((pieces - level) * taper)) ** 2 * (2.0 * dt / (taper @ taper))
-    power[:, 0] /= 2.0
-    if segment % 2 == 0:
-        power[:, -1] /= 2.0
-    return np.asarray(np.fft.rfftfreq(segment, dt)), np.asarray(power)
+    return np.asarray(pieces - (pieces.mean(axis=1, keepdims=True) + slope[:, None] * ramp))
 
 
 def _fit_levels(shapes: Array, power: Array) -> Array:

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 from scipy.ndimage import median_filter
@@ -92,6 +94,26 @@ class Grid:
             for r, place, taper in zip(records, self.places, self.tapers, strict=True)
         ]
         return np.abs(np.fft.rfft(spread)[:, WIDTH:]) ** 2
+
+
+def pieces_of(signal: NDArray[Any], samples: int) -> NDArray[Any]:
+    """Pieces (..., k, samples) of a signal (..., n), each half over the next; they are views."""
+    step = max(samples - samples // 2, 1)
+    return sliding_window_view(signal, samples, axis=-1)[..., ::step, :]
+
+
+def densities(pieces: Array, period: float) -> Array:
+    """One-sided power density of pieces (..., n), unit^2/Hz, (..., n // 2 + 1), by Hann's window.
+
+    Their mean is Welch's estimate (P. D. Welch, 1967). period: s between samples.
+    """
+    n = pieces.shape[-1]
+    taper = np.sin(np.pi * np.arange(n) / n) ** 2
+    power = np.abs(np.fft.rfft(pieces * taper)) ** 2 * (2.0 * period / (taper @ taper))
+    power[..., 0] /= 2.0
+    if n % 2 == 0:
+        power[..., -1] /= 2.0
+    return np.asarray(power)
 
 
 def level(powers: Array, empty: Array) -> Array:

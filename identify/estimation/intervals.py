@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from identify.estimation.evidence import left_out
 from identify.estimation.fit import Fit
@@ -174,7 +174,7 @@ def half_widths(fit: Fit) -> Array:
     covariance = inverse @ (scores.T @ scores * (BLOCKS - 1) / BLOCKS) @ inverse
     # A prior or a bound shifts the estimate from the least-squares solution by this much.
     shift = np.abs(inverse @ (columns.T @ fit.residual))
-    quantile = student.ppf(0.5 + CONFIDENCE / 2.0, BLOCKS - 1)
+    quantile = stdtrit(BLOCKS - 1, 0.5 + CONFIDENCE / 2.0)
     spread_of = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     out[excited] = (quantile * spread_of + shift) / norms[excited]
     return out

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from twin.effect import Effect
-from twin.log.check import CheckReport
+
+if TYPE_CHECKING:
+    from twin.log.check import CheckReport
 
 
 def effect_json(effect: Effect) -> dict[str, Any]:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from identify.dataset.noise_floor import noise_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.dataset.spectrum import densities, pieces_of
 from identify.estimation.force_balance import residual
 from twin.model.machine import AxisModel
 
@@ -66,7 +66,9 @@ def _spectrum(axis: AxisModel, log: PreparedLog) -> tuple[Array, Array, Array, A
     period = short.test_function.stride * motion.period
     segment = min(round(SEGMENT / period), len(force))
     both = np.stack([force, short.command - axis.mass * short.acceleration])
-    frequency, power = welch(both, 1.0 / period, nperseg=segment, detrend="constant")
+    pieces = pieces_of(both, segment)
+    power = densities(pieces - pieces.mean(axis=-1, keepdims=True), period).mean(axis=1)
+    frequency = np.asarray(np.fft.rfftfreq(segment, period), dtype=float)
     ratio = round(period / motion.sample_period)
     passed = short.test_function.response(motion.sample_period, segment * ratio)[: len(frequency)]
     passed_band = (passed > LEAST_PASSED) & (frequency > 0.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.noise_floor import floor_of
@@ -257,7 +257,7 @@ def worst_regions(maps: Sequence[MisfitMap], samples: float, count: int = 3) -> 
     found = []
     for m in maps:
         values = np.maximum(samples * m.visited, 1.0)
-        chance = np.sqrt(chi2.ppf(1.0 - CHANCE / max(tried, 1), values) / values)
+        chance = np.sqrt(chdtri(values, CHANCE / max(tried, 1)) / values)
         high = m.rms > np.maximum(ABOVE_FLOOR, chance) * m.floor
         excess = np.where(high, m.share - m.visited, 0.0)
         i = int(np.argmax(excess))

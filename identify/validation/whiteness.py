@@ -14,7 +14,7 @@ from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from identify.dataset.prepared_log import PreparedLog
 
@@ -116,7 +116,7 @@ def residual_tests(
         floor=floor,
         edges=edges,
         density=count / (len(left) * np.diff(edges)),
-        within=float(np.mean(np.abs(left) < norm.ppf(0.5 + WITHIN / 2.0) * floor)),
+        within=float(np.mean(np.abs(left) < ndtri(0.5 + WITHIN / 2.0) * floor)),
         correlations=tuple(
             correlation(name, residual, [s[name] for s in series], spacing, loop)
             for name in ("residual", "command", "velocity")
@@ -163,8 +163,8 @@ def correlation(
         lag=np.asarray(spacing * lags),
         value=products / max(power, 1e-300),
         tested=tested,
-        bound=float(norm.ppf(0.5 + WITHIN / 2.0) / root),
-        limit=float(norm.ppf(1.0 - (1.0 - SURE) / 2.0 / count) / root),
+        bound=float(ndtri(0.5 + WITHIN / 2.0) / root),
+        limit=float(ndtri(1.0 - (1.0 - SURE) / 2.0 / count) / root),
     )
 
 

@@ -21,7 +21,7 @@ import twin.log.importers
 import twin.model.file
 from identify import workflow
 from identify.cli.shared import checked
-from identify.output import as_json, machine_json
+from identify.output import as_json, machine_json, machine_text
 from identify.output import selftest as selftest_output
 from identify.output import text as as_text
 from identify.selftest.tally import Rate
@@ -203,8 +203,8 @@ def test_check(monkeypatch, cli, severity, code):
 
 
 def test_effects(monkeypatch, cli):
-    monkeypatch.setattr(as_text, "effects_text", lambda effects: f"all {len(effects)}")
-    monkeypatch.setattr(as_text, "effect_text", lambda effect: f"one {effect}")
+    monkeypatch.setattr(machine_text, "effects_text", lambda effects: f"all {len(effects)}")
+    monkeypatch.setattr(machine_text, "effect_text", lambda effect: f"one {effect}")
     monkeypatch.setattr(machine_json, "effect_json", lambda effect: {"is": effect})
     draw = stub(monkeypatch, identify.output.signature, "draw")
     assert cli("effects") == (0, "all 2\n", "")

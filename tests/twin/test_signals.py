@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from twin.signals import between, local_cubic, local_parabola, rate, usual_size
+from twin.signals import between, local_cubic, local_parabola, rate, sliding_products, usual_size
 
 PERIOD = 0.02
 T = PERIOD * np.arange(-8, 9)
@@ -40,3 +40,12 @@ def test_the_usual_size_passes_outliers_by():
     noise = np.random.default_rng(4).normal(0.0, 3.0, 20_000)
     noise[::50] = 1e6
     assert usual_size(noise) == pytest.approx(3.0, rel=0.04)
+
+
+def test_sliding_products_are_those_of_every_stretch():
+    rng = np.random.default_rng(3)
+    signal = rng.normal(size=37)
+    for length in (1, 5, 36, 37):
+        pattern = rng.normal(size=length)
+        wanted = [pattern @ signal[k : k + length] for k in range(38 - length)]
+        np.testing.assert_allclose(sliding_products(signal, pattern), wanted, atol=1e-12)

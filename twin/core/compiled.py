@@ -18,6 +18,7 @@ import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
+from numba.extending import register_jitable
 
 
 class _Cache(FunctionCache):
@@ -49,12 +50,31 @@ def compiled(*, inline: bool = False, nogil: bool = False) -> Callable[[Any], An
 def callback(function: Any, signature: Any) -> Any:
     """The function compiled now as a C function, from disk where it was compiled before.
 
+    It may call plain functions of its own file, so that a file of laws needs no numba to be read.
     Raises numba.core.errors.NumbaError where it cannot be compiled.
     """
+    for called in _own_functions(function, set()):
+        _let_be_called(called)
     out = _Callback(function, (signature.args, signature.return_type), {}, {"error_model": "numpy"})
     out.enable_caching()
     out.compile()
     return out
+
+
+def _own_functions(function: Any, seen: set[FunctionType]) -> set[FunctionType]:
+    """The plain functions of the same file that a function calls, directly or not."""
+    for name in function.__code__.co_names:
+        called = function.__globals__.get(name)
+        own = isinstance(called, FunctionType) and called.__module__ == function.__module__
+        if own and called not in seen:
+            seen.add(called)
+            _own_functions(called, seen)
+    return seen
+
+
+@cache  # once each
+def _let_be_called(function: FunctionType) -> None:
+    register_jitable(function)
 
 
 @cache

@@ -136,17 +136,18 @@ def run_reduced(
         for j in range(substeps):
             io[INDEX] = (first_sample + k) * substeps + j
             io[TIME] = origin + ((first_sample + k) * substeps + j) * step
-            for a in range(n_axes):
-                before[a, 0] = motion[a, 0]
-                before[a, 1] = motion[a, 1]
-                before[a, 2] = effect_states[axes[a, 2] + LAST_ACCELERATION]
+            if n_axes == 2:  # no law of a larger machine reads the other axis (MachineModel)
+                for a in range(2):
+                    before[a, 0] = motion[a, 0]
+                    before[a, 1] = motion[a, 1]
+                    before[a, 2] = effect_states[axes[a, 2] + LAST_ACCELERATION]
             for a in range(n_axes):
                 io[X] = motion[a, 0]
                 io[V] = motion[a, 1]
                 io[U] = commands[a]
                 io[MASS] = masses[a]
                 io[MOVED] = masses[a]
-                if n_axes == 2:  # no law of a larger machine reads them (MachineModel)
+                if n_axes == 2:
                     io[X_OTHER] = before[1 - a, 0]
                     io[V_OTHER] = before[1 - a, 1]
                     io[A_OTHER] = before[1 - a, 2]

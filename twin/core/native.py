@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.core.attached_masses import along, answers, settle, stands
-from twin.core.calling import ADDRESS, KIND, P_AT, S_AT, borrow, call_law, law_address
+from twin.core.calling import ADDRESS, KIND, P_AT, S_AT, borrow, call_law, doubles_at, law_address
 from twin.core.compiled import compiled
 from twin.effect import (
     A_OTHER,
@@ -64,10 +64,11 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
     io[DRY] = 1.0
     io[STATIC] = 1.0
     io[VISCOUS] = 1.0
-    io[FRICTION] = states[at + LAST_FRICTION]
     p = parameters.ctypes.data
     s = states.ctypes.data
     w = io.ctypes.data
+    own = doubles_at(s + 8 * at)
+    io[FRICTION] = own[LAST_FRICTION]
     structure = last
     while structure > first and entries[structure - 1, KIND] == _STRUCTURE:
         structure -= 1
@@ -105,9 +106,9 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
     added = 0.0
     if structure < last:
         added = settle(entries, structure, last, p, s, io, net, answered, rows, k)
-    states[at + LAST_FRICTION] = friction
-    states[at + LAST_ACCELERATION] = (io[V] - states[at + LAST_VELOCITY]) * rate
-    states[at + LAST_VELOCITY] = io[V]
+    own[LAST_FRICTION] = friction
+    own[LAST_ACCELERATION] = (io[V] - own[LAST_VELOCITY]) * rate
+    own[LAST_VELOCITY] = io[V]
     return net, added
 
 

@@ -17,9 +17,7 @@ each log, so C only helps where the phase is the same in all logs.
 
 from functools import cache
 from math import copysign, expm1, sqrt
-
-import numpy as np
-from numba.extending import register_jitable
+from typing import Any
 
 from twin.effect import DT, OUT, TIME, WHEN, Effect, Kind, Parameter, Part, V, X
 
@@ -28,7 +26,6 @@ SPEEDS = 17
 PHASES = 12
 
 
-@register_jitable
 def curve(p, first, intervals, place):
     """Piecewise-linear curve through even knots at a place 0..1; beyond, its end value."""
     along = min(max(place, 0.0), 1.0) * intervals
@@ -37,13 +34,11 @@ def curve(p, first, intervals, place):
     return low + (along - left) * (p[first + left + 1] - low)
 
 
-@register_jitable
 def inside(place, margin):
     """1 at a place 0..1, falling to zero within a margin beyond."""
     return max(1.0 - max(-place, place - 1.0, 0.0) / margin, 0.0)
 
 
-@register_jitable
 def ring(p, first, turns):
     """Closed piecewise-linear curve of a number of turns."""
     along = (turns % 1.0) * PHASES
@@ -74,13 +69,17 @@ def law(p, s, io):
     )
 
 
-def smooth(knots: int) -> np.ndarray:
-    """Second differences, and the values over their number."""
+def smooth(knots: int) -> Any:
+    """Second differences, and the values over their number: rows (2 knots - 2, knots)."""
+    import numpy as np  # the catalogue is listed without it
+
     return np.vstack([np.diff(np.eye(knots), 2, axis=0), np.eye(knots) / knots])
 
 
-def smooth_ring(knots: int) -> np.ndarray:
+def smooth_ring(knots: int) -> Any:
     """The same for a closed curve."""
+    import numpy as np
+
     own = np.eye(knots)
     bends = np.roll(own, 1, axis=0) - 2.0 * own + np.roll(own, -1, axis=0)
     return np.vstack([bends, own / knots])

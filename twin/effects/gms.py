@@ -21,14 +21,11 @@ integrated exactly over the sample for constant v, so any stiffness and C are st
 from functools import cache
 from math import copysign, exp, expm1, log
 
-from numba.extending import register_jitable
-
 from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 SHARES = 9  # where the elements' own parameters begin
 
 
-@register_jitable
 def totals(p, count, ratio):
     """Sums that share_i and the tapered stiff_i are parts of."""
     shares, springs, taper = 0.0, 0.0, 1.0
@@ -39,7 +36,6 @@ def totals(p, count, ratio):
     return shares, springs
 
 
-@register_jitable
 def advance(p, s, io, level):
     """Step the elements; their force at the wanted instant of the sample, N."""
     count, moves = int(p[0]), io[V] != 0.0

@@ -13,9 +13,7 @@ D. Dung, V. Temlyakov, T. Ullrich, Hyperbolic Cross Approximation, Birkhaeuser (
 """
 
 from math import copysign, cos, expm1, pi
-
-import numpy as np
-from numba.extending import register_jitable
+from typing import Any
 
 from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, Part, V, X
 
@@ -24,7 +22,6 @@ CROSS = 24
 SPEEDS = 4  # powers of speed, from 0
 
 
-@register_jitable
 def remembered(s, i, io, reach):
     """Direction with the memory of a distance, at the wanted instant; steps the state."""
     change = -expm1(-abs(io[V]) * io[DT] / reach) * (copysign(1.0, io[V]) - s[i])
@@ -32,7 +29,6 @@ def remembered(s, i, io, reach):
     return s[i] - (1.0 - io[WHEN]) * change
 
 
-@register_jitable
 def series(p, first, count, wave):
     """Sum of p[first + i] cos(i t) over ``count`` terms, wave = cos(t)."""
     total, now, following = 0.0, 1.0, wave
@@ -70,8 +66,10 @@ ORDERS = {
 }
 
 
-def ridge(count: int) -> np.ndarray:
-    """Penalty of each coefficient, larger for finer and mixed terms."""
+def ridge(count: int) -> Any:
+    """Penalty (count, count) of each coefficient, larger for finer and mixed terms."""
+    import numpy as np  # the catalogue is listed without it
+
     return np.diag(list(ORDERS.values())[:count])
 
 

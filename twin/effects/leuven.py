@@ -24,8 +24,6 @@ at the mean of the rates at both ends of the step: any stiffness is stable.
 
 from math import copysign, exp, expm1, log1p
 
-from numba.extending import register_jitable
-
 from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 TURNS = 16  # reversals remembered
@@ -35,7 +33,6 @@ MOST = 100.0  # exponent beyond which the stiffness is as good as gone
 FORCE, DIRECTION, DEPTH, STACK = range(4)  # states; the stack comes last
 
 
-@register_jitable
 def turn(s, direction):
     """Begin a branch where the direction of motion has changed."""
     depth = int(s[DEPTH])
@@ -47,7 +44,6 @@ def turn(s, direction):
     s[DIRECTION] = direction
 
 
-@register_jitable
 def slope(gap, m, softening):
     """Stiffness (1 - sgn(r)|r|^m)/(1 - r), with 1 - r = gap, over the stiffness at r = 0.
 
@@ -58,7 +54,6 @@ def slope(gap, m, softening):
     return ratio * exp(-min(softening * r, MOST))
 
 
-@register_jitable
 def advance(p, s, io, level):
     """Step the hysteresis along the path of a sample; its deflection, m."""
     direction = copysign(1.0, io[V])

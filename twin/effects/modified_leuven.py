@@ -21,8 +21,6 @@ rates at both ends of the step, so it never changes sign and any stiffness is st
 from functools import cache
 from math import copysign, exp, expm1, log, log1p
 
-from numba.extending import register_jitable
-
 from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 SHARES = 11  # where the elements' own parameters begin
@@ -30,7 +28,6 @@ FULL = 1.0 - 1e-12  # part of a limit, or of a gap, that counts as all of it
 NEAR = 1e-7  # gap below which its slope is that at its end
 
 
-@register_jitable
 def totals(p, count, ratio):
     """Sums that share_i and the tapered stiff_i are parts of."""
     shares, springs, taper = 0.0, 0.0, 1.0
@@ -41,7 +38,6 @@ def totals(p, count, ratio):
     return shares, springs
 
 
-@register_jitable
 def deflect(p, s, count, share, spring, ratio, step):
     """Move z by a step, m; the sum of the elements' forces, N."""
     force = 0.0
@@ -53,7 +49,6 @@ def deflect(p, s, count, share, spring, ratio, step):
     return force
 
 
-@register_jitable
 def sticking(p, s, count, share, spring, ratio, way):
     """Stiffness that z meets that way, N/m, and how far it goes until one more element slips, m."""
     stiffness, room = 0.0, 1e300
@@ -67,7 +62,6 @@ def sticking(p, s, count, share, spring, ratio, way):
     return stiffness, room
 
 
-@register_jitable
 def slope(gap, m):
     """(1 - sgn(r)|r|^m)/(1 - r) with 1 - r = gap."""
     r = min(max(1.0 - gap, -1e3), 1e3)
@@ -76,7 +70,6 @@ def slope(gap, m):
     return (1.0 - r**m if r > 0.0 else 1.0 + (-r) ** m) / gap
 
 
-@register_jitable
 def advance(p, s, io, level):
     """Step the bristle; its spring's force at the wanted instant, N, and its mean speed, m/s."""
     count = int(p[0])

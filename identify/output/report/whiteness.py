@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.stats import norm
 
 from identify.output.report.blocks import Block, Heading, Listing, Picture, Section
 from identify.output.report.drawing import BLUE, FLOOR, GREY, INK, ORANGE, new_figure
@@ -66,7 +65,8 @@ def _draw_histogram(axes: Axes, tests: ResidualTests, units: AxisUnits) -> None:
         scale.size * tests.density, edges, fill=True, color=BLUE, alpha=0.55, label="residual"
     )
     at = np.linspace(edges[0], edges[-1], 400)
-    normal = norm.pdf(at, scale=float(scale(tests.floor)))
+    floor = float(scale(tests.floor))
+    normal = np.exp(-0.5 * (at / floor) ** 2) / (np.sqrt(2.0 * np.pi) * floor)
     axes.plot(at, normal, color=ORANGE, label="normal, of the noise floor")
     axes.set_xlabel(scale.label(units.words("Force residual")))
     axes.set_ylabel(f"Density ({inverse(scale.unit)})")

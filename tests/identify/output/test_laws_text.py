@@ -13,15 +13,13 @@ from identify.estimation.fit import Outcome
 from identify.estimation.intervals import NotExcited
 from identify.experiment_design.missing_excitation import Gap
 from identify.output import remarks as remarks_module
+from identify.output.machine_text import check_text, effect_text, effects_text
 from identify.output.remarks import remarks
 from identify.output.text import (
     _step_line,
     add_text,
-    check_text,
     compare_text,
     diagnose_text,
-    effect_text,
-    effects_text,
     fit_text,
     in_short,
     plan_text,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from identify.cli import main
-from identify.output.as_json import plain
+from identify.output.plain import plain
 from identify.output.selftest import selftest_json
 from identify.selftest import (
     Case,

@@ -7,6 +7,7 @@ import pytest
 from machines import one_axis
 
 from identify.output import as_json
+from identify.output.plain import plain
 from identify.output.words.validation import region_in_words
 from identify.validation.error_spectrum import bands
 from identify.workflow import compare, fit
@@ -64,7 +65,7 @@ def test_the_worst_region_names_the_band(pumped):
 
 
 def test_the_bands_are_in_the_json(pumped):
-    found = json.loads(json.dumps(as_json.plain(as_json.compare_json(pumped))))
+    found = json.loads(json.dumps(plain(as_json.compare_json(pumped))))
     region = found["axes"]["x"]["regions"]["frequency"]
     assert region["unit"] == "Hz"
     assert max(region["force_error"]) == pytest.approx(HEIGHT / np.sqrt(2.0), rel=0.03)

@@ -12,6 +12,7 @@ from identify.dataset.dataset import datasets
 from identify.estimation.force_balance import residual
 from identify.output import as_json
 from identify.output import text as as_text
+from identify.output.plain import plain
 from identify.output.results import Comparison
 from identify.output.words.validation import loop_in_words
 from identify.validation.whiteness import Loop, correlation, loop_of, residual_tests
@@ -139,7 +140,7 @@ def compared(logs) -> Comparison:
 
 
 def test_the_reason_and_the_bounds_are_said(compared):
-    found = json.loads(json.dumps(as_json.plain(as_json.compare_json(compared))))
+    found = json.loads(json.dumps(plain(as_json.compare_json(compared))))
     tests = found["axes"]["x"]["residual_tests"]
     assert tests["loop"] == "closed"
     assert tests["tested"] == "force residual"

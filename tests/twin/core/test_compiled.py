@@ -13,10 +13,14 @@ from types import FunctionType
 
 import numba
 import numpy as np
+import pytest
 from numba.extending import intrinsic
 
 from twin.core import compiled
 from twin.core.compiled import digest
+from twin.core.native import walk
+from twin.effects import load_catalogue
+from twin.model.machine import AxisModel, Fitted, axis_table
 
 PACKAGE = Path(compiled.__file__).parent.parent
 
@@ -147,3 +151,55 @@ def test_digest_of_a_function_that_calls_itself_ends() -> None:
     function = FunctionType(outer.__code__, names)
     names["shifted"] = function
     assert digest(function)
+
+
+# --- the plain functions that a law calls --------------------------------------------------------
+
+LAW = """
+from math import copysign
+{before}
+from twin.effect import OUT, Effect, Kind, Parameter, V
+
+{mark}
+def inner(force, v):
+    return force * copysign(1.0, v)
+
+{mark}
+def outer(p, v):
+    return inner(p[0], v) if v != 0.0 else 0.0
+
+def law(p, s, io):
+    io[OUT] = -outer(p, io[V])
+
+EFFECT = Effect(
+    kind=Kind.FORCE, summary="", equation="", source="", law=law, fingerprint="", excited_by="",
+    parameters=(Parameter("force", "N", 0.0, -1e3, 1e3, "force", strength=True),),
+)
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "mark"),
+    [("", ""), ("from numba.extending import register_jitable", "@register_jitable")],
+)  # fmt: skip
+def test_a_law_may_call_functions_of_its_own_file(before, mark, tmp_path: Path) -> None:
+    path = tmp_path / "steady.py"
+    path.write_text(LAW.format(before=before, mark=mark))
+    effect = load_catalogue([path])["steady"]
+    table = axis_table({"": AxisModel(1.0, effects=(Fitted.at_start(effect, {"force": 2.0}),))})
+    motion = np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 0.0]])
+    rows = np.zeros((1, 3))
+    walk(
+        table.entries, 0, 1, table.parameters, np.zeros(table.n_states), 0, motion,
+        np.zeros_like(motion), 1e-3, 0, rows,
+    )  # fmt: skip
+    np.testing.assert_array_equal(rows, [[-2.0, 2.0, 0.0]])
+
+
+def test_a_change_of_a_function_that_a_law_calls_changes_its_digest(tmp_path: Path) -> None:
+    digests = set()
+    for sign in ("1.0", "2.0"):
+        path = tmp_path / "steady.py"
+        path.write_text(LAW.format(before="", mark="").replace("copysign(1.0", f"copysign({sign}"))
+        digests.add(digest(load_catalogue([path])["steady"].law))
+    assert len(digests) == 2

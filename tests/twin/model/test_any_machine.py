@@ -18,6 +18,7 @@ from matplotlib.text import Text
 from identify import workflow
 from identify.dataset.dataset import datasets
 from identify.output import as_json, text
+from identify.output.plain import plain
 from identify.output.report import write_report
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
 from identify.selection.residual_dependence import coordinates_of, unit_of
@@ -271,7 +272,7 @@ def test_json_is_in_units_of_the_axis(gone_round: Round) -> None:
         as_json.fit_json(gone_round.fitted), as_json.compare_json(gone_round.compared),
         as_json.diagnose_json(gone_round.found), as_json.add_json(gone_round.added),
     ]  # fmt: skip
-    units = set().union(*(stated_units(json.loads(json.dumps(as_json.plain(o)))) for o in objects))
+    units = set().union(*(stated_units(json.loads(json.dumps(plain(o)))) for o in objects))
     kind = gone_round.units
     other = LINEAR if kind.rotary else ROTARY
     known = ("m", "m/s", "m/s^2", "N", "kg", "N s/m", "1/N")

@@ -56,6 +56,27 @@ def test_the_callback_goes_when_something_fails() -> None:
     assert not installed()
 
 
+def test_the_clock_of_mujoco_stands_still_meanwhile_and_comes_back() -> None:
+    """Reading it takes a quarter of a step."""
+    model = mujoco.MjModel.from_xml_string(FOREIGN["slide"])
+
+    def timed(steps: int = 50) -> float:
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, steps)
+        return float(data.timer[mujoco.mjtTimer.mjTIMER_STEP].duration)
+
+    assert timed() > 0.0
+    with passive_callback():
+        assert timed() == 0.0
+        with passive_callback():
+            assert timed() == 0.0
+        assert timed() == 0.0
+    assert timed() > 0.0
+    with pytest.raises(KeyError), passive_callback():
+        raise KeyError
+    assert timed() > 0.0
+
+
 def test_a_callback_that_was_there_comes_back() -> None:
     calls: list[float] = []
 

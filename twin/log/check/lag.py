@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import correlate
 
-from twin.signals import Array
+from twin.signals import Array, sliding_products
 
 LONGEST = 0.25  # s, searched both ways
 _MOTION = 20  # least length of the log over the longest lag, so that it holds several moves
@@ -35,8 +34,8 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
     weights = kept[inner]
     basis = np.linalg.qr(_unit_columns(explained_by[inner] * weights[:, None]))[0]
     centred = signal - signal.mean()
-    total = correlate(centred**2, weights, "valid", "fft")
-    found = sum(correlate(centred, column, "valid", "fft") ** 2 for column in basis.T)
+    total = sliding_products(centred**2, weights)
+    found = sum(sliding_products(centred, column) ** 2 for column in basis.T)
     residual = np.maximum(total - found, 0.0)
     dips = 1 + np.flatnonzero((residual[1:-1] <= residual[:-2]) & (residual[1:-1] < residual[2:]))
     if not len(dips):

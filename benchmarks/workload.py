@@ -1,0 +1,129 @@
+"""The work that `passes` and `stages` measure: five logs of one axis, and what a pass over them is.
+
+A pass is the CPU time of the baseline's laws, fused by hand, over every sample of the logs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import thread_time
+
+import numpy as np
+
+from benchmarks import fused
+from benchmarks.timing import interleaved
+from identify.estimation.force_balance import residual
+from identify.experiment_design.planting import added_force, other_machine, strength_for
+from identify.workflow import fit
+from twin.effects import load_catalogue
+from twin.experiments.named import simulate
+from twin.log import Log, write_log
+from twin.log.log import Array
+from twin.model.file import load_model, save_model
+from twin.model.machine import Fitted, MachineModel
+
+DURATION = 30.8  # s of each log; together 1.54 million samples
+LOGS = 5
+AXIS = "x"
+HIDDEN, FLOORS = "cogging", 4.0  # effect, and its RMS force over the noise floor
+PITCH = 0.024  # m
+ROUNDS = 9
+
+
+@dataclass(frozen=True, eq=False)
+class Workload:
+    """A model of one axis, and the logs of the machine with and without a hidden effect."""
+
+    model: MachineModel
+    machine: MachineModel
+    plain: dict[str, Log]
+    hidden: dict[str, Log]
+
+    @property
+    def samples(self) -> int:
+        """Samples of all logs together."""
+        return sum(map(len, self.plain.values()))
+
+    @property
+    def measured_bytes(self) -> int:
+        """Bytes of the signals that a machine too would log."""
+        return sum(_bytes(a.columns) for log in self.plain.values() for a in log.axes.values())
+
+    @property
+    def log_bytes(self) -> int:
+        """Bytes of the arrays that the logs hold, those of the truth included."""
+        truths = (t for log in self.plain.values() for t in log.truth.values())
+        return self.measured_bytes + sum(map(_bytes, truths))
+
+    @cached_property
+    def one_pass(self) -> float:
+        """CPU time in s of one pass over the logs."""
+        period = self.model.period
+        c = fused.constants(self.model.axes[AXIS])
+        motions = [
+            (0.5 * (x[1:] + x[:-1]), np.diff(x) / period, np.empty(len(x) - 1))
+            for x in (log.axes[AXIS].position for log in self.plain.values())
+        ]
+
+        def job() -> None:
+            for position, velocity, out in motions:
+                fused.along(c, position, velocity, period, out)
+
+        return float(np.median(interleaved([job], ROUNDS, thread_time)))
+
+    def in_passes(self, seconds: float) -> float:
+        """CPU time in s as a number of passes."""
+        return seconds / self.one_pass
+
+
+def _bytes(columns: Mapping[str, Array]) -> int:
+    return sum(column.nbytes for column in columns.values())
+
+
+@contextmanager
+def saved(work: Workload) -> Iterator[tuple[Path, list[Path], list[Path]]]:
+    """Files of the model, of the logs without and of those with the hidden effect."""
+    with TemporaryDirectory() as folder:
+        model = Path(folder, "one_axis.toml")
+        save_model(work.model, model)
+        sets = []
+        for kind, logs in (("plain", work.plain), ("hidden", work.hidden)):
+            sets.append([Path(folder, f"{kind}_{name}.mcap") for name in logs])
+            for path, log in zip(sets[-1], logs.values(), strict=True):
+                write_log(log, path)
+        yield model, *sets
+
+
+def make(duration: float = DURATION) -> Workload:
+    """Simulate the logs, all with other values than those of the model."""
+    whole = load_model("proton_xy", load_catalogue())
+    model = replace(whole, axes={AXIS: whole.axes[AXIS]}, mjcf=None, mjcf_name=None)
+    machine = model.with_axis(AXIS, other_machine(model.axes[AXIS], np.random.default_rng(1)))
+    plain = _recorded(machine, duration)
+    hidden = machine.axes[AXIS].with_effect(_hidden_effect(model, plain))
+    return Workload(model, machine, plain, _recorded(machine.with_axis(AXIS, hidden), duration))
+
+
+def _recorded(machine: MachineModel, duration: float) -> dict[str, Log]:
+    return {
+        f"log_{i}": simulate(machine, "tracking", seed=i, duration=duration) for i in range(LOGS)
+    }
+
+
+def _hidden_effect(model: MachineModel, logs: dict[str, Log]) -> Fitted:
+    """Cogging whose force stands a few noise floors out of the residual."""
+    effect = load_catalogue()[HIDDEN]
+    name, log = next(iter(logs.items()))
+    base = fit(model, {name: log}).fits[AXIS]
+    without = residual(base.axis, base.logs)
+    return strength_for(
+        effect,
+        lambda fitted: added_force(fitted, base.axis, base.logs, without),
+        FLOORS * base.floor,
+        {**effect.starts(), "p": PITCH},
+    )

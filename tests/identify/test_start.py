@@ -1,0 +1,87 @@
+"""What a command loads before it works: no more than it needs, and one thread for matrices."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from twin.log import AxisLog, Log, write_log
+
+HEAVY = {"scipy", "numba", "mujoco", "matplotlib", "jinja2", "rich", "ruckig"}
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+SCRIPT = """
+import contextlib, io, json, os, sys
+from identify.cli import main
+early = "numpy" in sys.modules
+with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+    main()
+print(json.dumps({
+    "early": early, "loaded": sorted({name.split(".")[0] for name in sys.modules}),
+    "threads": {name: v for name, v in os.environ.items() if name.endswith("_NUM_THREADS")},
+}))
+"""
+
+
+def started(*arguments: object, folder: Path, **environment: str) -> dict:
+    """What a process of its own had loaded when `twin` ended."""
+    kept = {k: v for k, v in os.environ.items() if k not in THREADS}
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, *map(str, arguments)],
+        cwd=folder, env={**kept, **environment}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return json.loads(done.stdout)
+
+
+def small_log(folder: Path) -> Path:
+    t = 1e-3 * np.arange(3000)
+    columns = {"position": 0.05 * np.sin(3.0 * t), "force": np.cos(3.0 * t)}
+    path = folder / "small.mcap"
+    write_log(Log(1000.0, {"x": AxisLog(columns)}), path)
+    return path
+
+
+@pytest.mark.parametrize("command", ["--help", "effects", "effects gms", "check"])
+def test_a_short_command_loads_nothing_that_it_does_not_need(command: str, tmp_path: Path) -> None:
+    more = [small_log(tmp_path)] if command == "check" else []
+    found = started(*command.split(), *more, folder=tmp_path)
+    assert not HEAVY & set(found["loaded"])
+    assert ("numpy" in found["loaded"]) == (command == "check")
+
+
+def test_matrices_are_not_shared_out_unless_the_user_says_so(tmp_path: Path) -> None:
+    found = started("--help", folder=tmp_path)
+    assert not found["early"]  # read once, when NumPy is imported
+    assert found["threads"] == dict.fromkeys(THREADS, "1")
+    chosen = started("--help", folder=tmp_path, OMP_NUM_THREADS="3")
+    assert chosen["threads"]["OMP_NUM_THREADS"] == "3"
+
+
+def test_the_package_gives_its_calls_by_name() -> None:
+    import identify
+    from identify import workflow
+
+    assert [getattr(identify, n) for n in identify.__all__] == [
+        getattr(workflow, n) for n in identify.__all__
+    ]
+    with pytest.raises(AttributeError, match="no attribute 'guess'"):
+        _ = identify.guess
+
+
+def test_a_fit_is_not_slower_to_load_than_to_run(tmp_path: Path) -> None:
+    """scipy.signal and scipy.stats take a second to load; SciPy's smaller parts hold what is used.
+
+    Drawing takes another, and only a report draws.
+    """
+    script = "import json, sys, identify.workflow; print(json.dumps([*sys.modules]))"
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    loaded = set(json.loads(done.stdout))
+    assert "identify.workflow" in loaded
+    assert not {"scipy.signal", "scipy.stats", "matplotlib", "jinja2"} & loaded
