@@ -24,8 +24,8 @@ from twin.model.units import AxisUnits
 Array = NDArray[np.float64]
 
 TEST_FUNCTIONS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
-TRIED = 12.0  # s of motion on which nonlinear parameters are scanned before all of it is used
-SHORTEST_HEAD = 3.0  # s of each log
+TRIED = 8.0  # s of motion on which nonlinear parameters are scanned before all of it is used
+SHORTEST_HEAD = 2.0  # s of each log
 QUIET = 0.01  # largest noise floor, as a part of the force that the inertia does not explain
 
 

@@ -32,6 +32,8 @@ class DecisionRule:
     error below this part. collapse: a strength has collapsed if less than this part of it is left.
 
     promise: part of the required evidence that a linear step must reach before a refit is made.
+    contender: part of what the best candidate explains that it must reach as well; a refit that
+    started from less has not come near a best one, and is found beside it in the next step.
     same_error: relative error that simpler values may have. pair_first: part of the squared error
     that the first of two effects must explain alone.
 
@@ -66,6 +68,7 @@ class DecisionRule:
     collapse: float = 0.3
 
     promise: float = 0.3
+    contender: float = 0.1
     same_error: float = 1.01
     pair_first: float = 0.1
 

@@ -25,7 +25,7 @@ Mask = NDArray[np.bool_]
 
 FIRST_DAMPING = 1e-2
 MOST_DAMPING = 1e8
-LEAST_DAMPING = 1e-12
+LEAST_DAMPING = 1e-6
 KEPT = 0.75  # of the fall that the columns promise, from which they are followed by a secant
 POOR = 0.5  # of that fall, up to which the damping stays
 

@@ -30,7 +30,7 @@ from twin.model.parameters import ParameterReference, free_parameters, read, wri
 Array = NDArray[np.float64]
 
 RIDGE = 1e-4  # keeps the linear step finite along directions that the base explains already
-RESCORED_SHAPES = 24  # best shapes of a coarse scan that are tried with every strength
+RESCORED_SHAPES = 12  # best shapes of a coarse scan that are tried with every strength
 CHANCE = 4.0  # twice the gain in log likelihood, for each strength, that a scan of noise finds
 FULL_SHAPES = 4  # best shapes on the logs' heads that are tried on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
@@ -66,17 +66,19 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     excitation = _with_what_repeats(base, dataset)
     nothing, absent = np.zeros(0), Fitted.at_start(effect)
     found = [Start(shape, absent, nothing, nothing) for shape in tried_shapes(effect, excitation)]
-    if len(found) > FULL_SHAPES:
-        head = _Ground.of(base, dataset, effect, excitation, on_heads=True)
-        coarse = [p for p in effect.strengths if p.screened]
-        if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
-            found = _best(head, found, coarse, RESCORED_SHAPES)
-        found = _best(head, found, effect.strengths, FULL_SHAPES)
-        if effect.kind is Kind.FRICTION:
-            return found[:REFINED_STARTS]
+    if len(found) <= FULL_SHAPES:
+        whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
+        return _best(whole, found, effect.strengths, REFINED_STARTS)
+    head = _Ground.of(base, dataset, effect, excitation, on_heads=True)
+    coarse = [p for p in effect.strengths if p.screened]
+    if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
+        found = _best(head, found, coarse, RESCORED_SHAPES)
+    found = _best(head, found, effect.strengths, FULL_SHAPES)
+    if effect.kind is Kind.FRICTION:
+        return found[:REFINED_STARTS]
     whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
     first = _try(whole, found[0].shape, effect.strengths)
-    if len(found) == 1 or not _beyond_chance(base, first):
+    if not _beyond_chance(base, first):
         return [first]
     others = [_try(whole, s.shape, effect.strengths) for s in found[1:]]
     return sorted((first, *others), key=lambda s: s.squared_error)[:REFINED_STARTS]
@@ -142,10 +144,15 @@ def fit_thoroughly(axis: AxisModel, dataset: Dataset) -> Fit:
 
 
 def _promises(start: Start, fit: Fit, dataset: Dataset) -> bool:
-    """Whether a start leaves less than a fit, on the heads where it was found on them."""
-    whole = len(start.left) == len(fit.residual)
-    there = fit.residual if whole else fit.residual[dataset.in_heads[fit.kept]]
-    return bool(np.mean(start.left**2) < np.mean(there**2))
+    """Whether a start leaves less than a fit, both after a linear step on the same logs.
+
+    On the heads where it was found on them, which a fit to all of the logs does not fit as well.
+    """
+    there = fit.residual
+    if len(start.left) != len(there):
+        rows = dataset.in_heads[fit.kept]
+        there = unabsorbed(there[rows], orthonormal(fit.jacobian[rows]))
+    return bool(np.mean(start.left**2) < BETTER**2 * np.mean(there**2))
 
 
 def _is_nearest(shape: dict[str, float], present: Fitted, excitation: Excitation) -> bool:

@@ -87,22 +87,54 @@ def usable(catalogue: Catalogue, model: MachineModel) -> Catalogue:
     return Catalogue([e for e in catalogue.values() if model.can_use(e)])
 
 
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What a cheap estimate tells of an effect: its starts, best first, or the candidate it is.
+
+    share: part of the base's squared error that one linear step takes; None for a friction, which
+    no linear step can put in the place of another. candidate: None where a refit is promising.
+    """
+
+    effect: Effect
+    starts: tuple[Start, ...]
+    share: float | None
+    candidate: Candidate | None
+
+
 def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     """Refit the model together with the effect and score it against the base.
 
-    Where a cheap first estimate (one linear step beside the base; for a friction a fit to the heads
-    of the logs) is far from any evidence, the estimate is scored and no refit is made.
+    Where a look at it is far from any evidence, that is scored and no refit is made.
     """
-    best, *others = starts(base, dataset, effect)
+    look = look_at(base, dataset, effect)
+    return look.candidate or refitted(base, dataset, look)
+
+
+def look_at(base: Fit, dataset: Dataset, effect: Effect) -> Look:
+    """One linear step beside the base; for a friction a fit to the heads of the logs."""
+    found = tuple(starts(base, dataset, effect))
+    best, share = found[0], None
+    fit: Fit | None = None
     if is_noise(effect):
         axis = base.axis.with_effect(best.fitted)
-        return score(base, finished(axis, base.begun, dataset.fit, base.outcome), dataset, effect)
-    if effect.kind is Kind.FRICTION:
-        looked = _fitted_to_heads(base, dataset, best.fitted)
-        if looked is not None:
-            return score(base, looked, dataset, effect)
-    elif not _promising(base, best):
-        return score(base, one_linear_step(base, best), dataset, effect)
+        fit = finished(axis, base.begun, dataset.fit, base.outcome)
+    elif effect.kind is Kind.FRICTION:
+        fit = _fitted_to_heads(base, dataset, best.fitted)
+    else:
+        share = 1.0 - best.squared_error / max(float(base.residual @ base.residual), 1e-300)
+        fit = None if _promising(base, best) else one_linear_step(base, best)
+    candidate = None if fit is None else score(base, fit, dataset, effect)
+    return Look(effect, found, share, candidate)
+
+
+def as_looked(base: Fit, dataset: Dataset, look: Look) -> Candidate:
+    """The candidate as its linear step predicts it, without a refit."""
+    return score(base, one_linear_step(base, look.starts[0]), dataset, look.effect)
+
+
+def refitted(base: Fit, dataset: Dataset, look: Look) -> Candidate:
+    """The candidate with all parameters fitted, from where the look ended."""
+    effect, (best, *others) = look.effect, look.starts
     fit = fit_axis(base.axis.with_effect(best.fitted), dataset.fit, FIRST_EVALUATIONS)
     first = score(base, fit, dataset, effect)
     if first.delta_bic < 0.0:

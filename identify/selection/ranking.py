@@ -18,16 +18,20 @@ from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import residual
 from identify.selection.candidates import (
     Candidate,
+    Look,
     absent_effects,
+    as_looked,
+    look_at,
     on_equal_samples,
+    refitted,
     score,
-    try_effect,
 )
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]
+LEADERS = 2  # that are refitted first, and tell what others must promise
 Progress = Callable[[int, int], None]
 
 
@@ -43,22 +47,69 @@ def rank(
     If the values of the best candidate without its effect are a better start for the base, the base
     is refitted from there: a base short of its optimum would give evidence to every candidate.
     """
-    effects = absent_effects(base.axis, catalogue)
-    candidates = []
-    # The laws release Python's lock, so candidates run in parallel.
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
-        for candidate in pool.map(partial(try_effect, base, dataset), effects):
-            candidates.append(candidate)
-            if progress:
-                progress(len(candidates), len(effects))
+    candidates = _tried(base, dataset, absent_effects(base.axis, catalogue), progress, workers)
     supported = [c for c in candidates if c.supported]
     if supported:
         best = max(supported, key=lambda c: c.delta_bic)
-        again = less(best.effect, best.fit, base, dataset)
+        sure = _explained(base, best) > RULE.nearly_all  # wherever the base's optimum is
+        again = base if sure else less(best.effect, best.fit, base, dataset)
         if again.error < RULE.settled * base.error:
             base = again
             candidates = [score(base, c.fit, dataset, c.effect) for c in candidates]
     return base, _ranked(candidates)
+
+
+def _tried(
+    base: Fit,
+    dataset: Dataset,
+    effects: Sequence[Effect],
+    progress: Progress | None,
+    workers: int | None,
+) -> list[Candidate]:
+    """A candidate for each effect, in their order.
+
+    All are looked at; those that promise most are refitted, then the others that promise a part of
+    what these explain.
+    """
+    done: dict[str, Candidate] = {}
+
+    def keep(candidate: Candidate | None) -> None:
+        if candidate is not None:
+            done[candidate.effect.name] = candidate
+            if progress:
+                progress(len(done), len(effects))
+
+    # The laws release Python's lock, so candidates run in parallel.
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        looks = []
+        for look in pool.map(partial(look_at, base, dataset), effects):
+            looks.append(look)
+            keep(look.candidate)
+        waiting = sorted((k for k in looks if k.candidate is None), key=_promise, reverse=True)
+        least = RULE.contender * _promise(waiting[0]) if waiting else 0.0
+        leaders = [k for k in waiting[:LEADERS] if _promise(k) >= least]
+        for candidate in pool.map(partial(refitted, base, dataset), leaders):
+            keep(candidate)
+        most = max((_explained(base, done[k.effect.name]) for k in leaders), default=0.0)
+        others = [k for k in waiting if k not in leaders and _promise(k) >= RULE.contender * most]
+        for candidate in pool.map(partial(refitted, base, dataset), others):
+            keep(candidate)
+    for look in looks:
+        if look.effect.name not in done:
+            keep(as_looked(base, dataset, look))
+    return [done[e.name] for e in effects]
+
+
+def _promise(look: Look) -> float:
+    """Part of the base's squared error that a refit promises to explain; a friction's is open."""
+    return 1.0 if look.share is None else look.share
+
+
+def _explained(base: Fit, candidate: Candidate) -> float:
+    """Part of the base's squared error that a candidate explains, 0..1; 0 without support."""
+    if not candidate.supported:
+        return 0.0
+    return 1.0 - (candidate.fit.error / base.error) ** 2
 
 
 def less(effect: Effect, fit: Fit, base: Fit, dataset: Dataset) -> Fit:

@@ -16,12 +16,13 @@ from twin.effect import ACC, DT, MOVED, OUT, WHEN, Effect, Kind, Parameter
 
 def law(p, s, io):
     angle = min(2.0 * pi * p[2] * io[DT], 3.0)
+    rate = 1.0 / io[DT]
     grown = expm1(p[3] * angle)
     half = sin(0.5 * sqrt(1.0 - p[3] * p[3]) * angle)
     spring = min(grown * grown + 4.0 * (1.0 + grown) * half * half, 2.0 * (1.0 - p[0]))
-    damper = expm1(2.0 * p[3] * angle)
+    damper = grown * (2.0 + grown)
     depth = s[0] - min(max(s[0], -0.5 * p[1]), 0.5 * p[1])
-    pull = (spring * depth / io[DT] + damper * s[1]) / io[DT]
+    pull = (spring * depth * rate + damper * s[1]) * rate
     acceleration = -(pull + io[ACC]) / (1.0 + damper)
     if io[WHEN] > 0.0:
         s[1] += io[DT] * acceleration

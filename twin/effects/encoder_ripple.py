@@ -38,7 +38,10 @@ EFFECT = Effect(
             "period", "m", 2e-5, 1e-8, 10.0, "signal period of the scale", scan=periods, period=True
         ),
         *(
-            Parameter(f"{c}{k}", "m", 0.0, -1e-4, 1e-4, f"{f} term of harmonic {k}", strength=True)
+            Parameter(
+                f"{c}{k}", "m", 0.0, -1e-4, 1e-4, f"{f} term of harmonic {k}", strength=True,
+                screened=k == 1,
+            )
             for k in (1, 2)
             for c, f in (("a", "sine"), ("b", "cosine"))
         ),
@@ -46,4 +49,4 @@ EFFECT = Effect(
     law=law,
     fingerprint="command and speed ripple at a frequency of speed over the signal period",
     excited_by="slow constant speeds over many signal periods",
-)
+)  # fmt: skip

@@ -21,11 +21,12 @@ from twin.effect import ACC, DT, MOVED, OUT, WHEN, Effect, Excitation, Kind, Par
 
 def law(p, s, io):
     angle = min(2.0 * pi * p[1] * io[DT], 3.0)
+    rate = 1.0 / io[DT]
     grown = expm1(p[2] * angle)
     half = sin(0.5 * sqrt(1.0 - p[2] * p[2]) * angle)
     spring = min(grown * grown + 4.0 * (1.0 + grown) * half * half, 2.0 * (1.0 - p[0]))
-    damper = expm1(2.0 * p[2] * angle)
-    pull = (spring * s[0] / io[DT] + damper * s[1]) / io[DT]
+    damper = grown * (2.0 + grown)
+    pull = (spring * s[0] * rate + damper * s[1]) * rate
     acceleration = -(pull + io[ACC]) / (1.0 + damper)
     if io[WHEN] > 0.0:
         s[1] += io[DT] * acceleration

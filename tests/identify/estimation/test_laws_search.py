@@ -33,7 +33,7 @@ from twin.model.parameters import ParameterReference
 
 # The rules as they were decided.
 BETTER, CHANCE, FULL_SHAPES, REFINED_STARTS = 0.99, 4.0, 4, 2
-RESCORED_SHAPES, RESIDUAL_LINES = 24, 6
+RESCORED_SHAPES, RESIDUAL_LINES = 12, 6
 RNG = np.random.default_rng(3)
 SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
 
@@ -230,12 +230,12 @@ def test_the_best_tries_come_first_and_no_more_than_asked(monkeypatch):
     [
         ("quadratic_drag", 1, True, [("whole", 1, 1)]),
         ("dahl", FULL_SHAPES, True, [("whole", FULL_SHAPES, 2)]),
-        ("dahl", FULL_SHAPES, False, [("whole", 1, 2)]),
+        ("backlash", FULL_SHAPES, False, [("whole", FULL_SHAPES, 1)]),
         ("dahl", 5, True, [("head", 5, 2)]),
         ("backlash", 5, True, [("head", 5, 1), ("whole", FULL_SHAPES, 1)]),
         ("backlash", 5, False, [("head", 5, 1), ("whole", 1, 1)]),
-        ("cogging", RESCORED_SHAPES, True, [("head", 24, 6), ("whole", 4, 6)]),
-        ("cogging", 25, True, [("head", 25, 2), ("head", 24, 6), ("whole", 4, 6)]),
+        ("cogging", RESCORED_SHAPES, True, [("head", 12, 6), ("whole", 4, 6)]),
+        ("cogging", 13, True, [("head", 13, 2), ("head", 12, 6), ("whole", 4, 6)]),
         ("end_stop", 25, True, [("head", 25, None), ("whole", 4, None)]),
     ],
 )

@@ -19,12 +19,14 @@ from built_fits import (
 
 from identify.estimation.evidence import Evidence, effective_samples, held_out_gain
 from identify.selection import ranking
+from identify.selection.candidates import Look
 from identify.selection.ranking import _ranked, less, rank, tie, took_friction
 from twin.effects import Catalogue
 from twin.model.machine import Fitted
 
 # The rules as they were decided.
 AT_FLOOR, COLLAPSE, SETTLED, FIRSTS, LEAST_PART = 1.3, 0.3, 0.999, 3, 0.1
+CONTENDER = 0.1
 STUDY = study_stub()
 NAMES = ("cogging", "end_stop", "gms", "quadratic_drag", "wear")
 
@@ -64,8 +66,11 @@ def test_a_noise_comes_after_what_lowers_the_error_if_both_are_supported():
     assert names(_ranked([unsupported, noise])) == [NOISE.name, "wear"]
 
 
-def ranked(monkeypatch, ratio, t=9.0):
-    """rank among two effects, where a refit of the base gives that ratio of its error."""
+def ranked(monkeypatch, ratio, t=9.0, left=3.0):
+    """rank among two effects, where a refit of the base gives that ratio of its error.
+
+    left: N, error of the model with either effect, of 4 N.
+    """
     base, again = built_fit(4.0), built_fit(4.0 * ratio)
     bics = {"cogging": 40.0, "wear": 90.0}
     asked, bars = [], []
@@ -74,11 +79,12 @@ def ranked(monkeypatch, ratio, t=9.0):
         asked.append((effect.name, fit))
         return again
 
-    def try_effect(given, dataset, effect):
+    def look_at(given, dataset, effect):
         assert (given, dataset) == (base, STUDY)
-        return built(effect, bic=bics[effect.name], t=t)
+        fit = built_fit(left, axis=axis_of(fitted(effect.name)))
+        return Look(effect, (), 0.0, built(effect, bic=bics[effect.name], t=t, fit=fit))
 
-    monkeypatch.setattr(ranking, "try_effect", try_effect)
+    monkeypatch.setattr(ranking, "look_at", look_at)
     monkeypatch.setattr(ranking, "less", less_of)
 
     def score(given, fit, dataset, effect):
@@ -90,6 +96,67 @@ def ranked(monkeypatch, ratio, t=9.0):
     found = rank(base, STUDY, catalogue, lambda *done: bars.append(done), workers=1)
     assert bars == [(1, 2), (2, 2)]
     return found, base, again, asked
+
+
+def refits(monkeypatch, shares, explained, t=9.0):
+    """Names of the effects that are refitted, and of those that stay as they were looked at.
+
+    shares: what a linear step of each promises, None for a friction. explained: what each explains.
+    """
+    base, fitted_again, looked = built_fit(1.0), [], []
+    order = iter(shares.items())
+
+    def look_at(given, dataset, effect):
+        name, share = next(order)
+        assert effect.name == name
+        return Look(effect, (), share, None)
+
+    def refitted(given, dataset, look):
+        fitted_again.append(look.effect.name)
+        fit = built_fit(np.sqrt(1.0 - explained[look.effect.name]))
+        return built(look.effect, t=t, fit=fit)
+
+    def as_looked(given, dataset, look):
+        looked.append(look.effect.name)
+        return built(look.effect, t=0.0, fit=built_fit(0.99))
+
+    monkeypatch.setattr(ranking, "look_at", look_at)
+    monkeypatch.setattr(ranking, "refitted", refitted)
+    monkeypatch.setattr(ranking, "as_looked", as_looked)
+    monkeypatch.setattr(ranking, "less", lambda *_: base)
+    catalogue = Catalogue([CATALOGUE[n] for n in shares])
+    shares = {e.name: shares[e.name] for e in catalogue.values()}
+    order = iter(shares.items())
+    _, found = rank(base, STUDY, catalogue, workers=1)
+    assert sorted(names(found)) == sorted(shares)
+    return fitted_again, looked
+
+
+def test_only_what_promises_a_part_of_the_best_is_refitted(monkeypatch):
+    low, high = CONTENDER * 0.8 - 0.001, CONTENDER * 0.8 + 0.001
+    shares = {"cogging": 0.8, "end_stop": 0.5, "quadratic_drag": low, "wear": high}
+    explained = {"cogging": 0.8, "end_stop": 0.3, "quadratic_drag": 0.9, "wear": 0.1}
+    assert refits(monkeypatch, shares, explained) == (
+        ["cogging", "end_stop", "wear"], ["quadratic_drag"],
+    )  # fmt: skip
+    # what a leader explains counts, not what it promised; and where it has no support nothing does
+    explained["cogging"] = 0.9
+    assert refits(monkeypatch, shares, explained)[1] == ["quadratic_drag", "wear"]
+    assert refits(monkeypatch, shares, explained, t=1.0)[1] == []
+    # a second leader must be near the first; a friction promises all
+    one = {"cogging": 0.8, "end_stop": 0.01, "gms": None}
+    assert refits(monkeypatch, one, {"cogging": 0.8, "gms": 0.1})[0] == ["gms", "cogging"]
+    assert refits(monkeypatch, {"cogging": 0.8, "end_stop": 0.01}, {"cogging": 0.8}) == (
+        ["cogging"], ["end_stop"],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("part", "again"), [(0.949, True), (0.951, False)])
+def test_beside_an_effect_that_explains_nearly_all_the_base_is_not_refitted(
+    monkeypatch, part, again
+):
+    _, _, _, asked = ranked(monkeypatch, 0.5, left=4.0 * np.sqrt(1.0 - part))
+    assert bool(asked) is again
 
 
 @pytest.mark.parametrize(("ratio", "settled"), [(SETTLED + 1e-4, True), (SETTLED - 1e-4, False)])
