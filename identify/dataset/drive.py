@@ -57,8 +57,10 @@ def forces_lessened(axis: AxisModel, motions: Sequence[Motion]) -> float:
 
     At least 1e-6, so that one can divide by it.
     """
-    given = np.linalg.norm(np.concatenate([actual_force(axis, m) for m in motions]))
-    asked = np.linalg.norm(np.concatenate([m.raw[1] for m in motions]))
+    if not parts_of(axis, Kind.ACTUATION).effects:
+        return 1.0
+    given = np.linalg.norm([np.linalg.norm(actual_force(axis, m)) for m in motions])
+    asked = np.linalg.norm([np.linalg.norm(m.raw[1]) for m in motions])
     return 1.0 if given >= LESSENED * asked else max(float(given / asked), 1e-6)
 
 
@@ -87,8 +89,8 @@ def reading_error(sensing: AxisModel, motion: Motion) -> tuple[Array, Array]:
     """
     table = axis_table({motion.axis: sensing})
     _, _, _, first, last = table.axes[0]
-    true = motion.smoothed.copy()
-    path, reading = motion.smoothed[0], np.empty(true.shape[1])
+    path = motion.smoothed_position
+    true, reading = np.stack([path, *motion.raw]), np.empty(len(path))
     for _ in range(PASSES):
         walk_sensing(
             table.entries, first, last, table.parameters, np.zeros(table.n_states), true,
