@@ -173,7 +173,9 @@ def test_the_position_at_the_samples_is_that_read(instant):
 
 def test_smoothing_keeps_parabolas_and_averages_noise():
     bent = motion_of(log_of(1000.0, np.linspace(0, 1, 1501) ** 2, np.zeros(1501)), "x", "")
-    np.testing.assert_allclose(bent.smoothed_position, np.linspace(0, 1, 1501)[:1500] ** 2, atol=1e-12)
+    np.testing.assert_allclose(
+        bent.smoothed_position, np.linspace(0, 1, 1501)[:1500] ** 2, atol=1e-12
+    )
     rng = np.random.default_rng(3)
     x = np.linspace(0, 1, 9001) + rng.normal(0, 1e-6, 9001)
     rough = motion_of(log_of(9000.0, x, np.zeros(9001)), "x", "")
