@@ -89,7 +89,9 @@ class Excitation:
     dry_level (N, half the gap between the force in the two directions), duration (s), period (s,
     sample period), force_max (N, largest command), lines (Hz, frequencies at which the force
     repeats in time; strongest first), resolution (m, step of the readings; 0 where none shows),
-    ripples (m, periods at which the reading's error may repeat in position; strongest first).
+    ripples (m, periods at which the reading's error may repeat in position; strongest first),
+    pitches, thrust_pitches (m, periods at which what a model leaves of the force, or of the motor's
+    force in proportion to it, repeats along the track; strongest first; empty without a model).
     """
 
     position_low: float
@@ -102,6 +104,8 @@ class Excitation:
     lines: tuple[float, ...] = ()
     ripples: tuple[float, ...] = ()
     resolution: float = 0.0
+    pitches: tuple[float, ...] = ()
+    thrust_pitches: tuple[float, ...] = ()
 
     @property
     def travel(self) -> float:

@@ -9,6 +9,7 @@ scipy.signal and scipy.stats nowhere, as they take longer to load than a fit tak
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import perm
 
 import numpy as np
@@ -56,6 +57,7 @@ def local_cubic(signal: Array, period: float) -> tuple[Array, Array, Array]:
     return value, first, second
 
 
+@lru_cache(maxsize=16)
 def _local_fit(samples: int, order: int, derivative: int) -> Array:
     """Weights (samples, samples) of the values in the fitted polynomial's derivative at each."""
     at = np.arange(samples) - samples // 2

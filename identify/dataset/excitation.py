@@ -14,6 +14,7 @@ from twin.signals import Array
 
 FEWEST_CYCLES = 20  # over the travel, of an error of the reading
 MOST_RIPPLES = 8
+LISTENED = 40.0  # s of all logs together, that lines are sought in before there is a model
 
 
 def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) -> Excitation:
@@ -29,6 +30,7 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
         gap = np.median(ahead) - np.median(behind)
     else:
         gap = 2.0 * np.median(np.abs(command))
+    heard = _heads(motions)
     return Excitation(
         position_low=float(position.min()),
         position_high=float(position.max()),
@@ -37,10 +39,15 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
         duration=float(sum(len(m.time) * m.period for m in motions)),
         period=motions[0].period,
         force_max=float(np.abs(command).max()),
-        lines=lines(motions),
-        ripples=ripples(motions),
+        lines=lines(heard),
+        ripples=ripples(heard),
         resolution=max(m.resolution for m in motions),
     )
+
+
+def _heads(motions: Sequence[Motion]) -> list[Motion]:
+    """The beginnings of motions, long enough together to show what repeats."""
+    return [m.head(LISTENED / len(motions)) for m in motions]
 
 
 def lines(motions: Sequence[Motion]) -> tuple[float, ...]:

@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 
 SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
 LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
+MOST_SEGMENTS = 64  # whose median is sure enough: with as many frequencies, to 1 % of the power
 ROUNDS = 12
 TOLERATED = 0.5  # log of power over fit at which a frequency has half its weight
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
@@ -138,11 +139,13 @@ def _median_spectrum(
 ) -> tuple[Array, Array]:
     """Welch's one-sided density with medians: frequency Hz, power unit^2/Hz, (segment // 2 + 1,).
 
-    At least a quarter of the segments is used, those with the fewest left-out samples.
+    At least a quarter of the segments is used, those with the fewest left-out samples, and of very
+    many as many as make the median sure.
     Medians are biased, see B. Allen et al., Phys. Rev. D 85, 122006 (2012).
     """
     out = pieces_of(left_out, segment).mean(axis=1)
-    pieces = pieces_of(signal, segment)[out <= np.quantile(out, LEAST_KEPT)]
+    usable = np.flatnonzero(out <= np.quantile(out, LEAST_KEPT))
+    pieces = pieces_of(signal, segment)[usable[:: -(-len(usable) // MOST_SEGMENTS)]]
     power = densities(_less_lines(pieces), dt)
     odd = np.arange(2, (len(pieces) - 1) // 2 * 2 + 1, 2)
     bias = 1.0 + np.sum(1.0 / (odd + 1.0) - 1.0 / odd)

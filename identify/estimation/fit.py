@@ -16,12 +16,15 @@ from numpy.typing import NDArray
 from identify.dataset.drive import forces_lessened
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.dataset.spectral_lines import lines_in_time
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.levenberg_marquardt import minimise
+from identify.estimation.pitches import pitches
 from identify.estimation.scaling import Scaling
 from identify.estimation.smoothing import has_nonparametric, smoothing
+from identify.estimation.subspace import orthonormal
 from twin.effect import Kind
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters, read
@@ -31,7 +34,9 @@ Array = NDArray[np.float64]
 PRIOR_FORCE = 0.1  # expected force of an effect beside the friction, over the force to explain
 PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
 MOST_EVALUATIONS = 40
+NEGLIGIBLE = 1e-2  # twice a gain in log likelihood, below which a fit has converged
 PUSHED = 3.0  # standard errors by which the gradient must point beyond a bound
+RESIDUAL_LINES = 6  # spectral lines of the residual that are told
 AT_EDGE = 1e-6  # of a bound, within which a value is at it
 
 
@@ -81,6 +86,36 @@ class Fit:
     def jacobian(self) -> Array:
         """Derivative of the residual by the free parameters, (n, k) N per unit."""
         return jacobian(self.axis, self.logs, self.scaling.where)[self.kept]
+
+    @cached_property
+    def basis(self) -> Array:
+        """Orthonormal basis (n, r) of the forces that the free parameters can add."""
+        return orthonormal(self.jacobian)
+
+    @cached_property
+    def lines(self) -> tuple[float, ...]:
+        """Frequencies (Hz) at which the residual repeats in time, the surest first."""
+        every = np.zeros(len(self.kept))
+        every[self.kept] = self.residual
+        ends = np.cumsum([len(log) for log in self.logs])[:-1]
+        steps = [log.test_function.stride * log.test_function.period for log in self.logs]
+        return lines_in_time(list(zip(np.split(every, ends), steps, strict=True)), RESIDUAL_LINES)
+
+    @cached_property
+    def pitches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Periods (m) at which the residual repeats along the track, and the same times command."""
+        place, command = (
+            np.concatenate(parts)[self.kept]
+            for parts in zip(
+                *((log.test_function.mean(log.motion.position), log.command) for log in self.logs),
+                strict=True,
+            )
+        )
+        alike = np.ones(len(place))
+        plain, thrust = (
+            pitches(place, self.residual, weight, self.jacobian) for weight in (alike, command)
+        )
+        return plain, thrust
 
     @cached_property
     def at_bound(self) -> tuple[str, ...]:
@@ -166,19 +201,24 @@ class _Problem:
         self.constant_columns = jacobian(axis, logs, self._where(self.constant))
         self._last: tuple[bytes, Array] = b"", np.zeros((0, 0))
 
-    def set_priors(self, internal: Array) -> None:
-        """Weigh the priors by the residual's size, its colour, and the force to be explained."""
+    def set_priors(self, internal: Array) -> float:
+        """Weigh the priors by the residual's size, its colour, and the force to be explained.
+
+        Returns the effective sample size of the residual there.
+        """
         axis = self.scaling.outside(self.axis, internal)
         left = residual(axis, self.logs)[self.kept]
         inertia = axis.mass * np.concatenate([log.acceleration for log in self.logs])
         command = np.concatenate([log.command for log in self.logs])
         explained = rms((command - inertia)[self.kept])
-        noise = rms(left) * np.sqrt(len(left) / effective_samples(left))
+        samples = effective_samples(left)
+        noise = rms(left) * np.sqrt(len(left) / samples)
         columns = self.columns(internal)
         size = np.linalg.norm(columns, axis=0) / np.sqrt(max(len(left), 1))
         expected = max(PRIOR_FORCE * explained, noise)
         self.pull = np.where(self.added, noise * size / expected, 0.0)
         self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD
+        return samples
 
     def _where(self, mask: NDArray[np.bool_]) -> list[ParameterReference]:
         return [c for c, wanted in zip(self.scaling.where, mask, strict=True) if wanted]
@@ -227,8 +267,8 @@ def fit_axis(
     if len(internal):
         problem.set_priors(internal)
         internal, _ = problem.solve(internal, 1e-3)
-        problem.set_priors(internal)
-        internal, converged = problem.solve(internal, 1e-7)
+        samples = problem.set_priors(internal)
+        internal, converged = problem.solve(internal, NEGLIGIBLE / samples)
     outcome = Outcome.CONVERGED if converged else Outcome.NOT_CONVERGED
     return finished(problem.scaling.outside(axis, internal), axis, logs, outcome)
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.drive import actual_force, parts_of, true_motion
+from identify.dataset.drive import actual_force, parts_of, reading_error, true_motion
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, total_force, total_forces
 from twin.core.calling import P_AT
@@ -107,16 +107,18 @@ def _differences(
 ) -> Array:
     """Change (m, n) N of the averaged force when one effect's values move from those of a group."""
     kind = group[effect].effect.kind
+    # An effect alone of no strength gives no force, which need not be walked for.
+    strengths = [group[effect].values[p.name] for p in group[effect].effect.strengths]
+    absent = len(group.effects) == 1 and bool(strengths) and not any(strengths)
+    if kind is Kind.SENSING and absent:
+        return np.stack([_apparent_force(axis, logs) for axis in moved])
     if kind is Kind.SENSING or (kind is Kind.ACTUATION and _is_stepped_finely(group)):
-        base = averaged_force(group, logs)
+        base = 0.0 if absent else averaged_force(group, logs)
         return np.stack([averaged_force(axis, logs) - base for axis in moved])
     # The motion and the force behind it stay; all sets of values go along it in one walk.
     table = _between(group)
     at = table.labels.index(("", effect))
     first = int(table.entries[at, P_AT])
-    # An effect alone of no strength gives no force, which need not be walked for.
-    strengths = [group[effect].values[p.name] for p in group[effect].effect.strengths]
-    absent = len(table.entries) == 1 and bool(strengths) and not any(strengths)
     bases = 0 if absent else 1
     sets = np.tile(table.parameters, (len(moved) + bases, 1))
     for row, axis in zip(sets[bases:], moved, strict=True):
@@ -127,6 +129,13 @@ def _differences(
         forces = total_forces(table, sets, _driven(group, log)[0])
         parts.append(log.test_function.mean(forces if absent else forces[1:] - forces[0]))
     return np.concatenate(parts, axis=1)
+
+
+def _apparent_force(sensing: AxisModel, logs: Sequence[PreparedLog]) -> Array:
+    """Force (n,) N that sensing effects alone seem to add, to first order in their error."""
+    rates = (reading_error(sensing, log.motion, passes=1)[1] for log in logs)
+    pairs = zip(rates, logs, strict=True)
+    return sensing.mass * np.concatenate([log.fine.acceleration(rate) for rate, log in pairs])
 
 
 def _by_mass(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:

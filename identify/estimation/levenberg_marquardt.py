@@ -1,9 +1,10 @@
 """Levenberg-Marquardt within bounds, for many residuals and few variables.
 
 K. Levenberg (1944), D. W. Marquardt (1963), with the damping schedule of L. Jia (2023): 0.01 to
-start, a tenth on success, tenfold on failure. A variable at a bound that the gradient pushes
-outwards is held there for the step. It solves the normal equations of scaled columns, which costs
-two matrix products an iteration; the QR decomposition of a general solver took most of a fit.
+start, a tenth on success, tenfold on failure; after a step that keeps too little of what it
+promised it stays as it is, or the next step would fail. A variable at a bound that the gradient
+pushes outwards is held there for the step. It solves the normal equations of scaled columns, which
+costs two matrix products an iteration; the QR decomposition of a general solver took most of a fit.
 
 A Jacobian costs a walk over the motion for every variable, a residual one. Between two Jacobians
 the columns therefore follow the residuals by secants (C. G. Broyden, "A class of methods for
@@ -26,6 +27,7 @@ FIRST_DAMPING = 1e-2
 MOST_DAMPING = 1e8
 LEAST_DAMPING = 1e-12
 KEPT = 0.75  # of the fall that the columns promise, from which they are followed by a secant
+POOR = 0.5  # of that fall, up to which the damping stays
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,8 @@ def minimise(
         if trial_cost <= cost:
             expected = _cost(force + columns @ (moved - x))
             fall = 1.0 - trial_cost / cost if cost > 0.0 else 0.0
-            good = cost - trial_cost > KEPT * (cost - expected)
+            kept = (cost - trial_cost) / max(cost - expected, np.finfo(float).tiny)
+            good = kept > KEPT
             if fall < tolerance and exact:
                 return Solution(moved, True)
             if good and fall >= tolerance:
@@ -74,7 +77,7 @@ def minimise(
             else:
                 columns, exact = jacobian(moved), True
             x, force, cost = moved, trial, trial_cost
-            damping = max(0.1 * damping, LEAST_DAMPING)
+            damping = max(damping * (0.1 if kept > POOR else 1.0), LEAST_DAMPING)
         elif not exact:
             columns, exact = jacobian(x), True
         else:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +18,14 @@ from scipy.optimize import lsq_linear
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.dataset.spectral_lines import lines_in_time
 from identify.estimation.evidence import effective_samples
-from identify.estimation.fit import Fit, finished, fit_axis
+from identify.estimation.fit import Fit, Outcome, finished, fit_axis
 from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.scaling import Scaling
 from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.effect import Effect, Excitation, Kind, Parameter
 from twin.model.machine import AxisModel, Fitted
-from twin.model.parameters import ParameterReference, read, write
+from twin.model.parameters import ParameterReference, free_parameters, read, write
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,6 @@ RESCORED_SHAPES = 24  # best shapes of a coarse scan that are tried with every s
 CHANCE = 4.0  # twice the gain in log likelihood, for each strength, that a scan of noise finds
 FULL_SHAPES = 4  # best shapes on the logs' heads that are tried on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
-RESIDUAL_LINES = 12  # spectral lines of the residual that are tried
 BETTER = 0.99  # part of the error that a new start must reach to be taken
 
 
@@ -41,43 +41,53 @@ BETTER = 0.99  # part of the error that a new start must reach to be taken
 class Start:
     """An effect at one shape with the strengths that one linear step finds best beside a base.
 
-    squared_error: N^2, sum over the test functions after that step.
+    force (n,): N, residual with it and the base as it is. left (n,): N, after the base's own
+    parameters followed by a linear step.
     """
 
-    squared_error: float
     shape: dict[str, float]
     fitted: Fitted
+    force: Array
+    left: Array
+
+    @cached_property
+    def squared_error(self) -> float:
+        """N^2, sum over the test functions of what is left."""
+        return float(self.left @ self.left)
 
 
 def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     """The effect at its best shapes beside the base, best first; at least one.
 
     All shapes are tried on the logs' heads with the screened strengths, the best of them with every
-    strength, and the best of those on all of the logs.
+    strength, and the best of those on all of the logs; the others only if the first gains more
+    there than chance. A friction's shapes are told apart by the heads.
     """
-    excitation = _with_lines_left(base, dataset)
-    found = [
-        Start(0.0, shape, Fitted.at_start(effect)) for shape in tried_shapes(effect, excitation)
-    ]
-    whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
+    excitation = _with_what_repeats(base, dataset)
+    nothing, absent = np.zeros(0), Fitted.at_start(effect)
+    found = [Start(shape, absent, nothing, nothing) for shape in tried_shapes(effect, excitation)]
     if len(found) > FULL_SHAPES:
         head = _Ground.of(base, dataset, effect, excitation, on_heads=True)
         coarse = [p for p in effect.strengths if p.screened]
         if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
             found = _best(head, found, coarse, RESCORED_SHAPES)
         found = _best(head, found, effect.strengths, FULL_SHAPES)
-        if effect.kind is not Kind.FRICTION and not _worth_all(base, head, whole, found[0]):
-            found = found[:1]
-    return _best(whole, found, effect.strengths, REFINED_STARTS)
+        if effect.kind is Kind.FRICTION:
+            return found[:REFINED_STARTS]
+    whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
+    first = _try(whole, found[0].shape, effect.strengths)
+    if len(found) == 1 or not _beyond_chance(base, first):
+        return [first]
+    others = [_try(whole, s.shape, effect.strengths) for s in found[1:]]
+    return sorted((first, *others), key=lambda s: s.squared_error)[:REFINED_STARTS]
 
 
-def _worth_all(base: Fit, head: _Ground, whole: _Ground, start: Start) -> bool:
-    """Whether the best shape gains more on the heads than chance, so that others are tried too."""
-    samples = effective_samples(base.residual)
-    before = float(np.sum(head.unchanged**2))
-    gain = samples * np.log(before / max(start.squared_error, 1e-12 * before))
+def _beyond_chance(base: Fit, start: Start) -> bool:
+    """Whether a shape gains more on all of the logs than a scan of noise would."""
+    before = float(base.residual @ base.residual)
+    gain = np.log(before / max(start.squared_error, 1e-12 * before))
     free = len(start.fitted.effect.strengths)
-    return bool(gain * len(head.unchanged) / len(whole.unchanged) > CHANCE * free)
+    return bool(effective_samples(base.residual) * gain > CHANCE * free)
 
 
 def _best(
@@ -87,17 +97,27 @@ def _best(
     return sorted(scored, key=lambda s: s.squared_error)[:count]
 
 
-def stepped(base: Fit, fitted: Fitted, logs: Sequence[PreparedLog]) -> AxisModel:
-    """The base with the effect, after one linear step of the base's own parameters."""
-    together = base.axis.with_effect(fitted)
-    where = [c for c in base.scaling.where if _belongs(c, together)]
-    columns = base.jacobian[:, [base.scaling.where.index(c) for c in where]]
-    force = residual(together, logs)[base.kept]
-    norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    step = np.linalg.lstsq(columns / norms, -force, rcond=1e-6)[0] / norms
+def one_linear_step(base: Fit, start: Start) -> Fit:
+    """The base with the effect at this start, as a linear step of both predicts it.
+
+    The residual is the predicted one, so that nothing is walked.
+    """
+    where = base.scaling.where
+    norms = np.maximum(np.linalg.norm(base.jacobian, axis=0), 1e-300)
+    columns = base.jacobian / norms
+    followed = columns.T @ (start.left - start.force)
+    step = np.linalg.lstsq(columns.T @ columns, followed, rcond=1e-12)[0] / norms
     lower = [c.parameter.lower for c in where]
     upper = [c.parameter.upper for c in where]
-    return write(together, where, np.clip(read(together, where) + step, lower, upper))
+    moved = write(base.axis, where, np.clip(read(base.axis, where) + step, lower, upper))
+    axis = moved.with_effect(start.fitted)
+    return replace(
+        base,
+        axis=axis,
+        scaling=Scaling(free_parameters(axis)),
+        outcome=Outcome.NOT_CONVERGED,
+        residual=start.left,
+    )
 
 
 def fit_thoroughly(axis: AxisModel, dataset: Dataset) -> Fit:
@@ -108,7 +128,11 @@ def fit_thoroughly(axis: AxisModel, dataset: Dataset) -> Fit:
         if best.at_floor or not any(p.scan for p in effect.parameters):
             continue
         rest = fit_without(best, dataset, name)
-        first = starts(rest, dataset, effect)[0].fitted
+        found = starts(rest, dataset, effect)[0]
+        known = _with_what_repeats(rest, dataset)
+        if not _promises(found, best, dataset) and _is_nearest(found.shape, best.axis[name], known):
+            continue
+        first = found.fitted
         held = {n: best.axis[name].values[n] for n in best.axis[name].fixed}
         again = replace(first, values={**first.values, **held}, fixed=best.axis[name].fixed)
         other = fit_axis(best.axis.with_effect(again), dataset.fit)
@@ -117,20 +141,32 @@ def fit_thoroughly(axis: AxisModel, dataset: Dataset) -> Fit:
     return best
 
 
+def _promises(start: Start, fit: Fit, dataset: Dataset) -> bool:
+    """Whether a start leaves less than a fit, on the heads where it was found on them."""
+    whole = len(start.left) == len(fit.residual)
+    there = fit.residual if whole else fit.residual[dataset.in_heads[fit.kept]]
+    return bool(np.mean(start.left**2) < np.mean(there**2))
+
+
+def _is_nearest(shape: dict[str, float], present: Fitted, excitation: Excitation) -> bool:
+    """Whether the present values are nearer to this shape than to any other that is scanned."""
+
+    def nearest(p: Parameter) -> float:
+        value = present.values[p.name]
+        return min(p.scan(excitation) if p.scan else (), key=lambda v: abs(v - value))
+
+    return all(nearest(present.effect.parameter(n)) == v for n, v in shape.items())
+
+
 def fit_without(fit: Fit, dataset: Dataset, name: str) -> Fit:
     """The fit with one effect removed and the values of the others unchanged."""
     return finished(fit.axis.without(name), fit.begun, dataset.fit, fit.outcome)
 
 
-def _with_lines_left(base: Fit, dataset: Dataset) -> Excitation:
-    """What the motion covers, with the spectral lines of the base's residual first."""
-    every = np.zeros(len(base.kept))
-    every[base.kept] = base.residual
-    ends = np.cumsum([len(w) for w in dataset.fit])[:-1]
-    parts = zip(np.split(every, ends), dataset.fit, strict=True)
-    forces = [(part, w.test_function.stride * w.test_function.period) for part, w in parts]
-    left = lines_in_time(forces, most=RESIDUAL_LINES)
-    return replace(dataset.excitation, lines=(*left, *dataset.excitation.lines))
+def _with_what_repeats(base: Fit, dataset: Dataset) -> Excitation:
+    """What the motion covers, with what repeats in the base's residual, and first."""
+    known, (pitches, thrust) = dataset.excitation, base.pitches
+    return replace(known, lines=(*base.lines, *known.lines), pitches=pitches, thrust_pitches=thrust)
 
 
 def tried_shapes(effect: Effect, excitation: Excitation) -> Iterator[dict[str, float]]:
@@ -183,9 +219,12 @@ def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter
     # A reading's error changes the other forces too, but only to second order.
     alone = parts_of(axis, Kind.SENSING) if effect.kind is Kind.SENSING else axis
     columns = jacobian(alone, ground.logs, where)[ground.kept]
-    step, squared = _bounded_step(ground.basis, force, columns, where, first)
-    moved = {c.parameter.name: s for c, s in zip(where, step, strict=True)}
-    return Start(squared, shape, replace(first, values={**first.values, **moved}))
+    step = _bounded_step(ground.basis, force, columns, where, first)
+    values = read(axis, where) + step
+    moved = {c.parameter.name: v for c, v in zip(where, values, strict=True)}
+    added = force + columns @ step
+    fitted = replace(first, values={**first.values, **moved})
+    return Start(shape, fitted, added, unabsorbed(added, ground.basis))
 
 
 def _clipped(effect: Effect, excitation: Excitation, shape: dict[str, float]) -> dict[str, float]:
@@ -205,18 +244,21 @@ def _without_friction(axis: AxisModel) -> AxisModel:
 
 def _bounded_step(
     basis: Array, force: Array, columns: Array, where: list[ParameterReference], first: Fitted
-) -> tuple[Array, float]:
-    """Strengths within bounds that minimise the force outside the span of the base's columns."""
+) -> Array:
+    """Change of the strengths (k,) within bounds that minimises the force outside a base's span."""
     left, own = unabsorbed(force, basis), unabsorbed(columns, basis)
-    norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    norms = np.linalg.norm(columns, axis=0)
+    norms[norms == 0.0] = 1.0
     start = np.array([first.values[c.parameter.name] for c in where])
-    low = np.array([c.parameter.lower for c in where]) - start
-    high = np.array([c.parameter.upper for c in where]) - start
-    ridge = RIDGE * np.eye(len(where))
-    scaled = np.vstack([own / norms, ridge])
-    target = np.concatenate([-left, np.zeros(len(where))])
-    step = np.linalg.lstsq(scaled, target, rcond=None)[0] / norms
+    low = (np.array([c.parameter.lower for c in where]) - start) * norms
+    high = (np.array([c.parameter.upper for c in where]) - start) * norms
+    normal = own.T @ own / np.outer(norms, norms) + RIDGE**2 * np.eye(len(where))
+    wanted = -(own.T @ left) / norms
+    step = np.linalg.solve(normal, wanted)
     if ((step < low) | (step > high)).any():
-        low, high = low * norms, np.maximum(high * norms, low * norms + 1e-12)
-        step = lsq_linear(scaled, target, bounds=(low, high)).x / norms
-    return start + step, float(np.sum((left + own @ step) ** 2))
+        if len(step) == 1:
+            return np.clip(step, low, high) / norms
+        factor = np.linalg.cholesky(normal)
+        bounds = (low, np.maximum(high, low + 1e-12))
+        step = lsq_linear(factor.T, np.linalg.solve(factor, wanted), bounds=bounds).x
+    return np.asarray(step / norms)

@@ -26,13 +26,14 @@ from identify.estimation.evidence import (
 from identify.estimation.fit import Fit, Outcome, error_on, finished, fit_axis, rms
 from identify.estimation.force_balance import residual
 from identify.estimation.time_origin import phases_found
-from identify.estimation.variable_projection import Start, fit_thoroughly, starts, stepped
+from identify.estimation.variable_projection import Start, fit_thoroughly, one_linear_step, starts
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel, Fitted, MachineModel
 
 Array = NDArray[np.float64]
 
+FIRST_EVALUATIONS = 12  # of a refit, after which it must show some evidence to go on
 HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
 RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion does not excite
 
@@ -101,9 +102,14 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
         if looked is not None:
             return score(base, looked, dataset, effect)
     elif not _promising(base, best):
-        return score(base, _one_linear_step(base, dataset, best.fitted), dataset, effect)
-    fit = simplified(fit_axis(base.axis.with_effect(best.fitted), dataset.fit), dataset, effect)
+        return score(base, one_linear_step(base, best), dataset, effect)
+    fit = fit_axis(base.axis.with_effect(best.fitted), dataset.fit, FIRST_EVALUATIONS)
     first = score(base, fit, dataset, effect)
+    if first.delta_bic < 0.0:
+        return first
+    if fit.outcome is Outcome.NOT_CONVERGED:
+        fit = fit_axis(fit.axis, dataset.fit)
+    first = score(base, simplified(fit, dataset, effect), dataset, effect)
     if first.fit.at_floor or first.delta_bic < RULE.least_bic:
         return first
     # It helps but does not explain everything. The effect was missing when the base was fitted,
@@ -125,19 +131,6 @@ def _promising(base: Fit, start: Start) -> bool:
     gain = samples * np.log(before / max(start.squared_error, 1e-12 * before))
     free = len(start.fitted.effect.parameters) - len(start.fitted.fixed)
     return bool(gain > RULE.promise * (RULE.least_bic + free * np.log(samples)))
-
-
-def _one_linear_step(base: Fit, dataset: Dataset, fitted: Fitted) -> Fit:
-    """The linear step as a fit; with zero strengths where the step raises the error."""
-    fit = finished(
-        stepped(base, fitted, dataset.fit), base.begun, dataset.fit, Outcome.NOT_CONVERGED
-    )
-    if fit.error <= base.error:
-        return fit
-    free = (p.name for p in fitted.effect.strengths if p.name not in fitted.fixed)
-    absent = dict.fromkeys(free, 0.0)
-    axis = base.axis.with_effect(replace(fitted, values={**fitted.values, **absent}))
-    return finished(axis, base.begun, dataset.fit, Outcome.NOT_CONVERGED)
 
 
 def _fitted_to_heads(base: Fit, dataset: Dataset, fitted: Fitted) -> Fit | None:
@@ -207,9 +200,9 @@ def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
 
 def _score_noise(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     """Evidence for an effect that is noise: it counts where the error is noise with it."""
-    logs = dataset.holdout or dataset.fit
-    error = error_on(fit.axis, logs)
-    floors = [floor_of(f.axis, logs) for f in (base, fit)]
+    logs, own = dataset.holdout or dataset.fit, not dataset.holdout
+    error = fit.residual if own else error_on(fit.axis, logs)
+    floors = [f.floor if own else floor_of(f.axis, logs) for f in (base, fit)]
     explained = fit.at_floor and not base.at_floor and rms(error) < RULE.at_floor * floors[1]
     gain = noise_gain(fit.residual, base.floor, fit.floor) if explained else 0.0
     logs_gain = effective_samples(error) * noise_gain(error, *floors) if explained else 0.0

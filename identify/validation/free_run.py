@@ -139,7 +139,8 @@ def _states_at(
     """Effect states (n_starts, n_states) after following the measured motion up to each start."""
     middle = 0.5 * (position[1:] + position[:-1]).T
     velocity = between(position.T, period)
-    acceleration = _smooth_acceleration(velocity, period)
+    pair = len(table.axes) == 2  # no law of a larger machine reads the other axis
+    acceleration = _smooth_acceleration(velocity, period) if pair else np.zeros_like(velocity)
     states = np.zeros(table.n_states)
     out = np.empty((len(starts), table.n_states))
     rows = np.empty((len(table.entries), middle.shape[1]))
@@ -149,7 +150,7 @@ def _states_at(
         for a, (first, last, at, _, _) in enumerate(table.axes):
             motion = np.stack([middle[a, span], velocity[a, span], command[span, a]])
             others = np.zeros_like(motion)
-            if len(table.axes) == 2:  # no law of a larger machine reads them
+            if pair:
                 b = 1 - a
                 others = np.stack([middle[b, span], velocity[b, span], acceleration[b, span]])
             walk(

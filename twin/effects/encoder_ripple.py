@@ -11,7 +11,7 @@ from math import cos, pi, sin
 
 from twin.effect import READING, Effect, Excitation, Kind, Parameter
 
-SCALES = (2e-6, 4e-6, 8e-6, 1e-5, 1.6e-5, 2e-5, 4e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3)  # m
+SCALES = (2e-6, 4e-6, 8e-6, 1e-5, 1.6e-5, 2e-5, 4e-5, 1e-4)  # m; longer ones show as ripples
 
 
 def law(p, s, io):

@@ -21,7 +21,12 @@ def law(p, s, io):
 
 
 def pitches(e: Excitation) -> tuple[float, ...]:
-    """Pitches to try: half a cycle apart over the travel, from three cycles on."""
+    """Pitches to try: those at which force over thrust repeats, which may be those of a harmonic.
+
+    Before a model tells them, half a cycle apart over the travel, from three cycles on.
+    """
+    if e.thrust_pitches:
+        return tuple(k * pitch for pitch in e.thrust_pitches for k in (1, 2))
     cycles = int(min(e.travel / 2e-3, 70.0))
     return tuple(2.0 * e.travel / k for k in range(6, 2 * cycles + 1))
 

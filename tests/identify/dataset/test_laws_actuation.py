@@ -1,7 +1,5 @@
 """Laws of what actuator and encoder make of a log: known filters, and errors undone."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from constructed import (
@@ -62,9 +60,7 @@ def test_a_motor_counts_as_weaker_from_less_than_half_its_force():
     """A saturation that loses all above its limit lowers a constant command by what it says."""
 
     def motions(*levels):
-        return [
-            replace(SHORT, raw=np.stack([SHORT.raw[0], 0.0 * SHORT.raw[1] + v])) for v in levels
-        ]
+        return [SHORT.with_force(0.0 * SHORT.raw[1] + v) for v in levels]
 
     limited = effect("actuator_saturation", {"limit": 1.0, "loss": 1.0})
     axis = AxisModel(1.0, effects=(limited,))

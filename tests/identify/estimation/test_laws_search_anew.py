@@ -14,15 +14,17 @@ from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.estimation.variable_projection import (
     Start,
+    _is_nearest,
+    _promises,
     fit_thoroughly,
     fit_without,
 )
 from twin.effect import Excitation
 
 # The rules as they were decided.
-BETTER, CHANCE, FULL_SHAPES, REFINED_STARTS = 0.99, 4.0, 4, 2
-RESCORED_SHAPES, RESIDUAL_LINES = 24, 12
+BETTER = 0.99
 RNG = np.random.default_rng(3)
+NOTHING = np.zeros(0)
 SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
 
 
@@ -41,7 +43,7 @@ def base(dataset):
 # --- fitted thoroughly ----------------------------------------------------------------------
 
 
-def thorough(monkeypatch, again, first=4.0, floor=1.0):
+def thorough(monkeypatch, again, first=4.0, floor=1.0, promises=True, nearest=True):
     """fit_thoroughly of an axis with two effects, one with a shape; the axes fitted."""
     axes, errors = [], [first, first * again]
     shape = fitted("cogging", p=0.02, a1=0.4)
@@ -54,9 +56,12 @@ def thorough(monkeypatch, again, first=4.0, floor=1.0):
 
     def started(rest, dataset, effect):
         assert "cogging" not in rest.axis.names
-        return [Start(0.0, {}, fitted("cogging", p=0.03, a1=0.9, b1=0.5)), None]
+        return [Start({}, fitted("cogging", p=0.03, a1=0.9, b1=0.5), NOTHING, NOTHING), None]
 
     monkeypatch.setattr(search, "fit_axis", fit_axis)
+    monkeypatch.setattr(search, "_with_what_repeats", lambda rest, dataset: SEEN)
+    monkeypatch.setattr(search, "_promises", lambda start, fit, dataset: promises)
+    monkeypatch.setattr(search, "_is_nearest", lambda shape, present, known: nearest)
     monkeypatch.setattr(search, "starts", started)
     monkeypatch.setattr(
         search, "fit_without", lambda fit, dataset, name: built_fit(9.0, axis=axis.without(name))
@@ -73,6 +78,39 @@ def test_a_shape_found_anew_is_taken_where_it_is_better(monkeypatch, again, take
     assert axes[1]["cogging"].fixed == {"b1"}
     assert found.error == pytest.approx(4.0 * again if taken else 4.0)
     assert found.begun is axis
+
+
+@pytest.mark.parametrize(
+    ("promises", "nearest", "refits"), [(True, True, 1), (False, False, 1), (False, True, 0)]
+)
+def test_a_shape_that_is_there_already_is_not_refitted_in_vain(
+    monkeypatch, promises, nearest, refits
+):
+    _, axes, _ = thorough(monkeypatch, 0.5, promises=promises, nearest=nearest)
+    assert len(axes) == 1 + refits
+
+
+def test_a_start_promises_what_it_leaves_less_of(dataset, base):
+    shape = fitted("cogging")
+    for part, promising in ((0.99, True), (1.01, False)):
+        left = part * base.residual
+        assert _promises(Start({}, shape, left, left), base, dataset) is promising
+    few = replace(dataset, fit=dataset.fit)
+    few.__dict__["in_heads"] = np.arange(len(base.kept)) < 0.2 * len(base.kept)
+    there = base.residual[few.in_heads[base.kept]]
+    assert 0 < len(there) < len(base.residual)
+    for part, promising in ((0.99, True), (1.01, False)):
+        left = np.full(len(there), part * np.sqrt(np.mean(there**2)))
+        assert _promises(Start({}, shape, left, left), base, few) is promising
+
+
+def test_present_values_are_nearest_to_one_of_the_shapes():
+    lugre = fitted("lugre", v0=0.03, sigma0=299.0)
+    slow, fast = lugre.effect.parameter("v0").scan(SEEN)  # 8 and 40 mm/s
+    soft, stiff, _ = lugre.effect.parameter("sigma0").scan(SEEN)  # 300, 3000, 30 000 N/m
+    assert _is_nearest({"v0": fast, "sigma0": soft}, lugre, SEEN)
+    assert not _is_nearest({"v0": slow, "sigma0": soft}, lugre, SEEN)
+    assert not _is_nearest({"v0": fast, "sigma0": stiff}, lugre, SEEN)
 
 
 def test_at_the_floor_no_shape_is_sought_anew(monkeypatch):

@@ -228,9 +228,9 @@ def test_a_noise_is_told_where_it_alone_makes_the_error_noise(
     monkeypatch.setattr(candidates, "error_on", lambda axis, logs: seen * noise)
     monkeypatch.setattr(candidates, "floor_of", floor)
     base.__dict__["floor"], fit.__dict__["floor"] = 1.0, 1.05
-    score(base, fit, study_stub(fit=("fit",)), NOISE)
-    assert {logs for _, logs in asked} == {("fit",)}
-    asked.clear()
+    own = score(base, fit, study_stub(fit=("fit",)), NOISE)  # on the logs that it was fitted to
+    assert not asked
+    assert own.gain.after == pytest.approx(fit.error)
     dataset = study_stub(holdout=("held",), fit=("fit",))
     found = score(base, fit, dataset, NOISE)
     assert {logs for _, logs in asked} == {dataset.holdout}

@@ -24,15 +24,21 @@ from identify.estimation.variable_projection import Start
 from identify.selection import candidates
 from identify.selection.candidates import (
     _fitted_to_heads,
-    _one_linear_step,
     _promising,
     simplified,
     try_effect,
 )
 
 # The rules as they were decided.
+FIRST_EVALUATIONS = 12
 LEAST_BIC, LEAST_T, PROMISE, SAME_ERROR, AT_FLOOR = 10.0, 3.0, 0.3, 1.01, 1.3
 RNG = np.random.default_rng(5)
+
+
+def of_size(squared, at):
+    """A start that leaves one test function of that squared error, N^2."""
+    left = np.array([np.sqrt(squared)])
+    return Start({}, at, left, left)
 
 
 # --- how far an effect is tried -------------------------------------------------------------
@@ -46,34 +52,11 @@ def test_a_first_look_must_show_a_part_of_the_evidence_asked_for():
         wanted = PROMISE * (LEAST_BIC + free * np.log(n))
         for gain, promising in ((0.99 * wanted, False), (1.01 * wanted, True)):
             left = before * np.exp(-gain / n)
-            assert _promising(base, Start(left, {}, fitted(effect))) is promising
+            assert _promising(base, of_size(left, fitted(effect))) is promising
     held = replace(fitted("cogging"), fixed=frozenset({"p", "a1", "b1", "a2", "b2", "a3"}))
     one = PROMISE * (LEAST_BIC + np.log(n))
-    assert _promising(base, Start(before * np.exp(-1.01 * one / n), {}, held))
-    assert not _promising(built_fit(0.0), Start(0.0, {}, fitted("cogging")))
-
-
-@pytest.mark.parametrize(("error", "kept"), [(1.9, True), (2.0, True), (2.1, False)])
-def test_a_step_that_does_harm_leaves_the_effect_without_strength(monkeypatch, error, kept):
-    base, effect = built_fit(2.0), fitted("cogging", a1=0.7, b2=0.2, p=0.03)
-    moved = axis_of(fitted("constant_force"), effect)
-
-    def stepped(*given):
-        assert given == (base, effect, ("log",))
-        return moved
-
-    monkeypatch.setattr(candidates, "stepped", stepped)
-
-    def finished(axis, begun, logs, outcome):
-        assert (begun, logs, outcome) == (base.begun, ("log",), Outcome.NOT_CONVERGED)
-        return built_fit(error if axis is moved else 2.0, axis=axis, outcome=outcome)
-
-    monkeypatch.setattr(candidates, "finished", finished)
-    found = _one_linear_step(base, study_stub(fit=("log",)), effect)
-    values = found.axis["cogging"].values
-    assert (found.axis is moved) is kept
-    assert values["p"] == 0.03
-    assert (values["a1"], values["b2"]) == ((0.7, 0.2) if kept else (0.0, 0.0))
+    assert _promising(base, of_size(before * np.exp(-1.01 * one / n), held))
+    assert not _promising(built_fit(0.0), of_size(0.0, fitted("cogging")))
 
 
 @pytest.mark.parametrize(("error", "simpler"), [(0.99, True), (1.01, False)])
@@ -96,10 +79,13 @@ def test_simpler_values_may_cost_a_hundredth(monkeypatch, error, simpler):
     assert simplified(other, study_stub(), CATALOGUE["wear"]) is other
 
 
-def tried(monkeypatch, effect, *, promising=True, looked=None, errors=(0.5, 0.4, 0.3), bic=90.0):
+def tried(
+    monkeypatch, effect, *, promising=True, looked=None, errors=(0.5, 0.4, 0.3), bic=90.0,
+    unfinished=False,
+):  # fmt: skip
     """try_effect with every part given; the axis each fit began from, and what was scored."""
     begun, left = [], list(errors)
-    starts = [Start(float(i), {}, fitted(effect)) for i in (1, 2)]
+    starts = [of_size(float(i), fitted(effect)) for i in (1, 2)]
     other = axis_of(mass=9.9)
     base, dataset = built_fit(2.0, 0.1, begun=other), study_stub()
 
@@ -129,16 +115,21 @@ def tried(monkeypatch, effect, *, promising=True, looked=None, errors=(0.5, 0.4,
         assert (asked, where, what) == (base, dataset, CATALOGUE[effect])
         return built(what, bic=bic, fit=fit)
 
-    def fit_axis(axis, logs):
-        begun.append((axis.mass, axis[effect] is starts[1].fitted))
-        return built_fit(left.pop(0), 0.1, axis)
+    def stepped(*asked):
+        assert asked == (base, starts[0])
+        return built_fit(1.7, 0.1)
+
+    def fit_axis(axis, logs, most=None):
+        begun.append((axis.mass, axis[effect] is starts[1].fitted, most))
+        converged = Outcome.NOT_CONVERGED if most and unfinished else Outcome.CONVERGED
+        return built_fit(left.pop(0), 0.1, axis, outcome=converged)
 
     monkeypatch.setattr(candidates, "starts", begin)
     monkeypatch.setattr(candidates, "fit_axis", fit_axis)
     monkeypatch.setattr(candidates, "fit_thoroughly", lambda axis, s: built_fit(0.2, 0.1, axis))
     monkeypatch.setattr(candidates, "simplified", simplest)
     monkeypatch.setattr(candidates, "_promising", promises)
-    monkeypatch.setattr(candidates, "_one_linear_step", given(built_fit(1.7, 0.1)))
+    monkeypatch.setattr(candidates, "one_linear_step", stepped)
     monkeypatch.setattr(candidates, "_fitted_to_heads", given(looked))
     monkeypatch.setattr(candidates, "score", scored)
     return try_effect(base, dataset, CATALOGUE[effect]).fit.error, begun
@@ -148,14 +139,23 @@ def test_an_effect_is_tried_as_far_as_it_promises(monkeypatch):
     assert tried(monkeypatch, "cogging", promising=False) == (pytest.approx(1.7), [])
     looked = built_fit(1.5, 0.1)
     assert tried(monkeypatch, "lugre", looked=looked) == (pytest.approx(1.5), [])
-    first = [(5.3, False)]
+    first = [(5.3, False, FIRST_EVALUATIONS)]
     assert tried(monkeypatch, "cogging", errors=[0.12]) == (pytest.approx(0.12), first)
     assert tried(monkeypatch, "cogging", bic=9.0) == (pytest.approx(0.5), first)
-    every = [(5.3, False), (9.9, False), (5.3, True)]
+    every = [*first, (9.9, False, None), (5.3, True, None)]
     assert tried(monkeypatch, "cogging") == (pytest.approx(0.2), every)
     assert tried(monkeypatch, "lugre", promising=False) == (pytest.approx(0.2), every)
     floor = tried(monkeypatch, "cogging", errors=(0.5, 0.11, 0.3))
     assert floor == (pytest.approx(0.11), every)
+
+
+def test_a_refit_goes_on_to_its_end_where_its_first_steps_show_evidence(monkeypatch):
+    first, on = (5.3, False, FIRST_EVALUATIONS), (5.3, False, None)
+    found = tried(monkeypatch, "cogging", bic=-0.1, unfinished=True)
+    assert found == (pytest.approx(0.5), [first])
+    found = tried(monkeypatch, "cogging", bic=0.1, unfinished=True)
+    assert found == (pytest.approx(0.4), [first, on])
+    assert tried(monkeypatch, "cogging", bic=0.1) == (pytest.approx(0.5), [first])
 
 
 def test_a_noise_is_scored_without_a_refit(monkeypatch):
