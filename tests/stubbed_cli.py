@@ -30,6 +30,14 @@ class Stub:
         return call
 
 
+def logs_of(paths: list[Path] | None) -> dict[str, str]:
+    return {str(p): f"log {p}" for p in paths or ()}
+
+
+def checked_logs_of(paths: list[Path] | None) -> tuple[dict[str, str], list[str]]:
+    return logs_of(paths), [f"warned of {name}" for name in logs_of(paths)]
+
+
 def stubbed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, folder: Path):
     """A function that runs `twin`: exit code, standard output and standard error."""
     monkeypatch.chdir(folder)
@@ -40,13 +48,18 @@ def stubbed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, fold
                 lambda name, catalogue: MachineModel(f"{name} {catalogue['all']}", {}),
             ),
             ("catalogue_with", lambda files: {"all": [str(f) for f in files or ()], "wear": "W"}),
-            ("read_logs", lambda paths: {str(p): f"log {p}" for p in paths or ()}),
-            ("checked", lambda logs: [f"warned of {n}" for n in logs]),
+            ("read_logs", logs_of),
+            ("read_measured", logs_of),
+            (
+                "read_checked",
+                lambda paths: (logs_of(paths), [f"warned of {p}" for p in paths or ()]),
+            ),
             ("bars_on_stderr", lambda: nullcontext(Stub())),
         ):
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, answer)
-    monkeypatch.setattr("identify.cli.shared.read_logs", loop.read_logs)
+    monkeypatch.setattr("identify.cli.shared.read_checked", loop.read_checked)
+    monkeypatch.setattr("identify.cli.shared.read_measured", logs_of)
     monkeypatch.setattr("identify.cli.shared.bars_on_stderr", lambda: nullcontext(Stub()))
 
     def run(*arguments: object) -> tuple[int, str, str]:

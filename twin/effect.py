@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 # Slots of ``io``. Compiled laws freeze these numbers.
@@ -52,6 +53,21 @@ IO_SIZE = 21
 Law = Callable[[Any, Any, Any], None]
 
 ELEMENTS = "elements"  # the parameter that counts the elements of an effect with ``of_size``
+
+
+def own_functions(function: Callable[..., Any]) -> tuple[FunctionType, ...]:
+    """The plain functions of the same file that a function calls, directly or not."""
+    found: list[FunctionType] = []
+    waiting: list[Any] = [function]
+    while waiting:
+        caller = waiting.pop()
+        for name in caller.__code__.co_names:
+            called = caller.__globals__.get(name)
+            own = isinstance(called, FunctionType) and called.__module__ == function.__module__
+            if own and called not in found:
+                found.append(called)
+                waiting.append(called)
+    return tuple(found)
 
 
 class Kind(Enum):
@@ -227,8 +243,9 @@ class Effect:
         return any(values[p.name] != 0.0 for p in self.strengths)
 
     def reads(self, slot: str) -> bool:
-        """Whether the law names that slot of ``io``, such as "U" or "A_OTHER"."""
-        return slot in self.law.__code__.co_names
+        """Whether the law, or a function that it calls, names that slot of ``io``, such as "U"."""
+        written: list[Any] = [self.law, *own_functions(self.law)]
+        return any(slot in function.__code__.co_names for function in written)
 
     @property
     def reads_other_axis(self) -> bool:

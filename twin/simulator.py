@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +16,6 @@ from twin.errors import CannotRun, InputError
 from twin.experiments.trajectory.setpoint import Setpoint
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import attach, offsets, passive_callback, step_address
-from twin.mujoco.mjcf import attached_joint, machine_spec
 
 CHUNK = 20_000  # samples between two reports of progress
 WATCHED_STATES = 8  # an effect with more states than this is not logged state by state
@@ -54,9 +52,16 @@ class Stepper(Protocol):
 
 
 class MujocoSimulator:
-    """The machine in MuJoCo with its effects attached; steps only under passive_callback()."""
+    """The machine in MuJoCo with its effects attached.
+
+    MuJoCo is imported with the first, as most commands simulate nothing in it.
+    """
 
     def __init__(self, model: MachineModel, table: Table) -> None:
+        import mujoco
+
+        from twin.mujoco.mjcf import machine_spec
+
         spec = machine_spec(model)
         axes = tuple(model.axes)
         self.user_at = attach(spec, table, model.period, axes)
@@ -77,10 +82,13 @@ class MujocoSimulator:
 
     def _attached_joints(self, table: Table) -> NDArray[np.int64]:
         """For each joint that a structure effect built: qpos, dof, the effect's first state."""
+        from twin.mujoco.mjcf import attached_joint
+
+        joints = {self.model.joint(i).name for i in range(self.model.njnt)}
         rows = []
         for (axis, effect), entry in zip(table.labels, table.entries, strict=True):
             name = attached_joint(axis, effect)
-            if mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_JOINT, name) >= 0:
+            if name in joints:
                 joint = self.model.joint(name)
                 rows.append((joint.qposadr[0], joint.dofadr[0], int(entry[3])))
         return np.array(rows, dtype=np.int64).reshape(-1, 3)
@@ -102,10 +110,11 @@ class MujocoSimulator:
 
     def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
         """See Stepper."""
-        run_mujoco(
-            self._step, self.model._address, self.data._address, tuple(offsets()[3:7]),
-            self._where, self.user_at, first, *shared[:-1], setpoints, noise, shared[-1], *out,
-        )  # fmt: skip
+        with passive_callback():
+            run_mujoco(
+                self._step, self.model._address, self.data._address, tuple(offsets()[3:7]),
+                self._where, self.user_at, first, *shared[:-1], setpoints, noise, shared[-1], *out,
+            )  # fmt: skip
 
 
 class ReducedSimulator:
@@ -180,15 +189,13 @@ def run(
         np.zeros((n, len(table.entries))),
         np.empty((n, len(watched))),
     )
-    simulation: Stepper
-    with passive_callback():
-        simulation = simulator(model, table)
-        simulation.place(setpoint.position[0], np.zeros(n_axes), np.zeros(table.n_states), 0)
-        for first in range(0, n, CHUNK):
-            part = slice(first, first + CHUNK)
-            simulation.run(first, shared, setpoints[part], noise[part], tuple(o[part] for o in out))
-            if progress:
-                progress(min(first + CHUNK, n), n)
+    simulation: Stepper = simulator(model, table)
+    simulation.place(setpoint.position[0], np.zeros(n_axes), np.zeros(table.n_states), 0)
+    for first in range(0, n, CHUNK):
+        part = slice(first, first + CHUNK)
+        simulation.run(first, shared, setpoints[part], noise[part], tuple(o[part] for o in out))
+        if progress:
+            progress(min(first + CHUNK, n), n)
     _require_finite(out[0], model)
     return Run(*out, table=table, state_names=names)
 

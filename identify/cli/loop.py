@@ -19,9 +19,8 @@ from identify.cli.shared import (
     app,
     bars_on_stderr,
     catalogue_with,
-    checked,
     machine_model,
-    read_logs,
+    read_checked,
     require_folder,
     say,
     with_holdout,
@@ -47,13 +46,13 @@ def fit(
     if out:
         require_folder(out)
     catalogue = catalogue_with(effects)
-    result, recorded = with_holdout(
+    result, findings = with_holdout(
         partial(workflow.fit, catalogue=catalogue, test_function=test_function),
         machine_model(model, catalogue), logs, holdout,
     )  # fmt: skip
     if out:
         save_model(result.model, out)
-    say(as_text.fit_text(result), as_json.fit_json(result), as_json_, checked(recorded))
+    say(as_text.fit_text(result), as_json.fit_json(result), as_json_, findings)
 
 
 @app.command()
@@ -73,7 +72,7 @@ def compare(
     if out:
         require_folder(out)
     machine = machine_model(model, catalogue_with(effects))
-    recorded = read_logs(logs)
+    recorded, findings = read_checked(logs)
     with bars_on_stderr() as bars:
         result = workflow.compare(machine, recorded, test_function=test_function, progress=bars)
     if out:
@@ -83,7 +82,7 @@ def compare(
             out, title=f"{machine.name}: model against measurement", diagnosis=None,
             comparison=result, history=machine.history,
         )  # fmt: skip
-    say(as_text.compare_text(result), as_json.compare_json(result), as_json_, checked(recorded))
+    say(as_text.compare_text(result), as_json.compare_json(result), as_json_, findings)
 
 
 @app.command()
@@ -105,7 +104,7 @@ def diagnose(
         require_folder(out)
     catalogue = catalogue_with(effects)
     machine = machine_model(model, catalogue)
-    result, recorded = with_holdout(
+    result, findings = with_holdout(
         partial(workflow.diagnose, catalogue=catalogue, test_function=test_function),
         machine,
         logs,
@@ -118,7 +117,7 @@ def diagnose(
             out, title=f"{machine.name}: what the model lacks", diagnosis=result,
             comparison=result.comparison, history=result.model.history,
         )  # fmt: skip
-    say(as_text.diagnose_text(result), as_json.diagnose_json(result), as_json_, checked(recorded))
+    say(as_text.diagnose_text(result), as_json.diagnose_json(result), as_json_, findings)
 
 
 @app.command()
@@ -144,12 +143,12 @@ def add(
     require_folder(out)
     catalogue = catalogue_with(effects)
     chosen = catalogue[effect]
-    result, recorded = with_holdout(
+    result, findings = with_holdout(
         partial(workflow.add, chosen, axis=axis, test_function=test_function),
         machine_model(model, catalogue), logs, holdout,
     )  # fmt: skip
     save_model(result.model, out)
-    say(as_text.add_text(result), as_json.add_json(result), as_json_, checked(recorded))
+    say(as_text.add_text(result), as_json.add_json(result), as_json_, findings)
     if not result.kept:
         raise typer.Exit(1)
 

@@ -17,9 +17,9 @@ from identify.cli.shared import (
     app,
     bars_on_stderr,
     catalogue_with,
-    checked,
     machine_model,
-    read_logs,
+    read_checked,
+    read_measured,
     require_folder,
     say,
 )
@@ -64,11 +64,11 @@ def plan(
     catalogue = catalogue_with(effects)
     machine = machine_model(model, catalogue)
     rivals = [_rival(name, catalogue) for name in between or ()]
-    recorded = read_logs(logs)
+    recorded, findings = read_checked(logs)
     with bars_on_stderr() as bars:
         result = workflow.plan(
-            machine, recorded, read_logs(holdout), between=rivals, catalogue=catalogue, axis=axis,
-            duration=duration, test_function=test_function, progress=bars,
+            machine, recorded, read_measured(holdout), between=rivals, catalogue=catalogue,
+            axis=axis, duration=duration, test_function=test_function, progress=bars,
         )  # fmt: skip
     text, file = as_text.plan_text(result), None
     if result.decides:
@@ -77,7 +77,7 @@ def plan(
             result.chosen.experiment, out, *text.splitlines()[:3], units=result.chosen.units
         )
         text += f"\n{out}: run it on the machine, or `twin simulate {out} --model MODEL -o LOG`"
-    say(text, {**as_json.plan_json(result), "file": file}, as_json_, checked(recorded))
+    say(text, {**as_json.plan_json(result), "file": file}, as_json_, findings)
     if not result.decides:
         raise typer.Exit(1)
 

@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from twin.model.machine import MachineModel
 
 Result = TypeVar("Result")
+MEASURED = ("position", "force", "current", "setpoint_position")
 
 app = typer.Typer(
     help="Find out why the model and the machine disagree.",
@@ -113,17 +115,46 @@ def machine_model(name: str, catalogue: Catalogue) -> MachineModel:
 
 def with_holdout(
     job: Callable[..., Result], model: MachineModel, logs: list[Path], holdout: list[Path] | None
-) -> tuple[Result, dict[str, Log]]:
-    """The result of a job on a model, logs and held-out logs; and the logs."""
-    recorded = read_logs(logs)
+) -> tuple[Result, list[str]]:
+    """The result of a job on a model, logs and held-out logs; and the findings on the logs."""
+    recorded, findings = read_checked(logs)
+    held = read_measured(holdout)
     with bars_on_stderr() as bars:
-        return job(model, recorded, read_logs(holdout), progress=bars), recorded
+        return job(model, recorded, held, progress=bars), findings
 
 
 def read_logs(paths: list[Path] | None) -> dict[str, Log]:
+    """The logs by name, whole."""
+    return {str(path): log for path, log in _read(paths)}
+
+
+def read_measured(paths: list[Path] | None) -> dict[str, Log]:
+    """The logs by name, less what identification does not read: most of their memory."""
+    return {str(path): _measured(log) for path, log in _read(paths)}
+
+
+def read_checked(paths: list[Path] | None) -> tuple[dict[str, Log], list[str]]:
+    """The same, and the findings of the log check on the whole logs, one sentence each."""
+    recorded, findings = {}, []
+    for path, log in _read(paths):
+        findings += checked({str(path): log})
+        recorded[str(path)] = _measured(log)
+    return recorded, findings
+
+
+def _read(paths: list[Path] | None) -> Iterator[tuple[Path, Log]]:
     from twin.log import read_log
 
-    return {str(path): read_log(path) for path in paths or ()}
+    for path in paths or ():
+        yield path, read_log(path)
+
+
+def _measured(log: Log) -> Log:
+    axes = {
+        name: replace(axis, columns={k: v for k, v in axis.columns.items() if k in MEASURED})
+        for name, axis in log.axes.items()
+    }
+    return replace(log, axes=axes, truth={}, attachments={})
 
 
 def checked(logs: Mapping[str, Log]) -> list[str]:

@@ -94,8 +94,8 @@ def reading_error(sensing: AxisModel, motion: Motion, passes: int = PASSES) -> t
     """
     table = axis_table({motion.axis: sensing})
     _, _, _, first, last = table.axes[0]
-    true = motion.smoothed.copy()
-    path, reading = motion.smoothed[0], np.empty(true.shape[1])
+    path = motion.smoothed_position
+    true, reading = np.stack([path, *motion.raw]), np.empty(len(path))
     for _ in range(passes):
         walk_sensing(
             table.entries, first, last, table.parameters, np.zeros(table.n_states), true,

@@ -134,11 +134,9 @@ class Motion:
         return np.stack([middle + (instant - 0.5) * travelled, velocity, command])
 
     @cached_property
-    def smoothed(self) -> Array:
-        """Position m at the start of each sample, smoothed; velocity m/s and command N, (3, n)."""
-        signals = self.at_samples(0.0)
-        signals[0] = local_parabola(signals[0], SMOOTHED)
-        return signals
+    def smoothed_position(self) -> Array:
+        """Position (n,) m at the start of each sample, smoothed."""
+        return local_parabola(self.at_samples(0.0)[0], SMOOTHED)
 
     @cached_property
     def command_noise(self) -> float:

@@ -19,7 +19,6 @@ from twin.core.control import Controller, gain_table
 from twin.core.loop import N_SIGNALS, POSITION_COLUMN
 from twin.core.native import LAST_ACCELERATION, LAST_VELOCITY, Table, walk
 from twin.model.machine import MachineModel
-from twin.mujoco.callback import passive_callback
 from twin.signals import Array, between, local_cubic, local_parabola
 from twin.simulator import MujocoSimulator, ReducedSimulator, Stepper
 
@@ -57,18 +56,16 @@ def free_run(
     origin = _time_origin(logs)
     states = _states_at(table, position, command, period, starts, origin)
     out = np.full((n, len(model.axes)), np.nan)
-    simulation: Stepper
-    with passive_callback():
-        simulation = simulator(model, table)
-        for start, state in zip(starts, states, strict=True):
-            x, v, a = local_cubic(position[start - side : start + side + 1], period)
-            state[table.axes[:, 2] + LAST_ACCELERATION] = a
-            state[table.axes[:, 2] + LAST_VELOCITY] = v - period * a
-            # The stepped position leads the true one by half a sample (see twin.core.loop).
-            simulation.place(x + 0.5 * period * v, v, state, int(start), origin)
-            span = slice(start, min(start + count, n))
-            simulated = _open_loop(model, table, simulation, int(start), command[span])
-            out[span] = simulated - position[span]
+    simulation: Stepper = simulator(model, table)
+    for start, state in zip(starts, states, strict=True):
+        x, v, a = local_cubic(position[start - side : start + side + 1], period)
+        state[table.axes[:, 2] + LAST_ACCELERATION] = a
+        state[table.axes[:, 2] + LAST_VELOCITY] = v - period * a
+        # The stepped position leads the true one by half a sample (see twin.core.loop).
+        simulation.place(x + 0.5 * period * v, v, state, int(start), origin)
+        span = slice(start, min(start + count, n))
+        simulated = _open_loop(model, table, simulation, int(start), command[span])
+        out[span] = simulated - position[span]
     return FreeRun({a: out[:, i] for i, a in enumerate(model.axes) if a in logs}, HORIZON)
 
 

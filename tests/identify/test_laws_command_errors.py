@@ -6,13 +6,24 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from stubbed_cli import stubbed
 
 from identify import workflow
 from identify.cli import machine, main
-from identify.cli.shared import catalogue_with, machine_model, read_logs, require_folder, say
+from identify.cli.shared import (
+    catalogue_with,
+    checked,
+    machine_model,
+    read_checked,
+    read_logs,
+    read_measured,
+    require_folder,
+    say,
+)
 from twin.errors import InputError
+from twin.log import AxisLog, Log
 
 
 @pytest.fixture
@@ -86,3 +97,27 @@ def test_files_are_read_by_the_names_they_were_given(monkeypatch):
     assert read_logs(None) == {}
     assert (catalogue_with(paths), catalogue_with(None)) == (paths, ())
     assert machine_model("name", "catalogue") == ("name", "catalogue")
+
+
+def test_identification_holds_no_more_of_a_log_than_it_reads(monkeypatch):
+    """Six columns and the truth of a simulation are four times what is fitted."""
+    t = 1e-3 * np.arange(3000)
+    own = {
+        "position": 0.05 * np.sin(3.0 * t), "force": np.cos(3.0 * t), "current": np.cos(3.0 * t),
+        "setpoint_position": 0.05 * np.sin(3.0 * t),
+    }  # fmt: skip
+    late = 0.15 * np.cos(3.0 * (t - 0.02))  # only the check of the whole log sees it
+    whole = Log(
+        1000.0, {"x": AxisLog({**own, "velocity": late}, force_constant=1.0)}, {"a": "b"},
+        truth={"x": {"position": own["position"]}}, attachments={"model.toml": b""},
+    )  # fmt: skip
+    monkeypatch.setattr("twin.log.read_log", lambda path: whole)
+    found, findings = read_checked([Path("a.mcap")])
+    assert findings == checked({"a.mcap": whole})
+    assert any("velocity" in f for f in findings)
+    for logs in (found, read_measured([Path("a.mcap")])):
+        (log,) = logs.values()
+        assert log.axes["x"].columns == own
+        assert (log.truth, log.attachments) == ({}, {})
+        assert (log.metadata, log.axes["x"].force_constant) == ({"a": "b"}, 1.0)
+    assert read_checked(None) == ({}, [])

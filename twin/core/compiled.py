@@ -20,6 +20,8 @@ from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
 from numba.extending import register_jitable
 
+from twin.effect import own_functions
+
 
 class _Cache(FunctionCache):
     """A function's cache, keyed by all that is compiled into the function."""
@@ -53,23 +55,12 @@ def callback(function: Any, signature: Any) -> Any:
     It may call plain functions of its own file, so that a file of laws needs no numba to be read.
     Raises numba.core.errors.NumbaError where it cannot be compiled.
     """
-    for called in _own_functions(function, set()):
+    for called in own_functions(function):
         _let_be_called(called)
     out = _Callback(function, (signature.args, signature.return_type), {}, {"error_model": "numpy"})
     out.enable_caching()
     out.compile()
     return out
-
-
-def _own_functions(function: Any, seen: set[FunctionType]) -> set[FunctionType]:
-    """The plain functions of the same file that a function calls, directly or not."""
-    for name in function.__code__.co_names:
-        called = function.__globals__.get(name)
-        own = isinstance(called, FunctionType) and called.__module__ == function.__module__
-        if own and called not in seen:
-            seen.add(called)
-            _own_functions(called, seen)
-    return seen
 
 
 @cache  # once each

@@ -11,7 +11,6 @@ import importlib.metadata
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-import mujoco
 import numpy as np
 
 from twin.core.control import Controller
@@ -207,7 +206,7 @@ def _log(
         "experiment": experiment,
         "seed": str(seed),
         "software": f"proton-twin {importlib.metadata.version('proton-twin')}",
-        "mujoco": mujoco.__version__,
+        "mujoco": importlib.metadata.version("mujoco"),
     }
     attachments = {"model.toml": text.encode()}
     if model.mjcf:

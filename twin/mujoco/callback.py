@@ -14,9 +14,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import mujoco
 import numpy as np
 from numba import carray, types
 from numba.core import cgutils
@@ -41,6 +40,9 @@ from twin.effect import (
     X,
 )
 
+if TYPE_CHECKING:
+    import mujoco
+
 UNKNOWN_LAYOUT = "this MuJoCo lays out its structs in an unknown way; report its version"
 NUMERIC = "proton_twin_table"
 MAGIC = 0.3401950653e77  # no model holds this by chance
@@ -64,6 +66,8 @@ class Offsets(NamedTuple):
 @cache
 def library() -> ctypes.CDLL:
     """The MuJoCo library that the Python package has loaded."""
+    import mujoco
+
     folder = Path(mujoco.__file__).parent
     names = [p for p in folder.iterdir() if p.name.startswith(("libmujoco", "mujoco.dll"))]
     return ctypes.CDLL(str(names[0]))
@@ -78,6 +82,8 @@ def step_address() -> int:
 
 def _probe(numeric: int, userdata: int, neighbours: bool) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """A small model; with neighbours, the arrays beside those sought are not empty."""
+    import mujoco
+
     spec = mujoco.MjSpec()
     body = spec.worldbody.add_body()
     body.add_joint(name="q", type=mujoco.mjtJoint.mjJNT_SLIDE)
@@ -279,6 +285,8 @@ def passive_callback() -> Iterator[None]:
     Meanwhile MuJoCo's own timers stand still (``mjData.timer``): it reads the clock some twenty
     times a step, for a quarter of the step's time.
     """
+    import mujoco
+
     before = mujoco.get_mjcb_passive()
     clock = ctypes.c_void_p.in_dll(library(), "mjcb_time")
     ticking = clock.value

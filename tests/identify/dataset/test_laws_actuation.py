@@ -107,7 +107,7 @@ def test_a_ripple_of_the_encoder_is_undone():
     """reading = x + e(x), inverted by Newton's method here and by repetition there."""
     values = SENSING[1].values
     true, _ = true_motion(AxisModel(1.0, effects=SENSING[1:]), SHORT)
-    seen = SHORT.smoothed[0]
+    seen = SHORT.smoothed_position
     x = seen.copy()
     for _ in range(6):
         turn = 2.0 * np.pi / values["period"] * x

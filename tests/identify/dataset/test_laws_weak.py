@@ -173,11 +173,13 @@ def test_the_position_at_the_samples_is_that_read(instant):
 
 def test_smoothing_keeps_parabolas_and_averages_noise():
     bent = motion_of(log_of(1000.0, np.linspace(0, 1, 1501) ** 2, np.zeros(1501)), "x", "")
-    np.testing.assert_allclose(bent.smoothed[0], np.linspace(0, 1, 1501)[:1500] ** 2, atol=1e-12)
+    np.testing.assert_allclose(
+        bent.smoothed_position, np.linspace(0, 1, 1501)[:1500] ** 2, atol=1e-12
+    )
     rng = np.random.default_rng(3)
     x = np.linspace(0, 1, 9001) + rng.normal(0, 1e-6, 9001)
     rough = motion_of(log_of(9000.0, x, np.zeros(9001)), "x", "")
-    left = rough.smoothed[0] - np.linspace(0, 1, 9001)[: rough.raw.shape[1]]
+    left = rough.smoothed_position - np.linspace(0, 1, 9001)[: rough.raw.shape[1]]
     m = SMOOTHED // 2  # variance of a parabola's value in the middle of 2 m + 1 points
     shrunk = 3.0 * (3 * m**2 + 3 * m - 1) / ((2 * m + 3) * (2 * m + 1) * (2 * m - 1))
     assert np.std(left) == pytest.approx(1e-6 * np.sqrt(shrunk), rel=0.1)

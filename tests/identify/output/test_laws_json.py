@@ -17,10 +17,10 @@ from identify.output.as_json import (
     compare_json,
     diagnose_json,
     fit_json,
-    plain,
     plan_json,
 )
 from identify.output.machine_json import check_json, effect_json
+from identify.output.plain import plain
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
 from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.selection import verdict_in_words

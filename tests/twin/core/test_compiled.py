@@ -194,6 +194,9 @@ def test_a_law_may_call_functions_of_its_own_file(before, mark, tmp_path: Path) 
         np.zeros_like(motion), 1e-3, 0, rows,
     )  # fmt: skip
     np.testing.assert_array_equal(rows, [[-2.0, 2.0, 0.0]])
+    assert effect.reads("OUT")
+    assert effect.reads("copysign"), "by the function that its function calls"
+    assert not effect.reads("U")
 
 
 def test_a_change_of_a_function_that_a_law_calls_changes_its_digest(tmp_path: Path) -> None:
