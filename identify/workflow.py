@@ -18,7 +18,8 @@ from identify.output.results import Addition, Comparison, Diagnosis, FitResult
 from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate, score, try_effect, usable
 from identify.selection.confounded import moved_parameters
-from identify.selection.forward_selection import AxisDiagnosis, diagnose_axis
+from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
 from identify.validation.free_run import free_run, rms_error
 from identify.validation.misfit_maps import compare_axis, position_errors
@@ -143,7 +144,7 @@ def diagnose(
             result.datasets[axis],
             known,
             partial(progress, f"trying effects on {axis}"),
-        )
+        ).with_findings()
         for axis, fitted in result.fits.items()
     }
     plans, not_planned = _next_experiments(axes, result.model, test_function)

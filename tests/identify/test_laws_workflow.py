@@ -15,7 +15,7 @@ from identify.output import results
 from identify.output.words.selection import moved_in_words
 from identify.selection import confounded
 from identify.selection.confounded import moved_parameters
-from identify.selection.forward_selection import Verdict
+from identify.selection.diagnosis import Verdict
 from identify.workflow import _addition, add
 from twin.errors import CannotRun, InputError
 from twin.model.machine import MachineModel
@@ -177,7 +177,8 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_study(monkeypatch):
 
     def diagnose_axis(fit, dataset, catalogue, progress):
         progress(1, 2)
-        return SimpleNamespace(axis=dataset.axis, fit=fit, catalogue=catalogue)
+        told = SimpleNamespace(axis=dataset.axis, fit=fit, catalogue=catalogue)
+        return SimpleNamespace(with_findings=lambda: told)
 
     bars = []
     monkeypatch.setattr(workflow, "fit", fit)

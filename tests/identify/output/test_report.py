@@ -18,7 +18,7 @@ from identify.output.report import residuals
 from identify.output.report.drawing import data_uri, drawing_style
 from identify.output.report.units import Scale, number, quantity
 from identify.output.words.selection import verdict_in_words
-from identify.selection.forward_selection import Verdict
+from identify.selection.diagnosis import Verdict
 from identify.selection.residual_dependence import Dependence
 from twin.errors import InputError
 
