@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
-from twin.errors import InputError
-from twin.log.container import Damaged, Record, at
+from twin.errors import InputError, at
+from twin.log.container import Damaged, Record
 from twin.log.layout import Block
 from twin.log.log import AxisLog, Log
 from twin.log.series import Series, seconds

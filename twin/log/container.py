@@ -19,7 +19,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk, DataEnd, Footer, Statistics
 
-from twin.errors import InputError
+from twin.errors import InputError, at
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
@@ -59,15 +59,6 @@ class Payload:
 
     place: str
     data: bytes
-
-
-@contextmanager
-def at(place: str) -> Iterator[None]:
-    """Prefix the message of an InputError with where it happened, and keep it one line."""
-    try:
-        yield
-    except InputError as error:
-        raise type(error)(" ".join(f"{place}: {error}".splitlines())) from error
 
 
 def parse(kind: type[T], content: bytes, place: str) -> T:

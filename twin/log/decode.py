@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from mcap.opcode import Opcode
 
+from twin.errors import at
 from twin.log.assemble import Extras, Run
-from twin.log.container import RECORD_HEAD, Damaged, McapFile, at, open_mcap, payloads
+from twin.log.container import RECORD_HEAD, Damaged, McapFile, open_mcap, payloads
 from twin.log.layout import Block, MessageLayout, RowLayout
 from twin.log.log import Log
 from twin.log.topics import Topics

@@ -10,9 +10,8 @@ import numpy as np
 from mcap.records import Channel, Schema
 from mcap.well_known import MessageEncoding, SchemaEncoding
 
-from twin.errors import InputError
+from twin.errors import InputError, at
 from twin.log.assemble import SCHEMA_VERSION
-from twin.log.container import at
 from twin.log.layout import MessageLayout, RowLayout
 from twin.log.log import Array, AxisLog, Log
 from twin.log.schema import (

@@ -10,9 +10,9 @@ from pathlib import Path
 from mcap.opcode import Opcode
 from mcap.records import ChunkIndex
 
-from twin.errors import InputError
+from twin.errors import InputError, at
 from twin.log.assemble import Extras, Run
-from twin.log.container import MAGIC, RECORD_HEAD, Payload, Record, at, payloads, reading
+from twin.log.container import MAGIC, RECORD_HEAD, Payload, Record, payloads, reading
 from twin.log.decode import Decoder, read_strictly
 from twin.log.log import Log
 from twin.log.series import seconds

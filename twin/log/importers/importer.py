@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from twin.errors import InputError
-from twin.log.container import at, reading
+from twin.errors import InputError, at
+from twin.log.container import reading
 from twin.log.importers import csv_text, hdf5, mat, parquet, tdms
 from twin.log.importers.mapping import ImportMap
 from twin.log.importers.sample_rate import rate_of
