@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 
 from twin.errors import InputError, at
 
-MOST_BYTES = 50_000_000  # of a TOML file
+MOST_BYTES = 5_000_000  # of a TOML file
 NAME_OF_TABLE = "[key]"  # where the library found fault with the name and not what it names
 LONGEST_VALUE = 60  # characters of it in a message
 

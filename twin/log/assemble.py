@@ -22,9 +22,13 @@ SCHEMA_VERSION = "1"
 class Extras:
     """Metadata and attachments."""
 
-    def __init__(self) -> None:
-        self.metadata: dict[str, str] = {}
-        self.attachments: dict[str, bytes] = {}
+    def __init__(
+        self,
+        metadata: dict[str, str] | None = None,
+        attachments: dict[str, bytes] | None = None,
+    ) -> None:
+        self.metadata = metadata or {}
+        self.attachments = attachments or {}
 
     def add(self, record: Record) -> None:
         """Take metadata or an attachment from a record; raises Damaged, InputError."""

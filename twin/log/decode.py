@@ -11,7 +11,15 @@ from mcap.opcode import Opcode
 
 from twin.errors import at
 from twin.log.assemble import Extras, Run
-from twin.log.container import RECORD_HEAD, Damaged, McapFile, open_mcap, payloads
+from twin.log.container import (
+    IN_CHUNKS,
+    RECORD_HEAD,
+    Damaged,
+    Inflation,
+    McapFile,
+    open_mcap,
+    payloads,
+)
 from twin.log.layout import Block, MessageLayout, RowLayout
 from twin.log.log import Log
 from twin.log.topics import Topics
@@ -39,7 +47,7 @@ def read_strictly(path: Path, axes: Sequence[str] | None = None) -> Log:
         topics, extras = Topics(), Extras()
         run = Run(topics, axes, _capacities(file))
         decoder = Decoder(topics)
-        for payload in payloads(file.records(), extras.add):
+        for payload in payloads(file.records(), extras.add, Inflation(file.size)):
             with at(payload.place):
                 for block in decoder.blocks(payload.data):
                     run.append(block)
@@ -141,6 +149,8 @@ def _record(data: bytes, offset: int) -> tuple[int, bytes, int]:
     opcode, length = RECORD_HEAD.unpack_from(data, offset)
     if length > len(data) - start:
         raise Damaged(f"a record claims more bytes than follow, {offset} bytes into it")
+    if opcode not in IN_CHUNKS:
+        raise Damaged(f"a record of kind {opcode}, which no chunk holds, {offset} bytes into it")
     return opcode, data[start : start + length], start + length
 
 
