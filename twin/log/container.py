@@ -26,6 +26,8 @@ RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
 LOOSE_BYTES = 1 << 20  # messages outside chunks are decoded in batches of this size
 SMALLEST_INFLATION = 1 << 24  # bytes, whatever the size of the file
 LARGEST_RATIO = 256
+LARGEST_BOMB = 1 << 27  # bytes of a chunk that shrank by more than is usual
+USUAL_RATIO = 16
 _SIZE_INSIDE, _CHECKSUM = slice(16, 24), slice(24, 28)  # of the content of a chunk
 _FOOTER_SIZE = RECORD_HEAD.size + 20
 IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
@@ -186,8 +188,10 @@ class Inflation:
     def __init__(self, file_size: int) -> None:
         self._most = self._left = SMALLEST_INFLATION + LARGEST_RATIO * file_size
 
-    def take(self, size: int) -> None:
-        """Take so many bytes of what is left; raises Damaged."""
+    def take(self, size: int, stored: int) -> None:
+        """Take the bytes of a chunk that is stored in so many; raises Damaged."""
+        if size > max(LARGEST_BOMB, USUAL_RATIO * stored):
+            raise Damaged(f"announces {size} bytes, but has {stored}")
         if size > self._left:
             raise Damaged(
                 f"announces {size} bytes; the chunks of a file of this size decompress to at most "
@@ -211,7 +215,7 @@ def has_checksum(record: Record) -> bool:
 
 def decompressed(chunk: Chunk, budget: Inflation) -> bytes:
     """The records in a chunk, of the size it states and with the checksum; raises Damaged."""
-    budget.take(chunk.uncompressed_size)
+    budget.take(chunk.uncompressed_size, len(chunk.data))
     data = _decompress(chunk)
     if len(data) != chunk.uncompressed_size:
         raise Damaged(f"{len(data)} bytes where {chunk.uncompressed_size} are announced")

@@ -24,6 +24,7 @@ from twin.log.layout import Block, MessageLayout, RowLayout
 from twin.log.log import Log
 from twin.log.topics import Topics
 
+MOST_DEFINITIONS = 100_000  # of schemas and channels in a chunk; there are 65535 of each
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
@@ -68,12 +69,14 @@ class Decoder:
     def __init__(self, topics: Topics) -> None:
         self._topics = topics
         self._layout: RowLayout | None = None
+        self._registered = 0  # schemas and channels in the present chunk
 
     def blocks(self, data: bytes) -> Iterator[Block]:
         """Samples by channel, in file order; raises InputError, Damaged for broken framing.
 
         Rows of the same layout are taken as they lie; whatever else there is, message by message.
         """
+        self._registered = 0
         offset = self._register_leading(data)
         for layout in self._layouts(data, offset):
             rows = layout.rows(data, offset)
@@ -98,10 +101,15 @@ class Decoder:
             opcode, content, end = _record(data, offset)
             if opcode == Opcode.MESSAGE:
                 break
-            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._topics.register(opcode, content)
+            self._register(opcode, content)
             offset = end
         return offset
+
+    def _register(self, opcode: int, content: bytes) -> None:
+        self._registered += 1
+        if self._registered > MOST_DEFINITIONS:
+            raise Damaged(f"more than {MOST_DEFINITIONS} schemas and channels in one chunk")
+        self._topics.register(opcode, content)
 
     def _infer(self, data: bytes, offset: int) -> RowLayout | None:
         """Layout of the messages up to the one whose channel comes a second time."""
@@ -124,9 +132,9 @@ class Decoder:
         samples: dict[int, list[tuple[int, int, Sequence[float]]]] = {}
         while offset < len(data):
             opcode, content, offset = _record(data, offset)
-            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._topics.register(opcode, content)
-            elif opcode == Opcode.MESSAGE:
+            if opcode != Opcode.MESSAGE:
+                self._register(opcode, content)
+            else:
                 channel, sequence, time, _, payload = _message(content)
                 topic = self._topics.topic(channel, payload)
                 if topic is not None:
