@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
@@ -75,6 +75,11 @@ class Run:
         series = self._series[block.channel]
         if series is not None:
             series.append(block)
+
+    def extend(self, blocks: Iterable[Block]) -> None:
+        """Take the next samples of several channels; raises InputError."""
+        for block in blocks:
+            self.append(block)
 
     def _open(self, channel: int) -> Series | None:
         topic = self._topics.topic(channel, b"")

@@ -2,38 +2,21 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from mcap.opcode import Opcode
-from mcap.records import ChunkIndex, Footer
 
-from twin.errors import InputError, at
+from twin.errors import InputError
 from twin.log.assemble import Extras, Run
-from twin.log.container import (
-    IN_CHUNKS,
-    MAGIC,
-    RECORD_HEAD,
-    Inflation,
-    Record,
-    has_checksum,
-    open_chunk,
-    open_mcap,
-    reading,
-)
-from twin.log.decode import Decoder, read_strictly
-from twin.log.layout import Block
+from twin.log.container import has_checksum, open_mcap, reading
+from twin.log.decode import read_strictly
 from twin.log.log import Log
-from twin.log.scan import FoundChunk, FoundChunks
+from twin.log.salvage import Part, Salvage
 from twin.log.series import seconds
-from twin.log.topics import Topics
 
-_OPCODES = frozenset(Opcode)
 METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
-_DATA_END = RECORD_HEAD.pack(Opcode.DATA_END, 4)
-_FOOTER_BYTES = RECORD_HEAD.size + 20
 
 
 @dataclass(frozen=True)
@@ -72,7 +55,7 @@ def recover_log(path: str | Path, *, unproved: bool = False) -> tuple[Log, Recov
             raise InputError(f"{path}: {doubt[0]}; it can be read as it is, or with --unproved")
         return log, Recovery(f"all {len(log)} samples", (), doubt)
     with reading(path):
-        return _Salvage(path.read_bytes(), reason, unproved).result()
+        return _Stretches(path.read_bytes(), reason, unproved).result()
 
 
 def _doubt(path: Path) -> tuple[str, ...]:
@@ -85,42 +68,14 @@ def _doubt(path: Path) -> tuple[str, ...]:
     return ("the log has no checksums that prove its samples",)
 
 
-@dataclass(frozen=True)
-class _Part:
-    """The samples of one chunk, or of the messages outside chunks."""
+class _Stretches:
+    """The samples of a damaged log in stretches without a gap."""
 
-    place: str
-    data: bytes
-    blocks: list[Block]
-
-    @property
-    def start(self) -> tuple[int, int]:
-        """Time in ns and number of its first sample."""
-        return min((int(b.log_time[0]), int(b.sequence[0])) for b in self.blocks)
-
-    @property
-    def span(self) -> tuple[int, int]:
-        """Times of its first and last message, ns."""
-        return self.start[0], max(int(b.log_time[-1]) for b in self.blocks)
-
-
-class _Salvage:
-    """What can be had from the bytes of a damaged log."""
-
-    def __init__(self, data: bytes, reason: str, unproved: bool) -> None:
-        self._data = data
-        self._wanted = unproved
-        self._lost = [reason]
-        self._unproved: list[str] = []
-        self._extras = Extras()
-        self._topics = Topics()
-        self._decoder = Decoder(self._topics)
-        self._announced: list[ChunkIndex] = []
-        self._loose = bytearray()  # schemas, channels and messages outside chunks
-        self._chunks = FoundChunks(data)
-        self._damaged: set[int] = set()  # places of chunks that were found damaged
-        self._register_summary()
-        self._parts = self._sorted(list(self._read()))
+    def __init__(self, data: bytes, reason: str, keep_unproved: bool) -> None:
+        self._keep_unproved = keep_unproved
+        self._salvage = Salvage(data, reason, keep_unproved)
+        self._lost = self._salvage.lost
+        self._parts = self._sorted(list(self._salvage.parts()))
 
     def result(self) -> tuple[Log, Recovery]:
         """The longest series and the others; raises InputError where there is none."""
@@ -128,17 +83,21 @@ class _Salvage:
         self._report_absent_chunks()
         counts = [self._count(run) for run in runs]
         if not any(counts):
-            hint = "" if self._wanted or not self._unproved else "; read it with --unproved"
-            lost = "; ".join(dict.fromkeys([*self._lost, *self._unproved]))
-            raise InputError(f"nothing can be recovered ({lost}){hint}")
+            hint = (
+                ""
+                if self._keep_unproved or not self._salvage.unproved
+                else "; read it with --unproved"
+            )
+            why = "; ".join(dict.fromkeys([*self._lost, *self._salvage.unproved]))
+            raise InputError(f"nothing can be recovered ({why}){hint}")
         # the rate is stated in every chunk too, and there a checksum protects it
-        self._extras.metadata.pop("sample_rate_hz", None)
+        self._salvage.extras.metadata.pop("sample_rate_hz", None)
         longest = counts.index(max(counts))
         log, kept = self._log(runs[longest], counts[longest])
         others = list(self._others(runs, counts, longest))
-        lost = self._lost if self._wanted else [*self._lost, *self._unproved]
-        unproved = [METADATA] if self._extras.metadata else []
-        unproved += self._unproved if self._wanted else []
+        lost = self._lost if self._keep_unproved else [*self._lost, *self._salvage.unproved]
+        unproved: list[str] = [METADATA] if self._salvage.extras.metadata else []
+        unproved += self._salvage.unproved if self._keep_unproved else []
         recovery = Recovery(
             kept, tuple(dict.fromkeys(lost)), tuple(dict.fromkeys(unproved)), tuple(others)
         )
@@ -146,10 +105,10 @@ class _Salvage:
 
     def _log(self, run: Run, count: int) -> tuple[Log, str]:
         kept = f"{count} samples from {seconds(run.start())}"
-        metadata = {**self._extras.metadata, "recovered": kept}
-        if self._wanted and self._unproved:
-            metadata["not_proved"] = "; ".join(self._unproved)
-        return run.trimmed_log(Extras(metadata, self._extras.attachments)), kept
+        metadata = {**self._salvage.extras.metadata, "recovered": kept}
+        if self._keep_unproved and self._salvage.unproved:
+            metadata["not_proved"] = "; ".join(self._salvage.unproved)
+        return run.trimmed_log(Extras(metadata, self._salvage.extras.attachments)), kept
 
     def _others(self, runs: list[Run], counts: list[int], longest: int) -> Iterator[Log]:
         for i, (run, count) in enumerate(zip(runs, counts, strict=True)):
@@ -166,105 +125,7 @@ class _Salvage:
                 "them from the longer run"
             )
 
-    def _register_summary(self) -> None:
-        """Take schemas and channels from the summary, where its checksum holds."""
-        data, footer_at = self._data, len(self._data) - len(MAGIC) - _FOOTER_BYTES
-        record = _record_at(data, footer_at) if footer_at > 0 else None
-        if record is None or record.opcode != Opcode.FOOTER or len(record.content) != 20:
-            return
-        footer = record.parsed(Footer)
-        # Where bytes are gone or too many, the summary is not where the footer says.
-        after_data = data.rfind(_DATA_END, 0, footer_at) + len(_DATA_END) + 4
-        for start in (footer.summary_start, after_data):
-            if (
-                footer.summary_crc
-                and zlib.crc32(data[start : record.end - 4]) == footer.summary_crc
-            ):
-                self._register(start, footer_at)
-                return
-
-    def _register(self, offset: int, end: int) -> None:
-        while offset < end and (record := _record_at(self._data, offset)):
-            if record.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._topics.register(record.opcode, record.content)
-            offset = record.end
-
-    def _read(self) -> Iterator[_Part]:
-        """Samples in the order of the file, and along the way metadata and attachments."""
-        for chunk in self._walk():
-            place = f"chunk at byte {chunk.offset}"
-            if not chunk.length_holds:
-                self._lost.append(
-                    f"bytes {chunk.offset} to {chunk.offset + RECORD_HEAD.size - 1}: the length of "
-                    "a chunk is unreadable; its samples are intact"
-                )
-            if not chunk.proved:
-                self._unproved.append(f"{place}: has no checksum that proves its samples")
-                if not self._wanted:
-                    continue
-            yield from self._part(place, chunk.data)
-        if not self._loose:
-            return
-        parts = list(self._part("messages outside chunks", bytes(self._loose)))
-        if any(p.blocks for p in parts):
-            self._unproved.append("messages outside chunks: no checksum proves their samples")
-            yield from parts if self._wanted else ()
-
-    def _part(self, place: str, data: bytes) -> Iterator[_Part]:
-        try:
-            with at(place):
-                blocks = [b for b in self._decoder.blocks(data) if len(b.log_time)]
-        except InputError as error:
-            self._lost.append(str(error))
-            return
-        if blocks:
-            yield _Part(place, data, blocks)
-
-    def _walk(self) -> Iterator[FoundChunk]:
-        """Chunks in the order of the file; behind unreadable bytes, from the next one on."""
-        data, previous, offset = self._data, len(MAGIC), len(MAGIC)
-        budget = Inflation(len(data))
-        while offset < len(data) and data[offset:] != MAGIC:
-            chunk = self._chunks.at(offset)
-            if chunk is not None:
-                yield chunk
-                previous = offset = chunk.end
-                continue
-            record = _record_at(data, offset)
-            following = self._chunks.next(previous)
-            if record is not None and not self._hides(record, following):
-                self._take(record, budget)
-                previous, offset = offset, record.end
-            elif following is None:
-                self._lost.append(f"bytes {offset} to {len(data) - 1}: cut off or unreadable")
-                return
-            else:
-                self._lost.append(f"bytes {previous} to {following.offset - 1}: unreadable")
-                previous = offset = following.offset
-
-    def _hides(self, record: Record, following: FoundChunk | None) -> bool:
-        """Whether a record reaches over a chunk because its length is damaged."""
-        if following is None or following.offset >= record.end:
-            return False
-        return record.opcode != Opcode.ATTACHMENT or not _attachment_holds(record)
-
-    def _take(self, record: Record, budget: Inflation) -> None:
-        """Take metadata, an attachment, or a message outside the chunks."""
-        try:
-            if record.opcode == Opcode.CHUNK:
-                self._damaged.add(record.offset)
-                open_chunk(record, budget)
-            elif record.opcode in IN_CHUNKS:
-                self._loose += RECORD_HEAD.pack(record.opcode, len(record.content))
-                self._loose += record.content
-            elif record.opcode == Opcode.CHUNK_INDEX:
-                self._announced.append(record.parsed(ChunkIndex))
-            else:
-                self._extras.add(record)
-        except InputError as error:
-            self._lost.append(str(error))
-
-    def _sorted(self, parts: list[_Part]) -> list[_Part]:
+    def _sorted(self, parts: list[Part]) -> list[Part]:
         """In the order of time, each once."""
         seen: dict[bytes, str] = {}
         once = []
@@ -281,20 +142,19 @@ class _Salvage:
     def _runs(self) -> list[Run]:
         """The samples in stretches without a gap."""
         runs: list[Run] = []
-        losses = -1  # how many were known when the last samples were taken
+        losses = -1  # how many were known when the last samples were read
         for part in self._parts:
-            try:
-                for block in part.blocks if runs else ():
-                    runs[-1].append(block)
-                if runs:
+            explained, losses = part.losses != losses, part.losses
+            if runs:
+                try:
+                    runs[-1].extend(part.blocks)
                     continue
-            except InputError as error:
-                if len(self._lost) == losses:  # no damage was seen where the gap is
-                    self._lost.append(f"{part.place}: {error}")
-            runs.append(Run(self._topics, None, {}))
+                except InputError as error:
+                    if not explained:  # no damage was seen where the gap is
+                        self._lost.append(f"{part.place}: {error}")
+            runs.append(Run(self._salvage.topics, None, {}))
             try:
-                for block in part.blocks:
-                    runs[-1].append(block)
+                runs[-1].extend(part.blocks)
             except InputError as error:
                 self._lost.append(f"{part.place}: {error}")
         return runs
@@ -302,9 +162,9 @@ class _Salvage:
     def _report_absent_chunks(self) -> None:
         """Chunks of the summary that were not found at all, not even damaged."""
         there = {p.span for p in self._parts}
-        for index in self._announced:
+        for index in self._salvage.announced:
             span = (index.message_start_time, index.message_end_time)
-            if span not in there and index.chunk_start_offset not in self._damaged:
+            if span not in there and index.chunk_start_offset not in self._salvage.damaged:
                 self._lost.append(
                     f"the chunk of samples from {seconds(span[0])} to {seconds(span[1])} that the "
                     "summary announces is not there"
@@ -316,19 +176,3 @@ class _Salvage:
         except InputError as error:
             self._lost.append(str(error))
             return 0
-
-
-def _record_at(data: bytes, offset: int) -> Record | None:
-    start = offset + RECORD_HEAD.size
-    if start > len(data):
-        return None
-    opcode, length = RECORD_HEAD.unpack_from(data, offset)
-    if opcode not in _OPCODES or length > len(data) - start:
-        return None
-    return Record(opcode, offset, data[start : start + length])
-
-
-def _attachment_holds(record: Record) -> bool:
-    """Whether its checksum proves an attachment; it may hold a log, with chunks of its own."""
-    content = record.content
-    return zlib.crc32(content[:-4]) == int.from_bytes(content[-4:], "little")
