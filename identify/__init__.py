@@ -1,5 +1,19 @@
 """The model against measurements: fit, compare, diagnose, add, plan."""
 
-from identify.workflow import add, compare, diagnose, fit, plan
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from identify.workflow import add, compare, diagnose, fit, plan
 
 __all__ = ["add", "compare", "diagnose", "fit", "plan"]
+
+
+def __getattr__(name: str) -> Any:
+    """The calls, loaded with the first of them: `twin --help` needs none."""
+    if name not in __all__:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    from identify import workflow
+
+    return getattr(workflow, name)

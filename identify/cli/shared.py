@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from twin.errors import InputError
-
 if TYPE_CHECKING:
     from identify.workflow import Progress
     from twin.effects import Catalogue
@@ -138,6 +136,7 @@ def checked(logs: Mapping[str, Log]) -> list[str]:
 
 
 def require_folder(path: Path) -> None:
-    """Raise InputError now, instead of after the work, where the folder does not exist."""
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
+    """Raise InputError now, instead of after the work, where the file could not be written."""
+    from twin.files import require_writable
+
+    require_writable(path)

@@ -33,14 +33,14 @@ def cli(monkeypatch, capsys, tmp_path):
         (ValueError("odd"), "twin: this is a fault of the program: ValueError: odd; please"),
     ],
 )
-def test_every_failure_is_one_line_and_exit_code_two(monkeypatch, cli, error, said):
+def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, said):
     def fails(*_: object, **__: object) -> None:
         raise error
 
     monkeypatch.delenv("TWIN_TRACEBACK", raising=False)
     monkeypatch.setattr(workflow, "compare", fails)
     code, out, err = cli("compare", "m.toml", "a.mcap", "--json")
-    assert (code, out) == (2, "")
+    assert (code, out) == (130 if isinstance(error, KeyboardInterrupt) else 2, "")
     assert err.startswith(said)
     assert err.count("\n") == 1
 

@@ -14,7 +14,7 @@ from twin.entries import read_toml, shown
 from twin.errors import InputError
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, kind_of
-from twin.model.file import write_atomically
+from twin.files import write_atomically
 from twin.model.units import LINEAR, AxisUnits
 from twin.numbers import is_number
 
@@ -53,10 +53,7 @@ def save_experiment(
     experiment: Experiment, path: str | Path, *comments: str, units: AxisUnits = LINEAR
 ) -> None:
     """Write the experiment, whole or not at all. Raises InputError where the folder is missing."""
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
-    write_atomically(path, format_experiment(experiment, *comments, units=units).encode())
+    write_atomically(Path(path), format_experiment(experiment, *comments, units=units).encode())
 
 
 def load_experiment(path: str | Path) -> Experiment:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.errors import InputError
+from twin.files import replacing
 from twin.log.assemble import METADATA_NAME
 from twin.log.layout import sample_times
 from twin.log.log import Log
@@ -97,24 +95,3 @@ def _fill(rows: np.ndarray, plan: Outline, first: int, times: np.ndarray) -> Non
         records[".log_time"] = records[".publish_time"] = times
         for name, column in columns.items():
             records[name] = column[span]
-
-
-@contextmanager
-def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A stream whose bytes become ``path`` at the end, or nothing where anything fails.
-
-    Raises InputError where the folder or the disk refuses.
-    """
-    part = path.parent / f".{path.name}.{os.getpid()}.part"
-    try:
-        with open(part, "wb") as stream:
-            yield stream
-        os.replace(part, path)
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputError(
-            f"{path}: cannot be written: {reason}; check folder, rights and free space"
-        ) from error
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)

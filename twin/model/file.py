@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.entries import read_entries, read_toml
 from twin.errors import InputError, at
+from twin.files import write_atomically
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.schema import AxisEntry, EffectEntry, ModelFile
 from twin.model.units import LINEAR, ROTARY, AxisUnits
@@ -203,20 +203,8 @@ def _axis_table(axis: AxisModel) -> tomlkit.items.Table:
 def save_model(model: MachineModel, path: str | Path) -> None:
     """Write the model, and its MJCF beside it where that is not there yet."""
     path = Path(path)
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
     write_atomically(path, format_model(model).encode())
     if model.mjcf and model.mjcf_name:
         beside = path.parent / model.mjcf_name
         if not beside.exists():
             write_atomically(beside, model.mjcf.encode())
-
-
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write to a temporary name, then rename, so that the file is never half written."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_bytes(content)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)

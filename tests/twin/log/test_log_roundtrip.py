@@ -174,9 +174,11 @@ def test_a_failing_write_leaves_what_was_there(tmp_path):
     assert [(p, p.read_bytes()) for p in tmp_path.iterdir()] == [(target, b"older")]
 
 
-@pytest.mark.parametrize("name", ["no/such/folder/a.mcap", "."])
-def test_a_place_that_cannot_be_written_is_named(tmp_path, name):
-    with pytest.raises(InputError, match="cannot be written"):
+@pytest.mark.parametrize(
+    ("name", "why"), [("no/such/folder/a.mcap", "its folder does not exist"), (".", "is a folder")]
+)
+def test_a_place_that_cannot_be_written_is_named(tmp_path, name, why):
+    with pytest.raises(InputError, match=why):
         write_log(two_axes(), tmp_path / name)
 
 
