@@ -63,7 +63,11 @@ def front_door(
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Effects = Annotated[
-    list[Path] | None, typer.Option("--effects", help="Your own effect file; may be repeated.")
+    list[Path] | None,
+    typer.Option(
+        "--effects",
+        help="Your own effect file; loading it runs its code. May be repeated.",
+    ),
 ]
 
 
