@@ -65,7 +65,7 @@ def simulate(
 
 @app.command("import")
 def import_(
-    source: Annotated[Path, typer.Argument(help="CSV, MAT, Parquet, HDF5 or TDMS file.")],
+    source: Annotated[Path, typer.Argument(help="CSV, MAT, JSON, Parquet, HDF5 or TDMS file.")],
     mapping: Annotated[Path, typer.Option("--map", help="Columns, units, scale, sign, rate.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")],
     as_json_: Json = False,
@@ -78,7 +78,8 @@ def import_(
     log = import_log(source, load_mapping(mapping))
     write_log(log, out)
     result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
-    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_)
+    resampled = [log.metadata["resampled"]] if "resampled" in log.metadata else []
+    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, resampled)
 
 
 @app.command()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from types import SimpleNamespace
+from typing import ClassVar
 
 import pytest
 from stubbed_cli import stub, stubbed
@@ -170,6 +171,7 @@ def test_simulate(monkeypatch, cli):
 def test_import_and_recover(monkeypatch, cli):
     class Recording(list):
         sample_rate = 125.0
+        metadata: ClassVar[dict[str, str]] = {"resampled": "steps of 1 ms"}
 
     log = Recording([0] * 9)
     load = stub(monkeypatch, twin.log.importers, "load_mapping", "the map")

@@ -65,9 +65,9 @@ def test_units(field: str, unit: str, size: float, si: str | None) -> None:
     ("unit", "si", "answer"),
     [
         ("MM", "m", "did you mean 'mm'?"),
-        ("mm/sec", "m/s", "did you mean 'mm/s'?"),
+        ("mm/sek", "m/s", "did you mean 'mm/s'?"),
         ("Nm/", "N m", "did you mean 'Nm'?"),
-        ("furlong", "m", "give a unit of m (m, cm, mm, um, nm, in, ...)"),
+        ("flurg", "m", "give a unit of m (m, cm, mm, um, nm, in, ...)"),
     ],
 )
 def test_an_unknown_unit_is_answered_with_the_nearest(unit: str, si: str, answer: str) -> None:

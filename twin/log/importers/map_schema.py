@@ -54,6 +54,11 @@ class MapFile(Entries):
     format: str | None = Field(None, description='a format in quotes, such as "csv"')
     sample_rate: float | None = Field(None, gt=0.0, description=NUMBER + " above 0, in Hz")
     time: TimeEntry | None = Field(None, description='a table such as {column = "t", unit = "s"}')
+    resample: float | None = Field(
+        None,
+        gt=0.0,
+        description="a number above 0, in Hz: uneven time stamps are brought onto this clock",
+    )
     delimiter: str | None = Field(
         None, min_length=1, max_length=1, description="one character, such as ';'"
     )

@@ -1,6 +1,7 @@
 """The import map: which column of a foreign file is which signal, in which unit.
 
     sample_rate = 1000.0                  # Hz; or time = {column = "t", unit = "s"}
+    resample = 1000.0                     # Hz, with a time whose stamps are uneven
     [axes.x]
     force_constant = 53.4                 # N/A, optional
     position = {column = "qm", unit = "mm"}
@@ -83,7 +84,10 @@ class CsvLayout:
 
 @dataclass(frozen=True)
 class ImportMap:
-    """A whole map. At most one of sample_rate (Hz) and time; text: the map as it was written."""
+    """A whole map. At most one of sample_rate (Hz) and time.
+
+    resample: Hz of the clock that uneven times are brought onto. text: the map as it was written.
+    """
 
     axes: Mapping[str, AxisMap]
     sample_rate: float | None = None
@@ -91,6 +95,7 @@ class ImportMap:
     format: str | None = None
     csv: CsvLayout = CsvLayout()
     text: str = ""
+    resample: float | None = None
 
     def column_names(self) -> tuple[str, ...]:
         """The columns that are read, each once."""
@@ -114,6 +119,8 @@ def load_mapping(path: str | Path) -> ImportMap:
 def _map(entries: MapFile, text: str) -> ImportMap:
     if entries.time is not None and entries.sample_rate is not None:
         raise InputError("sample_rate and time are both given; give one of them")
+    if entries.resample is not None and entries.time is None:
+        raise InputError('resample needs the times; give time = {column = "t", unit = "s"} too')
     time = None
     if entries.time is not None:
         with at("time"):
@@ -125,6 +132,7 @@ def _map(entries: MapFile, text: str) -> ImportMap:
         format=entries.format,
         csv=CsvLayout(entries.delimiter, entries.decimal, entries.header_line),
         text=text,
+        resample=entries.resample,
     )
 
 
