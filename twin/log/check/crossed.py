@@ -12,8 +12,8 @@ from twin.log.check.dynamics import fit_dynamics
 from twin.log.check.report import Fault, Finding, Severity
 from twin.signals import Array
 
-_OWN = 0.6  # least part of a force that its own motion leaves, where channels are swapped
-_OTHER = 0.5  # largest part that the motion of the other axis leaves
+_WORSE = 1.2  # times what the motion of the other axis leaves of a force, its own leaves
+_EXPLAINED = 0.6  # largest part that the motion of the other axis leaves
 _ALIKE = 0.98  # correlation of a position and the setpoint that it follows
 
 
@@ -24,7 +24,7 @@ def check(axes: Sequence[Axis]) -> Iterator[Finding]:
             continue
         own = min(_left(one, one), _left(other, other))
         crossed = max(_left(one, other), _left(other, one))
-        if own < _OWN or crossed > _OTHER:
+        if own < _WORSE * crossed or crossed > _EXPLAINED:
             continue
         what = "positions" if _follows(one, other) and _follows(other, one) else "forces"
         yield Finding(
