@@ -13,6 +13,7 @@ from time import perf_counter
 from benchmarks import (
     diagnosis,
     effect_cost,
+    fuzz,
     import_time,
     mcap_logs,
     peer_fits,
@@ -25,7 +26,7 @@ from benchmarks.mutation import noticed
 
 ALL = (
     simulation, second_start, peer_fits, diagnosis, mcap_logs, effect_cost, import_time, selftest,
-    noticed,
+    fuzz, noticed,
 )  # fmt: skip
 
 

@@ -190,5 +190,11 @@ def _axes(mapping: ImportMap, columns: Mapping[str, Array], span: range) -> dict
             )
             for field, c in axis.columns.items()
         }
+        for field, values in signals.items():
+            if not np.isfinite(values).all():
+                raise InputError(
+                    f"axes.{name}.{field} is too large for a number after unit, scale and offset; "
+                    "correct them in the map"
+                )
         axes[name] = AxisLog(signals, axis.units, axis.force_constant)
     return axes

@@ -45,7 +45,8 @@ class ColumnMap:
     def to_si(self, raw: Array) -> Array:
         """Values (n,) of the column in SI."""
         factor = self.sign * self.unit.size
-        return np.asarray(factor * self.scale * raw + factor * self.offset)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is too large is refused later
+            return np.asarray(factor * self.scale * raw + factor * self.offset)
 
 
 @dataclass(frozen=True)
