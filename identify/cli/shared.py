@@ -125,7 +125,7 @@ def with_holdout(
 def read_logs(paths: list[Path] | None) -> dict[str, Log]:
     from twin.log import read_log
 
-    return {str(path): read_log(path) for path in paths or ()}
+    return {str(path): read_log(path, truth=False) for path in paths or ()}
 
 
 def checked(logs: Mapping[str, Log]) -> list[str]:

@@ -78,7 +78,7 @@ def test_what_is_said_goes_to_its_own_stream(capsys, tmp_path):
 
 
 def test_files_are_read_by_the_names_they_were_given(monkeypatch):
-    monkeypatch.setattr("twin.log.read_log", lambda path: f"log {path}")
+    monkeypatch.setattr("twin.log.read_log", lambda path, truth: f"log {path}")
     monkeypatch.setattr("twin.effects.load_catalogue", lambda files: files)
     monkeypatch.setattr("twin.model.file.load_model", lambda *given: given)
     paths = [Path("b.mcap"), Path("a.mcap")]

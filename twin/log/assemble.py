@@ -57,14 +57,20 @@ class Extras:
 class Run:
     """Samples of all topics without a gap between them.
 
-    axes: those wanted, None for all; capacities: channel -> samples expected.
+    axes: those wanted, None for all; capacities: channel -> samples expected; truth: whether the
+    simulator's truth is wanted.
     """
 
     def __init__(
-        self, topics: Topics, axes: Sequence[str] | None, capacities: Mapping[int, int]
+        self,
+        topics: Topics,
+        axes: Sequence[str] | None,
+        capacities: Mapping[int, int],
+        truth: bool = True,
     ) -> None:
         self._topics = topics
         self._axes = axes
+        self._truth = truth
         self._capacities = capacities
         self._series: dict[int, Series | None] = {}
 
@@ -84,6 +90,8 @@ class Run:
     def _open(self, channel: int) -> Series | None:
         topic = self._topics.topic(channel, b"")
         if topic is None or (self._axes is not None and topic.axis not in self._axes):
+            return None
+        if topic.is_truth and not self._truth:
             return None
         if any(s.topic.name == topic.name for s in self._opened()):
             raise InputError(f"two channels have the topic {topic.name}; write one a topic")

@@ -28,25 +28,27 @@ MOST_DEFINITIONS = 100_000  # of schemas and channels in a chunk; there are 6553
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
-def read_log(path: str | Path, axes: Sequence[str] | None = None) -> Log:
+def read_log(path: str | Path, axes: Sequence[str] | None = None, *, truth: bool = True) -> Log:
     """Read an MCAP log; ``axes`` limits it to those named, None reads all.
+
+    truth: whether the simulator's truth is read too, which takes more than half of the memory.
 
     Every checksum is verified, and the samples must be complete, evenly spaced and finite.
     Raises InputError otherwise, and where no axis has position and one of current and force.
     """
     try:
-        return read_strictly(Path(path), axes)
+        return read_strictly(Path(path), axes, truth)
     except Damaged as error:
         raise Damaged(
             f"{error}; copy the file again, or keep what is intact: twin recover {path} -o GOOD"
         ) from error
 
 
-def read_strictly(path: Path, axes: Sequence[str] | None = None) -> Log:
+def read_strictly(path: Path, axes: Sequence[str] | None = None, truth: bool = True) -> Log:
     """``read_log`` without the remedy in its messages."""
     with open_mcap(path) as file:
         topics, extras = Topics(), Extras()
-        run = Run(topics, axes, _capacities(file))
+        run = Run(topics, axes, _capacities(file), truth)
         decoder = Decoder(topics)
         for payload in payloads(file.records(), extras.add, Inflation(file.size)):
             with at(payload.place):

@@ -225,3 +225,13 @@ def test_a_log_that_could_not_be_read_back_is_refused(tmp_path, spoil, message):
         write_log(spoil(two_axes()), tmp_path / "a.mcap")
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_truth_is_left_out_where_it_is_not_wanted(tmp_path):
+    write_log(two_axes(), tmp_path / "a.mcap")
+    whole, bare = read_log(tmp_path / "a.mcap"), read_log(tmp_path / "a.mcap", truth=False)
+    assert whole.truth
+    assert not bare.truth
+    assert bare.metadata == whole.metadata
+    for name, axis in whole.axes.items():
+        np.testing.assert_array_equal(bare.axes[name].position, axis.position)
