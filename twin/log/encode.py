@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TypeVar
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from twin.files import replacing
 from twin.log.assemble import METADATA_NAME
 from twin.log.layout import sample_times
-from twin.log.log import Log
-from twin.log.outline import Outline, outline
+from twin.log.log import Array, Log
+from twin.log.outline import Outline, outline, outline_of_topics
 from twin.log.writer import McapWriter, PackedChunk, encoded, pack
 
 CHUNK_BYTES = 1 << 20
@@ -33,13 +33,35 @@ def write_log(log: Log, path: str | Path, progress: Progress | None = None) -> N
     ``path`` appears only when it is complete. Raises InputError for a log that could not be read
     back (a NaN, columns of different length, no position, ...) and where writing fails.
     """
-    plan = outline(log)
-    with replacing(Path(path)) as stream:
+    _write(outline(log), log.sample_rate, log.attachments, Path(path), progress)
+
+
+def write_topics(
+    topics: Mapping[str, Mapping[str, Array]],
+    units: Mapping[str, str],
+    sample_rate: float,
+    path: str | Path,
+) -> None:
+    """Write columns (n,) of any topics, "/model/x" -> name -> column, for other programs to show.
+
+    units: "/model/x/force" -> unit. Raises InputError as write_log does.
+    """
+    _write(outline_of_topics(topics, units, sample_rate), sample_rate, {}, Path(path), None)
+
+
+def _write(
+    plan: Outline,
+    sample_rate: float,
+    attachments: Mapping[str, bytes],
+    path: Path,
+    progress: Progress | None,
+) -> None:
+    with replacing(path) as stream:
         writer = McapWriter(stream)
         writer.add_metadata(METADATA_NAME, plan.metadata)
-        for name, data in log.attachments.items():
+        for name, data in attachments.items():
             writer.add_attachment(name, data)
-        for written in _write_chunks(writer, plan, log.sample_rate):
+        for written in _write_chunks(writer, plan, sample_rate):
             if progress is not None:
                 progress(written, plan.count)
         writer.finish(plan.schemas, plan.channels)
