@@ -17,6 +17,8 @@ from types import ModuleType
 from twin.effect import Effect
 from twin.errors import InputError
 
+LONGEST_TRIAL = 30.0  # s for loading, trying and compiling a user's file
+
 
 class Catalogue(Mapping[str, Effect]):
     """Effects by name, in alphabetical order."""
@@ -55,9 +57,7 @@ def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:
     effects = [importlib.import_module(f"{__name__}.{name}").EFFECT for name in names]
     for path in map(Path, user_files):
         _require_name(path, [e.name for e in effects])
-        from twin.core.effect_trial import try_file
-
-        try_file(path, _load_and_try)
+        _try_apart(path)
         effects.append(_load(path))
     return Catalogue(effects)
 
@@ -73,6 +73,15 @@ def _require_name(path: Path, taken: Sequence[str]) -> None:
         raise InputError(
             f"{path}: there is an effect '{path.stem}' already; give the file another name"
         )
+
+
+def _try_apart(path: Path) -> None:
+    from twin.apart import NoAnswer, apart
+
+    try:
+        apart(_load_and_try, path, seconds=LONGEST_TRIAL)
+    except NoAnswer as error:
+        raise InputError(f"{path}: {error}") from error
 
 
 def _load_and_try(path: Path) -> None:

@@ -57,7 +57,7 @@ def test_a_mistake_is_said_in_one_line(
     path = tmp_path / "bad.py"
     path.write_text(text, encoding="utf-8")
     if fault.startswith("loop"):
-        monkeypatch.setattr("twin.core.effect_trial.SECONDS", 0.5)
+        monkeypatch.setattr("twin.effects.LONGEST_TRIAL", 0.5)
     monkeypatch.setattr(sys, "argv", ["twin", "effects", "bad", "--effects", str(path)])
     with pytest.raises(SystemExit) as stopped:
         main()
@@ -68,6 +68,7 @@ def test_a_mistake_is_said_in_one_line(
     assert re.search(message.replace("[", r"\["), told.err), told.err
     assert "bad" in told.err
     assert "Traceback" not in told.err
+    assert told.err.count(str(path)) <= 1
 
 
 def test_the_example_itself_is_sound(
