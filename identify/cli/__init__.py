@@ -27,7 +27,8 @@ def main() -> None:
     except InputError as error:
         code = fail(str(error))
     except KeyboardInterrupt:
-        code = fail("interrupted")
+        fail("interrupted")
+        code = INTERRUPTED
     except OSError as error:
         code = fail(f"{error.filename}: {error.strerror}; check the name and the permissions")
     except Exception as error:

@@ -10,6 +10,7 @@ from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, Effect, Kind, Parameter
 from twin.errors import InputError
 from twin.model.units import LINEAR, ROTARY, AxisUnits
+from twin.numbers import is_number
 
 MASS = Parameter(LINEAR.mass_name, LINEAR.mass, 1.0, 1e-6, 1e6, "moved mass")
 # Declared linear as all parameters are; a small motor has a millionth of a kg m^2.
@@ -73,10 +74,9 @@ def _sized(effect: Effect, values: Mapping[str, float]) -> Effect:
     count = values.get(ELEMENTS)
     if effect.of_size is None or count is None:
         return effect
-    whole = isinstance(count, int | float) and float(count).is_integer()
-    if not (whole and 1 <= count <= MOST_ELEMENTS):
+    if not (is_number(count) and float(count).is_integer() and 1 <= count <= MOST_ELEMENTS):
         raise InputError(
-            f"{effect.name}.{ELEMENTS} = {count}: give a whole number of elements from 1 to "
+            f"{effect.name}.{ELEMENTS} = {count!s:.60}: give a whole number of elements from 1 to "
             f"{MOST_ELEMENTS}"
         )
     return effect.of_size(int(count))
@@ -90,9 +90,9 @@ def _check_value(effect: Effect, name: str, value: float, units: AxisUnits) -> N
         )
     p = effect.parameter(name)
     unit = units(p.unit)
-    if not (isinstance(value, int | float) and math.isfinite(value)):
+    if not is_number(value):
         raise InputError(
-            f"{effect.name}.{name} = {value}: is not a finite number; give it in {unit}"
+            f"{effect.name}.{name} = {value!s:.60}: is not a finite number; give it in {unit}"
         )
     if not p.lower <= value <= p.upper:
         raise InputError(
