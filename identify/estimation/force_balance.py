@@ -86,20 +86,33 @@ def jacobian(
     axis: AxisModel, logs: Sequence[PreparedLog], where: Sequence[ParameterReference]
 ) -> Array:
     """Derivative of the residual by these parameters, (n, n_parameters), N per unit."""
-    columns = np.empty((sum(map(len, logs)), len(where)))
+    values = read(axis, where)
+    steps = np.array([difference_step(c, v) for c, v in zip(where, values, strict=True)])
+    return (changes(axis, logs, where, steps) / steps[:, None]).T
+
+
+def changes(
+    axis: AxisModel,
+    logs: Sequence[PreparedLog],
+    where: Sequence[ParameterReference],
+    steps: Array,
+) -> Array:
+    """Change (m, n) N of the residual as each of m parameters by itself changes by its step.
+
+    Those of one effect go along the motion in one walk; a parameter may be given several times.
+    """
+    out = np.empty((len(where), sum(map(len, logs))))
     by_effect: dict[str, list[int]] = {}
     for j, c in enumerate(where):
         by_effect.setdefault(c.effect, []).append(j)
     for effect, index in by_effect.items():
         if not effect:
-            columns[:, index[0]] = _by_mass(axis, logs)
+            out[index] = steps[index, None] * _by_mass(axis, logs)
             continue
         group = group_of(axis, effect)
-        own = [where[j] for j in index]
-        steps = np.array([difference_step(c, read(group, [c])[0]) for c in own])
-        moved = [write(group, [c], read(group, [c]) + h) for c, h in zip(own, steps, strict=True)]
-        columns[:, index] = (_differences(group, moved, effect, logs) / steps[:, None]).T
-    return columns
+        moved = [write(group, [where[j]], read(group, [where[j]]) + steps[j]) for j in index]
+        out[index] = _differences(group, moved, effect, logs)
+    return out
 
 
 def _differences(

@@ -8,6 +8,7 @@ D. F. McCaffrey, Survey Methodology 28 (2002) for left-out residuals.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
@@ -18,7 +19,7 @@ from scipy.special import stdtrit
 
 from identify.estimation.evidence import left_out
 from identify.estimation.fit import Fit
-from identify.estimation.force_balance import residual
+from identify.estimation.force_balance import changes
 from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]
@@ -90,46 +91,57 @@ class Estimate:
 
 def estimates(fit: Fit) -> tuple[Estimate, ...]:
     """Estimates of all parameters of a fitted axis, free ones first."""
-    values = read(fit.axis, fit.scaling.where)
     half = half_widths(fit)
-    reason: NoInterval | None = refusal(fit)
-    twins = inseparable(fit)
+    reasons = _reasons(fit, half)
+    values = read(fit.axis, fit.scaling.where)
     free = []
-    units = fit.axis.units
     for c, value, width in zip(fit.scaling.where, values, half, strict=True):
-        p = c.parameter
-        low: float | None = None
-        high: float | None = None
-        why = reason
-        if why is None and not np.isfinite(width):
-            why = NotExcited()
-        if why is None and c.label in twins:
-            why = Inseparable(twins[c.label])
-        if why is None and (side := open_side(fit, c, width)):
-            why = OpenSided(side)
-        if why is None:
-            low, high = max(value - width, p.lower), min(value + width, p.upper)
-        free.append(Estimate(c.label, float(value), units(p.unit), low, high, True, why))
+        p, why = c.parameter, reasons.get(c.label)
+        low = None if why else max(value - width, p.lower)
+        high = None if why else min(value + width, p.upper)
+        unit = fit.axis.units(p.unit)
+        free.append(Estimate(c.label, float(value), unit, low, high, True, why))
     return (*free, *_held(fit))
 
 
-def open_side(fit: Fit, c: ParameterReference, half: float) -> Side | None:
-    """The side to which the error hardly rises; None where it rises to both.
+def _reasons(fit: Fit, half: Array) -> dict[str, NoInterval]:
+    """Why free parameters have no interval, by label; those that have one are left out."""
+    where = fit.scaling.where
+    if (common := refusal(fit)) is not None:
+        return {c.label: common for c in where}
+    out: dict[str, NoInterval] = {
+        c.label: NotExcited() for c, width in zip(where, half, strict=True) if not width < np.inf
+    }
+    for label, other in inseparable(fit).items():
+        out.setdefault(label, Inseparable(other))
+    asked = [j for j, c in enumerate(where) if c.label not in out]
+    sides = open_sides(fit, [where[j] for j in asked], half[asked])
+    return out | {label: OpenSided(side) for label, side in sides.items()}
 
-    Example: the position of an end stop that the motion just touches has a slope to one side only.
+
+def open_sides(fit: Fit, where: Sequence[ParameterReference], half: Array) -> dict[str, Side]:
+    """Sides to which the error hardly rises, by label, of parameters with these half widths.
+
+    One to which both sides are closed is left out. Example: the position of an end stop that the
+    motion just touches has a slope to one side only.
     """
-    column = fit.jacobian[:, fit.scaling.where.index(c)]
-    value = read(fit.axis, [c])[0]
-    for side, step in ((Side.SMALLER, -FAR * half), (Side.LARGER, FAR * half)):
-        moved = write(fit.axis, [c], [np.clip(value + step, c.parameter.lower, c.parameter.upper)])
-        step = read(moved, [c])[0] - value
+    tried: list[tuple[ParameterReference, Side, float]] = []
+    for c, width, value in zip(where, half, read(fit.axis, where), strict=True):
+        for side, far in ((Side.SMALLER, -FAR * width), (Side.LARGER, FAR * width)):
+            to = np.clip(value + far, c.parameter.lower, c.parameter.upper)
+            step = read(write(fit.axis, [c], [to]), [c])[0] - value
+            if abs(step) >= 0.5 * FAR * width:  # else a bound is in the way
+                tried.append((c, side, float(step)))
+    steps = np.array([step for _, _, step in tried])
+    moved = changes(fit.axis, fit.logs, [c for c, _, _ in tried], steps)[:, fit.kept]
+    out: dict[str, Side] = {}
+    for (c, side, step), change in zip(tried, moved, strict=True):
+        column = fit.jacobian[:, fit.scaling.where.index(c)]
         predicted = 2.0 * step * float(fit.residual @ column) + step**2 * float(column @ column)
-        if abs(step) < 0.5 * FAR * half or predicted <= 0.0:  # a bound is in the way
-            continue
-        there = residual(moved, fit.logs)[fit.kept]
-        if float(there @ there - fit.residual @ fit.residual) < LEAST_RISE * predicted:
-            return side
-    return None
+        rise = 2.0 * float(fit.residual @ change) + float(change @ change)
+        if predicted > 0.0 and rise < LEAST_RISE * predicted:
+            out.setdefault(c.label, side)
+    return out
 
 
 def inseparable(fit: Fit) -> dict[str, str]:

@@ -15,6 +15,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -57,7 +58,6 @@ STYLE: dict[RcKeyType, Any] = {
     "lines.linewidth": 1.2,
     "legend.frameon": False,
     "legend.fontsize": 8.5,
-    "figure.constrained_layout.use": True,
     "svg.fonttype": "none",
     "svg.hashsalt": "twin",  # the same report is the same file
 }
@@ -88,9 +88,11 @@ def data_uri(figure: Figure) -> str:
 
 
 def settle(figure: Figure) -> None:
-    """Lay the figure out, once, on a grid: the solver's last digits differ from run to run."""
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    """Lay the figure out, once, on a grid: the solver's last digits differ from run to run.
+
+    A figure that has a layout engine would be drawn three times, twice of them to lay it out.
+    """
+    ConstrainedLayoutEngine().execute(figure)
     for axes in figure.axes:
         axes.set_position(tuple(np.round(axes.get_position().bounds, 4)))
 

@@ -50,11 +50,12 @@ def _fitted(found: AxisDiagnosis) -> Table:
     if found.best:
         name, richest = spaced(found.best.effect.name), found.best.fit
         fits = {f"Without {name}": found.base, f"With {name}": richest}
-    labels = [e.label for e in estimates(richest)]
+    known = {heading: estimates(fit) for heading, fit in fits.items()}
+    base, rich = next(iter(known.values())), list(known.values())[-1]
+    labels = list(dict.fromkeys(e.label for e in (*rich, *base)))
     meanings = _meanings(richest.axis)
-    meanings |= {e.label: f"{meanings[e.label]}, held" for e in estimates(richest) if not e.free}
-    labels += [e.label for e in estimates(found.base) if e.label not in labels]
-    parts = [_part(heading, fit, labels) for heading, fit in fits.items()]
+    meanings |= {e.label: f"{meanings[e.label]}, held" for e in rich if not e.free}
+    parts = [_part(heading, fit, known[heading], labels) for heading, fit in fits.items()]
     columns = [c for part in parts for c in part.columns]
     new = {c.label for c in richest.scaling.where} - {c.label for c in found.base.scaling.where}
     rows = [
@@ -77,8 +78,8 @@ class _Part:
     remark: str
 
 
-def _part(heading: str, fit: Fit, labels: Sequence[str]) -> _Part:
-    known = {e.label: e for e in estimates(fit)}
+def _part(heading: str, fit: Fit, found: Sequence[Estimate], labels: Sequence[str]) -> _Part:
+    known = {e.label: e for e in found}
     cells = [_cells(known.get(label)) for label in labels]
     columns = (Column(heading, numeric=True), Column("90 % interval"))
     if refusal(fit) is None:

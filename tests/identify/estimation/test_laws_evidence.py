@@ -30,7 +30,7 @@ from identify.estimation.intervals import (
     estimates,
     half_widths,
     inseparable,
-    open_side,
+    open_sides,
     refusal,
 )
 from identify.estimation.scaling import Scaling
@@ -239,16 +239,18 @@ def test_a_side_is_open_where_the_error_hardly_rises(monkeypatch, rises, wanted)
     )  # fmt: skip
 
     def made(rises):
-        def left(axis, logs):
-            d = axis["constant_force"].values["a"] - 2.0
-            return np.array([3.0, d * np.sqrt(rises[0] if d < 0 else rises[1]), 55.0])
+        def change(axis, logs, where, steps):
+            assert len(where) == len(steps)
+            return np.array(
+                [[0.0, d * np.sqrt(rises[0] if d < 0 else rises[1]), 55.0] for d in steps]
+            ).reshape(-1, 3)
 
-        return left
+        return change
 
-    monkeypatch.setattr(uncertainty, "residual", made(rises))
-    assert open_side(fit, c, 0.5) == wanted
+    monkeypatch.setattr(uncertainty, "changes", made(rises))
+    assert side_of(fit, c) == wanted
     # where a bound is in the way nothing can be said
-    monkeypatch.setattr(uncertainty, "residual", made((0.02, 0.02)))
+    monkeypatch.setattr(uncertainty, "changes", made((0.02, 0.02)))
     for low, high, side in (
         (1.01, 9.0, Side.LARGER),
         (-9.0, 2.99, Side.SMALLER),
@@ -256,10 +258,14 @@ def test_a_side_is_open_where_the_error_hardly_rises(monkeypatch, rises, wanted)
     ):
         near = ParameterReference("constant_force", replace(p, lower=low, upper=high))
         fit.scaling = Scaling((near,))
-        assert open_side(fit, near, 0.5) == side
+        assert side_of(fit, near) == side
     lower = ParameterReference("constant_force", replace(p, lower=0.99))
     fit.scaling = Scaling((lower,))
-    assert open_side(fit, lower, 0.5) is Side.SMALLER
+    assert side_of(fit, lower) is Side.SMALLER
+
+
+def side_of(fit, c, half=0.5):
+    return open_sides(fit, [c], np.array([half])).get(c.label)
 
 
 def test_the_rise_foreseen_counts_what_a_bound_or_prior_left_of_the_slope(monkeypatch):
@@ -276,12 +282,12 @@ def test_the_rise_foreseen_counts_what_a_bound_or_prior_left_of_the_slope(monkey
         ((0.09, 0.5), Side.SMALLER),
     ):
 
-        def left(axis, logs, rises=rises):
-            d = axis["constant_force"].values["a"] - 2.0
-            return np.array([3.0, np.sqrt(0.16 + rises[int(d > 0)] * (0.8 * d + d * d))])
+        def change(axis, logs, where, steps, rises=rises):
+            after = [np.sqrt(0.16 + rises[int(d > 0)] * (0.8 * d + d * d)) for d in steps]
+            return np.array([[0.0, a - 0.4] for a in after])
 
-        monkeypatch.setattr(uncertainty, "residual", left)
-        assert open_side(fit, c, 0.5) == wanted
+        monkeypatch.setattr(uncertainty, "changes", change)
+        assert side_of(fit, c) == wanted
 
 
 def test_estimates_are_the_values_with_their_intervals_within_the_bounds():
