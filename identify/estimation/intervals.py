@@ -8,6 +8,7 @@ D. F. McCaffrey, Survey Methodology 28 (2002) for left-out residuals.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
@@ -111,6 +112,15 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
             low, high = max(value - width, p.lower), min(value + width, p.upper)
         free.append(Estimate(c.label, float(value), units(p.unit), low, high, True, why))
     return (*free, *_held(fit))
+
+
+def found_intervals(found: Sequence[Estimate]) -> dict[str, tuple[float, float]]:
+    """Low and high end by label, of the estimates that have an interval."""
+    return {
+        e.label: (float(e.low), float(e.high))
+        for e in found
+        if e.low is not None and e.high is not None
+    }
 
 
 def open_side(fit: Fit, c: ParameterReference, half: float) -> Side | None:

@@ -15,6 +15,7 @@ import tomlkit
 
 from twin.effects import Catalogue
 from twin.errors import InputError
+from twin.model.intervals import ENTRY, intervals_table, read_intervals
 from twin.model.machine import AxisModel, Fitted, Hardware, HistoryStep, MachineModel
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 
@@ -101,6 +102,7 @@ def parse_model(
             mjcf=mjcf,
             mjcf_name=document.get("mujoco"),
             history=tuple(_history_step(step) for step in document.get("history", ())),
+            intervals=read_intervals(document, axes),
         )
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
@@ -186,6 +188,8 @@ def format_model(model: MachineModel) -> str:
     for name, axis in model.axes.items():
         axes[name] = _axis_table(axis)
     document["axes"] = axes
+    if model.intervals:
+        document[ENTRY] = intervals_table(model)
     if model.history:
         steps = tomlkit.aot()
         for step in model.history:
