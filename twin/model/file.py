@@ -15,6 +15,7 @@ from twin.effects import Catalogue
 from twin.entries import read_entries, read_toml
 from twin.errors import InputError, at
 from twin.files import write_atomically
+from twin.model.intervals import ENTRY, intervals_table, read_intervals
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.schema import AxisEntry, EffectEntry, ModelFile
 from twin.model.units import LINEAR, ROTARY, AxisUnits
@@ -99,13 +100,15 @@ def _checked(document: Mapping[str, Any], where: str) -> ModelFile:
 
 def _model(entries: ModelFile, catalogue: Catalogue, mjcf: str | None, where: str) -> MachineModel:
     with at(where):
+        axes = {name: _axis(name, entry, catalogue) for name, entry in entries.axes.items()}
         return MachineModel(
             name=Path(where).stem if entries.name is None else entries.name,
-            axes={name: _axis(name, entry, catalogue) for name, entry in entries.axes.items()},
+            axes=axes,
             sample_rate=float(entries.sample_rate),
             mjcf=mjcf,
             mjcf_name=entries.mujoco,
             history=tuple(entry.step() for entry in entries.history),
+            intervals=read_intervals(entries.intervals, axes),
         )
 
 
@@ -165,6 +168,8 @@ def format_model(model: MachineModel) -> str:
     for name, axis in model.axes.items():
         axes[name] = _axis_table(axis)
     document["axes"] = axes
+    if model.intervals:
+        document[ENTRY] = intervals_table(model)
     if model.history:
         steps = tomlkit.aot()
         for step in model.history:
