@@ -13,6 +13,7 @@ from time import perf_counter
 from benchmarks import (
     diagnosis,
     effect_cost,
+    fuzz,
     import_time,
     mcap_logs,
     passes,
@@ -27,7 +28,7 @@ from benchmarks.mutation import noticed
 
 ALL = (
     simulation, second_start, peer_fits, diagnosis, passes, stages, mcap_logs, effect_cost,
-    import_time, selftest, noticed,
+    import_time, selftest, fuzz, noticed,
 )  # fmt: skip
 
 

@@ -1,13 +1,13 @@
-"""The model against measurements: fit, compare, diagnose, add, plan."""
+"""The model against measurements: fit, compare, diagnose, add, plan, agree."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from identify.workflow import add, compare, diagnose, fit, plan
+    from identify.workflow import add, agree, compare, diagnose, fit, plan
 
-__all__ = ["add", "compare", "diagnose", "fit", "plan"]
+__all__ = ["add", "agree", "compare", "diagnose", "fit", "plan"]
 
 
 def __getattr__(name: str) -> Any:

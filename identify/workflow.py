@@ -12,18 +12,20 @@ from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.fit import Fit, error_on, rms
 from identify.estimation.force_balance import residual
-from identify.estimation.intervals import estimates
+from identify.estimation.intervals import estimates, found_intervals
 from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
 from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate, score, try_effect, usable
 from identify.selection.confounded import moved_parameters
-from identify.selection.forward_selection import AxisDiagnosis, diagnose_axis
+from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
+from identify.validation.agreement import Agreement, agreement
 from identify.validation.free_run import free_run, rms_error
 from identify.validation.misfit_maps import compare_axis, position_errors
 from twin.effect import Effect
-from twin.effects import Catalogue
+from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.log import Log
 from twin.model.machine import AxisModel, HistoryStep, MachineModel
@@ -60,11 +62,12 @@ def fit(
         found[axis], fits[axis] = fit_aligned(model.axes[axis], dataset)
         require_residual(fits[axis].axis, found[axis])
         progress("fitting", i + 1, len(found))
-    for axis, result in fits.items():
-        model = model.with_axis(axis, result.axis)
     held = {a: holdout_error(f, found[a]) for a, f in fits.items()}
     known = Catalogue([]) if catalogue is None else usable(catalogue, given)
     intervals = {a: estimates(f) for a, f in fits.items()}
+    for axis, result in fits.items():
+        model = model.with_axis(axis, result.axis)
+        model = model.with_intervals(axis, found_intervals(intervals[axis]))
     return FitResult(model, found, fits, intervals, held, given, known)
 
 
@@ -143,7 +146,7 @@ def diagnose(
             result.datasets[axis],
             known,
             partial(progress, f"trying effects on {axis}"),
-        )
+        ).with_findings()
         for axis, fitted in result.fits.items()
     }
     plans, not_planned = _next_experiments(axes, result.model, test_function)
@@ -245,6 +248,7 @@ def _addition(
         notes=addition_notes(best, moved, set_aside),
     )
     new = model.with_axis(name, best.fit.axis).with_history(step)
+    new = new.with_intervals(name, found_intervals(estimates(best.fit)))
     first = next(iter(by_log(prepared).values()))
     return Addition(
         model=new,
@@ -261,13 +265,31 @@ def _addition(
     )
 
 
+def agree(
+    fit_a: FitResult | MachineModel,
+    fit_b: FitResult | MachineModel,
+    *,
+    catalogue: Catalogue | None = None,
+) -> Agreement:
+    """Whether two fits agree within their uncertainties, and what makes the difference.
+
+    fit_a, fit_b: results of `fit`, or models read from files that `twin fit` or `add` wrote.
+    catalogue: effects that may be the cause; the package's own where None. Raises InputError where
+    no parameter has an interval in both.
+    """
+    a, b = (f.model if isinstance(f, FitResult) else f for f in (fit_a, fit_b))
+    return agreement(a, b, load_catalogue() if catalogue is None else catalogue)
+
+
 __all__ = [
     "Addition",
+    "Agreement",
     "Comparison",
     "Diagnosis",
     "FitResult",
     "add",
     "add_named",
+    "agree",
     "compare",
     "diagnose",
     "fit",

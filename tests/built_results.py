@@ -15,7 +15,9 @@ from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
 from identify.selection.confounded import Change, MovedParameter, Refit
-from identify.selection.forward_selection import AxisDiagnosis, Step, Verdict
+from identify.selection.decoys import Proof
+from identify.selection.diagnosis import AxisDiagnosis, Step, Verdict
+from identify.selection.findings import Finding
 from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
 from identify.validation.misfit_maps import AxisComparison, MisfitMap, Region
@@ -84,6 +86,11 @@ def diagnosis_of(verdict: Verdict = Verdict.AMBIGUOUS, **changes: object) -> Axi
     return found
 
 
+FOUND = (
+    Finding("cogging", ("quadratic_drag",), 0.871, 7.17, 2.19, "N", {"p": 0.0261},
+            Proof(0.813, 0.137)),
+    Finding("lugre", (), 0.119, 3.23, 2.19, "N", {"Fc": 0.31}, None),
+)  # fmt: skip
 STRUCTURE = Dependence(
     0.631, "other_axis_position", 0.0273, "m", {"time": 0.117, "position": 0.231}
 )

@@ -9,6 +9,7 @@ from twin.log.check import (
     CheckReport,
     Fault,
     Finding,
+    breaks,
     check_log,
     content,
     excitation,
@@ -70,7 +71,7 @@ CHECKS = {
     Fault.SIGN: units.check,
     Fault.LAG: timing.check,
     Fault.SATURATION: saturation.check,
-    Fault.OUTLIERS: outliers.check,
+    Fault.OUTLIERS: lambda axis: [*breaks.check(axis), *outliers.check(axis)],
     Fault.COARSE_POSITION: excitation.check,
     Fault.WEAK_EXCITATION: excitation.check,
 }

@@ -75,7 +75,9 @@ def account(case: Case, recovery: Recovery) -> Account:
     """Read the sentences; a chunk is damaged where it or bytes of it are named."""
     left_out, damaged = [], set()
     for sentence in recovery.lost:
-        if found := re.match(r"(\d+) intact samples from (\S+) s are left out", sentence):
+        if found := re.match(
+            r"(\d+) intact samples from (\S+) s are in a log of their own", sentence
+        ):
             left_out.append(span(*found.groups()))
         for number, chunk in enumerate(case.chunks):
             if re.search(rf"[Cc]hunk (record )?at byte {chunk.start}: ", sentence):

@@ -20,7 +20,7 @@ from identify.output.report.blocks import Answer, Picture, Section
 from identify.output.report.drawing import drawing_style
 from identify.output.report.subject import Subject
 from identify.output.results import Addition, Diagnosis
-from identify.selection.forward_selection import AxisDiagnosis
+from identify.selection.diagnosis import AxisDiagnosis
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
 from twin.log import Log

@@ -17,9 +17,9 @@ IDENTIFY, TWIN = (Path(package.__file__).parent for package in (identify, twin))
 # In the order in which data pass them: a room imports only from those before it.
 ROOMS = (
     "dataset", "estimation", "selection", "validation", "experiment_design", "selftest",
-    "output", "workflow", "demo", "cli",
+    "output", "workflow", "testing", "demo", "cli", "start",
 )  # fmt: skip
-MOST_FLOORS = 10
+MOST_FLOORS = 11
 ONE_OF_EACH = re.compile(r"np\.gradient|savgol|0\.6745|np\.diff\([^)]*\) / ")
 UNIT_SELECTORS = re.compile(r"""\bunit\s*(==|!=|in|not in)\s*[(\[{]?["'](?!1["'])""")
 

@@ -1,5 +1,8 @@
 """Errors that a user may cause; the command line prints them as a single line."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class InputError(ValueError):
     """Input that cannot be used.
@@ -14,3 +17,12 @@ class CannotRun(InputError):
     Code that chooses among motions may leave such a motion out and report it; any other error must
     not be caught.
     """
+
+
+@contextmanager
+def at(place: str) -> Iterator[None]:
+    """Prefix the message of an InputError with where it happened, and keep it one line."""
+    try:
+        yield
+    except InputError as error:
+        raise type(error)(" ".join(f"{place}: {error}".splitlines())) from error

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.breakdown import require_sound
 from twin.core.control import Controller, gain_table
 from twin.core.loop import N_SIGNALS, run_mujoco, run_reduced
 from twin.core.native import Table
@@ -65,7 +66,10 @@ class MujocoSimulator:
         spec = machine_spec(model)
         axes = tuple(model.axes)
         self.user_at = attach(spec, table, model.period, axes)
+        # A bad state stays bad, and is found, instead of starting again from zero.
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self.model = spec.compile()
+        self._machine, self._table = model, table
         self.data = mujoco.MjData(self.model)
         self._where = np.array(
             [
@@ -110,11 +114,19 @@ class MujocoSimulator:
 
     def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
         """See Stepper."""
-        with passive_callback():
+        from twin.mujoco.warnings import collected_warnings
+
+        with passive_callback(), collected_warnings(self.data) as warnings:
             run_mujoco(
                 self._step, self.model._address, self.data._address, tuple(offsets()[3:7]),
                 self._where, self.user_at, first, *shared[:-1], setpoints, noise, shared[-1], *out,
             )  # fmt: skip
+        if warnings:
+            require_sound(out[0], out[1], self._machine, self._table, first)
+            raise CannotRun(
+                f"MuJoCo ended the simulation at t = {warnings[0].time:.4f} s: {warnings[0].text} "
+                f"Change {self._machine.mjcf_name or 'the model'}, or raise sample_rate (Hz)"
+            )
 
 
 class ReducedSimulator:
@@ -196,7 +208,7 @@ def run(
         simulation.run(first, shared, setpoints[part], noise[part], tuple(o[part] for o in out))
         if progress:
             progress(min(first + CHUNK, n), n)
-    _require_finite(out[0], model)
+    require_sound(out[0], out[1], model, table)
     return Run(*out, table=table, state_names=names)
 
 
@@ -212,12 +224,3 @@ def _watched(
             indices += [int(entry[3]) + i for i in range(len(states))]
             names += [(label[0], f"{label[1]}_{s}") for s in states]
     return np.array(indices, dtype=np.int64), tuple(names)
-
-
-def _require_finite(signals: Array, model: MachineModel) -> None:
-    bad = np.flatnonzero(~np.isfinite(signals).all(axis=(1, 2)))
-    if len(bad):
-        raise CannotRun(
-            f"the simulation became unstable at t = {bad[0] * model.period:.4f} s; lower the "
-            "bandwidth (Hz) or the damping parameters, or raise sample_rate (Hz)"
-        )

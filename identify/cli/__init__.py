@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import sys
 
-from identify.cli import loop, machine, plan, selftest
+from identify.cli import agree, loop, machine, plan, selftest
 from identify.cli.shared import app
 from twin.errors import InputError
 
-__all__ = ["loop", "machine", "main", "plan", "selftest"]
+__all__ = ["agree", "loop", "machine", "main", "plan", "selftest"]
 
 INTERRUPTED = 130  # exit code that typer makes of Ctrl-C, without a word
 
@@ -27,7 +27,8 @@ def main() -> None:
     except InputError as error:
         code = fail(str(error))
     except KeyboardInterrupt:
-        code = fail("interrupted")
+        fail("interrupted")
+        code = INTERRUPTED
     except OSError as error:
         code = fail(f"{error.filename}: {error.strerror}; check the name and the permissions")
     except Exception as error:

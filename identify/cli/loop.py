@@ -60,6 +60,10 @@ def compare(
     model: Model,
     logs: Logs,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")] = None,
+    mcap: Annotated[
+        Path | None,
+        typer.Option(help="The first log measured, modelled and their difference, as MCAP."),
+    ] = None,
     test_function: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
@@ -69,8 +73,8 @@ def compare(
     from identify.output import as_json
     from identify.output import text as as_text
 
-    if out:
-        require_folder(out)
+    for path in filter(None, (out, mcap)):
+        require_folder(path)
     machine = machine_model(model, catalogue_with(effects))
     recorded, findings = read_checked(logs)
     with bars_on_stderr() as bars:
@@ -82,6 +86,10 @@ def compare(
             out, title=f"{machine.name}: model against measurement", diagnosis=None,
             comparison=result, history=machine.history,
         )  # fmt: skip
+    if mcap:
+        from identify.output.side_by_side import write_side_by_side
+
+        write_side_by_side(result, mcap)
     say(as_text.compare_text(result), as_json.compare_json(result), as_json_, findings)
 
 

@@ -65,7 +65,7 @@ def simulate(
 
 @app.command("import")
 def import_(
-    source: Annotated[Path, typer.Argument(help="CSV, MAT, Parquet, HDF5 or TDMS file.")],
+    source: Annotated[Path, typer.Argument(help="CSV, MAT, JSON, Parquet, HDF5 or TDMS file.")],
     mapping: Annotated[Path, typer.Option("--map", help="Columns, units, scale, sign, rate.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")],
     as_json_: Json = False,
@@ -78,7 +78,8 @@ def import_(
     log = import_log(source, load_mapping(mapping))
     write_log(log, out)
     result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
-    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_)
+    resampled = [log.metadata["resampled"]] if "resampled" in log.metadata else []
+    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, resampled)
 
 
 @app.command()
@@ -97,16 +98,28 @@ def check(logs: Logs, as_json_: Json = False) -> None:
 def recover(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="Damaged MCAP log.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log of what is intact.")],
+    unproved: Annotated[
+        bool, typer.Option("--unproved", help="Keep samples that no checksum proves as well.")
+    ] = False,
     as_json_: Json = False,
 ) -> None:
-    """Keep the intact part of a damaged log."""
+    """Keep the intact parts of a damaged log: the longest at OUT, the others beside it."""
     from twin.log import recover_log, write_log
 
     require_folder(out)
-    good, recovery = recover_log(log)
-    write_log(good, out)
-    result = {"log": str(out), "kept": recovery.kept, "lost": list(recovery.lost)}
-    say(str(recovery), result, as_json_)
+    good, recovery = recover_log(log, unproved=unproved)
+    parts = {
+        out.with_name(f"{out.stem}.part{n}{out.suffix}"): part
+        for n, part in enumerate(recovery.others, 1)
+    }
+    for path, part in {out: good, **parts}.items():
+        write_log(part, path)
+    result = {
+        "log": str(out), "kept": recovery.kept, "lost": list(recovery.lost),
+        "not_proved": list(recovery.unproved), "others": [str(p) for p in parts],
+    }  # fmt: skip
+    written = [f"{path}: {part.metadata['recovered']}" for path, part in parts.items()]
+    say("\n".join([str(recovery), *written]), result, as_json_)
 
 
 @app.command()

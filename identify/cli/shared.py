@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from twin.errors import InputError
-
 if TYPE_CHECKING:
     from identify.workflow import Progress
     from twin.effects import Catalogue
@@ -67,7 +65,11 @@ def front_door(
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Effects = Annotated[
-    list[Path] | None, typer.Option("--effects", help="Your own effect file; may be repeated.")
+    list[Path] | None,
+    typer.Option(
+        "--effects",
+        help="Your own effect file; loading it runs its code. May be repeated.",
+    ),
 ]
 
 
@@ -124,7 +126,7 @@ def with_holdout(
 
 
 def read_logs(paths: list[Path] | None) -> dict[str, Log]:
-    """The logs by name, whole."""
+    """The logs by name, less the truth that a simulation knows."""
     return {str(path): log for path, log in _read(paths)}
 
 
@@ -146,7 +148,7 @@ def _read(paths: list[Path] | None) -> Iterator[tuple[Path, Log]]:
     from twin.log import read_log
 
     for path in paths or ():
-        yield path, read_log(path)
+        yield path, read_log(path, truth=False)
 
 
 def _measured(log: Log) -> Log:
@@ -169,6 +171,7 @@ def checked(logs: Mapping[str, Log]) -> list[str]:
 
 
 def require_folder(path: Path) -> None:
-    """Raise InputError now, instead of after the work, where the folder does not exist."""
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
+    """Raise InputError now, instead of after the work, where the file could not be written."""
+    from twin.files import require_writable
+
+    require_writable(path)

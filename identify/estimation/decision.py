@@ -72,6 +72,8 @@ class DecisionRule:
     same_error: float = 1.01
     pair_first: float = 0.1
 
+    beside_decoys: float = 0.8
+
     least_share: float = 0.1
     rather: float = 0.8
     left_over: float = 0.5

@@ -119,6 +119,15 @@ def _reasons(fit: Fit, half: Array) -> dict[str, NoInterval]:
     return out | {label: OpenSided(side) for label, side in sides.items()}
 
 
+def found_intervals(found: Sequence[Estimate]) -> dict[str, tuple[float, float]]:
+    """Low and high end by label, of the estimates that have an interval."""
+    return {
+        e.label: (float(e.low), float(e.high))
+        for e in found
+        if e.low is not None and e.high is not None
+    }
+
+
 def open_sides(fit: Fit, where: Sequence[ParameterReference], half: Array) -> dict[str, Side]:
     """Sides to which the error hardly rises, by label, of parameters with these half widths.
 

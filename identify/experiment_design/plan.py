@@ -26,7 +26,8 @@ from identify.experiment_design.rival_hypotheses import (
     simulated_dataset,
 )
 from identify.selection.candidates import Candidate, usable
-from identify.selection.forward_selection import AxisDiagnosis, Verdict, diagnose_axis
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from identify.selection.forward_selection import diagnose_axis
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError

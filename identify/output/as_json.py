@@ -11,11 +11,12 @@ from identify.output.remarks import remarks_on
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
 from identify.output.words.experiment_design import gap_in_words, not_run_in_words
-from identify.output.words.selection import verdict_in_words
+from identify.output.words.selection import advice, verdict_in_words
 from identify.output.words.validation import loop_in_words, region_in_words
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
-from identify.selection.forward_selection import Step
+from identify.selection.diagnosis import AxisDiagnosis, Step
+from identify.selection.findings import Finding
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import ResidualTests
 from twin.experiments.file import parameters
@@ -155,6 +156,8 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
             "period": dependence.period,
             "unit": dependence.unit,
         },
+        "findings": [_finding(f) for f in d.findings],
+        "remainder": _remainder(d),
         "force_error": d.base.error,
         "noise_floor": d.base.floor,
         "unit": units.force,
@@ -174,6 +177,39 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "notes": list(remarks_on(result, axis)),
         "next_experiment": following and plan_json(following),
         "next_experiment_refused": result.not_planned.get(axis),
+    }
+
+
+def _finding(f: Finding) -> dict[str, Any]:
+    return {
+        "effect": f.effect,
+        "kind": "missing",
+        "explains": f.explains,
+        "indistinguishable_from": list(f.tied),
+        "test_error_before": f.error_before,
+        "test_error_after": f.error_after,
+        "unit": f.unit,
+        "parameters": f.parameters,
+        "gain": f.proof and f.proof.gain,
+        "best_decoy": f.proof and f.proof.best_decoy,
+    }
+
+
+def _remainder(d: AxisDiagnosis) -> dict[str, Any] | None:
+    """What stands above the noise floor beside the findings."""
+    left = d.unexplained
+    if left is None:
+        return None
+    fit = d.final if d.named else d.base
+    return {
+        "error": fit.error,
+        "over_noise_floor": fit.ratio,
+        "unit": fit.axis.units.force,
+        "depends_on": left.depends_on,
+        "share_of_error": left.share_of_error,
+        "period": left.period,
+        "period_unit": left.unit,
+        "advice": advice(),
     }
 
 

@@ -9,7 +9,7 @@ from identify.estimation.fit import Outcome
 from identify.output.words.estimation import channel_delay_in_words, outcome_in_words
 from identify.output.words.selection import moved_in_words, refit_in_words, repeat_in_words
 from identify.selection.confounded import Refit, moved_parameters
-from identify.selection.forward_selection import AxisDiagnosis
+from identify.selection.diagnosis import AxisDiagnosis
 
 if TYPE_CHECKING:  # results print themselves, with these sentences
     from identify.output.results import Diagnosis

@@ -14,7 +14,7 @@ from identify.output.text import add_text, compare_text, diagnose_text, fit_text
 from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import MovedParameter, Refit, refit
-from identify.selection.forward_selection import AxisDiagnosis, Verdict
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.misfit_maps import AxisComparison
 from twin.effect import Effect
 from twin.effects import Catalogue

@@ -14,7 +14,7 @@ from identify.experiment_design.planting import strength_for
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
-from twin.model.file import write_atomically
+from twin.files import write_atomically
 from twin.model.machine import AxisModel, Fitted, axis_table
 from twin.signals import rate
 

@@ -18,8 +18,10 @@ from identify.output.words.experiment_design import gap_in_words, not_run_in_wor
 from identify.output.words.selection import (
     advice,
     dependence_in_words,
+    finding_in_words,
     nonparametric_in_words,
     refit_in_words,
+    remainder_in_words,
     verdict_in_words,
 )
 from identify.output.words.validation import (
@@ -28,7 +30,7 @@ from identify.output.words.validation import (
     region_in_words,
 )
 from identify.selection.candidates import Candidate
-from identify.selection.forward_selection import Step
+from identify.selection.diagnosis import Step
 from identify.selection.nonparametric import nonparametric_labels
 from twin.experiments.file import in_short
 from twin.experiments.kinds import kind_of
@@ -116,6 +118,9 @@ def diagnose_text(result: Diagnosis) -> str:
             lines.append(f"  these data cannot separate it from: {', '.join(d.ambiguous_with)}")
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
+        lines += [f"  {words(finding_in_words(f))}" for f in d.findings]
+        if remains := remainder_in_words(d):
+            lines.append(f"  {remains}")
         if d.unexplained:
             lines.append(f"  {words(dependence_in_words(d.unexplained))}")
             lines.append(f"  {advice()}")

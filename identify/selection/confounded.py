@@ -75,7 +75,7 @@ def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
             found.append((change, back))
     found = [t for t in found if t[0].force > LEAST_FORCE * error]
     found = sorted(found, key=lambda t: -t[0].force)[:MOST_CHANGES]
-    bases = _bases(fit, catalogue) if found else {}
+    bases = linear_bases(fit, catalogue) if found else {}
     changes = tuple(
         replace(change, alike=tuple(name for name, basis in bases.items() if _within(back, basis)))
         for change, back in found
@@ -83,7 +83,7 @@ def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
     return Refit(error, fit.error, changes, units.force)
 
 
-def _bases(fit: Fit, catalogue: Catalogue) -> dict[str, Array]:
+def linear_bases(fit: Fit, catalogue: Catalogue) -> dict[str, Array]:
     """Orthonormal basis (n, k) of the force of each absent effect that is linear, by name."""
     out = {}
     for effect in absent_effects(fit.axis, catalogue):

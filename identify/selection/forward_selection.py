@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from enum import Enum
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.channel_delay import moved_by
@@ -14,98 +13,13 @@ from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.time_origin import synchronised
 from identify.estimation.variable_projection import fit_thoroughly
 from identify.selection.candidates import Candidate, score
+from identify.selection.decoys import proof
+from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, Verdict, kept
 from identify.selection.pair_search import held_at_floor, search_pairs
 from identify.selection.ranking import Progress, less, rank, tie, took_friction
-from identify.selection.repeating_force import Repeat, not_general
-from identify.selection.residual_dependence import Dependence, explains, find_dependence
+from identify.selection.residual_dependence import explains, find_dependence
 from twin.effect import Kind
 from twin.effects import Catalogue
-
-
-class Verdict(Enum):
-    """The answer of a diagnosis."""
-
-    MISSING_EFFECT = "missing effect"
-    NOTHING_MISSING = "nothing missing"
-    AMBIGUOUS = "ambiguous"
-    UNEXPLAINED = "unexplained"
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """One added effect, and the earlier ones that are not needed any more beside it.
-
-    tied: effects that explain as much. beside: for a pair, the other effect, without which this one
-    has no evidence. rivals: candidates that explained about as much when it was added.
-    """
-
-    candidate: Candidate
-    tied: tuple[str, ...]
-    dropped: tuple[str, ...] = ()
-    beside: str | None = None
-    rivals: tuple[Candidate, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class SelectionState:
-    """The steps so far, and the fit with the effects that they added."""
-
-    steps: tuple[Step, ...]
-    fit: Fit
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class AxisDiagnosis:
-    """Diagnosis of one axis.
-
-    base: the fitted model. ranking: candidates beside it, by falling evidence. steps: the effects
-    added one after another while there was evidence. final: the fit with those that were kept.
-    unexplained: what the residual depends on, where it is not noise.
-    """
-
-    dataset: Dataset
-    base: Fit
-    ranking: tuple[Candidate, ...]
-    steps: tuple[Step, ...]
-    final: Fit
-    verdict: Verdict
-    unexplained: Dependence | None
-
-    def __repr__(self) -> str:
-        answer = f"{self.verdict.name.lower()} {list(self.answers)}"
-        return f"<AxisDiagnosis of {self.dataset.axis}: {answer}>"
-
-    @cached_property
-    def repeat(self) -> Repeat | None:
-        """A force that repeats along the track in each log, but at other places in each."""
-        return None if self.final.at_floor else not_general(self.final, self.dataset)
-
-    @property
-    def named(self) -> tuple[str, ...]:
-        """Names of the effects that are missing, in the order they were found."""
-        return tuple(answer[0] for answer in self.answers)
-
-    @property
-    def answers(self) -> tuple[tuple[str, ...], ...]:
-        """Each missing effect, followed by those that explain as much."""
-        if self.verdict not in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS):
-            return ()
-        return tuple((s.candidate.effect.name, *s.tied) for s in _kept(self.steps))
-
-    @property
-    def best(self) -> Candidate | None:
-        """The candidate that is named first, where one is."""
-        return _kept(self.steps)[0].candidate if self.named else None
-
-    @property
-    def ambiguous_with(self) -> tuple[str, ...]:
-        """Effects that explain as much as the one named first."""
-        return _kept(self.steps)[0].tied if self.named else ()
-
-
-def _kept(steps: Sequence[Step]) -> list[Step]:
-    dropped = {name for s in steps for name in s.dropped}
-    return [s for s in steps if s.candidate.effect.name not in dropped]
 
 
 def diagnose_axis(
@@ -127,7 +41,7 @@ def diagnose_axis(
     states = [SelectionState((), base)]
     final, found = base, ranking
     while len(steps) < RULE.most_steps and (more := _next(final, dataset, found, ranked)):
-        earlier = [s.candidate for s in _kept(steps)]
+        earlier = [s.candidate for s in kept(steps)]
         final, dropped = _eliminated_backwards(base, more[-1].candidate.fit, dataset, earlier)
         steps += [*more[:-1], replace(more[-1], dropped=dropped)]
         states.append(SelectionState(tuple(steps), final))
@@ -200,10 +114,10 @@ def _compared_again(states: Sequence[SelectionState], dataset: Dataset) -> tuple
     When an early effect was compared with its rivals, the later effects were still missing.
     """
     base, (steps, final) = states[0].fit, (states[-1].steps, states[-1].fit)
-    kept = _kept(steps)
-    if len(kept) < 2:
+    still = kept(steps)
+    if len(still) < 2:
         return steps
-    named = {s.candidate.effect.name for s in kept}
+    named = {s.candidate.effect.name for s in still}
 
     def level(own: Candidate, rival: Candidate) -> bool:
         axis = final.axis.without(own.effect.name)
@@ -217,7 +131,7 @@ def _compared_again(states: Sequence[SelectionState], dataset: Dataset) -> tuple
         own = score(base, final, dataset, step.candidate.effect)
         return replace(step, tied=tuple(r.effect.name for r in rivals if level(own, r)))
 
-    return tuple(compared(s) if s in kept and s.beside is None else s for s in steps)
+    return tuple(compared(s) if s in still and s.beside is None else s for s in steps)
 
 
 def _eliminated_backwards(
@@ -244,14 +158,24 @@ def _eliminated_backwards(
 def _decided(
     dataset: Dataset, ranking: tuple[Candidate, ...], states: Sequence[SelectionState]
 ) -> AxisDiagnosis:
-    """The verdict on the added effects, up to the last one that explained enough."""
+    """The verdict on the added effects, up to the last one that explained enough.
+
+    Beyond it, and where none explains enough, those are named that are proved against decoys.
+    """
     base = states[0].fit
     explained = list(states)
     while len(explained) > 1 and not _convincing(explained[-2], explained[-1], dataset):
         explained.pop()
     steps, final = _compared_again(explained, dataset), explained[-1].fit
-    if len(explained) > 1 and _convincing(states[0], explained[-1], dataset):
-        verdict = Verdict.AMBIGUOUS if _kept(steps)[0].tied else Verdict.MISSING_EFFECT
+    enough = len(explained) > 1 and _convincing(states[0], explained[-1], dataset)
+    if not (enough and final.at_floor) and len(states) > 1:
+        sure = kept(steps) if enough else []
+        graded = _graded(states, [s.candidate.effect.name for s in sure], dataset)
+        if graded is not None:
+            steps, final, enough = *graded, True
+    if enough:
+        first = next(s for s in kept(steps) if s.proved)
+        verdict = Verdict.AMBIGUOUS if first.tied else Verdict.MISSING_EFFECT
         done = final.at_floor or held_at_floor(final, dataset)
         dependence = None if done else find_dependence(final, dataset)
     elif len(states) == 1 and base.at_floor:
@@ -260,6 +184,35 @@ def _decided(
         steps, final = states[-1].steps, states[-1].fit
         verdict, dependence = Verdict.UNEXPLAINED, find_dependence(base, dataset)
     return AxisDiagnosis(dataset, base, ranking, steps, final, verdict, dependence)
+
+
+def _graded(
+    states: Sequence[SelectionState], sure: Sequence[str], dataset: Dataset
+) -> tuple[tuple[Step, ...], Fit] | None:
+    """The steps with those marked that are sure or proved against decoys, and the fit with them.
+
+    None where that proves none beyond the sure ones.
+    """
+    base, (steps, final) = states[0].fit, (states[-1].steps, states[-1].fit)
+    names = [s.candidate.effect.name for s in kept(steps)]
+    if not set(sure) < set(names):
+        return None
+    proved = set(sure)
+    for step in kept(steps):
+        effect = step.candidate.effect
+        if effect.name in sure or effect.name not in final.axis.names:
+            continue
+        beside = proof(less(effect, final, base, dataset), final.axis[effect.name], dataset)
+        if beside is not None and beside.holds:
+            proved.add(effect.name)
+    if proved == set(sure):
+        return None
+    axis = final.axis
+    for name in set(names) - proved:
+        axis = axis.without(name) if name in axis.names else axis
+    fit = final if axis is final.axis else fit_axis(axis, dataset.fit)
+    named = (replace(s, proved=s.candidate.effect.name in proved) for s in steps)
+    return tuple(named), fit
 
 
 def _convincing(before: SelectionState, after: SelectionState, dataset: Dataset) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from identify.selftest.tally import AMBIGUOUS, NOTHING, UNEXPLAINED, confusion
 from identify.selftest.trial import TrialResult
 from twin.errors import InputError
-from twin.model.file import write_atomically
+from twin.files import write_atomically
 
 FORMATS = (".png", ".svg", ".pdf")
 

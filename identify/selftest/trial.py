@@ -15,7 +15,8 @@ from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates
 from identify.estimation.subspace import orthonormal, unabsorbed
-from identify.selection.forward_selection import AxisDiagnosis, Verdict, diagnose_axis
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from identify.selection.forward_selection import diagnose_axis
 from identify.selection.residual_dependence import dependences
 from identify.selftest.cases import AXIS, Machine, NotShown, machine
 from twin.effects import Catalogue, load_catalogue

@@ -44,14 +44,14 @@ def cli(monkeypatch, capsys, tmp_path):
         (ValueError("odd"), "twin: this is a fault of the program: ValueError: odd; please"),
     ],
 )
-def test_every_failure_is_one_line_and_exit_code_two(monkeypatch, cli, error, said):
+def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, said):
     def fails(*_: object, **__: object) -> None:
         raise error
 
     monkeypatch.delenv("TWIN_TRACEBACK", raising=False)
     monkeypatch.setattr(workflow, "compare", fails)
     code, out, err = cli("compare", "m.toml", "a.mcap", "--json")
-    assert (code, out) == (2, "")
+    assert (code, out) == (130 if isinstance(error, KeyboardInterrupt) else 2, "")
     assert err.startswith(said)
     assert err.count("\n") == 1
 
@@ -89,7 +89,7 @@ def test_what_is_said_goes_to_its_own_stream(capsys, tmp_path):
 
 
 def test_files_are_read_by_the_names_they_were_given(monkeypatch):
-    monkeypatch.setattr("twin.log.read_log", lambda path: f"log {path}")
+    monkeypatch.setattr("twin.log.read_log", lambda path, truth: f"log {path}")
     monkeypatch.setattr("twin.effects.load_catalogue", lambda files: files)
     monkeypatch.setattr("twin.model.file.load_model", lambda *given: given)
     paths = [Path("b.mcap"), Path("a.mcap")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from types import SimpleNamespace
+from typing import ClassVar
 
 import pytest
 from stubbed_cli import stub, stubbed
@@ -170,6 +171,7 @@ def test_simulate(monkeypatch, cli):
 def test_import_and_recover(monkeypatch, cli):
     class Recording(list):
         sample_rate = 125.0
+        metadata: ClassVar[dict[str, str]] = {"resampled": "steps of 1 ms"}
 
     log = Recording([0] * 9)
     load = stub(monkeypatch, twin.log.importers, "load_mapping", "the map")
@@ -181,12 +183,17 @@ def test_import_and_recover(monkeypatch, cli):
     )  # fmt: skip
     assert (load.only[0], read.only[0]) == ((Path("m.toml"),), (Path("d.csv"), "the map"))
     assert write.calls.pop()[0] == (log, Path("r.mcap"))
-    found = SimpleNamespace(kept=41, lost=("end",))
+    part = SimpleNamespace(metadata={"recovered": "2 samples"})
+    log = SimpleNamespace(metadata={"recovered": "41 samples"})
+    found = SimpleNamespace(kept=41, lost=("end",), unproved=("all",), others=(part,))
     mend = stub(monkeypatch, twin.log, "recover_log", (log, found))
     code, text, _ = cli("recover", "bad.mcap", "-o", "g.mcap", "--json")
-    assert json.loads(text) == {"log": "g.mcap", "kept": 41, "lost": ["end"]}
-    assert mend.only[0] == (Path("bad.mcap"),)
-    assert write.only[0] == (log, Path("g.mcap"))
+    assert json.loads(text) == {
+        "log": "g.mcap", "kept": 41, "lost": ["end"], "not_proved": ["all"],
+        "others": ["g.part1.mcap"],
+    }  # fmt: skip
+    assert mend.only == ((Path("bad.mcap"),), {"unproved": False})
+    assert [c[0] for c in write.calls] == [(log, Path("g.mcap")), (part, Path("g.part1.mcap"))]
 
 
 @pytest.mark.parametrize(("severity", "code"), [(Severity.ERROR, 1), (Severity.WARNING, 0)])

@@ -15,7 +15,7 @@ from identify.output import results
 from identify.output.words.selection import moved_in_words
 from identify.selection import confounded
 from identify.selection.confounded import moved_parameters
-from identify.selection.forward_selection import Verdict
+from identify.selection.diagnosis import Verdict
 from identify.workflow import _addition, add
 from twin.errors import CannotRun, InputError
 from twin.model.machine import MachineModel
@@ -115,6 +115,7 @@ def handed(monkeypatch):
     monkeypatch.setattr(workflow, "datasets", read)
     monkeypatch.setattr(workflow, "fit_aligned", aligned)
     monkeypatch.setattr(workflow, "estimates", lambda fit: ("estimates", fit))
+    monkeypatch.setattr(workflow, "found_intervals", lambda found: {"mass": (0.0, found[1].error)})
     monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
     monkeypatch.setattr(workflow, "error_on", lambda axis, logs: np.full(5, axis.mass * len(logs)))
     monkeypatch.setattr(results, "refit", lambda *given: given)
@@ -133,6 +134,7 @@ def test_a_fit_takes_over_the_values_and_the_shift_of_each_axis(monkeypatch):
     assert {a: m.mass for a, m in found.model.axes.items()} == {"x": 10.6, "y": 15.8}
     assert {a: s.channel_delay for a, s in found.datasets.items()} == {"x": 5.3e-4, "y": 7.9e-4}
     assert found.holdout_error == pytest.approx({"x": 10.6, "y": 15.8})
+    assert found.model.intervals == {a: {"mass": (0.0, f.error)} for a, f in found.fits.items()}
     assert all(found.estimates[a] == ("estimates", found.fits[a]) for a in "xy")
     assert found.refits == {a: (made.MODEL.axes[a], found.fits[a], "known") for a in "xy"}
     bare = replace(made.STUDY, holdout=())
@@ -177,7 +179,8 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_study(monkeypatch):
 
     def diagnose_axis(fit, dataset, catalogue, progress):
         progress(1, 2)
-        return SimpleNamespace(axis=dataset.axis, fit=fit, catalogue=catalogue)
+        told = SimpleNamespace(axis=dataset.axis, fit=fit, catalogue=catalogue)
+        return SimpleNamespace(with_findings=lambda: told)
 
     bars = []
     monkeypatch.setattr(workflow, "fit", fit)
@@ -266,6 +269,8 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
         return effects, simulator
 
     errors = {(1, "reduced"): 5.1, (2, "reduced"): 1.7}
+    monkeypatch.setattr(workflow, "estimates", lambda fit: (fit,))
+    monkeypatch.setattr(workflow, "found_intervals", lambda found: {"mass": (0.0, found[0].error)})
     monkeypatch.setattr(workflow, "free_run", run)
     monkeypatch.setattr(workflow, "rms_error", lambda r, axis: errors.get(r, 1.9))
     monkeypatch.setattr(

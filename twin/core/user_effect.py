@@ -6,6 +6,7 @@ Compiled code does not check array bounds, so the law first runs as plain Python
 from __future__ import annotations
 
 import math
+import random
 from pathlib import Path
 
 from twin.core.calling import law_address
@@ -14,12 +15,14 @@ from twin.effect import (
     DRY,
     DT,
     HOLD,
+    INDEX,
     IO_SIZE,
     MASS,
     MOVED,
     NET,
     READING,
     STATIC,
+    TIME,
     VISCOUS,
     WHEN,
     Effect,
@@ -40,6 +43,7 @@ RESULT = {
 }
 SPEEDS = (0.0, 0.1, 1e-6, -1e-6, -0.1, 0.0)  # m/s, one sample each
 PERIOD = 1e-4  # s
+MOTIONS = 1000  # samples of any motion, for the indices alone
 
 
 class Outside(Exception):
@@ -92,7 +96,26 @@ def require_sound(effect: Effect, path: Path) -> None:
             f"{path}: its law writes no result; a {effect.kind.name.lower()} effect writes "
             f"{RESULT[effect.kind]}"
         )
+    _require_indices(effect, values, path)
     law_address(effect)
+
+
+def _require_indices(effect: Effect, values: list[float], path: Path) -> None:
+    """Raise InputError where an index leaves its array anywhere in a wide range of motion."""
+    rng = random.Random(1)
+    p, s = Guarded("p", values), Guarded("s", [0.0] * len(effect.states))
+    for k in range(MOTIONS):
+        size = 10.0 ** rng.uniform(-6.0, 1.0)
+        io = Guarded("io", [rng.choice((-1.0, 1.0)) * size * rng.random() for _ in range(IO_SIZE)])
+        io[DT], io[MASS], io[MOVED], io[WHEN] = PERIOD, 1.0, 1.0, 1.0
+        io[INDEX], io[TIME] = k, k * PERIOD
+        try:
+            effect.law(p, s, io)
+        except Outside as touched:
+            words = outside_words(effect, str(touched))
+            raise InputError(f"{path}: at x = {io[X]:.3g} m {words}") from None
+        except (ArithmeticError, ValueError):  # of numbers beyond any machine
+            s = Guarded("s", [0.0] * len(effect.states))
 
 
 def _told(error: Exception) -> str:

@@ -17,6 +17,8 @@ from types import ModuleType
 from twin.effect import Effect
 from twin.errors import InputError
 
+LONGEST_TRIAL = 30.0  # s for loading, trying and compiling a user's file
+
 
 class Catalogue(Mapping[str, Effect]):
     """Effects by name, in alphabetical order."""
@@ -48,32 +50,56 @@ class Catalogue(Mapping[str, Effect]):
 def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:
     """The catalogue of this package, and the effects of the user's own files.
 
-    Raises InputError where a user's file is missing, cannot be run or defines no EFFECT.
+    Loading a user's file runs its code. Raises InputError where one is missing, has the name of
+    another effect, cannot be run, does not come to an end, or defines no EFFECT.
     """
-    names = (m.name for m in pkgutil.iter_modules(__path__))
-    modules = [importlib.import_module(f"{__name__}.{name}") for name in names]
-    return Catalogue([m.EFFECT for m in modules] + [_user_effect(Path(f)) for f in user_files])
+    names = [m.name for m in pkgutil.iter_modules(__path__)]
+    effects = [importlib.import_module(f"{__name__}.{name}").EFFECT for name in names]
+    for path in map(Path, user_files):
+        _require_name(path, [e.name for e in effects])
+        _try_apart(path)
+        effects.append(_load(path))
+    return Catalogue(effects)
 
 
-def _user_effect(path: Path) -> Effect:
+def _require_name(path: Path, taken: Sequence[str]) -> None:
     if not path.is_file():
         raise InputError(f"{path}: no such effect file; give a Python file that defines EFFECT")
     if not path.stem.isidentifier():
         raise InputError(
             f"{path}: '{path.stem}' cannot be the name of an effect; use letters, digits and _"
         )
-    module = _import_file(path)
-    effect = getattr(module, "EFFECT", None)
+    if path.stem in taken:
+        raise InputError(
+            f"{path}: there is an effect '{path.stem}' already; give the file another name"
+        )
+
+
+def _try_apart(path: Path) -> None:
+    from twin.apart import NoAnswer, apart
+
+    try:
+        apart(_load_and_try, path, seconds=LONGEST_TRIAL)
+    except NoAnswer as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _load_and_try(path: Path) -> None:
+    """Raise InputError for what is wrong with a file; it may also end the process, or hang."""
+    from twin.core.user_effect import (
+        require_sound,  # only a user's file needs the compiler to be read
+    )
+
+    require_sound(_load(path), path)
+
+
+def _load(path: Path) -> Effect:
+    effect = getattr(_import_file(path), "EFFECT", None)
     if not isinstance(effect, Effect):
         raise InputError(
             f"{path}: defines no EFFECT of type twin.effect.Effect; "
             "see the worked example in examples/my_effect.py"
         )
-    from twin.core.user_effect import (
-        require_sound,  # only a user's file needs the compiler to be read
-    )
-
-    require_sound(effect, path)
     return effect
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
@@ -11,11 +10,13 @@ from typing import Any
 
 import tomlkit
 
+from twin.entries import read_toml, shown
 from twin.errors import InputError
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, kind_of
-from twin.model.file import write_atomically
+from twin.files import write_atomically
 from twin.model.units import LINEAR, AxisUnits
+from twin.numbers import is_number
 
 SUFFIX = ".toml"
 
@@ -52,23 +53,15 @@ def save_experiment(
     experiment: Experiment, path: str | Path, *comments: str, units: AxisUnits = LINEAR
 ) -> None:
     """Write the experiment, whole or not at all. Raises InputError where the folder is missing."""
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
-    write_atomically(path, format_experiment(experiment, *comments, units=units).encode())
+    write_atomically(Path(path), format_experiment(experiment, *comments, units=units).encode())
 
 
 def load_experiment(path: str | Path) -> Experiment:
     """Read an experiment. Raises InputError naming the file, the entry and what is allowed."""
     path = Path(path)
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(
-            f"{path}: no such experiment file; `twin plan` writes one, or give a name"
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is not a TOML file: {error}") from error
+    if not path.exists():
+        raise InputError(f"{path}: no such experiment file; `twin plan` writes one, or give a name")
+    document = read_toml(path)
     table = document.get("experiment")
     if not isinstance(table, dict):
         raise InputError(f"{path}: has no [experiment] table; `twin plan` writes one")
@@ -82,7 +75,7 @@ def parse_experiment(table: Mapping[str, Any]) -> Experiment:
     """An experiment from its table. Raises InputError for an unknown kind or entry."""
     name = table.get("kind")
     if not isinstance(name, str) or name not in KINDS:
-        raise InputError(f"unknown kind {name!r} of experiment{_near(name, KINDS)}")
+        raise InputError(f"unknown kind {shown(name)} of experiment{_near(name, KINDS)}")
     known = {f.name: f for f in fields(KINDS[name])}
     given = {key: value for key, value in table.items() if key != "kind"}
     for key, value in given.items():
@@ -96,10 +89,11 @@ def parse_experiment(table: Mapping[str, Any]) -> Experiment:
 
 
 def _require_form(f: Field[Any], value: Any) -> None:
-    form = list if _several(f) else int | float if "unit" in f.metadata else str
-    numbers = value if isinstance(value, list) else [value] if "unit" in f.metadata else []
-    if not isinstance(value, form) or not all(isinstance(v, int | float) for v in numbers):
-        raise InputError(f"{f.name} = {value!r}: give {_wanted(f)}")
+    several, numbers = _several(f), "unit" in f.metadata
+    values = value if several and isinstance(value, list) else [value]
+    right = is_number if numbers else lambda v: isinstance(v, str)
+    if several != isinstance(value, list) or not all(map(right, values)):
+        raise InputError(f"{f.name} = {shown(value)}: give {_wanted(f)}")
 
 
 def _several(f: Field[Any]) -> bool:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
-from twin.errors import InputError
-from twin.log.container import Damaged, Record, at
+from twin.errors import InputError, at
+from twin.log.container import Damaged, Record
 from twin.log.layout import Block
 from twin.log.log import AxisLog, Log
 from twin.log.series import Series, seconds
@@ -22,9 +22,13 @@ SCHEMA_VERSION = "1"
 class Extras:
     """Metadata and attachments."""
 
-    def __init__(self) -> None:
-        self.metadata: dict[str, str] = {}
-        self.attachments: dict[str, bytes] = {}
+    def __init__(
+        self,
+        metadata: dict[str, str] | None = None,
+        attachments: dict[str, bytes] | None = None,
+    ) -> None:
+        self.metadata = metadata or {}
+        self.attachments = attachments or {}
 
     def add(self, record: Record) -> None:
         """Take metadata or an attachment from a record; raises Damaged, InputError."""
@@ -53,14 +57,20 @@ class Extras:
 class Run:
     """Samples of all topics without a gap between them.
 
-    axes: those wanted, None for all; capacities: channel -> samples expected.
+    axes: those wanted, None for all; capacities: channel -> samples expected; truth: whether the
+    simulator's truth is wanted.
     """
 
     def __init__(
-        self, topics: Topics, axes: Sequence[str] | None, capacities: Mapping[int, int]
+        self,
+        topics: Topics,
+        axes: Sequence[str] | None,
+        capacities: Mapping[int, int],
+        truth: bool = True,
     ) -> None:
         self._topics = topics
         self._axes = axes
+        self._truth = truth
         self._capacities = capacities
         self._series: dict[int, Series | None] = {}
 
@@ -72,9 +82,16 @@ class Run:
         if series is not None:
             series.append(block)
 
+    def extend(self, blocks: Iterable[Block]) -> None:
+        """Take the next samples of several channels; raises InputError."""
+        for block in blocks:
+            self.append(block)
+
     def _open(self, channel: int) -> Series | None:
         topic = self._topics.topic(channel, b"")
         if topic is None or (self._axes is not None and topic.axis not in self._axes):
+            return None
+        if topic.is_truth and not self._truth:
             return None
         if any(s.topic.name == topic.name for s in self._opened()):
             raise InputError(f"two channels have the topic {topic.name}; write one a topic")

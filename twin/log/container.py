@@ -19,14 +19,18 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk, DataEnd, Footer, Statistics
 
-from twin.errors import InputError
+from twin.errors import InputError, at
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
 LOOSE_BYTES = 1 << 20  # messages outside chunks are decoded in batches of this size
-MAX_CHUNK_BYTES = 1 << 32
+SMALLEST_INFLATION = 1 << 24  # bytes, whatever the size of the file
+LARGEST_RATIO = 256
+LARGEST_BOMB = 1 << 27  # bytes of a chunk that shrank by more than is usual
+USUAL_RATIO = 16
+_SIZE_INSIDE, _CHECKSUM = slice(16, 24), slice(24, 28)  # of the content of a chunk
 _FOOTER_SIZE = RECORD_HEAD.size + 20
-_IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
 T = TypeVar("T")
 
@@ -61,15 +65,6 @@ class Payload:
     data: bytes
 
 
-@contextmanager
-def at(place: str) -> Iterator[None]:
-    """Prefix the message of an InputError with where it happened, and keep it one line."""
-    try:
-        yield
-    except InputError as error:
-        raise type(error)(" ".join(f"{place}: {error}".splitlines())) from error
-
-
 def parse(kind: type[T], content: bytes, place: str) -> T:
     """Parse ``content`` with the stock record class; whatever it raises becomes Damaged."""
     try:
@@ -86,6 +81,7 @@ class McapFile:
 
     def __init__(self, stream: BinaryIO, size: int) -> None:
         self.size = size
+        self.checked = False  # whether a checksum of all records was found right
         self._stream = stream
         self._check_magic()
         self._data_end, self.statistics = self._read_summary()
@@ -153,7 +149,9 @@ class McapFile:
             offset = record.end
         if record.end != self._data_end or len(record.content) != 4:
             raise Damaged(f"the data section ends at byte {record.offset}, before the summary")
-        if record.parsed(DataEnd).data_section_crc not in (0, crc):
+        stated = record.parsed(DataEnd).data_section_crc
+        self.checked = stated == crc
+        if stated not in (0, crc):
             raise Damaged(
                 f"data section (bytes 0 to {offset}): wrong checksum though every chunk is intact; "
                 "metadata, an attachment or an index is damaged"
@@ -181,23 +179,53 @@ def open_mcap(path: Path) -> Iterator[McapFile]:
         yield McapFile(stream, os.fstat(stream.fileno()).st_size)
 
 
-def open_chunk(record: Record) -> Payload:
+class Inflation:
+    """How many bytes the chunks of one file may decompress to, told from the file's own size.
+
+    Samples at rest shrink to a fiftieth, others to a half: a file of kB that announces GB has none.
+    """
+
+    def __init__(self, file_size: int) -> None:
+        self._most = self._left = SMALLEST_INFLATION + LARGEST_RATIO * file_size
+
+    def take(self, size: int, stored: int) -> None:
+        """Take the bytes of a chunk that is stored in so many; raises Damaged."""
+        if size > max(LARGEST_BOMB, USUAL_RATIO * stored):
+            raise Damaged(f"announces {size} bytes, but has {stored}")
+        if size > self._left:
+            raise Damaged(
+                f"announces {size} bytes; the chunks of a file of this size decompress to at most "
+                f"{self._most}"
+            )
+        self._left -= size
+
+
+def open_chunk(record: Record, budget: Inflation) -> Payload:
     """Decompress a chunk and verify its size and checksum; raises Damaged."""
     place = f"chunk at byte {record.offset}"
     chunk = record.parsed(Chunk)
     with at(place):
-        data = _decompress(chunk)
-        if len(data) != chunk.uncompressed_size:
-            raise Damaged(f"{len(data)} bytes where {chunk.uncompressed_size} are announced")
-        if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-            raise Damaged("wrong checksum")
-    return Payload(place, data)
+        return Payload(place, decompressed(chunk, budget))
+
+
+def has_checksum(record: Record) -> bool:
+    """Whether a chunk states the checksum of its samples; that of no samples is 0."""
+    return any(record.content[_CHECKSUM]) or not any(record.content[_SIZE_INSIDE])
+
+
+def decompressed(chunk: Chunk, budget: Inflation) -> bytes:
+    """The records in a chunk, of the size it states and with the checksum; raises Damaged."""
+    budget.take(chunk.uncompressed_size, len(chunk.data))
+    data = _decompress(chunk)
+    if len(data) != chunk.uncompressed_size:
+        raise Damaged(f"{len(data)} bytes where {chunk.uncompressed_size} are announced")
+    if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
+        raise Damaged("wrong checksum")
+    return data
 
 
 def _decompress(chunk: Chunk) -> bytes:
     size = chunk.uncompressed_size
-    if size > MAX_CHUNK_BYTES:
-        raise Damaged(f"announces {size} bytes; at most {MAX_CHUNK_BYTES} are read")
     try:
         match chunk.compression:
             case "":
@@ -213,19 +241,27 @@ def _decompress(chunk: Chunk) -> bytes:
     raise Damaged(f"compression {chunk.compression!r} is not one of zstd, lz4 or none")
 
 
-def payloads(records: Iterator[Record], other: Callable[[Record], None]) -> Iterator[Payload]:
+def payloads(
+    records: Iterator[Record], other: Callable[[Record], None], budget: Inflation
+) -> Iterator[Payload]:
     """Chunks, and messages outside chunks joined to batches; the rest goes to ``other``."""
     batch, start = bytearray(), 0
+    checked: set[bool] = set()  # a writer gives every chunk its checksum, or none
     for record in records:
-        if record.opcode in _IN_CHUNKS:
+        if record.opcode in IN_CHUNKS:
             start = start if batch else record.offset
             batch += RECORD_HEAD.pack(record.opcode, len(record.content)) + record.content
         if batch and (record.opcode == Opcode.CHUNK or len(batch) >= LOOSE_BYTES):
             yield Payload(f"messages from byte {start}", bytes(batch))
             batch.clear()
         if record.opcode == Opcode.CHUNK:
-            yield open_chunk(record)
-        elif record.opcode not in _IN_CHUNKS:
+            checked.add(has_checksum(record))
+            if len(checked) > 1:
+                raise Damaged(
+                    f"chunk at byte {record.offset}: some chunks have a checksum and some have none"
+                )
+            yield open_chunk(record, budget)
+        elif record.opcode not in IN_CHUNKS:
             other(record)
     if batch:
         yield Payload(f"messages from byte {start}", bytes(batch))

@@ -9,36 +9,48 @@ from pathlib import Path
 import numpy as np
 from mcap.opcode import Opcode
 
+from twin.errors import at
 from twin.log.assemble import Extras, Run
-from twin.log.container import RECORD_HEAD, Damaged, McapFile, at, open_mcap, payloads
+from twin.log.container import (
+    IN_CHUNKS,
+    RECORD_HEAD,
+    Damaged,
+    Inflation,
+    McapFile,
+    open_mcap,
+    payloads,
+)
 from twin.log.layout import Block, MessageLayout, RowLayout
 from twin.log.log import Log
 from twin.log.topics import Topics
 
+MOST_DEFINITIONS = 100_000  # of schemas and channels in a chunk; there are 65535 of each
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
-def read_log(path: str | Path, axes: Sequence[str] | None = None) -> Log:
+def read_log(path: str | Path, axes: Sequence[str] | None = None, *, truth: bool = True) -> Log:
     """Read an MCAP log; ``axes`` limits it to those named, None reads all.
+
+    truth: whether the simulator's truth is read too, which takes more than half of the memory.
 
     Every checksum is verified, and the samples must be complete, evenly spaced and finite.
     Raises InputError otherwise, and where no axis has position and one of current and force.
     """
     try:
-        return read_strictly(Path(path), axes)
+        return read_strictly(Path(path), axes, truth)
     except Damaged as error:
         raise Damaged(
             f"{error}; copy the file again, or keep what is intact: twin recover {path} -o GOOD"
         ) from error
 
 
-def read_strictly(path: Path, axes: Sequence[str] | None = None) -> Log:
+def read_strictly(path: Path, axes: Sequence[str] | None = None, truth: bool = True) -> Log:
     """``read_log`` without the remedy in its messages."""
     with open_mcap(path) as file:
         topics, extras = Topics(), Extras()
-        run = Run(topics, axes, _capacities(file))
+        run = Run(topics, axes, _capacities(file), truth)
         decoder = Decoder(topics)
-        for payload in payloads(file.records(), extras.add):
+        for payload in payloads(file.records(), extras.add, Inflation(file.size)):
             with at(payload.place):
                 for block in decoder.blocks(payload.data):
                     run.append(block)
@@ -59,12 +71,14 @@ class Decoder:
     def __init__(self, topics: Topics) -> None:
         self._topics = topics
         self._layout: RowLayout | None = None
+        self._registered = 0  # schemas and channels in the present chunk
 
     def blocks(self, data: bytes) -> Iterator[Block]:
         """Samples by channel, in file order; raises InputError, Damaged for broken framing.
 
         Rows of the same layout are taken as they lie; whatever else there is, message by message.
         """
+        self._registered = 0
         offset = self._register_leading(data)
         for layout in self._layouts(data, offset):
             rows = layout.rows(data, offset)
@@ -89,10 +103,15 @@ class Decoder:
             opcode, content, end = _record(data, offset)
             if opcode == Opcode.MESSAGE:
                 break
-            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._topics.register(opcode, content)
+            self._register(opcode, content)
             offset = end
         return offset
+
+    def _register(self, opcode: int, content: bytes) -> None:
+        self._registered += 1
+        if self._registered > MOST_DEFINITIONS:
+            raise Damaged(f"more than {MOST_DEFINITIONS} schemas and channels in one chunk")
+        self._topics.register(opcode, content)
 
     def _infer(self, data: bytes, offset: int) -> RowLayout | None:
         """Layout of the messages up to the one whose channel comes a second time."""
@@ -115,9 +134,9 @@ class Decoder:
         samples: dict[int, list[tuple[int, int, Sequence[float]]]] = {}
         while offset < len(data):
             opcode, content, offset = _record(data, offset)
-            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._topics.register(opcode, content)
-            elif opcode == Opcode.MESSAGE:
+            if opcode != Opcode.MESSAGE:
+                self._register(opcode, content)
+            else:
                 channel, sequence, time, _, payload = _message(content)
                 topic = self._topics.topic(channel, payload)
                 if topic is not None:
@@ -140,6 +159,8 @@ def _record(data: bytes, offset: int) -> tuple[int, bytes, int]:
     opcode, length = RECORD_HEAD.unpack_from(data, offset)
     if length > len(data) - start:
         raise Damaged(f"a record claims more bytes than follow, {offset} bytes into it")
+    if opcode not in IN_CHUNKS:
+        raise Damaged(f"a record of kind {opcode}, which no chunk holds, {offset} bytes into it")
     return opcode, data[start : start + length], start + length
 
 

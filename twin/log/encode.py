@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.errors import InputError
+from twin.files import replacing
 from twin.log.assemble import METADATA_NAME
 from twin.log.layout import sample_times
-from twin.log.log import Log
-from twin.log.outline import Outline, outline
+from twin.log.log import Array, Log
+from twin.log.outline import Outline, outline, outline_of_topics
 from twin.log.writer import McapWriter, PackedChunk, encoded, pack
 
 CHUNK_BYTES = 1 << 20
@@ -35,13 +33,35 @@ def write_log(log: Log, path: str | Path, progress: Progress | None = None) -> N
     ``path`` appears only when it is complete. Raises InputError for a log that could not be read
     back (a NaN, columns of different length, no position, ...) and where writing fails.
     """
-    plan = outline(log)
-    with replacing(Path(path)) as stream:
+    _write(outline(log), log.sample_rate, log.attachments, Path(path), progress)
+
+
+def write_topics(
+    topics: Mapping[str, Mapping[str, Array]],
+    units: Mapping[str, str],
+    sample_rate: float,
+    path: str | Path,
+) -> None:
+    """Write columns (n,) of any topics, "/model/x" -> name -> column, for other programs to show.
+
+    units: "/model/x/force" -> unit. Raises InputError as write_log does.
+    """
+    _write(outline_of_topics(topics, units, sample_rate), sample_rate, {}, Path(path), None)
+
+
+def _write(
+    plan: Outline,
+    sample_rate: float,
+    attachments: Mapping[str, bytes],
+    path: Path,
+    progress: Progress | None,
+) -> None:
+    with replacing(path) as stream:
         writer = McapWriter(stream)
         writer.add_metadata(METADATA_NAME, plan.metadata)
-        for name, data in log.attachments.items():
+        for name, data in attachments.items():
             writer.add_attachment(name, data)
-        for written in _write_chunks(writer, plan, log.sample_rate):
+        for written in _write_chunks(writer, plan, sample_rate):
             if progress is not None:
                 progress(written, plan.count)
         writer.finish(plan.schemas, plan.channels)
@@ -97,24 +117,3 @@ def _fill(rows: np.ndarray, plan: Outline, first: int, times: np.ndarray) -> Non
         records[".log_time"] = records[".publish_time"] = times
         for name, column in columns.items():
             records[name] = column[span]
-
-
-@contextmanager
-def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A stream whose bytes become ``path`` at the end, or nothing where anything fails.
-
-    Raises InputError where the folder or the disk refuses.
-    """
-    part = path.parent / f".{path.name}.{os.getpid()}.part"
-    try:
-        with open(part, "wb") as stream:
-            yield stream
-        os.replace(part, path)
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputError(
-            f"{path}: cannot be written: {reason}; check folder, rights and free space"
-        ) from error
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from mcap.records import Channel, Schema
 from mcap.well_known import MessageEncoding, SchemaEncoding
 
-from twin.errors import InputError
+from twin.errors import InputError, at
 from twin.log.assemble import SCHEMA_VERSION
-from twin.log.container import at
 from twin.log.layout import MessageLayout, RowLayout
 from twin.log.log import Array, AxisLog, Log
 from twin.log.schema import (
@@ -25,6 +24,7 @@ from twin.log.schema import (
 from twin.log.series import seconds
 from twin.log.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_units
 
+SERIES = "twin.Series"  # the message of a topic that no log of a machine has
 _TRUTH_UNITS = ("position", "velocity")  # truth columns of these names have the axis' units
 
 
@@ -55,9 +55,31 @@ def outline(log: Log) -> Outline:
     """Plan the file; raises InputError for a log that could not be read back."""
     _check_log(log)
     topics = [*_axis_signals(log), *_truth_signals(log)]
+    return _planned(topics, len(log), log.sample_rate, _metadata(log))
+
+
+def outline_of_topics(
+    topics: Mapping[str, Mapping[str, Array]], units: Mapping[str, str], sample_rate: float
+) -> Outline:
+    """Plan a file of any topics, "/model/x" -> column -> (n,); units: "/model/x/force" -> unit."""
+    signals = [
+        Signals(
+            topic, SERIES, columns, {column: n for n, column in enumerate(columns, 1)},
+            {"sample_rate_hz": repr(float(sample_rate)),
+             **{f"unit.{c}": u for c in columns if (u := units.get(f"{topic}/{c}"))}},
+        )
+        for topic, columns in topics.items()
+    ]  # fmt: skip
+    count = len(next(iter(signals[0].columns.values())))
+    return _planned(signals, count, sample_rate, {"source": "comparison"})
+
+
+def _planned(
+    topics: Sequence[Signals], count: int, sample_rate: float, metadata: dict[str, str]
+) -> Outline:
     for signals in topics:
         with at(signals.topic):
-            _check_columns(signals, len(log), log.sample_rate)
+            _check_columns(signals, count, sample_rate)
     schemas: dict[bytes, Schema] = {}
     channels, messages = [], []
     for number, signals in enumerate(topics, 1):
@@ -75,8 +97,8 @@ def outline(log: Log) -> Outline:
         )
         messages.append(MessageLayout(number, protobuf_segments(signals.numbers)))
     return Outline(
-        count=len(log),
-        metadata=_metadata(log),
+        count=count,
+        metadata=metadata,
         schemas=tuple(schemas.values()),
         channels=tuple(channels),
         layout=RowLayout(tuple(messages)),

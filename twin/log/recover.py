@@ -1,45 +1,48 @@
-"""Recover a damaged log: the longest intact series of samples without a gap."""
+"""Recover a damaged log: every stretch of samples that a checksum proves, without a gap in it."""
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from mcap.opcode import Opcode
-from mcap.records import ChunkIndex
 
 from twin.errors import InputError
 from twin.log.assemble import Extras, Run
-from twin.log.container import MAGIC, RECORD_HEAD, Payload, Record, at, payloads, reading
-from twin.log.decode import Decoder, read_strictly
+from twin.log.container import has_checksum, open_mcap, reading
+from twin.log.decode import read_strictly
 from twin.log.log import Log
+from twin.log.salvage import Part, Salvage
 from twin.log.series import seconds
-from twin.log.topics import Topics
 
-_OPCODES = frozenset(Opcode)
-_BEFORE_COMPRESSION = RECORD_HEAD.size + 28  # bytes of a chunk record before its compression
-_CHUNK_TIMES = struct.Struct("<QQ")  # of its first and last message, ns; a chunk begins with them
-_COMPRESSIONS = (b"\x04\0\0\0zstd", b"\x03\0\0\0lz4")
+METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
 
 
 @dataclass(frozen=True)
 class Recovery:
-    """What was kept of a log, and one sentence for each loss (none: the log was intact)."""
+    """What was kept of a log, and one sentence for each loss (none: the log was intact).
+
+    unproved: what was kept although no checksum proves it, one sentence each. others: the stretches
+    of samples that a gap separates from the longest one, in the order of time.
+    """
 
     kept: str
     lost: tuple[str, ...]
+    unproved: tuple[str, ...] = ()
+    others: tuple[Log, ...] = ()
 
     def __str__(self) -> str:
-        return "\n".join((f"kept {self.kept}", *(self.lost or ("nothing was lost",))))
+        lost = self.lost or ("nothing was lost",)
+        return "\n".join((f"kept {self.kept}", *(f"not proved: {u}" for u in self.unproved), *lost))
 
 
-def recover_log(path: str | Path) -> tuple[Log, Recovery]:
-    """Read the longest series of intact chunks without a gap between them.
+def recover_log(path: str | Path, *, unproved: bool = False) -> tuple[Log, Recovery]:
+    """Read the longest series of intact chunks without a gap between them, and all others.
 
-    Chunks are kept only where their checksum holds. Metadata has no checksum of its own; where
-    it contradicts the chunks it is ignored. Raises InputError where nothing is left.
+    Samples are kept only where a checksum proves them, or, where ``unproved`` is asked for, where
+    nothing speaks against them. Metadata has no checksum of its own; where it contradicts the
+    chunks it is ignored. Raises InputError where nothing is left.
     """
     path = Path(path)
     try:
@@ -47,137 +50,129 @@ def recover_log(path: str | Path) -> tuple[Log, Recovery]:
     except InputError as error:
         reason = str(error).removeprefix(f"{path}: ")
     else:
-        return log, Recovery(f"all {len(log)} samples", ())
+        doubt = _doubt(path)
+        if doubt and not unproved:
+            raise InputError(f"{path}: {doubt[0]}; it can be read as it is, or with --unproved")
+        return log, Recovery(f"all {len(log)} samples", (), doubt)
     with reading(path):
-        salvage = _Salvage(path.read_bytes())
-        log = salvage.log()
-        return log, Recovery(salvage.kept, tuple(dict.fromkeys([reason, *salvage.lost])))
+        return _Stretches(path.read_bytes(), reason, unproved).result()
 
 
-class _Salvage:
-    """One pass over the bytes of a damaged log."""
+def _doubt(path: Path) -> tuple[str, ...]:
+    """Why nothing proves the samples of a log in which no fault was found."""
+    with open_mcap(path) as file:
+        records = file.records()
+        opcodes = {r.opcode for r in records if r.opcode != Opcode.CHUNK or not has_checksum(r)}
+        if file.checked or not opcodes & {Opcode.CHUNK, Opcode.MESSAGE}:
+            return ()
+    return ("the log has no checksums that prove its samples",)
 
-    def __init__(self, data: bytes) -> None:
-        self.lost: list[str] = []
-        self.kept = ""
-        self._extras = Extras()
-        self._topics = Topics()
-        self._decoder = Decoder(self._topics)
-        self._best = self._run = Run(self._topics, None, {})
-        self._found: dict[int, tuple[int, int]] = {}  # place of a chunk -> its times
-        self._announced: list[ChunkIndex] = []
-        self._losses_before = 0  # how many were known when the last samples were taken
-        records = self._records(data)
-        while True:
-            try:
-                for payload in payloads(records, self._add_extra):
-                    self._take(payload)
-                break
-            except InputError as error:  # a damaged chunk: go on with the record after it
-                self.lost.append(str(error))
-        self._close()
+
+class _Stretches:
+    """The samples of a damaged log in stretches without a gap."""
+
+    def __init__(self, data: bytes, reason: str, keep_unproved: bool) -> None:
+        self._keep_unproved = keep_unproved
+        self._salvage = Salvage(data, reason, keep_unproved)
+        self._lost = self._salvage.lost
+        self._parts = self._sorted(list(self._salvage.parts()))
+
+    def result(self) -> tuple[Log, Recovery]:
+        """The longest series and the others; raises InputError where there is none."""
+        runs = self._runs()
         self._report_absent_chunks()
-
-    def log(self) -> Log:
-        """The longest series; raises InputError where it is empty or no valid log."""
-        count = self._count(self._best)
-        if count == 0:
-            raise InputError(f"nothing can be recovered ({'; '.join(self.lost)})")
+        counts = [self._count(run) for run in runs]
+        if not any(counts):
+            hint = (
+                ""
+                if self._keep_unproved or not self._salvage.unproved
+                else "; read it with --unproved"
+            )
+            why = "; ".join(dict.fromkeys([*self._lost, *self._salvage.unproved]))
+            raise InputError(f"nothing can be recovered ({why}){hint}")
         # the rate is stated in every chunk too, and there a checksum protects it
-        self._extras.metadata.pop("sample_rate_hz", None)
-        self.kept = f"{count} samples from {seconds(self._best.start())}"
-        self._extras.metadata["recovered"] = self.kept
-        return self._best.trimmed_log(self._extras)
+        self._salvage.extras.metadata.pop("sample_rate_hz", None)
+        longest = counts.index(max(counts))
+        log, kept = self._log(runs[longest], counts[longest])
+        others = list(self._others(runs, counts, longest))
+        lost = self._lost if self._keep_unproved else [*self._lost, *self._salvage.unproved]
+        unproved: list[str] = [METADATA] if self._salvage.extras.metadata else []
+        unproved += self._salvage.unproved if self._keep_unproved else []
+        recovery = Recovery(
+            kept, tuple(dict.fromkeys(lost)), tuple(dict.fromkeys(unproved)), tuple(others)
+        )
+        return log, recovery
 
-    def _add_extra(self, record: Record) -> None:
-        try:
-            self._extras.add(record)
-            if record.opcode == Opcode.CHUNK_INDEX:
-                self._announced.append(record.parsed(ChunkIndex))
-        except InputError as error:
-            self.lost.append(str(error))
+    def _log(self, run: Run, count: int) -> tuple[Log, str]:
+        kept = f"{count} samples from {seconds(run.start())}"
+        metadata = {**self._salvage.extras.metadata, "recovered": kept}
+        if self._keep_unproved and self._salvage.unproved:
+            metadata["not_proved"] = "; ".join(self._salvage.unproved)
+        return run.trimmed_log(Extras(metadata, self._salvage.extras.attachments)), kept
 
-    def _take(self, payload: Payload) -> None:
-        with at(payload.place):
-            blocks = list(self._decoder.blocks(payload.data))
+    def _others(self, runs: list[Run], counts: list[int], longest: int) -> Iterator[Log]:
+        for i, (run, count) in enumerate(zip(runs, counts, strict=True)):
+            if i == longest or not count:
+                continue
+            start = seconds(run.start())
             try:
-                for block in blocks:
-                    self._run.append(block)
+                yield self._log(run, count)[0]
             except InputError as error:
-                unexplained = len(self.lost) == self._losses_before
-                self._close()
-                self._run = Run(self._topics, None, {})
-                for block in blocks:
-                    self._run.append(block)
-                if unexplained:  # no damage was seen where the gap is
-                    self.lost.append(f"{payload.place}: {error}")
-        self._losses_before = len(self.lost)
+                self._lost.append(f"{count} samples from {start}: {error}")
+                continue
+            self._lost.append(
+                f"{count} intact samples from {start} are in a log of their own: a gap separates "
+                "them from the longer run"
+            )
+
+    def _sorted(self, parts: list[Part]) -> list[Part]:
+        """In the order of time, each once."""
+        seen: dict[bytes, str] = {}
+        once = []
+        for part in parts:
+            if (first := seen.setdefault(part.data, part.place)) != part.place:
+                self._lost.append(f"a copy of the {first} is left out (the {part.place})")
+            else:
+                once.append(part)
+        ordered = sorted(once, key=lambda p: p.start)
+        if [p.place for p in ordered] != [p.place for p in once]:
+            self._lost.append("chunks were out of order; they are sorted by time")
+        return ordered
+
+    def _runs(self) -> list[Run]:
+        """The samples in stretches without a gap."""
+        runs: list[Run] = []
+        losses = -1  # how many were known when the last samples were read
+        for part in self._parts:
+            explained, losses = part.losses != losses, part.losses
+            if runs:
+                try:
+                    runs[-1].extend(part.blocks)
+                    continue
+                except InputError as error:
+                    if not explained:  # no damage was seen where the gap is
+                        self._lost.append(f"{part.place}: {error}")
+            runs.append(Run(self._salvage.topics, None, {}))
+            try:
+                runs[-1].extend(part.blocks)
+            except InputError as error:
+                self._lost.append(f"{part.place}: {error}")
+        return runs
 
     def _report_absent_chunks(self) -> None:
         """Chunks of the summary that were not found at all, not even damaged."""
-        times = {(i.message_start_time, i.message_end_time): i for i in self._announced}
-        for span, index in times.items():
-            instead = self._found.get(index.chunk_start_offset)
-            if span in self._found.values() or (instead is not None and instead not in times):
-                continue
-            self.lost.append(
-                f"the chunk of samples from {seconds(span[0])} to {seconds(span[1])} that the "
-                "summary announces is not there"
-            )
-
-    def _close(self) -> None:
-        """Keep the longer of the present series and the best so far, and report the other."""
-        best, other = self._best, self._run
-        if best is other:
-            return
-        if self._count(other) > self._count(best):
-            best, other = other, best
-        if self._count(other):
-            self.lost.append(
-                f"{self._count(other)} intact samples from {seconds(other.start())} are "
-                "left out: a gap separates them from the longer run"
-            )
-        self._best = best
+        there = {p.span for p in self._parts}
+        for index in self._salvage.announced:
+            span = (index.message_start_time, index.message_end_time)
+            if span not in there and index.chunk_start_offset not in self._salvage.damaged:
+                self._lost.append(
+                    f"the chunk of samples from {seconds(span[0])} to {seconds(span[1])} that the "
+                    "summary announces is not there"
+                )
 
     def _count(self, run: Run) -> int:
         try:
             return run.common_count()
         except InputError as error:
-            self.lost.append(str(error))
+            self._lost.append(str(error))
             return 0
-
-    def _records(self, data: bytes) -> Iterator[Record]:
-        """Records one after the other; behind unreadable bytes, from the next chunk on."""
-        previous, offset = 0, len(MAGIC)
-        while offset < len(data) and data[offset:] != MAGIC:
-            record = _record_at(data, offset)
-            if record is not None:
-                if record.opcode == Opcode.CHUNK and len(record.content) >= _CHUNK_TIMES.size:
-                    first, last = _CHUNK_TIMES.unpack_from(record.content)
-                    self._found[offset] = (first, last)
-                yield record
-                previous, offset = offset, record.end
-                continue
-            found = _next_chunk(data, previous + 1)
-            if found is None:
-                self.lost.append(f"bytes {offset} to {len(data) - 1}: cut off or unreadable")
-                return
-            self.lost.append(f"bytes {previous} to {found - 1}: unreadable")
-            previous = offset = found
-
-
-def _record_at(data: bytes, offset: int) -> Record | None:
-    start = offset + RECORD_HEAD.size
-    if start > len(data):
-        return None
-    opcode, length = RECORD_HEAD.unpack_from(data, offset)
-    if opcode not in _OPCODES or length > len(data) - start:
-        return None
-    return Record(opcode, offset, data[start : start + length])
-
-
-def _next_chunk(data: bytes, start: int) -> int | None:
-    """Where the next compressed chunk record may begin; its checksum verifies it."""
-    found = (data.find(c, start + _BEFORE_COMPRESSION) for c in _COMPRESSIONS)
-    candidates = [f - _BEFORE_COMPRESSION for f in found if f >= 0]
-    return min(candidates, default=None)

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from twin.errors import InputError
-from twin.log.container import Damaged, at, parse
+from twin.errors import InputError, at
+from twin.log.container import Damaged, parse
 from twin.log.foreign import open_codec
 from twin.log.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS
 from twin.log.schema import Codec

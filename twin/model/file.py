@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import math
-import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
 from pathlib import Path
@@ -13,9 +10,14 @@ from typing import Any
 
 import tomlkit
 
+from twin.effect import Effect
 from twin.effects import Catalogue
-from twin.errors import InputError
-from twin.model.machine import AxisModel, Fitted, Hardware, HistoryStep, MachineModel
+from twin.entries import read_entries, read_toml
+from twin.errors import InputError, at
+from twin.files import write_atomically
+from twin.model.intervals import ENTRY, intervals_table, read_intervals
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.model.schema import AxisEntry, EffectEntry, ModelFile
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 
 # Of a linear axis; ``hardware_unit`` gives those of any.
@@ -67,19 +69,18 @@ def find_model(name: str | Path) -> Path:
 def load_model(name: str | Path, catalogue: Catalogue) -> MachineModel:
     """Read a machine model. Raises InputError naming the file, the entry and what is allowed."""
     path = find_model(name)
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is not a TOML file: {error}") from error
-    mjcf_name = document.get("mujoco")
-    mjcf = _read_beside(path, mjcf_name) if mjcf_name else None
-    return parse_model(document, catalogue, mjcf, str(path))
+    entries = _checked(read_toml(path), str(path))
+    mjcf = _read_beside(path, entries.mujoco) if entries.mujoco else None
+    return _model(entries, catalogue, mjcf, str(path))
 
 
 def _read_beside(path: Path, name: str) -> str:
     for folder in (path.parent, models_folder()):
         if (folder / name).is_file():
-            return (folder / name).read_text(encoding="utf-8")
+            try:
+                return (folder / name).read_text(encoding="utf-8")
+            except UnicodeDecodeError as error:
+                raise InputError(f"{folder / name}: is not an MJCF file: {error}") from error
     raise InputError(f"{path}: mujoco = '{name}' is not beside it; copy the MJCF file there")
 
 
@@ -87,55 +88,49 @@ def parse_model(
     document: Mapping[str, Any], catalogue: Catalogue, mjcf: str | None, where: str
 ) -> MachineModel:
     """A machine model from its TOML document; ``where`` names the file in messages."""
+    return _model(_checked(document, where), catalogue, mjcf, where)
+
+
+def _checked(document: Mapping[str, Any], where: str) -> ModelFile:
     if not document.get("axes"):
         raise InputError(f"{where}: has no [axes.<name>] table; a machine model has at least one")
-    rate = document.get("sample_rate", 10_000.0)
-    if not (isinstance(rate, int | float) and math.isfinite(rate) and rate > 0):
-        raise InputError(f"{where}: sample_rate = {rate}: must be a positive number of Hz")
-    try:
-        axes = {name: _axis(entry, catalogue) for name, entry in document["axes"].items()}
+    with at(where):
+        return read_entries(ModelFile, document)
+
+
+def _model(entries: ModelFile, catalogue: Catalogue, mjcf: str | None, where: str) -> MachineModel:
+    with at(where):
+        axes = {name: _axis(name, entry, catalogue) for name, entry in entries.axes.items()}
         return MachineModel(
-            name=document.get("name", Path(where).stem),
+            name=Path(where).stem if entries.name is None else entries.name,
             axes=axes,
-            sample_rate=float(rate),
+            sample_rate=float(entries.sample_rate),
             mjcf=mjcf,
-            mjcf_name=document.get("mujoco"),
-            history=tuple(_history_step(step) for step in document.get("history", ())),
+            mjcf_name=entries.mujoco,
+            history=tuple(entry.step() for entry in entries.history),
+            intervals=read_intervals(entries.intervals, axes),
         )
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from error
 
 
-def _axis(entry: Mapping[str, Any], catalogue: Catalogue) -> AxisModel:
-    known = {f.name for f in fields(Hardware)}
-    for key in entry:
-        if key not in known | {*MASS_NAMES, "effects", "fixed"}:
-            near = difflib.get_close_matches(key, {*known, *MASS_NAMES}, n=1)
-            hint = f"; did you mean '{near[0]}'?" if near else ""
-            raise InputError(f"unknown entry '{key}' of an axis{hint}")
-    units = _units(entry)
-    given = {k: entry[k] for k in known & set(entry)}
-    for key, value in given.items():
-        numbers = value if key == "travel" else [value]
-        if not all(isinstance(n, int | float) and not math.isnan(n) for n in numbers):
-            raise InputError(f"{key} = {value}: must be a number in {hardware_unit(key, units)}")
-    if "travel" in given:
-        given["travel"] = tuple(given["travel"])
-    return AxisModel(
-        mass=_mass(entry, units),
-        hardware=Hardware(**given),
-        effects=tuple(_fitted(catalogue[n], v, units) for n, v in entry.get("effects", {}).items()),
-        mass_fixed=units.mass_name in entry.get("fixed", ()),
-        rotary=units.rotary,
-    )
+def _axis(name: str, entry: AxisEntry, catalogue: Catalogue) -> AxisModel:
+    with at(f"axes.{name}"):
+        units = _units(entry)
+        unknown = set(entry.fixed or ()) - {units.mass_name}
+        if unknown:
+            raise InputError(f"fixed = {entry.fixed}: give ['{units.mass_name}'], or leave it out")
+        given = {f.name: getattr(entry, f.name) for f in fields(Hardware)}
+        return AxisModel(
+            mass=float(getattr(entry, units.mass_name)),
+            hardware=Hardware(**{key: v for key, v in given.items() if v is not None}),
+            effects=tuple(_fitted(catalogue[n], e, units) for n, e in entry.effects.items()),
+            mass_fixed=bool(entry.fixed),
+            rotary=units.rotary,
+        )
 
 
-MASS_NAMES = {kind.mass_name: kind for kind in (LINEAR, ROTARY)}
-
-
-def _units(entry: Mapping[str, Any]) -> AxisUnits:
+def _units(entry: AxisEntry) -> AxisUnits:
     """Linear for an axis with a mass, rotary for one with an inertia."""
-    kinds = [kind for name, kind in MASS_NAMES.items() if name in entry]
+    kinds = [kind for kind in (LINEAR, ROTARY) if getattr(entry, kind.mass_name) is not None]
     if len(kinds) > 1:
         raise InputError(
             "an axis has both mass and inertia; give mass in kg for a linear axis, or inertia in "
@@ -149,30 +144,17 @@ def _units(entry: Mapping[str, Any]) -> AxisUnits:
     return kinds[0]
 
 
-def _mass(entry: Mapping[str, Any], units: AxisUnits) -> float:
-    mass = entry[units.mass_name]
-    if isinstance(mass, bool) or not isinstance(mass, int | float):
-        raise InputError(f"{units.mass_name} = {mass}: must be a number in {units.mass}")
-    return float(mass)
-
-
-def _fitted(effect: Any, entry: Mapping[str, Any], units: AxisUnits) -> Fitted:
-    fitted = Fitted.at_start(effect, {k: v for k, v in entry.items() if k != "fixed"}, units)
-    if "fixed" not in entry:
+def _fitted(effect: Effect, entry: EffectEntry, units: AxisUnits) -> Fitted:
+    fitted = Fitted.at_start(effect, entry.model_extra, units)
+    if entry.fixed is None:
         return fitted
-    unknown = set(entry["fixed"]) - set(fitted.values)
+    unknown = set(entry.fixed) - set(fitted.values)
     if unknown:
-        raise InputError(f"effect '{effect.name}': fixed names unknown {', '.join(unknown)}")
-    return replace(fitted, fixed=frozenset(entry["fixed"]))
-
-
-def _history_step(entry: Mapping[str, Any]) -> HistoryStep:
-    known = {f.name for f in fields(HistoryStep)}
-    values = {k: v for k, v in entry.items() if k in known}
-    values["notes"] = tuple(values.get("notes", ()))
-    for optional in ("holdout_error_before", "holdout_error_after"):
-        values.setdefault(optional, None)
-    return HistoryStep(**values)
+        raise InputError(
+            f"effect '{effect.name}': fixed names unknown {', '.join(sorted(unknown))}; it has "
+            f"{', '.join(fitted.values)}"
+        )
+    return replace(fitted, fixed=frozenset(entry.fixed))
 
 
 def format_model(model: MachineModel) -> str:
@@ -186,6 +168,8 @@ def format_model(model: MachineModel) -> str:
     for name, axis in model.axes.items():
         axes[name] = _axis_table(axis)
     document["axes"] = axes
+    if model.intervals:
+        document[ENTRY] = intervals_table(model)
     if model.history:
         steps = tomlkit.aot()
         for step in model.history:
@@ -224,20 +208,8 @@ def _axis_table(axis: AxisModel) -> tomlkit.items.Table:
 def save_model(model: MachineModel, path: str | Path) -> None:
     """Write the model, and its MJCF beside it where that is not there yet."""
     path = Path(path)
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
     write_atomically(path, format_model(model).encode())
     if model.mjcf and model.mjcf_name:
         beside = path.parent / model.mjcf_name
         if not beside.exists():
             write_atomically(beside, model.mjcf.encode())
-
-
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write to a temporary name, then rename, so that the file is never half written."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_bytes(content)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)

@@ -9,7 +9,9 @@ from dataclasses import dataclass, field, replace
 from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, Effect, Kind, Parameter
 from twin.errors import InputError
+from twin.model.intervals import Interval, Intervals
 from twin.model.units import LINEAR, ROTARY, AxisUnits
+from twin.numbers import is_number
 
 MASS = Parameter(LINEAR.mass_name, LINEAR.mass, 1.0, 1e-6, 1e6, "moved mass")
 # Declared linear as all parameters are; a small motor has a millionth of a kg m^2.
@@ -73,10 +75,9 @@ def _sized(effect: Effect, values: Mapping[str, float]) -> Effect:
     count = values.get(ELEMENTS)
     if effect.of_size is None or count is None:
         return effect
-    whole = isinstance(count, int | float) and float(count).is_integer()
-    if not (whole and 1 <= count <= MOST_ELEMENTS):
+    if not (is_number(count) and float(count).is_integer() and 1 <= count <= MOST_ELEMENTS):
         raise InputError(
-            f"{effect.name}.{ELEMENTS} = {count}: give a whole number of elements from 1 to "
+            f"{effect.name}.{ELEMENTS} = {count!s:.60}: give a whole number of elements from 1 to "
             f"{MOST_ELEMENTS}"
         )
     return effect.of_size(int(count))
@@ -90,9 +91,9 @@ def _check_value(effect: Effect, name: str, value: float, units: AxisUnits) -> N
         )
     p = effect.parameter(name)
     unit = units(p.unit)
-    if not (isinstance(value, int | float) and math.isfinite(value)):
+    if not is_number(value):
         raise InputError(
-            f"{effect.name}.{name} = {value}: is not a finite number; give it in {unit}"
+            f"{effect.name}.{name} = {value!s:.60}: is not a finite number; give it in {unit}"
         )
     if not p.lower <= value <= p.upper:
         raise InputError(
@@ -190,7 +191,9 @@ class MachineModel:
 
     Raises InputError where it has more than two axes and an effect that depends on the other one.
 
-    mjcf: MJCF text of the stage, or None for plain slides and hinges, one for each axis.
+    mjcf: MJCF text of the stage, or None for plain slides and hinges, one for each axis. intervals:
+    by axis and parameter label, what the last fit of the axis found (90 %); none where it was
+    exchanged since.
     """
 
     name: str
@@ -199,6 +202,7 @@ class MachineModel:
     mjcf: str | None = None
     mjcf_name: str | None = None
     history: tuple[HistoryStep, ...] = field(default=())
+    intervals: Intervals = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, axis in self.axes.items():
@@ -230,8 +234,13 @@ class MachineModel:
         return self.axes[name]
 
     def with_axis(self, name: str, axis: AxisModel) -> MachineModel:
-        """This stage with one axis exchanged."""
-        return replace(self, axes={**self.axes, name: axis})
+        """This stage with one axis exchanged, and without that axis' intervals."""
+        kept = {a: i for a, i in self.intervals.items() if a != name}
+        return replace(self, axes={**self.axes, name: axis}, intervals=kept)
+
+    def with_intervals(self, name: str, found: Mapping[str, Interval]) -> MachineModel:
+        """This stage with the intervals of one axis, by parameter label."""
+        return replace(self, intervals={**self.intervals, name: found})
 
     def with_history(self, step: HistoryStep) -> MachineModel:
         """This stage with one more step of history."""

@@ -27,8 +27,7 @@ from identify.output.report.drawing import data_uri, drawing_style
 from identify.output.report.subject import Subject
 from identify.output.report.units import quantity
 from identify.output.results import Addition, Comparison, Diagnosis
-from twin.errors import InputError
-from twin.model.file import write_atomically
+from twin.files import require_writable, write_atomically
 from twin.model.machine import HistoryStep
 
 SECTIONS: tuple[Callable[[Subject], Section | None], ...] = (
@@ -61,8 +60,7 @@ def write_report(
     One HTML file without outside references: styles and pictures are inside. It appears whole or
     not at all. Raises InputError where the folder does not exist.
     """
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
+    require_writable(path)
     subject = Subject(title, diagnosis, comparison, tuple(history), tuple(additions))
     with drawing_style():
         page = render(subject, sections(subject))

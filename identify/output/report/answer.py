@@ -13,12 +13,14 @@ from identify.output.words.numbers import capitalised
 from identify.output.words.selection import (
     advice,
     dependence_in_words,
+    finding_in_words,
     refit_in_words,
+    remainder_in_words,
     verdict_in_words,
 )
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
-from identify.selection.forward_selection import AxisDiagnosis, Verdict
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
 from twin.model.units import AxisUnits
@@ -42,11 +44,17 @@ def section(subject: Subject) -> Section:
 def _diagnosed(
     axis: AxisComparison, found: AxisDiagnosis, following: Plan | None, refit: Refit | None
 ) -> Answer:
-    remarks = []
+    remarks: list[str] = []
     sentence = axis.units.words(verdict_in_words(found.verdict))
+    if remains := remainder_in_words(found, SCALED):
+        sentence = f"{sentence} {capitalised(remains)}"
     if found.unexplained is not None:
         sentence = f"{sentence} {dependence_in_words(found.unexplained, SCALED)}"
-    if found.best is not None:
+    remarks.extend(
+        axis.units.words(f"{capitalised(spaced(finding_in_words(f, SCALED)))}")
+        for f in found.findings
+    )
+    if found.best is not None and not found.findings:
         remarks.append(_left_over(found.best))
     remarks.extend(_runner_up(found))
     if found.unexplained is not None:

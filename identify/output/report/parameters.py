@@ -11,7 +11,7 @@ from identify.output.report.blocks import Block, Column, Heading, Row, Section, 
 from identify.output.report.subject import Subject
 from identify.output.report.units import NOTHING, Scale, number, quantity, spaced
 from identify.output.words.estimation import no_interval_in_words
-from identify.selection.forward_selection import AxisDiagnosis
+from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.nonparametric import nonparametric_labels
 from twin.model.machine import AxisModel
 

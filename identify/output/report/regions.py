@@ -14,7 +14,7 @@ from identify.output.report.subject import Subject
 from identify.output.report.units import SCALED, spaced
 from identify.output.words.numbers import capitalised
 from identify.output.words.validation import region_in_words
-from identify.selection.forward_selection import AxisDiagnosis
+from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.residual_dependence import Dependence
 from identify.validation.misfit_maps import AxisComparison
 from twin.model.units import units_of

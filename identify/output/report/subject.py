@@ -15,7 +15,7 @@ from identify.experiment_design.plan import Plan
 from identify.output.results import Addition, Comparison, Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
-from identify.selection.forward_selection import AxisDiagnosis, Verdict
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.misfit_maps import AxisComparison
 from twin.model.machine import AxisModel, HistoryStep
 from twin.model.units import LINEAR

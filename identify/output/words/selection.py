@@ -9,7 +9,8 @@ import numpy as np
 from identify.output.words.numbers import PLAIN, Numbers
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Change, MovedParameter, Refit
-from identify.selection.forward_selection import Verdict
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from identify.selection.findings import Finding
 from identify.selection.nonparametric import followed
 from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
@@ -19,7 +20,7 @@ from twin.model.units import units_of
 
 VERDICTS = {
     Verdict.MISSING_EFFECT: (
-        "One effect explains what the model lacks, on the fit logs and on the held-out logs."
+        "The model lacks an effect: the fit logs and the held-out logs prove it."
     ),
     Verdict.NOTHING_MISSING: "Nothing is missing: the force error is at its noise floor.",
     Verdict.AMBIGUOUS: (
@@ -34,6 +35,30 @@ VERDICTS = {
 def verdict_in_words(verdict: Verdict) -> str:
     """The answer of a diagnosis."""
     return VERDICTS[verdict]
+
+
+def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
+    """E.g. "cogging explains 93 % of the squared error above the noise floor: ..."."""
+    unit = finding.unit
+    error = units_of(unit).words("test error")
+    text = (
+        f"{finding.effect} explains {100.0 * finding.explains:.0f} % of the squared error above "
+        f"the noise floor: without it the {error} is "
+        f"{numbers.amount(finding.error_before, unit)}, with it "
+        f"{numbers.amount(finding.error_after, unit)}"
+    )
+    if finding.proof is None:
+        return text
+    gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.best_decoy))
+    return f"{text}; in one linear step it takes {gain:.0f} % of it, its best decoy {decoy:.0f} %"
+
+
+def remainder_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str | None:
+    """How large the error is that remains beside what was named, or None where it is noise."""
+    if not found.named or found.unexplained is None:
+        return None
+    error = numbers.amount(found.final.error, found.final.axis.units.force)
+    return f"what remains is {error}, {found.final.ratio:.1f} times the noise floor"
 
 
 def change_in_words(change: Change) -> str:

@@ -250,12 +250,12 @@ def test_studies_are_of_the_axes_that_move():
 def test_heads_are_the_first_seconds_of_each_log():
     logs = tuple(windowed(moved(np.random.default_rng(k), 5.0, 1000.0)) for k in range(5))
     dataset = Dataset("x", logs, (), None)
-    assert [len(w.motion.time) for w in dataset.heads] == [3000] * 5
+    assert [len(w.motion.time) for w in dataset.heads] == [2000] * 5
     assert len(dataset.in_heads) == sum(map(len, logs))
     for head, log, own in zip(dataset.heads, logs, np.split(dataset.in_heads, 5), strict=True):
         np.testing.assert_array_equal(log.command[own], head.command)
     few = Dataset("x", logs[:3], (), None)
-    assert [len(w.motion.time) for w in few.heads] == [4000] * 3
+    assert [len(w.motion.time) for w in few.heads] == [pytest.approx(8000 / 3, abs=1)] * 3
 
 
 # --- by frequency -------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from identify.experiment_design.discrimination import (
     Arena,
     Explanation,
 )
-from identify.selection.forward_selection import Verdict
+from identify.selection.diagnosis import Verdict
 from twin.errors import CannotRun, InputError
 from twin.experiments.kinds import Tracking
 from twin.model.machine import MachineModel

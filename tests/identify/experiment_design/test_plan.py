@@ -24,7 +24,7 @@ from identify.output.report.drawing import drawing_style
 from identify.output.report.subject import Subject
 from identify.output.text import diagnose_text, plan_text
 from identify.output.words.experiment_design import not_run_in_words
-from identify.selection.forward_selection import Verdict
+from identify.selection.diagnosis import Verdict
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment

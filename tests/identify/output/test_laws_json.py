@@ -23,9 +23,9 @@ from identify.output.machine_json import check_json, effect_json
 from identify.output.plain import plain
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
 from identify.output.words.experiment_design import gap_in_words
-from identify.output.words.selection import verdict_in_words
+from identify.output.words.selection import advice, verdict_in_words
 from identify.output.words.validation import loop_in_words, region_in_words
-from identify.selection.forward_selection import Verdict
+from identify.selection.diagnosis import Verdict
 from twin.log.check import CheckReport, Fault, Finding, Severity
 
 
@@ -154,7 +154,7 @@ def expected_candidate(c):
 
 
 def test_a_diagnosis():
-    x = made.diagnosis_of(Verdict.AMBIGUOUS, unexplained=made.STRUCTURE)
+    x = made.diagnosis_of(Verdict.AMBIGUOUS, unexplained=made.STRUCTURE, findings=made.FOUND)
     x.__dict__["repeat"] = made.REPEAT
     result = made.diagnosed(x)
     found = strict(diagnose_json(result))
@@ -176,6 +176,24 @@ def test_a_diagnosis():
             "share_of_error": 0.631, "depends_on": "other_axis_position", "period": 0.0273,
             "unit": "m",
         },
+        "findings": [
+            {
+                "effect": "cogging", "kind": "missing", "explains": 0.871,
+                "indistinguishable_from": ["quadratic_drag"], "test_error_before": 7.17,
+                "test_error_after": 2.19, "unit": "N", "parameters": {"p": 0.0261},
+                "gain": 0.813, "best_decoy": 0.137,
+            },
+            {
+                "effect": "lugre", "kind": "missing", "explains": 0.119,
+                "indistinguishable_from": [], "test_error_before": 3.23, "test_error_after": 2.19,
+                "unit": "N", "parameters": {"Fc": 0.31}, "gain": None, "best_decoy": None,
+            },
+        ],
+        "remainder": {
+            "error": pytest.approx(3.19), "over_noise_floor": pytest.approx(3.19 / 2.03),
+            "unit": "N", "depends_on": "other_axis_position", "share_of_error": 0.631,
+            "period": 0.0273, "period_unit": "m", "advice": advice(),
+        },
         "force_error": pytest.approx(8.37), "noise_floor": 2.11, "unit": "N",
         "force_shift": 0.000217, "force_shift_unit": "s",
         "repeats_not_general": {
@@ -190,6 +208,11 @@ def test_a_diagnosis():
     }  # fmt: skip
     quiet = axes["y"]
     assert (quiet["verdict"], quiet["effect"], quiet["missing"]) == ("nothing_missing", None, [])
+    assert (quiet["findings"], quiet["remainder"]) == ([], None)
+    lost = made.diagnosis_of(Verdict.UNEXPLAINED, unexplained=made.STRUCTURE)
+    left = strict(diagnose_json(made.diagnosed(lost)))["remainder"]  # of the model as it was given
+    assert left["error"] == pytest.approx(8.37)
+    assert left["over_noise_floor"] == pytest.approx(8.37 / 2.11)
     assert (quiet["unexplained"], quiet["next_experiment"], quiet["steps"]) == (None, None, [])
     assert (quiet["repeats_not_general"], quiet["force_shift"]) == (None, 0.0)
     assert quiet["refit"] == expected_refit(result.refits["y"])

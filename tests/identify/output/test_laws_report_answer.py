@@ -29,7 +29,7 @@ from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import advice, refit_in_words, verdict_in_words
 from identify.output.words.validation import region_in_words
-from identify.selection.forward_selection import Verdict
+from identify.selection.diagnosis import Verdict
 
 
 @pytest.fixture(autouse=True)
@@ -97,6 +97,18 @@ def test_the_answer_for_an_ambiguity():
         ("Force error", "1.07 N"), ("Error over noise floor", number(1.07 / 0.97)),
         ("Position, free run", "1.90 mm"),
     ]  # fmt: skip
+
+
+def test_the_answer_where_error_remains_beside_what_is_named():
+    left = made.diagnosis_of(unexplained=made.STRUCTURE, findings=made.FOUND)
+    card, _ = cards(made.diagnosed(left))
+    assert card.sentence.startswith(
+        f"{verdict_in_words(Verdict.AMBIGUOUS)} What remains is 3.19 N, 1.6 times the noise floor. "
+        "The error depends most on other axis position"
+    )
+    assert [r.split(" explains ")[0] for r in card.remarks[:2]] == ["Cogging", "Lugre"]
+    assert "without it the test error is 7.17 N, with it 2.19 N; in one" in card.remarks[0]
+    assert not any("is at its noise floor" in r for r in card.remarks)
 
 
 def test_the_answer_for_what_nothing_explains():

@@ -27,7 +27,7 @@ from identify.output.report.subject import LogForces, Subject
 from identify.output.report.units import Scale, number, quantity
 from identify.output.results import Diagnosis
 from identify.output.words.selection import verdict_in_words
-from identify.selection.forward_selection import AxisDiagnosis, Verdict
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.residual_dependence import Dependence
 from twin.effects import Catalogue, load_catalogue
 

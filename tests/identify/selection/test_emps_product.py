@@ -12,7 +12,7 @@ import pytest
 from emps_published import direction_dependent, identify, prediction_error, symmetric
 
 from identify.output.remarks import remarks
-from identify.selection.forward_selection import Verdict
+from identify.selection.diagnosis import Verdict
 from identify.workflow import add, diagnose
 from twin.effects import Catalogue, load_catalogue
 from twin.log import read_log, write_log

@@ -10,7 +10,8 @@ from foreign_kernel import SLIP_ELEMENTS
 from foreign_machine import AHEAD, BEHIND, FORCE, drawn, gaussian
 from foreign_study import CATALOGUE, STAGE, diagnosed, model_for
 
-from identify.selection.forward_selection import Verdict
+from identify.selection.diagnosis import Verdict
+from identify.selection.forward_selection import diagnose_axis
 from twin.model.machine import Fitted
 
 SEED = 5
@@ -64,7 +65,7 @@ def test_an_effect_of_the_catalogue_is_named_whatever_its_form(effect, size, ter
 @pytest.mark.parametrize(("effect", "size", "terms"), cases(OTHER, SLOWLY_OTHER))
 def test_an_effect_of_no_catalogue_is_not_given_a_name(effect, size, terms, monkeypatch):
     if terms is QUICK:  # pairs take most of the time
-        monkeypatch.setattr(sys.modules[Verdict.__module__], "search_pairs", lambda *_: [])
+        monkeypatch.setattr(sys.modules[diagnose_axis.__module__], "search_pairs", lambda *_: [])
     assert found(OUTSIDE[effect], size, terms).verdict is Verdict.UNEXPLAINED
 
 

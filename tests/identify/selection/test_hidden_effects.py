@@ -7,7 +7,7 @@ import pytest
 from check_cases import with_axis
 from machines import DURATION, machine, one_axis
 
-from identify.selection.forward_selection import Verdict
+from identify.selection.diagnosis import Verdict
 from identify.workflow import add, diagnose
 from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model

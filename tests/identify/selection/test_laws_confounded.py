@@ -58,7 +58,7 @@ def test_a_change_is_told_with_the_force_that_it_makes(monkeypatch, dataset):
 def test_only_effects_without_a_shape_can_be_a_parameter_by_another_name(dataset):
     fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
     names = ("payload_mass", "axis_coupling", "cogging", "lugre", "coulomb_viscous")
-    found = given._bases(fit, Catalogue([CATALOGUE[n] for n in names]))
+    found = given.linear_bases(fit, Catalogue([CATALOGUE[n] for n in names]))
     assert {n: b.shape[1] for n, b in found.items()} == {"axis_coupling": 2, "payload_mass": 1}
     for basis in found.values():
         assert given._within(basis @ np.arange(1.0, 1.0 + basis.shape[1]), basis)

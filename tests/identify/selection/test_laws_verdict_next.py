@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 from built_fits import built, built_fit, step, study_stub
 
-from identify.selection.forward_selection import (
-    SelectionState,
-    _next,
-    diagnose_axis,
-)
+from identify.selection.diagnosis import SelectionState
+from identify.selection.forward_selection import _next, diagnose_axis
 from identify.selection.pair_search import Pair
 from twin.effects import Catalogue
 

@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 from built_fits import axis_of, built, built_fit, fitted, stage, step, study_stub
 
+from identify.selection.decoys import Proof
+from identify.selection.diagnosis import AxisDiagnosis, Verdict, kept
 from identify.selection.forward_selection import (
-    AxisDiagnosis,
-    Verdict,
     _compared_again,
     _decided,
     _eliminated_backwards,
-    _kept,
+    _graded,
 )
 from identify.selection.residual_dependence import Dependence
 
 module = importlib.import_module("identify.selection.forward_selection")
+diagnoses = importlib.import_module("identify.selection.diagnosis")
 # The rules as they were decided.
 BEYOND_DOUBT, FLOOR_SURE, MOST_STEPS = 100.0, (0.85, 1.15), 5
 STUDY = study_stub()
@@ -46,7 +47,7 @@ def test_what_a_later_step_made_needless_is_not_an_answer():
         step("quadratic_drag", ("payload_mass", "constant_force")),
         step("lugre", dropped=("cogging",)),
     )
-    assert [s.candidate.effect.name for s in _kept(steps)] == ["quadratic_drag", "lugre"]
+    assert [s.candidate.effect.name for s in kept(steps)] == ["quadratic_drag", "lugre"]
     for verdict in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS):
         found = diagnosis(verdict, *steps)
         expected = (("quadratic_drag", "payload_mass", "constant_force"), ("lugre",))
@@ -65,7 +66,7 @@ def test_without_a_convincing_effect_none_is_named(verdict):
 def test_a_force_that_repeats_is_only_sought_where_error_is_left(monkeypatch):
     seen = []
     monkeypatch.setattr(
-        module, "not_general", lambda fit, dataset: seen.append((fit, dataset)) or 7
+        diagnoses, "not_general", lambda fit, dataset: seen.append((fit, dataset)) or 7
     )
     assert diagnosis(Verdict.UNEXPLAINED).repeat is None
     assert replace(diagnosis(Verdict.UNEXPLAINED), final=HIGH).repeat == 7
@@ -152,7 +153,7 @@ def test_ties_are_told_again_only_beside_several_effects(monkeypatch):
 STRUCTURE = Dependence(0.5, "position", None, "m", {"position": 0.5})
 
 
-def decided(monkeypatch, stages, convinced, held=False):
+def decided(monkeypatch, stages, convinced, held=False, graded=None):
     """_decided with convinced(number of steps before, after); what structure was sought in."""
     sought = []
 
@@ -166,6 +167,7 @@ def decided(monkeypatch, stages, convinced, held=False):
     monkeypatch.setattr(module, "_compared_again", lambda stages, dataset: stages[-1].steps)
     monkeypatch.setattr(module, "find_dependence", structure)
     monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is STUDY)
+    monkeypatch.setattr(module, "_graded", lambda states, sure, dataset: graded)
     found = _decided(STUDY, (built("wear"),), stages)
     return found, sought
 
@@ -203,6 +205,55 @@ def test_a_tie_of_the_first_effect_that_stays_is_an_ambiguity(monkeypatch, first
 def test_structure_is_not_sought_where_the_held_out_logs_are_explained(monkeypatch):
     found, sought = decided(monkeypatch, STAGES, lambda a, b: True, held=True)
     assert (found.unexplained, sought) == (None, [])
+
+
+def test_what_is_proved_is_named_although_other_error_remains(monkeypatch):
+    steps = (replace(FIRST, proved=False), SECOND)
+    fit = built_fit(4.4)
+    found, sought = decided(monkeypatch, STAGES, lambda a, b: False, graded=(steps, fit))
+    assert (found.verdict, found.named) == (Verdict.AMBIGUOUS, ("wear",))
+    assert found.best is SECOND.candidate
+    assert (found.final, found.unexplained, sought) == (fit, STRUCTURE, [fit])
+
+
+@pytest.mark.parametrize(
+    ("holds", "sure", "named"),
+    [
+        ({"cogging"}, (), ["cogging"]),
+        ({"cogging", "wear"}, (), ["cogging", "wear"]),
+        ({"wear"}, ("cogging",), ["cogging", "wear"]),
+        (set(), ("cogging",), None),
+        (set(), (), None),
+        ({"cogging", "wear"}, ("quadratic_drag",), None),  # a later step made it needless
+    ],
+)
+def test_a_step_is_named_that_is_sure_or_beats_its_decoys(monkeypatch, holds, sure, named):
+    final = built_fit(4.0, axis=axis_of(fitted("cogging"), fitted("wear")))
+    states = [stage(HIGH), stage(built_fit(5.0), FIRST), stage(final, FIRST, SECOND)]
+    asked = []
+
+    def proof(without, fitted, dataset):
+        asked.append((without.axis.names, fitted.effect.name))
+        holding = fitted.effect.name in holds
+        return Proof(0.5, 0.1 if holding else 0.45)
+
+    monkeypatch.setattr(
+        module,
+        "less",
+        lambda effect, fit, base, d: built_fit(9.0, axis=fit.axis.without(effect.name)),
+    )
+    monkeypatch.setattr(module, "proof", proof)
+    monkeypatch.setattr(module, "fit_axis", lambda axis, logs: built_fit(4.5, axis=axis))
+    found = _graded(states, sure, study_stub())
+    assert all(name not in names for names, name in asked)
+    assert not set(sure) & {name for _, name in asked}
+    if named is None:
+        assert found is None
+        return
+    steps, fit = found
+    assert [s.candidate.effect.name for s in steps if s.proved] == named
+    assert set(named) <= set(fit.axis.names)
+    assert ("wear" in fit.axis.names) is ("wear" in named)
 
 
 @pytest.mark.parametrize(

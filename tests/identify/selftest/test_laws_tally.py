@@ -16,7 +16,7 @@ from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import Estimate
 from identify.output.words.selftest import rate_in_words, target_in_words, trial_in_words
-from identify.selection.forward_selection import AxisDiagnosis, Verdict
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selftest import cases, design, trial
 from identify.selftest.design import FULL, PAIR_STRENGTH, QUICK, Design, plantable
 from identify.selftest.tally import COVERED, Rate, confusion, coverage, rates

@@ -1,11 +1,15 @@
 """Mistakes in a user's own effect: exit code 2, one line that says what to try, no traceback."""
 
+import re
 import sys
 from pathlib import Path
 
 import pytest
+from cli_runs import twin
 
 from identify.cli import main
+from twin.effects import load_catalogue
+from twin.errors import InputError
 
 SOURCE = Path(__file__).parents[3] / "examples" / "my_effect.py"
 LAW_END = "io[OUT] = -p[0] * distance * exp(-ratio * ratio)"
@@ -28,6 +32,13 @@ FAULTS = {
     "domain": (LAW_END, "io[OUT] = p[0] * sqrt(io[V])", "no finite number at v = -1e-06 m/s"),
     "no result": (LAW_END, "distance = ratio", "its law writes no result; a force effect writes"),
     "not compiled": (LAW_END, 'io[OUT] = float("%g" % p[0])', "cannot be compiled"),
+    "index by position": (LAW_END, f"{LAW_END} + s[int(io[X] > 0.5) - 1]", "s[-1], but 0 states"),
+    "index far away": (LAW_END, f"{LAW_END} + (p[int(io[X])] if io[X] > 3.0 else 0.0)", "at x = "),
+    "exit": ("EFFECT = ", "import sys\nsys.exit(0)\nEFFECT = ", "ended the program while it was"),
+    "hard exit": ("EFFECT = ", "import os\nos._exit(0)\nEFFECT = ", "ended the program while it"),
+    "crash": ("EFFECT = ", "import ctypes\nctypes.string_at(0)\nEFFECT = ", "crashed .*SIGSEGV"),
+    "loop": ("EFFECT = ", "while True:\n    pass\nEFFECT = ", "a loop without an end"),
+    "loop in the law": (LAW_END, f"while io[V] > 0.05:\n        pass\n    {LAW_END}", "a loop"),
     "unknown name": (LAW_END, "io[OUT] = missing", "name 'missing' is not defined"),
 }  # fmt: skip
 
@@ -45,6 +56,8 @@ def test_a_mistake_is_said_in_one_line(
         text = text.replace(LAW_END, f"s[1] = distance\n    {LAW_END}")
     path = tmp_path / "bad.py"
     path.write_text(text, encoding="utf-8")
+    if fault.startswith("loop"):
+        monkeypatch.setattr("twin.effects.LONGEST_TRIAL", 0.5)
     monkeypatch.setattr(sys, "argv", ["twin", "effects", "bad", "--effects", str(path)])
     with pytest.raises(SystemExit) as stopped:
         main()
@@ -52,9 +65,10 @@ def test_a_mistake_is_said_in_one_line(
     assert stopped.value.code == 2
     assert told.out == ""
     assert told.err.count("\n") == 1, told.err
-    assert message in told.err
+    assert re.search(message.replace("[", r"\["), told.err), told.err
     assert "bad" in told.err
     assert "Traceback" not in told.err
+    assert told.err.count(str(path)) <= 1
 
 
 def test_the_example_itself_is_sound(
@@ -66,3 +80,17 @@ def test_the_example_itself_is_sound(
         main()
     assert stopped.value.code in (0, None)
     assert "magnetic detent" in capsys.readouterr().out
+
+
+def test_the_name_of_another_effect_is_refused(tmp_path: Path) -> None:
+    for name in ("cogging", "mine"):
+        (tmp_path / f"{name}.py").write_text(SOURCE.read_text(encoding="utf-8"), encoding="utf-8")
+    with pytest.raises(InputError, match="there is an effect 'cogging' already; give the file"):
+        load_catalogue([tmp_path / "cogging.py"])
+    with pytest.raises(InputError, match="there is an effect 'mine' already"):
+        load_catalogue([tmp_path / "mine.py"] * 2)
+
+
+def test_the_help_says_that_loading_runs_code() -> None:
+    done = twin("effects", "--help", folder=Path.cwd())
+    assert "loading it runs its code" in " ".join(done.stdout.split())

@@ -19,7 +19,7 @@ FAULTS = {
         "is finite at every bound", "with k = 100000 N/m",
     ),
     "a state that is not declared": (
-        LAW_END, f"{LAW_END} + (p[0] * s[0] if io[X] > 0.19 else 0.0)",
+        LAW_END, f"{LAW_END} + (p[0] * s[0] if p[0] > 9e4 else 0.0)",
         "uses only what it declares", "s[0], but 0 states are declared",
     ),
     "a write to what is not its own": (

@@ -101,9 +101,11 @@ def test_a_force_recorded_late(clean: Log, axis: str, lag: float) -> None:
 
 
 @pytest.mark.parametrize("lag", [-2.0, 2.0])
-def test_a_lag_that_a_drive_may_have_is_left_to_the_fit(clean: Log, lag: float) -> None:
+def test_a_lag_that_a_drive_may_have_is_a_warning(clean: Log, lag: float) -> None:
     report = check_log(with_axis(clean, "x", late(round(lag * 10), "force", "current")))
-    assert report.findings == ()
+    (finding,) = report.findings
+    assert (finding.fault, finding.severity) == (Fault.LAG, Severity.WARNING)
+    assert milliseconds(finding) == pytest.approx(lag, abs=0.3)
 
 
 def test_the_smallest_lag_that_counts(clean: Log) -> None:
@@ -156,10 +158,10 @@ OFFSET = np.ones(BURST)
 @pytest.mark.parametrize(
     ("name", "shape", "message"),
     [
-        ("position", 1e-3 * OFFSET, "position bends"),
-        ("position", 1e-5 * OFFSET, "position bends"),
+        ("position", 1e-3 * OFFSET, "samples of the position are off"),
+        ("position", 1e-5 * OFFSET, "samples of the position are off"),
         ("position", 1e-6 * NOISE, "position bends"),
-        ("position", 1e-4 * HALF_SINE, "position bends"),
+        ("position", 1e-4 * HALF_SINE, "samples of the position are off"),
         ("force", 20.0 * OFFSET, "force and motion contradict each other"),
         ("force", 20.0 * HALF_SINE, "force and motion contradict each other"),
         ("force", 5.0 * NOISE, "force jumps to and fro"),

@@ -70,26 +70,24 @@ def test_a_position_that_jumps_farther_is_an_outlier_there(at, sign):
         def change(columns):
             columns["position"][at:] += sign * size
 
-        return findings(drive(change=change), Fault.OUTLIERS)
+        wanted = (Fault.STEP, Fault.MISSING, Fault.JOINED)  # without a setpoint they look alike
+        return [f for f in check_log(drive(change=change)).findings if f.fault in wanted]
 
-    assert not [f for f in jump(0.9 * (allowed - bend)) if "position" in f.what]
-    (found,) = [f for f in jump(1.2 * (allowed + bend)) if "position" in f.what]
-    stated = float(found.what.partition("up to ")[2].split()[0])
-    assert stated == pytest.approx(1.2 * (allowed + bend), abs=1.05 * bend)
+    assert not jump(0.9 * (allowed - bend))
+    (found,) = jump(8.0 * (allowed + bend))
     assert found.where == f"{(at - 1) / 1e3:g} to {at / 1e3:g} s"
     assert found.severity is Severity.ERROR
 
 
-@pytest.mark.parametrize(("apart", "bursts"), [(45, 1), (60, 2)])
-def test_outliers_more_than_fifty_milliseconds_apart_are_two(apart, bursts):
+@pytest.mark.parametrize("apart", [45, 60])
+def test_samples_more_than_fifty_milliseconds_apart_are_two(apart):
     def change(columns):
         for at in (1000, 1000 + apart):
             columns["position"][at] += 1e-3
 
     (found,) = findings(drive(change=change), Fault.OUTLIERS)
-    last = 1001 + (apart if bursts == 1 else 0)
-    more = " and 1 more times" if bursts == 2 else ""
-    assert found.where == f"0.999 to {last / 1e3:g} s{more}"
+    one, two = ("0.999 to 1.046 s", "0.999 to 1.001 s and 1 more times")
+    assert found.where == (one if apart == 45 else two)
 
 
 @pytest.mark.parametrize(("size", "told"), [(0.4, False), (60.0, True)])

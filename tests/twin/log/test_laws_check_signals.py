@@ -146,8 +146,8 @@ def wave(angle: float, noise: float):
         # a late sine leaves the sine of its angle: three hundredths of it do not count
         (np.arcsin(0.027), 0.005, False),
         (np.arcsin(0.034), 0.005, True),
-        # half of the signal must be explained
-        (1.5, 0.46, True),
+        # a quarter of a period is not told from damping
+        (1.5, 0.46, False),
         (1.5, 0.54, False),
         # the least that is left is 0.56 or 0.64 of what is left without a lag
         (np.arcsin(np.sqrt(((0.3 / 0.56) ** 2 - 0.09) / 0.91)), 0.3, True),

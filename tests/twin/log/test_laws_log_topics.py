@@ -186,7 +186,7 @@ def test_what_topics_have_in_common_is_kept_at_the_same_times(tmp_path, before, 
     ]
     message = "/axis/x has 12 samples from 0 s to 0.011 s" if not before else "/axis/[xy] has"
     refused(tmp_path / "a.mcap", items, message)
-    log, recovery = recover_log(tmp_path / "a.mcap")
+    log, recovery = recover_log(tmp_path / "a.mcap", unproved=True)
     for channel, name in ((1, "x"), (2, "y")):
         assert log.axes[name].position.tolist() == [10.0 * channel + k for k in times]
         assert log.axes[name].force.tolist() == [-100.0 * channel - k for k in times]
@@ -199,7 +199,7 @@ def test_topics_that_overlap_are_cut_at_both_ends(tmp_path):
     items = [*HEAD, json_channel(2, "/axis/y", schema=1)]
     items += [sample(k, c) for k in range(14) for c in (1, 2) if 4 * (c - 1) <= k < 6 + 4 * c]
     refused(tmp_path / "a.mcap", items, "/axis/x has 10 samples from 0 s to 0.009 s")
-    log, recovery = recover_log(tmp_path / "a.mcap")
+    log, recovery = recover_log(tmp_path / "a.mcap", unproved=True)
     assert log.axes["x"].position.tolist() == [10.0 + k for k in range(4, 10)]
     assert log.axes["y"].position.tolist() == [20.0 + k for k in range(4, 10)]
     assert recovery.kept == "6 samples from 0.004 s"
@@ -212,7 +212,7 @@ def test_two_gaps_without_a_summary_are_two_losses(tmp_path):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(container, "LOOSE_BYTES", record_bytes)
             (tmp_path / "a.mcap").write_bytes(plain_file(items))
-            log, recovery = recover_log(tmp_path / "a.mcap")
+            log, recovery = recover_log(tmp_path / "a.mcap", unproved=True)
         told = " ".join(recovery.lost)
         assert log.axes["x"].position.tolist() == [10.0 + k for k in range(21, 40)]
         assert re.search(r"message 4 has sequence number 7, expected 5", told)

@@ -151,7 +151,9 @@ def test_a_damaged_chunk_in_the_middle_keeps_the_longer_side(tmp_path, intact, s
     assert_same_samples(log, small_log, slice(48, 120))
     assert recovery.kept == "72 samples from 0.0048 s"
     assert recovery.lost[0].startswith(f"chunk at byte {place}: ")
-    assert recovery.lost[1].startswith("36 intact samples from 0 s are left out")
+    assert recovery.lost[1].startswith("36 intact samples from 0 s are in a log of their own")
+    (other,) = recovery.others
+    assert_same_samples(other, small_log, slice(0, 36))
     assert len(recovery.lost) == 2
     write_log(log, tmp_path / "good.mcap")
     assert_same_log(read_log(tmp_path / "good.mcap"), log)

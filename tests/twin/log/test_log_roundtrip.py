@@ -174,9 +174,11 @@ def test_a_failing_write_leaves_what_was_there(tmp_path):
     assert [(p, p.read_bytes()) for p in tmp_path.iterdir()] == [(target, b"older")]
 
 
-@pytest.mark.parametrize("name", ["no/such/folder/a.mcap", "."])
-def test_a_place_that_cannot_be_written_is_named(tmp_path, name):
-    with pytest.raises(InputError, match="cannot be written"):
+@pytest.mark.parametrize(
+    ("name", "why"), [("no/such/folder/a.mcap", "its folder does not exist"), (".", "is a folder")]
+)
+def test_a_place_that_cannot_be_written_is_named(tmp_path, name, why):
+    with pytest.raises(InputError, match=why):
         write_log(two_axes(), tmp_path / name)
 
 
@@ -223,3 +225,13 @@ def test_a_log_that_could_not_be_read_back_is_refused(tmp_path, spoil, message):
         write_log(spoil(two_axes()), tmp_path / "a.mcap")
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_truth_is_left_out_where_it_is_not_wanted(tmp_path):
+    write_log(two_axes(), tmp_path / "a.mcap")
+    whole, bare = read_log(tmp_path / "a.mcap"), read_log(tmp_path / "a.mcap", truth=False)
+    assert whole.truth
+    assert not bare.truth
+    assert bare.metadata == whole.metadata
+    for name, axis in whole.axes.items():
+        np.testing.assert_array_equal(bare.axes[name].position, axis.position)

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from twin.log.check import content, excitation, outliers, saturation, timing, units
+from twin.log.check import (
+    breaks,
+    command,
+    content,
+    crossed,
+    excitation,
+    outliers,
+    saturation,
+    timing,
+    units,
+)
 from twin.log.check.axis import Axis
 from twin.log.check.report import CheckReport, Fault, Finding, Severity
 from twin.log.log import Log
@@ -21,11 +31,14 @@ def check_log(log: Log) -> CheckReport:
     Where an axis lacks something that every other check needs, only that is reported.
     """
     findings: list[Finding] = []
+    sound: list[Axis] = []
     for name, columns in log.axes.items():
         axis = Axis(name, log.sample_rate, columns)
         basic = list(content.check(axis))
         findings += basic
         if not basic:
-            for part in (units, timing, outliers, saturation, excitation):
+            sound.append(axis)
+            for part in (units, timing, breaks, command, outliers, saturation, excitation):
                 findings += part.check(axis)
+    findings += crossed.check(sound)
     return CheckReport(tuple(findings))

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from twin.log.check.dynamics import Dynamics, fit_dynamics
-from twin.log.check.lag import Lag, find_lag
+from twin.log.check.lag import Lag, Trend, find_lag, find_trend
 from twin.log.check.smooth import Smoother
 from twin.log.log import AxisLog
 from twin.signals import Array, white_noise
@@ -113,7 +113,12 @@ class Axis:
     @cached_property
     def lag(self) -> Lag:
         """Lag of the command behind the motion that it causes."""
-        return find_lag(self.force, self._regressors, self.kept, self.smoother.block)
+        return find_lag(self.force, self.regressors, self.kept, self.smoother.block)
+
+    @cached_property
+    def trend(self) -> Trend | None:
+        """The same in each part of the log."""
+        return find_trend(self.force, self.regressors, self.kept, self.smoother.block)
 
     @cached_property
     def dynamics(self) -> Dynamics:
@@ -121,10 +126,10 @@ class Axis:
         shift = round(self.lag.seconds / self.smoother.block) if self.lag.clear else 0
         span = slice(max(-shift, 0), len(self.force) - max(shift, 0))
         force = self.force[span.start + shift : span.stop + shift]
-        return fit_dynamics(force, self._regressors[span], self.kept[span], span.start)
+        return fit_dynamics(force, self.regressors[span], self.kept[span], span.start)
 
     @cached_property
-    def _regressors(self) -> Array:
+    def regressors(self) -> Array:
         """(m, 5) regressors of a command: mass, damping, Coulomb friction, bias, stiffness."""
         fast = float(np.quantile(np.abs(self.velocity), 0.99))
         position = self.smoother.position(self.log.position)

@@ -8,8 +8,11 @@ import numpy as np
 
 from twin.log.check.axis import Axis
 from twin.log.check.report import Fault, Finding, Severity
+from twin.signals import white_noise
 
 _COARSE = 0.3  # acceleration noise as a part of the acceleration
+_ROUNDED = 0.05  # the same, where it is the rounding: that is no noise and does not average out
+_ROUNDING = 1.0  # noise of rounding is at most its step
 _CREEP = 0.02  # of the highest speed; slower motion counts as standstill
 _ONE_WAY = 0.02  # share of the moving time
 _SAME_SPEED = 0.05  # spread of the speeds as a part of their median
@@ -61,7 +64,8 @@ def _directions(axis: Axis) -> Iterator[Finding]:
 def _coarse(axis: Axis) -> Iterator[Finding]:
     noise = axis.smoother.acceleration_noise(axis.position_noise)
     rms = float(np.sqrt(np.mean(axis.acceleration**2)))
-    if noise < _COARSE * rms:
+    rounded = white_noise(axis.log.position) < _ROUNDING * axis.position_step
+    if noise < (_ROUNDED if rounded else _COARSE) * rms:
         return
     unit = axis.log.units["position"]
     yield _warning(

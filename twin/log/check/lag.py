@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,6 +14,11 @@ _MOTION = 20  # least length of the log over the longest lag, so that it holds s
 _CLEAR = 0.5  # largest residual at the best lag, as a part of the signal
 _WRONG = 0.03  # least residual without a lag, as a part of the signal
 _BETTER = 0.6  # largest residual at the best lag, as a part of that without a lag
+PARTS = 8  # of a log, each with a lag of its own
+_FEWEST_PARTS = 5
+_LIVELY = 0.04  # least range of a part, of that of the whole
+_REPEATS = 0.7  # least correlation of a signal with itself a period later
+_OF_A_PERIOD = 0.125  # lags beyond that part of a period are told from none by the harmonics alone
 _AS_GOOD = 1.5  # times the least residual: lags up to it count as equally good
 
 
@@ -57,7 +63,59 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
         and residual[reach] > _WRONG**2 * total[reach]
         and at < _BETTER**2 * residual[reach]
     )
-    return Lag(float((best - reach + fraction[nearest]) * block), bool(clear))
+    samples = float(best - reach + fraction[nearest])
+    return Lag(samples * block, bool(clear) and abs(samples) <= _OF_A_PERIOD * _period(centred))
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Lag in s over a log: its middle and how well that is known, its drift in s/s, likewise."""
+
+    seconds: float
+    error: float
+    drift: float
+    drift_error: float
+
+
+def find_trend(signal: Array, explained_by: Array, kept: Array, block: float) -> Trend | None:
+    """The lag in each part of a log; None where too few parts tell one."""
+    edges = np.linspace(0, len(signal), PARTS + 1).astype(int)
+    found = []
+    for first, last in pairwise(edges):
+        part = slice(first, last)
+        if kept[part].mean() > 0.5 and np.ptp(signal[part]) > _LIVELY * np.ptp(signal):
+            lag = find_lag(signal[part], explained_by[part], kept[part], block)
+            found.append((0.5 * (first + last) * block, lag.seconds))
+    if len(found) < _FEWEST_PARTS:
+        return None
+    times, lags = np.array(found).T
+    times = times - times.mean()
+    middle = float(np.median(lags))
+    spread = 1.4826 * float(np.median(np.abs(lags - middle)))
+    slopes = [
+        (lags[j] - lags[i]) / (times[j] - times[i])
+        for i in range(len(lags)) for j in range(i + 1, len(lags))
+    ]  # fmt: skip
+    drift = float(np.median(slopes))
+    left = 1.4826 * float(np.median(np.abs(lags - middle - drift * times)))
+    length = float(np.linalg.norm(times))
+    return Trend(middle, 1.25 * spread / len(lags) ** 0.5, drift, 1.25 * left / length)
+
+
+def _period(signal: Array) -> float:
+    """Samples (inf where it does not) after which a signal (n,) of zero mean repeats itself."""
+    half = len(signal) // 2
+    power = np.concatenate([[0.0], np.cumsum(signal**2)])
+    spectrum = np.fft.rfft(signal, 2 * len(signal))
+    total = np.fft.irfft(np.abs(spectrum) ** 2)[:half]
+    lags = np.arange(half)
+    overlap = np.sqrt((power[len(signal) - lags]) * (power[-1] - power[lags]))
+    alike = total / np.maximum(overlap, np.finfo(float).tiny)
+    below = np.flatnonzero(alike < 0.0)
+    if not len(below):
+        return float("inf")
+    again = np.flatnonzero(alike[below[0] :] > _REPEATS)
+    return float(below[0] + again[0]) if len(again) else float("inf")
 
 
 def _unit_columns(matrix: Array) -> Array:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.log.check.axis import Axis
+from twin.log.check.breaks import find_breaks, held_samples, is_uneven
 from twin.log.check.report import Fault, Finding, Severity
 from twin.signals import Array
 
@@ -20,14 +22,15 @@ _FEWEST_ROUGH = 5
 
 def check(axis: Axis) -> Iterator[Finding]:
     """Outliers in position and command."""
-    jumps = np.flatnonzero(axis.jumps) + 1
+    jumps = _unexplained_jumps(axis)
     if len(jumps):
         unit = axis.log.units["position"]
         yield _outliers(
             axis,
             jumps / axis.sample_rate,
-            f"position bends by up to {axis.jumps.max():.3g} {unit} within a sample, its usual "
-            f"motion and noise allow {axis.possible_jump:.2g} {unit}",
+            f"position bends by up to {axis.jumps[jumps - 1].max():.3g} {unit} within a sample, "
+            f"its usual motion and noise allow {axis.possible_jump:.2g} {unit}",
+            "cut the log there (was the carriage touched?) or repair the samples",
         )
     if not axis.moves:
         return
@@ -36,6 +39,16 @@ def check(axis: Axis) -> Iterator[Finding]:
         yield _outliers(axis, rough, "the force jumps to and fro from sample to sample")
     else:
         yield from _contradictions(axis)
+
+
+def _unexplained_jumps(axis: Axis) -> NDArray[np.intp]:
+    """Samples (k,) where the position bends, but for those that another check names."""
+    if held_samples(axis.log.position) or is_uneven(axis):
+        return np.empty(0, dtype=np.intp)
+    jumps = np.flatnonzero(axis.jumps) + 1
+    for found in find_breaks(axis):
+        jumps = jumps[(jumps < found.first - 2) | (jumps > found.last + 2)]
+    return jumps
 
 
 def _rough_command(axis: Axis) -> Array:
@@ -76,7 +89,12 @@ def _usual(axis: Axis, values: Array) -> float:
     return float(np.quantile(values, 1.0 - max(0.01, burst)))
 
 
-def _outliers(axis: Axis, times: Array, what: str) -> Finding:
+def _outliers(
+    axis: Axis,
+    times: Array,
+    what: str,
+    remedy: str = "cut the log there (was an end stop hit, the carriage touched?)",
+) -> Finding:
     bursts = np.split(times, np.flatnonzero(np.diff(times) > _APART) + 1)
     more = f" and {len(bursts) - 1} more times" if len(bursts) > 1 else ""
     return Finding(
@@ -85,5 +103,5 @@ def _outliers(axis: Axis, times: Array, what: str) -> Finding:
         axis.name,
         what,
         f"{bursts[0][0]:.6g} to {bursts[0][-1]:.6g} s{more}",
-        "cut the log there (was an end stop hit, the carriage touched?) or repair the samples",
+        remedy,
     )

@@ -14,6 +14,10 @@ from twin.signals import Array
 ALLOWED = 3e-3  # s
 ALLOWED_SAMPLES = 2.0
 PHYSICAL = 10e-3  # s, what a slow drive may account for
+STEADY = 0.25e-3  # s, what friction that the check does not know may account for
+STEADY_SAMPLES = 1.5
+SURE = 5.0  # times the error
+DRIFT = 60e-6  # s/s
 FOLLOWING = 30e-3  # s, what a slow position loop may account for
 
 
@@ -35,6 +39,8 @@ def check(axis: Axis) -> Iterator[Finding]:
             "whole log",
             f"{_remedy(axis, late, lag)}{', unless the drive has that dead time' * dead_time}",
         )
+    else:
+        yield from _steady(axis)
     if "velocity" in columns:
         lag = _lag(axis, axis.smoother.rate(columns["velocity"]), axis.velocity)
         if abs(lag) > allowed:
@@ -46,6 +52,32 @@ def check(axis: Axis) -> Iterator[Finding]:
         if lag < -allowed or lag > max(allowed, FOLLOWING):
             late = "position" if lag > 0.0 else "setpoint_position"
             yield _disagree(axis, "position", "its setpoint", late, lag)
+
+
+def _steady(axis: Axis) -> Iterator[Finding]:
+    """A lag or a drift too small to be seen at once, but the same in all parts of the log."""
+    trend = axis.trend
+    if trend is None or not axis.dynamics.explains:
+        return
+    if abs(trend.drift) > max(DRIFT, SURE * trend.drift_error):
+        yield Finding(
+            Severity.WARNING, Fault.DRIFT, axis.name,
+            f"the force gets {abs(trend.drift) * 1e3:.2g} ms a second "
+            f"{'later' if trend.drift > 0.0 else 'earlier'} against the position "
+            f"({abs(trend.drift) * 1e6:.3g} ppm, +- {trend.drift_error * 1e6:.2g}): two clocks",
+            "whole log", "record both with one clock, or import each with time stamps",
+        )  # fmt: skip
+        return
+    least = max(STEADY_SAMPLES / axis.sample_rate, STEADY, SURE * trend.error)
+    if least < abs(trend.seconds) < PHYSICAL:
+        late = "force" if trend.seconds > 0.0 else "position"
+        yield Finding(
+            Severity.WARNING, Fault.LAG, axis.name,
+            f"the force is {_text(axis, trend.seconds)} the motion that it causes, "
+            f"+- {trend.error * 1e3:.2g} ms",
+            "whole log",
+            f"{_remedy(axis, late, trend.seconds)}, unless the drive has that dead time",
+        )  # fmt: skip
 
 
 def _lag(axis: Axis, signal: Array, other: Array) -> float:

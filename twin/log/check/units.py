@@ -30,6 +30,7 @@ class _Pair:
     other: Array
     low: float
     high: float
+    zero: bool = False  # whether 0 is the same on both sides, as of speeds and not of positions
 
 
 def check(axis: Axis) -> Iterator[Finding]:
@@ -65,11 +66,11 @@ def _pairs(axis: Axis) -> Iterator[_Pair]:
                     "setpoint_position", smoother.position(setpoint), 0.5, 2.0)  # fmt: skip
     if "velocity" in columns:
         yield _Pair("velocity", smoother.rate(columns["velocity"]),
-                    "the rate of position", axis.velocity, 0.95, 1.05)  # fmt: skip
+                    "the rate of position", axis.velocity, 0.95, 1.05, True)  # fmt: skip
     if setpoint is not None and velocity is not None:
         yield _Pair("setpoint_velocity", smoother.rate(velocity),
                     "the rate of setpoint_position", smoother.velocity(setpoint),
-                    0.95, 1.05)  # fmt: skip
+                    0.95, 1.05, True)  # fmt: skip
     if setpoint is not None and acceleration is not None:
         yield _Pair("setpoint_acceleration", smoother.rate(acceleration),
                     "the second rate of setpoint_position", smoother.acceleration(setpoint),
@@ -80,7 +81,9 @@ def _pairs(axis: Axis) -> Iterator[_Pair]:
 
 
 def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
-    one, other = pair.signal - pair.signal.mean(), pair.other - pair.other.mean()
+    one, other = pair.signal, pair.other
+    if not pair.zero:
+        one, other = one - one.mean(), other - other.mean()
     power = float(other @ other)
     if power == 0.0 or not axis.moves:
         return

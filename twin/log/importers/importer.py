@@ -9,13 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from twin.errors import InputError
-from twin.log.container import at, reading
-from twin.log.importers import csv_text, hdf5, mat, parquet, tdms
+from twin.errors import InputError, at
+from twin.log.container import reading
+from twin.log.importers import csv_text, hdf5, json_table, mat, parquet, tdms
 from twin.log.importers.mapping import ImportMap
+from twin.log.importers.resample import clock_of
 from twin.log.importers.sample_rate import rate_of
 from twin.log.importers.table import Table, numbers
 from twin.log.log import Array, AxisLog, Log
+
+_EARLIEST, _LATEST = 5e8, 5e9  # s since 1970, between which a time is that of a calendar
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,7 @@ FORMATS: Mapping[str, Format] = {
     "mat": Format((".mat",), mat.read),
     "hdf5": Format((".h5", ".hdf5", ".hdf", ".he5"), hdf5.read),
     "parquet": Format((".parquet", ".pq"), parquet.read),
+    "json": Format((".json",), json_table.read),
     "tdms": Format((".tdms",), tdms.read),
 }
 
@@ -49,8 +53,15 @@ def import_log(path: str | Path, mapping: ImportMap) -> Log:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()
         table = FORMATS[name].read(path, mapping)
         columns = {n: numbers(n, raw) for n, raw in table.columns.items()}
+        start = _start(table, mapping, columns)
         count = _common_length(columns)
-        rate = _sample_rate(table, mapping, columns)
+        notes: dict[str, str] = {}
+        if mapping.resample is None:
+            rate = _sample_rate(table, mapping, columns)
+        else:
+            rate = mapping.resample
+            columns, notes = _on_one_clock(mapping, columns)
+            count = _common_length(columns)
         for column, values in columns.items():
             _require_finite(column, values, rate)
         span = _undelayed(mapping, count)
@@ -59,8 +70,41 @@ def import_log(path: str | Path, mapping: ImportMap) -> Log:
         "original_format": name,
         "original_sha256": digest,
         "import_map": mapping.text,
+        **start,
+        **notes,
     }
     return Log(rate, _axes(mapping, columns, span), metadata)
+
+
+def _on_one_clock(
+    mapping: ImportMap, columns: Mapping[str, Array]
+) -> tuple[dict[str, Array], dict[str, str]]:
+    """The columns resampled, and for the metadata what that cost."""
+    assert mapping.time is not None
+    assert mapping.resample is not None
+    with at(f"column '{mapping.time.column}'"):
+        clock = clock_of(mapping.time.to_si(columns[mapping.time.column]), mapping.resample)
+    even = {n: clock.resampled(c) for n, c in columns.items() if n != mapping.time.column}
+    costs = [
+        f"{axis}.{field} {c.unit.size * abs(c.scale) * clock.cost(columns[c.column]):.2g} "
+        f"{entry.units[field]}"
+        for axis, entry in mapping.axes.items()
+        for field, c in entry.columns.items()
+    ]
+    return even, {"resampled": f"{clock}; error rms about {', '.join(costs)}"}
+
+
+def _start(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> dict[str, str]:
+    """When the recording began by the wall clock, where its times are those since 1970."""
+    if mapping.time is None:
+        return {}
+    raw = np.asarray(table.columns[mapping.time.column])
+    if raw.dtype.kind == "M" and len(raw):
+        return {"start_time_unix_ns": str(int(raw[0].astype("datetime64[ns]").astype(np.int64)))}
+    first = mapping.time.to_si(columns[mapping.time.column][:1])
+    if len(first) and _EARLIEST < first[0] < _LATEST:
+        return {"start_time_unix_ns": str(round(float(first[0]) * 1e9))}
+    return {}
 
 
 def _format_name(path: Path, mapping: ImportMap) -> str:
@@ -146,5 +190,11 @@ def _axes(mapping: ImportMap, columns: Mapping[str, Array], span: range) -> dict
             )
             for field, c in axis.columns.items()
         }
+        for field, values in signals.items():
+            if not np.isfinite(values).all():
+                raise InputError(
+                    f"axes.{name}.{field} is too large for a number after unit, scale and offset; "
+                    "correct them in the map"
+                )
         axes[name] = AxisLog(signals, axis.units, axis.force_constant)
     return axes

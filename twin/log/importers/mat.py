@@ -5,7 +5,7 @@ A field of a struct is named ``struct.field``, whatever the version.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,20 +13,28 @@ import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
+from twin.apart import apart
 from twin.log.importers import hdf5
 from twin.log.importers.mapping import ImportMap
 from twin.log.importers.table import Table, parsing, require_columns, split_columns
+
+LONGEST = 600.0  # s
 
 
 def read(path: Path, mapping: ImportMap) -> Table:
     """Columns of a MAT file; raises InputError."""
     if hdf5.is_hdf5(path):
         return hdf5.read_named(path, mapping, separator=".")
+    # In a process of its own: SciPy's reader of damaged files may crash.
+    return Table(apart(_read, path, mapping.column_names(), seconds=LONGEST))
+
+
+def _read(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
     with parsing("MAT"):
         content = scipy.io.loadmat(path, simplify_cells=True)
     columns = _columns("", {k: v for k, v in content.items() if not k.startswith("__")})
-    require_columns(mapping.column_names(), columns)
-    return Table({name: columns[name] for name in mapping.column_names()})
+    require_columns(names, columns)
+    return {name: columns[name] for name in names}
 
 
 def _columns(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:

@@ -42,8 +42,9 @@ def rate_of(time: Array) -> float:
 
 
 def _uneven(fault: str, time: Array, row: int, period: float) -> InputError:
+    rate = 1.0 / max(period, 1e-9)
     return InputError(
         f"the time {fault}: {time[row - 1]:.9g} s is followed by {time[row]:.9g} s in row "
-        f"{row + 1}, usual are {period:.6g} s a sample; resample the log evenly, or state "
-        "sample_rate in place of time where only the printed times are inexact"
+        f"{row + 1}, usual are {period:.6g} s a sample; give resample = {rate:.6g} "
+        "(Hz) in the map, or sample_rate in place of time where only the printed times are inexact"
     )

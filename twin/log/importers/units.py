@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 from twin.errors import InputError
 from twin.log.log import LINEAR_UNITS, ROTARY_UNITS
@@ -54,6 +57,7 @@ _QUANTITIES: Mapping[str, Mapping[str, float]] = {
 }
 # what only a scale turns into a physical quantity
 _RAW = ("V", "mV", "count", "counts", "increment", "increments", "digit", "digits", "%", "1")
+_WORD = re.compile(r"^[A-Za-z][A-Za-z0-9_*/^]{0,30}$")
 _SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "·": "", "*": "", " ": ""})
 
 
@@ -78,6 +82,9 @@ def find_unit(text: str, *allowed: str) -> Unit:
             return Unit(_QUANTITIES[si][plain], si)
     if plain in _RAW:
         return Unit(1.0, None)
+    for si in allowed:
+        if (size := _size_by_library(text.strip(), si)) is not None:
+            return Unit(size, si)
     known = [unit for si in allowed for unit in _QUANTITIES[si]]
     by_lower = {unit.lower(): unit for unit in reversed(known)}
     near = difflib.get_close_matches(plain.lower(), by_lower, n=1, cutoff=0.55)
@@ -86,6 +93,26 @@ def find_unit(text: str, *allowed: str) -> Unit:
         f"unit '{text}' is not known here; {hint}give a unit of {' or '.join(allowed)} "
         f"({', '.join(known[:6])}, ...), or V or counts with a scale"
     )
+
+
+def _size_by_library(text: str, si: str) -> float | None:
+    """One of a rarer unit, such as kip or lbf in, in SI; None where it is of another quantity.
+
+    Angles have no dimension there, so that anything would pass for one.
+    """
+    if "rad" in si or not _WORD.search(text):
+        return None
+    try:
+        return float(_registry()(text.replace("·", "*")).to(si.replace(" ", "*")).magnitude)
+    except Exception:  # whatever a parser of any text may raise: then it is no unit
+        return None
+
+
+@cache
+def _registry() -> Any:
+    import pint  # takes a second to load, for the few who need it
+
+    return pint.UnitRegistry()
 
 
 def field_unit(field: str, text: str) -> Unit:

@@ -1,0 +1,141 @@
+"""Proof against decoys: whether an effect gains more than its own columns do where they are untrue.
+
+Where something else remains above the noise floor, noise is no yardstick for an effect: a smooth
+remainder is lessened by any smooth columns. A decoy has the effect's own columns, shifted in time
+within each log by 10 to 90 % of it: as many, as smooth, as large, and true to nothing. Base and
+effect are solved in one linear step on the fit logs, and scored on the held-out logs; on blocks
+left out where there are none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.estimation.decision import RULE
+from identify.estimation.evidence import left_out
+from identify.estimation.fit import Fit
+from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.time_origin import depends_on_time_origin
+from twin.effect import Kind
+from twin.model.machine import AxisModel, Fitted
+from twin.model.parameters import ParameterReference
+
+Array = NDArray[np.float64]
+
+DECOYS = 40
+SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
+SEED = 0  # of the shifts, the same for each effect
+RIDGE = 1e-4  # of a column's length, which keeps what the motion does not excite finite
+
+
+@dataclass(frozen=True)
+class Proof:
+    """Part of the squared test error that an effect takes, and the most that a decoy takes, 0..1.
+
+    Both may be below zero, where the test error rises.
+    """
+
+    gain: float
+    best_decoy: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the effect leaves clearly less than its best decoy."""
+        return 1.0 - self.gain < RULE.beside_decoys * (1.0 - self.best_decoy)
+
+
+def proof(without: Fit, fitted: Fitted, dataset: Dataset) -> Proof | None:
+    """How an effect, at the shape it was found with, does beside a fit without it, and its decoys.
+
+    None where a shift in time makes no decoy: a friction takes the place of another, and what
+    depends on the time alone is as true at any other.
+    """
+    axis = without.axis.with_effect(fitted)
+    where = [
+        ParameterReference(fitted.effect.name, p)
+        for p in fitted.effect.strengths
+        if p.name not in fitted.fixed
+    ]
+    timed = depends_on_time_origin(_alone(axis, fitted), dataset)
+    if fitted.effect.kind is Kind.FRICTION or timed or not where:
+        return None
+    fit, held = (_Part.of(without, axis, where, logs) for logs in (dataset.fit, dataset.holdout))
+    rng = np.random.default_rng(SEED)
+    before = _left(fit, held, None)
+    gain = 1.0 - _left(fit, held, np.zeros(len(dataset.logs))) / before
+    decoys = (
+        1.0 - _left(fit, held, rng.uniform(*SHIFTS, len(dataset.logs))) / before
+        for _ in range(DECOYS)
+    )
+    return Proof(float(gain), float(max(decoys)))
+
+
+def _alone(axis: AxisModel, fitted: Fitted) -> AxisModel:
+    others = [n for n in axis.names if n != fitted.effect.name]
+    for name in others:
+        axis = axis.without(name)
+    return axis
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Some logs: residual (n,) N and the base's columns (n, k) where the axis moves (kept).
+
+    columns: of the effect, (m, j) for each log.
+    """
+
+    force: Array
+    base: Array
+    columns: Sequence[Array]
+    kept: NDArray[np.bool_]
+
+    @classmethod
+    def of(
+        cls,
+        without: Fit,
+        axis: AxisModel,
+        where: Sequence[ParameterReference],
+        logs: Sequence[PreparedLog],
+    ) -> _Part | None:
+        if not logs:
+            return None
+        kept = moving(logs, sticks(axis))
+        ends = np.cumsum([len(log) for log in logs])[:-1]
+        return cls(
+            residual(without.axis, logs)[kept],
+            jacobian(without.axis, logs, without.scaling.where)[kept],
+            np.split(jacobian(axis, logs, where), ends),
+            kept,
+        )
+
+    def with_effect(self, shifts: Array | None) -> Array:
+        """Columns (n, k + j) of base and effect, shifted by parts of each log; None: base alone."""
+        if shifts is None:
+            return self.base
+        moved = [
+            np.roll(c, round(shift * len(c)), axis=0)
+            for c, shift in zip(self.columns, shifts, strict=True)
+        ]
+        return np.hstack([self.base, np.concatenate(moved)[self.kept]])
+
+
+def _left(fit: _Part | None, held: _Part | None, shifts: Array | None) -> float:
+    """Mean squared test error N^2 after a linear step with the effect so shifted."""
+    assert fit is not None
+    there = None if shifts is None else shifts[: len(fit.columns)]
+    columns = fit.with_effect(there)
+    norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    columns = columns / norms
+    normal = columns.T @ columns + RIDGE**2 * np.eye(len(norms))
+    step = np.linalg.solve(normal, columns.T @ fit.force)
+    if held is None:
+        solved = fit.force - columns @ step
+        return float(np.mean(left_out(solved, columns, np.full(len(norms), RIDGE)) ** 2))
+    rest = None if shifts is None else shifts[len(fit.columns) :]
+    return float(np.mean((held.force - held.with_effect(rest) / norms @ step) ** 2))

@@ -1,0 +1,121 @@
+"""What a diagnosis of one axis is: its verdict, its findings, and the steps that led there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property
+
+from identify.dataset.dataset import Dataset
+from identify.estimation.fit import Fit
+from identify.selection.candidates import Candidate
+from identify.selection.findings import Finding, found
+from identify.selection.repeating_force import Repeat, not_general
+from identify.selection.residual_dependence import Dependence
+
+
+class Verdict(Enum):
+    """The answer of a diagnosis."""
+
+    MISSING_EFFECT = "missing effect"
+    NOTHING_MISSING = "nothing missing"
+    AMBIGUOUS = "ambiguous"
+    UNEXPLAINED = "unexplained"
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One added effect, and the earlier ones that are not needed any more beside it.
+
+    tied: effects that explain as much. beside: for a pair, the other effect, without which this one
+    has no evidence. rivals: candidates that explained about as much when it was added. proved:
+    whether it is named where steps are.
+    """
+
+    candidate: Candidate
+    tied: tuple[str, ...]
+    dropped: tuple[str, ...] = ()
+    beside: str | None = None
+    rivals: tuple[Candidate, ...] = ()
+    proved: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class SelectionState:
+    """The steps so far, and the fit with the effects that they added."""
+
+    steps: tuple[Step, ...]
+    fit: Fit
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AxisDiagnosis:
+    """Diagnosis of one axis.
+
+    base: the fitted model. ranking: candidates beside it, by falling evidence. steps: the effects
+    added one after another while there was evidence. final: the fit with those that were kept.
+    unexplained: what the residual depends on, where it is not noise. findings: what each named
+    effect explains, by ``with_findings``.
+    """
+
+    dataset: Dataset
+    base: Fit
+    ranking: tuple[Candidate, ...]
+    steps: tuple[Step, ...]
+    final: Fit
+    verdict: Verdict
+    unexplained: Dependence | None
+    findings: tuple[Finding, ...] = ()
+
+    def __repr__(self) -> str:
+        answer = f"{self.verdict.name.lower()} {list(self.answers)}"
+        return f"<AxisDiagnosis of {self.dataset.axis}: {answer}>"
+
+    @cached_property
+    def repeat(self) -> Repeat | None:
+        """A force that repeats along the track in each log, but at other places in each."""
+        return None if self.final.at_floor else not_general(self.final, self.dataset)
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Names of the effects that are missing, in the order they were found."""
+        return tuple(answer[0] for answer in self.answers)
+
+    @property
+    def answers(self) -> tuple[tuple[str, ...], ...]:
+        """Each missing effect, followed by those that explain as much."""
+        if self.verdict not in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS):
+            return ()
+        return tuple((s.candidate.effect.name, *s.tied) for s in self._proved)
+
+    @property
+    def best(self) -> Candidate | None:
+        """The candidate that is named first, where one is."""
+        return self._proved[0].candidate if self.named else None
+
+    @property
+    def ambiguous_with(self) -> tuple[str, ...]:
+        """Effects that explain as much as the one named first."""
+        return self._proved[0].tied if self.named else ()
+
+    def with_findings(self) -> AxisDiagnosis:
+        """The same with what each named effect explains, which takes a refit for each."""
+        steps = self._proved if self.named else []
+        return replace(
+            self,
+            findings=tuple(
+                found(s.candidate.effect, s.tied, self.base, self.final, self.dataset)
+                for s in steps
+            ),
+        )
+
+    @property
+    def _proved(self) -> list[Step]:
+        return [s for s in kept(self.steps) if s.proved]
+
+
+def kept(steps: Sequence[Step]) -> list[Step]:
+    """The steps whose effects were not dropped later."""
+    dropped = {name for s in steps for name in s.dropped}
+    return [s for s in steps if s.candidate.effect.name not in dropped]

@@ -1,0 +1,55 @@
+"""Findings: what a missing effect explains of the test error, and how it does beside decoys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from identify.dataset.dataset import Dataset
+from identify.estimation.fit import Fit, error_on, rms
+from identify.selection.decoys import Proof, proof
+from identify.selection.ranking import less
+from twin.effect import Effect
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A missing effect that the data prove.
+
+    tied: effects that these data cannot separate from it. explains: part of the squared test error
+    above the noise floor that comes back when it alone is taken out, about 0..1. error_before,
+    error_after: RMS test error in ``unit`` without it and with it. parameters: of its law.
+    proof: beside decoys; None where a shift in time makes none.
+    """
+
+    effect: str
+    tied: tuple[str, ...]
+    explains: float
+    error_before: float
+    error_after: float
+    unit: str
+    parameters: dict[str, float]
+    proof: Proof | None
+
+
+def found(
+    effect: Effect, tied: tuple[str, ...], base: Fit, final: Fit, dataset: Dataset
+) -> Finding:
+    """The finding of one effect of a final fit, all others left in it."""
+    without = less(effect, final, base, dataset)
+    before, after, first = (test_error(f, dataset) for f in (without, final, base))
+    above = first**2 - base.floor**2
+    return Finding(
+        effect=effect.name,
+        tied=tied,
+        explains=(before**2 - after**2) / above if above > 0.0 else 0.0,
+        error_before=before,
+        error_after=after,
+        unit=final.axis.units.force,
+        parameters=dict(final.axis[effect.name].values),
+        proof=proof(without, final.axis[effect.name], dataset),
+    )
+
+
+def test_error(fit: Fit, dataset: Dataset) -> float:
+    """RMS force error (N) on the held-out logs, or on the fit logs where there are none."""
+    return rms(error_on(fit.axis, dataset.holdout)) if dataset.holdout else fit.error

@@ -1,0 +1,47 @@
+"""What was measured, what the model says and what is left, on one clock, for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.force_balance import residual
+from identify.validation.free_run import free_run
+from twin.model.machine import MachineModel
+from twin.signals import Array
+
+
+@dataclass(frozen=True, eq=False)
+class SideBySide:
+    """Of one log. sample_rate: Hz; topics: "/measured/x" -> column -> (n,) in units of the axis.
+
+    The position of the model is that of the free run; its force is averaged by test functions.
+    """
+
+    sample_rate: float
+    topics: Mapping[str, Mapping[str, Array]]
+
+
+def side_by_side(model: MachineModel, parts: Mapping[str, PreparedLog]) -> SideBySide:
+    """Measured, model and residual of the axes of one log; raises CannotRun."""
+    run = free_run(model, parts)
+    first = max(int(np.argmax(np.isfinite(error))) for error in run.error.values())
+    topics: dict[str, dict[str, Array]] = {}
+    for axis, log in parts.items():
+        motion = log.motion
+        position, velocity, command = motion.at_samples(0.0)
+        times = motion.sample_period * np.arange(len(position))
+        left = np.interp(times, log.time - log.motion.time[0], residual(model.axes[axis], [log]))
+        force = np.interp(times, log.time - log.motion.time[0], log.command)
+        off = np.nan_to_num(run.error[axis])
+        columns = {
+            "measured": {"position": position, "velocity": velocity, "force": command},
+            "model": {"position": position + off, "force": force - left},
+            "residual": {"position": -off, "force": left},
+        }
+        for kind, signals in columns.items():
+            topics[f"/{kind}/{axis}"] = {n: c[first : len(off)] for n, c in signals.items()}
+    return SideBySide(1.0 / next(iter(parts.values())).motion.sample_period, topics)

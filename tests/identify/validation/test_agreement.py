@@ -1,0 +1,106 @@
+"""Two fits: whether they agree, what differs, and which effect would make the difference."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from cli_runs import twin
+
+import identify
+from identify.testing import assert_agree
+from identify.validation.agreement import agreement
+from twin.effects import Catalogue, load_catalogue
+from twin.errors import InputError
+from twin.model.file import load_model, save_model
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.model.parameters import free_parameters, read, write
+
+FEW = Catalogue(
+    [load_catalogue()[n] for n in ("constant_force", "payload_mass", "quadratic_drag", "wear")]
+)
+CATALOGUE = load_catalogue()
+
+
+def fitted(width: float = 0.01, **moved: float) -> MachineModel:
+    """A slide whose parameters have intervals of this relative half width, some of them moved."""
+    friction = Fitted.at_start(CATALOGUE["coulomb_viscous"], {"Fc": 0.3, "Fs": 0.3, "sigma2": 0.2})
+    cable = Fitted.at_start(CATALOGUE["cable_slab"], {"offset": 0.1, "k1": 1.0})
+    axis = AxisModel(10.0, Hardware(travel=(-0.15, 0.15)), (friction, cable))
+    where = free_parameters(axis)
+    values = dict(zip([c.label for c in where], read(axis, where), strict=True))
+    values |= {name.replace("__", "."): v for name, v in moved.items()}
+    axis = write(axis, where, list(values.values()))
+    ends = {k: (v - width * abs(v) - 1e-4, v + width * abs(v) + 1e-4) for k, v in values.items()}
+    return MachineModel("slide", {"x": axis}, 2000.0).with_intervals("x", ends)
+
+
+def test_a_fit_agrees_with_itself_and_with_one_within_its_interval() -> None:
+    assert identify.agree(fitted(), fitted(), catalogue=FEW).agrees
+    assert identify.agree(fitted(), fitted(coulomb_viscous__sigma2=0.202), catalogue=FEW).agrees
+
+
+def test_what_differs_is_named_with_its_size_and_the_effects_that_would_make_it() -> None:
+    other = fitted(mass=10.5, cable_slab__offset=0.3)
+    found = agreement(fitted(), other, FEW).axes["x"]
+    assert {d.label for d in found.differing} == {"mass", "cable_slab.offset"}
+    mass = next(d for d in found.differing if d.label == "mass")
+    assert mass.b - mass.a == pytest.approx(0.5)
+    assert mass.ratio == pytest.approx(0.5 / mass.standard_error)
+    # Half widths of 1 % of 10 kg and of 10.5 kg, 1.699 standard errors each.
+    assert mass.standard_error == pytest.approx((0.1001**2 + 0.1051**2) ** 0.5 / 1.699, rel=1e-3)
+    assert {c.effect for c in found.causes} == {"payload_mass", "constant_force"}
+    assert sum(c.share for c in found.causes) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_an_effect_that_one_fit_has_alone_is_one_of_no_strength_in_the_other() -> None:
+    more = Fitted.at_start(CATALOGUE["constant_force"], {"F0": 0.2})
+    base = fitted()
+    axis = base.axes["x"].with_effect(more)
+    ends = {**base.intervals["x"], "constant_force.F0": (0.19, 0.21)}
+    richer = base.with_axis("x", axis).with_intervals("x", ends)
+    found = agreement(base, richer, FEW).axes["x"]
+    assert found.only_b == ("constant_force",)
+    assert [d.label for d in found.differing] == ["constant_force.F0"]
+
+
+def test_intervals_travel_with_the_file_and_leave_with_what_they_belong_to(tmp_path: Path) -> None:
+    path = tmp_path / "fitted.toml"
+    save_model(fitted(), path)
+    read_back = load_model(path, CATALOGUE)
+    assert read_back.intervals == fitted().intervals
+    edited = path.read_text().replace("mass = 10.0", "mass = 12.0")
+    path.write_text(edited)
+    assert "mass" not in load_model(path, CATALOGUE).intervals["x"]
+    changed = read_back.with_axis("x", replace(read_back.axes["x"], mass=9.0))
+    assert "x" not in changed.intervals
+    start = edited.split("[intervals")[0]
+    for entry in ('x."gms.k9" = [1, 2]', "x.mass = [3, 2]", 'x.mass = "wide"', "z.mass = [1, 2]"):
+        path.write_text(f"{start}\n[intervals]\n{entry}\n")
+        with pytest.raises(InputError, match="intervals"):
+            load_model(path, CATALOGUE)
+
+
+def test_the_helper_for_other_peoples_tests_says_what_differs(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    save_model(fitted(), path)
+    assert_agree(path, fitted(), catalogue=CATALOGUE)
+    with pytest.raises(AssertionError, match=r"mass differs by 1 kg.*\n.*RMS"):
+        assert_agree(str(path), fitted(mass=11.0), catalogue=CATALOGUE)
+    with pytest.raises(InputError, match="nothing can be compared"):
+        assert_agree(path, load_model("proton_xy", CATALOGUE))
+
+
+def test_the_command_ends_with_1_where_the_fits_differ(tmp_path: Path) -> None:
+    for name, model in (("a", fitted()), ("b", fitted(mass=10.01)), ("c", fitted(mass=12.0))):
+        save_model(model, tmp_path / f"{name}.toml")
+    assert twin("agree", "a.toml", "b.toml", folder=tmp_path).returncode == 0
+    done = twin("agree", "a.toml", "c.toml", "--json", folder=tmp_path)
+    assert done.returncode == 1
+    found = json.loads(done.stdout)
+    assert not found["agree"]
+    assert found["axes"]["x"]["differing"] == ["mass"]
+    assert found["axes"]["x"]["parameters"]["mass"]["in_standard_errors"] > 3.0
+    assert "payload_mass" in [c["effect"] for c in found["axes"]["x"]["causes"]]

@@ -1,0 +1,200 @@
+"""Every entry of a model and of an experiment with every wrong type, value and nesting."""
+
+from __future__ import annotations
+
+import copy
+import datetime
+import json
+import math
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import pytest
+
+from twin.effects import load_catalogue
+from twin.errors import InputError
+from twin.experiments.file import load_experiment, parse_experiment
+from twin.experiments.kinds import KINDS
+from twin.log.importers import load_mapping
+from twin.model.file import load_model, models_folder, parse_model
+from twin.model.schema import AxisEntry
+
+CATALOGUE = load_catalogue()
+WRONG: tuple[Any, ...] = (
+    True, False, 0, -1, -1e-300, 1e300, -1e300, math.nan, math.inf, -math.inf, 10**400, "", "2.0",
+    "x\n\x00", "a" * 300, [], [1.0], [[1.0]], [1.0, 2.0, 3.0], [True, "x"], {}, {"a": {"b": 1}},
+    {"": []}, [{}], [{"mass": 1}], datetime.date(2020, 1, 1), datetime.time(1), None,
+)  # fmt: skip
+HISTORY = {"action": "add", "effect": "cogging", "axis": "x", "fit_error_before": 2.0,
+           "fit_error_after": 1.0, "unit": "N", "notes": ["why"]}  # fmt: skip
+
+MAP = """
+format = "csv"
+delimiter = ";"
+decimal = ","
+header_line = 1
+time = {column = "t", unit = "s"}
+[axes.x]
+force_constant = 2.0
+position = {column = "q", unit = "mm", sign = -1, offset = 1.0, delay_samples = 2}
+force = {column = 3, unit = "V", scale = 35.0}
+"""
+
+
+def complete() -> dict[str, Any]:
+    """A document that has every entry of a model, with a few effects."""
+    text = (models_folder() / "proton_xy.toml").read_text()
+    document = tomllib.loads(text)
+    document.pop("mujoco")
+    document["history"] = [dict(HISTORY)]
+    document["axes"]["x"]["fixed"] = ["mass"]
+    document["axes"]["x"]["effects"]["gms"] = {"elements": 3}
+    del document["axes"]["x"]["effects"]["lugre"]
+    return document
+
+
+def places(document: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """The path of every table, list and value."""
+    if path:
+        yield path
+    if isinstance(document, dict):
+        for key in document:
+            yield from places(document[key], (*path, key))
+    elif isinstance(document, list):
+        for i, value in enumerate(document):
+            yield from places(value, (*path, i))
+
+
+def changed(document: Any, path: tuple[Any, ...], value: Any) -> Any:
+    copied = copy.deepcopy(document)
+    at = copied
+    for key in path[:-1]:
+        at = at[key]
+    at[path[-1]] = value
+    return copied
+
+
+def test_every_entry_of_a_model_with_everything_wrong() -> None:
+    document = complete()
+    parse_model(document, CATALOGUE, None, "m.toml")
+    answers = [
+        answer(lambda p=path, v=value: parse_model(changed(document, p, v), CATALOGUE, None, "m"))
+        for path in places(document)
+        for value in WRONG
+    ]
+    refused = [a for a in answers if a is not None]
+    assert len(refused) > 1500
+    for text in refused:
+        assert text.startswith("m: ")
+        assert "\n" not in text
+        assert len(text) < 800
+
+
+def answer(load: Callable[[], object]) -> str | None:
+    """What a refusal says; any other error is a fault of the program."""
+    try:
+        load()
+    except InputError as error:
+        return str(error)
+    return None
+
+
+def test_no_wrong_type_passes_for_a_number() -> None:
+    document = complete()
+    numbers = [
+        path for path in places(document)
+        if isinstance(value_at(document, path), float) and path[0] != "history"
+    ]  # fmt: skip
+    assert len(numbers) > 20
+    for path in numbers:
+        for value in (True, False, "1", [1.0], {"a": 1.0}, math.nan, -math.inf, 10**400):
+            with pytest.raises(InputError):
+                parse_model(changed(document, path, value), CATALOGUE, None, "m.toml")
+
+
+def value_at(document: Any, path: tuple[Any, ...]) -> Any:
+    for key in path:
+        document = document[key]
+    return document
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        (("samplerate",), 2000.0, r"unknown entry 'samplerate'; did you mean 'sample_rate'\?"),
+        (("axes", "x", "encoder_noise"), -1e-9, "encoder_noise = -1e-09: give a number from 0"),
+        (("axes", "x", "bandwidth"), -30, "axes.x: bandwidth = -30: give a number above 0.* Hz"),
+        (("axes", "x", "force_constant"), 0, "force_constant = 0: give a number above 0.* N/A"),
+        (("axes", "x", "velocity"), True, "velocity = True: give a number above 0"),
+        (("axes", "x", "travel"), [1.0, 0.0], r"travel = \[1.0, 0.0\]: give two numbers, the low"),
+        (("axes", "x", "effects", "coging"), {}, "did you mean 'cogging'"),
+        (("axes", "x", "effects", "cogging"), {"pich": 1.0}, "'cogging' has no parameter 'pich'"),
+        (("axes", "a b"), {"mass": 1.0}, "give a table for each of 1 to 64 axes"),
+        (("mujoco",), "../other.xml", "without folders"),
+        (("history", 0, "notes"), "why", r"history.0: notes = 'why': give a list of texts"),
+    ],
+)  # fmt: skip
+def test_nonsense_is_refused_with_what_is_allowed(path, value, message) -> None:
+    with pytest.raises(InputError, match=message):
+        parse_model(changed(complete(), path, value), CATALOGUE, None, "m.toml")
+
+
+@pytest.mark.parametrize(
+    "text", ["a = " + "[" * 5000, "a = " + "9" * 5000, "a = 1\na = 2", "\x00", "[axes.x"]
+)
+def test_a_file_that_is_no_toml_is_one_line(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(text)
+    for load in (lambda: load_model(path, CATALOGUE), lambda: load_experiment(path)):
+        with pytest.raises(InputError, match=r"m\.toml: is not a TOML file") as refused:
+            load()
+        assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_entry_of_an_experiment_with_everything_wrong(kind: str) -> None:
+    for f in fields(KINDS[kind]):
+        for value in WRONG:
+            text = answer(lambda n=f.name, v=value: parse_experiment({"kind": kind, n: v}))
+            assert text is None or "\n" not in text
+
+
+def test_every_entry_of_a_map_with_everything_wrong(tmp_path: Path) -> None:
+    path = tmp_path / "map.toml"
+    path.write_text(MAP)
+    load_mapping(path)
+    document = tomllib.loads(MAP)
+    for place in places(document):
+        for value in WRONG:
+            edited = changed(document, place, value)
+            with patch("twin.log.importers.mapping.toml_document", lambda p, e=edited: ("", e)):
+                text = answer(lambda: load_mapping(path))
+            assert text is None or (text.startswith(str(path)) and "\n" not in text)
+
+
+def test_the_schemas_that_ship_are_those_of_the_code() -> None:
+    from twin.schemas import written
+
+    for path, text in written().items():
+        assert path.read_text(encoding="utf-8") == text, f"run python -m twin.schemas ({path})"
+
+
+def test_the_hardware_entries_are_those_of_the_schema() -> None:
+    from twin.model.machine import Hardware
+
+    known = set(AxisEntry.model_fields) - {"mass", "inertia", "fixed", "effects"}
+    assert known == {f.name for f in fields(Hardware)}
+
+
+def test_an_editor_finds_every_effect_and_parameter_in_the_schema() -> None:
+    from twin.schemas import FOLDER
+
+    schema = json.loads((FOLDER / "model.schema.json").read_text(encoding="utf-8"))
+    effects = schema["$defs"]["AxisEntry"]["properties"]["effects"]["properties"]
+    assert set(effects) == set(CATALOGUE)
+    for name, effect in CATALOGUE.items():
+        assert {p.name for p in effect.parameters} <= set(effects[name]["properties"])

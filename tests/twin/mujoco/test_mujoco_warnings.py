@@ -1,0 +1,94 @@
+"""A simulation that breaks down ends, and says when, on which axis and by which effect."""
+
+from __future__ import annotations
+
+from math import nan, sqrt
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from twin.effect import OUT, Effect, Kind, Parameter, X
+from twin.errors import CannotRun
+from twin.experiments.trajectory.setpoint import Setpoint
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.mujoco.warnings import collected_warnings
+from twin.simulator import MujocoSimulator, ReducedSimulator, run
+
+BOTH = pytest.mark.parametrize("simulator", [MujocoSimulator, ReducedSimulator])
+
+
+def _law(p, s, io):  # type: ignore[no-untyped-def]
+    io[OUT] = p[0] * sqrt(p[1] - io[X])
+
+
+BREAKS = Effect(
+    kind=Kind.FORCE,
+    summary="no number beyond a place",
+    equation="F = a sqrt(b - x)",
+    source="this test",
+    parameters=(
+        Parameter("a", "N", 1.0, -10.0, 10.0, "size", strength=True),
+        Parameter("b", "m", 0.05, -10.0, 10.0, "place"),
+    ),
+    law=_law,
+    fingerprint="",
+    excited_by="",
+)
+
+
+def machine(values: dict[str, float]) -> MachineModel:
+    """Axis y holds the effect."""
+    hardware = Hardware(bandwidth=20.0)
+    effect = Fitted(BREAKS, {"a": 1.0, "b": 0.05, **values}, frozenset())
+    axes = {"x": AxisModel(2.0, hardware), "y": AxisModel(2.0, hardware, (effect,))}
+    return MachineModel("two", axes, 1000.0)
+
+
+def ramp() -> Setpoint:
+    """Both axes from 0 to 0.1 m in 1 s."""
+    position = np.repeat(np.linspace(0.0, 0.1, 1001)[:, None], 2, axis=1)
+    still = np.zeros_like(position)
+    return Setpoint(position, np.full_like(position, 0.1), still, still, 1000.0)
+
+
+@BOTH
+def test_a_law_that_breaks_in_the_travel_ends_the_run(
+    simulator: type, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(CannotRun) as refused:
+        run(machine({}), ramp(), np.random.default_rng(0), simulator=simulator)
+    text = str(refused.value)
+    assert "on axis y: effect test_mujoco_warnings gives nan N" in text
+    seconds = float(text.split("t = ")[1].split(" s")[0])
+    assert seconds == pytest.approx(0.5, abs=0.05)
+    assert list(tmp_path.iterdir()) == []  # no MUJOCO_LOG.TXT
+
+
+@BOTH
+def test_a_force_that_is_no_number_from_the_start(simulator: type) -> None:
+    with pytest.raises(
+        CannotRun, match=r"t = 0\.0000 s on axis y: effect test_mujoco_warnings gives nan N"
+    ):
+        run(machine({"a": nan}), ramp(), np.random.default_rng(0), simulator=simulator)
+
+
+def test_any_other_warning_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    def warn(*arguments: Any) -> None:
+        arguments[-3].fill(0.0)  # the signals
+        mujoco.get_mju_user_warning()("No room.")
+
+    monkeypatch.setattr("twin.simulator.run_mujoco", warn)
+    with pytest.raises(CannotRun, match=r"at t = 0\.0000 s: No room\. Change the model"):
+        run(machine({"b": 9.0}), ramp(), np.random.default_rng(0))
+
+
+def test_the_handler_of_warnings_is_given_back() -> None:
+    before = mujoco.get_mju_user_warning()
+    data = mujoco.MjData(mujoco.MjSpec().compile())
+    with collected_warnings(data):
+        assert mujoco.get_mju_user_warning() is not before
+    assert mujoco.get_mju_user_warning() is before

@@ -1,0 +1,140 @@
+"""Files that appear whole or not at all, and are found wanting before the work is done."""
+
+from __future__ import annotations
+
+import os
+import stat
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from twin.errors import InputError
+
+PART = ".twin-part"
+TRIAL = bytes(1 << 16)  # written and removed again, to find a full disk before the work
+
+# A program that is told to end at once has no other way to know what it would leave behind.
+_unfinished: set[Path] = set()
+
+
+def require_writable(path: Path) -> None:
+    """Raise InputError now, instead of after the work, where the file could not be written."""
+    if _is_direct(path):
+        return
+    with _explained(path):
+        target = _target(path)
+        with _part(path, target) as (stream, _):
+            stream.write(TRIAL)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """A stream whose bytes become ``path`` at the end, or nothing where anything fails.
+
+    A symbolic link is followed, a file keeps its permissions, and a device or pipe is written to.
+    Raises InputError where the folder or the disk refuses.
+    """
+    with _explained(path):
+        if _is_direct(path):
+            with open(path, "wb") as stream:
+                yield stream
+            return
+        target = _target(path)
+        with _part(path, target) as (stream, part):
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+            if target.exists():
+                os.chmod(part, stat.S_IMODE(target.stat().st_mode))
+            os.replace(part, target)
+        _keep_folder(target.parent)
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all; raises InputError."""
+    with replacing(path) as stream:
+        stream.write(content)
+
+
+def remove_unfinished() -> None:
+    """Remove what is half written, where the program ends at once."""
+    for part in tuple(_unfinished):
+        with suppress(OSError):
+            part.unlink()
+
+
+@contextmanager
+def _part(path: Path, target: Path) -> Iterator[tuple[BinaryIO, Path]]:
+    """A file beside the target that is removed on leaving, if it is still there."""
+    if target.is_dir():
+        raise InputError(f"{path}: is a folder; give the name of a file in it")
+    if not target.parent.is_dir():
+        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
+    _remove_left_over(target.parent)
+    part = target.with_name(f".{target.name}.{os.getpid()}{PART}")
+    _unfinished.add(part)
+    try:
+        with open(part, "wb") as stream:
+            _lock(stream)
+            yield stream, part
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        _unfinished.discard(part)
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(
+            f"{path}: cannot be written: {reason}; check folder, rights and free space"
+        ) from error
+
+
+def _is_direct(path: Path) -> bool:
+    """Whether there is nothing to replace: a device, a pipe, standard output."""
+    if path.as_posix().startswith(("/dev/", "/proc/")):
+        return True
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def _target(path: Path) -> Path:
+    """The file itself where the path is a symbolic link to it."""
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
+def _remove_left_over(folder: Path) -> None:
+    """Remove the unfinished files of runs that were killed; a run that lives has its own locked."""
+    for part in folder.glob(f".*{PART}"):
+        if part in _unfinished:
+            continue
+        with suppress(OSError), open(part, "r+b") as stream:
+            _lock(stream)
+            part.unlink()
+
+
+def _lock(stream: BinaryIO) -> None:
+    """Hold the file until it is closed; raises OSError where another process does."""
+    if sys.platform != "win32":  # there an open file cannot be removed
+        import fcntl
+
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _keep_folder(folder: Path) -> None:
+    """Write the folder's entry to the disk as well, where the system can."""
+    with suppress(OSError):
+        number = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)

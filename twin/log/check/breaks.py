@@ -1,0 +1,257 @@
+"""Where the position breaks off its course, and what does that: each looks different around it.
+
+Missing samples take the position and its setpoint as far on as the motion went meanwhile. An
+encoder that stands still is caught up with in one sample. A counter that wraps goes back by nearly
+the whole travel. A single sample that is off leaves the course as it was, and so does a clock that
+skips, by less than a sample's motion. Joined logs differ in everything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.log.check.axis import Axis
+from twin.log.check.report import Fault, Finding, Severity
+from twin.signals import Array
+
+_COURSE = 10  # samples on either side from which the course is told
+_CLUSTER = 3  # samples between two bends of one break
+_STUCK = 5e-3  # s of one value
+_STUCK_SAMPLES = 5
+_SURE = 6.0  # times the bend that motion allows
+_ALIKE = 0.3  # difference of two speeds, as a part of the larger
+_WHOLE_TRAVEL = 0.8  # of the travel; a counter that wraps goes back by nearly all of it
+_LONGEST_GAP = 2.0  # s of missing samples
+_SHORT_GAP = 0.05  # s, over which the speed may change, and which makes two breaks one
+_A_SAMPLE = 2.0  # times the motion of a sample
+_MANY = 12  # places from which on it is not this and that, but the clock
+_EVERYWHERE = 1.0  # bends a second at least, where the clock is uneven
+_MOST_HELD = 20  # samples
+_PHASE = 0.95  # of the changes fall on one of every m samples where a signal is held
+_FEWEST_CHANGES = 50
+
+
+class Kind(Enum):
+    """What breaks a position."""
+
+    MISSING = "missing"
+    STUCK = "stuck"
+    WRAPPED = "wrapped"
+    SAMPLE = "sample"
+    JOINED = "joined"
+    STEP = "step"
+    CLOCK = "clock"
+
+
+@dataclass(frozen=True)
+class Break:
+    """From sample ``first`` to ``last``; size: m, or the number of samples that are missing.
+
+    step: m, by which the course is another behind it.
+    """
+
+    kind: Kind
+    first: int
+    last: int
+    size: float
+    step: float = 0.0
+
+
+def check(axis: Axis) -> Iterator[Finding]:
+    """What breaks the position, each kind once."""
+    if count := held_samples(axis.log.position):
+        yield held(axis, "the position", count)
+        return
+    if is_uneven(axis):
+        yield _uneven(axis)
+        return
+    breaks = find_breaks(axis)
+    for kind in Kind:
+        found = [b for b in breaks if b.kind is kind]
+        if found:
+            yield _finding(axis, kind, found)
+
+
+def find_breaks(axis: Axis) -> list[Break]:
+    """All breaks in the order of time; none where the position is held for some samples each."""
+    if held_samples(axis.log.position):
+        return []
+    stuck = list(_stuck(axis))
+    bends = np.flatnonzero(axis.jumps) + 1
+    for b in stuck:
+        bends = bends[(bends < b.first - 2) | (bends > b.last + 2)]
+    if not len(bends):
+        return stuck
+    clusters = np.split(bends, np.flatnonzero(np.diff(bends) > _CLUSTER) + 1)
+    single = [_classified(axis, int(c[0]), int(c[-1])) for c in clusters]
+    return _undone(sorted([*stuck, *(b for b in single if b)], key=lambda b: b.first), axis)
+
+
+def _undone(breaks: list[Break], axis: Axis) -> list[Break]:
+    """A step that is soon taken back is an offset of the samples between; so are two samples."""
+    out: list[Break] = []
+    for b in breaks:
+        last = out[-1] if out else None
+        if last is not None and b.first - last.last < _SHORT_GAP * axis.sample_rate:
+            opposed = abs(last.step + b.step) < _ALIKE * abs(b.step)
+            if opposed or {last.kind, b.kind} <= {Kind.SAMPLE, Kind.CLOCK}:
+                size = max(abs(last.size), abs(b.step or b.size))
+                out[-1] = Break(Kind.SAMPLE, last.first, b.last, size)
+                continue
+        out.append(b)
+    return out
+
+
+def held_samples(signal: Array) -> int:
+    """For how many samples each value of a signal is held, where it is; else 0."""
+    change = np.flatnonzero(np.diff(signal))
+    if len(change) < _FEWEST_CHANGES:
+        return 0
+    steps = np.diff(change)
+    count = int(np.median(steps))
+    if not 2 <= count <= _MOST_HELD:
+        return 0
+    share = np.bincount(change % count).max() / len(change)
+    return count if share >= _PHASE else 0
+
+
+def _stuck(axis: Axis) -> Iterator[Break]:
+    """One value for long, with a bend where it begins and where it ends."""
+    x = axis.log.position
+    same = np.flatnonzero(np.diff(np.concatenate([[1.0], np.diff(x), [1.0]]) == 0.0))
+    least = max(_STUCK * axis.sample_rate, _STUCK_SAMPLES)
+    bends = axis.jumps > 0.0
+    for first, last in zip(same[::2], same[1::2], strict=False):
+        if last - first < least:
+            continue
+        ends = (bends[max(first - 3, 0) : first + 1], bends[max(last - 3, 0) : last + 1])
+        caught_up = abs(x[min(last + 1, len(x) - 1)] - x[last])
+        if all(part.any() for part in ends):
+            yield Break(Kind.STUCK, int(first), int(last), float(caught_up))
+
+
+def _classified(axis: Axis, first: int, last: int) -> Break | None:
+    """What the bends at samples ``first`` to ``last`` are; None where it cannot be told."""
+    x, dt = axis.log.position, 1.0 / axis.sample_rate
+    course = _around(x, first, last)
+    if course is None:
+        return None
+    step, before, after = course
+    speed = 0.5 * (before + after) / dt
+    alike = abs(before - after) <= _ALIKE * max(abs(before), abs(after)) + axis.possible_jump
+    sure = _SURE * axis.possible_jump
+    if abs(step) <= sure:
+        off = float(axis.jumps[first - 1 : last].max())
+        if last - first > _CLUSTER:
+            return None
+        kind = Kind.CLOCK if off < _A_SAMPLE * abs(speed) * dt else Kind.SAMPLE
+        return Break(kind, first, last, off)
+    setpoint = axis.log.columns.get("setpoint_position")
+    follows = _around(setpoint, first, last) if setpoint is not None else None
+    with_setpoint = follows is not None and abs(follows[0]) > 0.5 * abs(step)
+    if abs(step) >= _WHOLE_TRAVEL * np.ptp(x) and alike and not with_setpoint:
+        return Break(Kind.WRAPPED, first, last, abs(step))
+    if setpoint is not None and not with_setpoint:
+        return Break(Kind.STEP, first, last, step, step)
+    samples = step / (speed * dt) if speed else np.inf
+    gap = _LONGEST_GAP if alike else _SHORT_GAP
+    if 0.5 < samples <= gap * axis.sample_rate:
+        return Break(Kind.MISSING, first, last, float(round(samples)), step)
+    return Break(Kind.STEP if alike else Kind.JOINED, first, last, step, step)
+
+
+def _around(x: Array, first: int, last: int) -> tuple[float, float, float] | None:
+    """The step of a signal's course, and its slopes a sample before and behind."""
+    begin, end = first - 1, last + 1  # the last sample before, the first behind
+    if begin - _COURSE < 0 or end + _COURSE >= len(x):
+        return None
+    before = float(x[begin] - x[begin - _COURSE]) / _COURSE
+    after = float(x[end + _COURSE] - x[end]) / _COURSE
+    expected = 0.5 * (before + after) * (end - begin)
+    return float(x[end] - x[begin]) - expected, before, after
+
+
+def _finding(axis: Axis, kind: Kind, found: list[Break]) -> Finding:
+    first, unit = found[0], axis.log.units["position"]
+    largest = max(found, key=lambda b: abs(b.size))
+    size = f"{abs(largest.size):.3g} {unit}"
+    fault, what, remedy = {
+        Kind.MISSING: (
+            Fault.MISSING, f"{largest.size:.0f} samples are missing, the motion goes on behind",
+            "import the file with its time stamps, or cut the log there",
+        ),
+        Kind.STUCK: (
+            Fault.STUCK,
+            f"the position stands still for {(first.last - first.first) / axis.sample_rate:.3g} s "
+            f"and is {size} farther in the next sample: the encoder was stuck",
+            "cut the log there, and check the encoder's connection",
+        ),
+        Kind.WRAPPED: (
+            Fault.WRAPPED, f"the position goes back by {size} in one sample: its counter wraps",
+            f"add {size} behind each wrap before the import",
+        ),
+        Kind.SAMPLE: (
+            Fault.OUTLIERS, f"samples of the position are off by up to {size}",
+            "repair these samples, or cut the log there",
+        ),
+        Kind.JOINED: (
+            Fault.JOINED, f"position and motion differ on both sides by {size}: logs were joined",
+            "import each part as a log of its own",
+        ),
+        Kind.STEP: (
+            Fault.STEP, f"the position steps by {size} and goes on as before: counts were lost",
+            "cut the log there, and check the encoder's connection",
+        ),
+        Kind.CLOCK: (
+            Fault.UNEVEN,
+            f"the position is off by {size}, less than two samples' motion: a clock skipped",
+            "record with the drive's own clock",
+        ),
+    }[kind]  # fmt: skip
+    more = f" and {len(found) - 1} more times" if len(found) > 1 else ""
+    where = f"{first.first / axis.sample_rate:.6g} to {first.last / axis.sample_rate:.6g} s{more}"
+    severity = Severity.WARNING if fault is Fault.UNEVEN else Severity.ERROR
+    return Finding(severity, fault, axis.name, what, where, remedy)
+
+
+def is_uneven(axis: Axis) -> bool:
+    """Whether the position bends everywhere: then it is the clock, and not this and that."""
+    bends = _bends_of_a_clock(axis)
+    if not len(bends) or held_samples(axis.log.position):
+        return False
+    places = 1 + np.count_nonzero(np.diff(bends) > _SHORT_GAP * axis.sample_rate)
+    return bool(places >= max(_MANY, _EVERYWHERE * axis.duration))
+
+
+def _bends_of_a_clock(axis: Axis) -> NDArray[np.intp]:
+    """Where the position bends, but not by most of the travel, as a counter that wraps."""
+    most = 0.5 * float(np.ptp(axis.log.position))
+    return np.flatnonzero((axis.jumps > 0.0) & (axis.jumps < most))
+
+
+def _uneven(axis: Axis) -> Finding:
+    bends = _bends_of_a_clock(axis)
+    unit = axis.log.units["position"]
+    return Finding(
+        Severity.WARNING, Fault.UNEVEN, axis.name,
+        f"the position bends by up to {axis.jumps[bends].max():.3g} {unit} at {len(bends)} "
+        "samples all over the log: the clock jitters, or samples are missing",
+        f"from {bends[0] / axis.sample_rate:.6g} s",
+        "record with the drive's own clock, or import with the time stamps",
+    )  # fmt: skip
+
+
+def held(axis: Axis, name: str, count: int) -> Finding:
+    """A signal that is held for ``count`` samples."""
+    return Finding(
+        Severity.WARNING, Fault.HELD, axis.name,
+        f"{name} changes at every {count}th sample only: it was sampled at "
+        f"{axis.sample_rate / count:g} Hz and held",
+        "whole log",
+        f"record it at {axis.sample_rate:g} Hz, or the log at {axis.sample_rate / count:g} Hz",
+    )  # fmt: skip

@@ -1,0 +1,73 @@
+"""Faults of the command itself: noise, single samples that are off, values that are held."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from twin.log.check.axis import Axis
+from twin.log.check.breaks import held, held_samples
+from twin.log.check.report import Fault, Finding, Severity
+from twin.signals import Array, white_noise
+
+_NOISY = 0.05  # noise of the command, as a part of it
+_HIDES = 0.4  # averaged noise, as a part of what the motion leaves unexplained
+_ALONE = 60.0  # times what 99 % of the samples are off their neighbours
+_LARGE = 0.3  # of the command
+_BURST, _MOST_TOGETHER = 21, 3  # more in so many samples are a burst, and no single ones
+_AROUND = 5  # samples whose median tells what one should be
+
+
+def check(axis: Axis) -> Iterator[Finding]:
+    """Held values, noise, and single samples."""
+    if not axis.moves:
+        return
+    force, unit = axis.log.force, axis.log.units["force"]
+    if count := held_samples(force):
+        yield held(axis, "the force", count)
+        return
+    size = np.abs(force - np.median(force))
+    off = off_course(force)
+    # A sample at a steep edge may be off by as much; noise is no single sample.
+    most = max(_ALONE * float(np.quantile(off, 0.99)), _LARGE * float(np.quantile(size, 0.99)))
+    bad = off > most
+    together = np.convolve(bad, np.ones(_BURST), "same")
+    single = np.flatnonzero(bad & (together <= _MOST_TOGETHER))
+    if len(single):
+        first = single[0] / axis.sample_rate
+        more = f" and {len(single) - 1} more times" if len(single) > 1 else ""
+        yield Finding(
+            Severity.ERROR, Fault.OUTLIERS, axis.name,
+            f"single samples of the force are off by up to {off.max():.3g} {unit}",
+            f"{first:.6g} s{more}", "repair these samples, or cut the log there",
+        )  # fmt: skip
+    yield from _noise(axis)
+
+
+def _noise(axis: Axis) -> Iterator[Finding]:
+    """Noise that hides what the motion does not explain, even when it is averaged."""
+    noise, unit = white_noise(axis.log.force), axis.log.units["force"]
+    left = float(np.median(np.abs(axis.dynamics.residual)))
+    averaged = axis.smoother.held_noise(noise)
+    if not axis.dynamics.explains or averaged < _HIDES * left:
+        return
+    if noise > _NOISY * float(np.std(axis.log.force)):
+        yield Finding(
+            Severity.WARNING, Fault.NOISE, axis.name,
+            f"the force has noise of {noise:.3g} {unit} rms from sample to sample, {averaged:.2g} "
+            f"{unit} over {axis.smoother.length * 1e3:.2g} ms: about all that is left of it beside "
+            "the motion",
+            "whole log", "record the command that the controller computed, or shield the cable",
+        )  # fmt: skip
+
+
+def off_course(signal: Array) -> Array:
+    """(n,) by how much each sample is off the median of those around it; 0 at the ends."""
+    off = np.zeros(len(signal))
+    half = _AROUND // 2
+    if len(signal) > _AROUND:
+        around = np.median(sliding_window_view(signal, _AROUND), axis=1)
+        off[half:-half] = np.abs(signal[half:-half] - around)
+    return off

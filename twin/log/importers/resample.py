@@ -1,0 +1,68 @@
+"""Columns with uneven time stamps onto one clock, and what that costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.log.log import Array
+
+LONGEST_GAP = 20.0  # usual steps, over which a line is no measurement
+
+
+@dataclass(frozen=True)
+class Clock:
+    """rows: those kept, in the order of time; times: (n,) s of them; grid: (m,) s, even."""
+
+    rows: NDArray[np.intp]
+    times: Array
+    grid: Array
+    dropped: int
+
+    def resampled(self, column: Array) -> Array:
+        """A column (rows of the file,) on the even clock, by straight lines."""
+        return np.asarray(np.interp(self.grid, self.times, column[self.rows]))
+
+    def cost(self, column: Array) -> float:
+        """RMS error of the straight lines, told from the lines between every other row."""
+        kept = column[self.rows]
+        between = np.interp(self.times[1:-1:2], self.times[::2], kept[::2])
+        # Of a smooth signal lines twice as long are four times as far off.
+        return float(np.sqrt(np.mean((between - kept[1:-1:2]) ** 2))) / 4.0
+
+    def __str__(self) -> str:
+        steps = np.diff(self.times) * 1e3
+        dropped = f", {self.dropped} rows with a time that does not increase left out"
+        return (
+            f"steps of {steps.min():.3g} to {steps.max():.3g} ms were resampled to "
+            f"{np.median(np.diff(self.grid)) * 1e3:.4g} ms{dropped if self.dropped else ''}"
+        )
+
+
+def clock_of(time: Array, rate: float) -> Clock:
+    """The even clock of ``rate`` Hz over the times (n,) in s; raises InputError."""
+    if not np.isfinite(time).all():
+        k = int(np.argmin(np.isfinite(time)))
+        raise InputError(f"the time in row {k + 1} is {time[k]}; give every row a time")
+    increasing = time > np.maximum.accumulate(np.concatenate([[-np.inf], time[:-1]]))
+    rows = np.flatnonzero(increasing)
+    kept = time[rows]
+    if len(kept) < 3 or 2 * len(kept) < len(time):
+        raise InputError(f"the time increases in {len(kept)} of {len(time)} rows only")
+    steps = np.diff(kept)
+    usual = float(np.median(steps))
+    if rate * usual > 2.0 or rate * usual < 0.01:
+        raise InputError(
+            f"resample = {rate:g} Hz, but the rows come at about {1.0 / usual:.4g} Hz; give that"
+        )
+    gap = int(np.argmax(steps))
+    if steps[gap] > LONGEST_GAP * usual:
+        raise InputError(
+            f"there is nothing between {kept[gap]:.6g} and {kept[gap + 1]:.6g} s; import the parts "
+            "before and behind it as logs of their own"
+        )
+    grid = kept[0] + np.arange(int((kept[-1] - kept[0]) * rate * (1.0 + 1e-12)) + 1) / rate
+    return Clock(rows, kept, grid, len(time) - len(kept))

@@ -1,0 +1,153 @@
+"""What a machine model's TOML file may hold. Which effects there are is the catalogue's matter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, ConfigDict, Field
+
+from twin.effect import Effect
+from twin.entries import Entries
+from twin.model.machine import HistoryStep
+from twin.model.units import ROTARY
+
+AXIS_NAME = r"^[A-Za-z_][A-Za-z0-9_]*$"
+MOST_AXES = 64
+Name = Annotated[str, Field(max_length=80)]
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Place = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+def _quantity(unit: str, meaning: str, *, zero: bool = False, most: float = 1e12) -> Any:
+    """A hardware entry: a number above 0 (or 0 too), with its unit on either kind of axis."""
+    bounds: dict[str, Any] = {"ge": 0.0} if zero else {"gt": 0.0}
+    least = "a number from 0" if zero else "a number above 0"
+    rotary = ROTARY(unit)
+    units = unit if rotary == unit else f"{unit} ({rotary} on a rotary axis)"
+    if most != float("inf"):
+        bounds["le"] = most
+        least += f" to {most:g}" if zero else f", at most {most:g}"
+    return Field(None, **bounds, description=f"{least}, in {units}: {meaning}")
+
+
+def _ordered(travel: tuple[float, float]) -> tuple[float, float]:
+    if not travel[0] < travel[1]:
+        raise ValueError
+    return travel
+
+
+class EffectEntry(Entries):
+    """Parameters by name; each number is checked against the effect's own bounds."""
+
+    model_config = ConfigDict(extra="allow")
+
+    fixed: list[str] | None = Field(
+        None, description='a list of names of parameters, such as ["pitch"], that a fit holds'
+    )
+
+
+class AxisEntry(Entries):
+    """One axis, with ``mass`` or with ``inertia``; what is left out has the default of Hardware."""
+
+    mass: float | None = Field(
+        None, ge=1e-6, le=1e6, description="a number from 1e-06 to 1e+06, in kg: the moved mass"
+    )
+    inertia: float | None = Field(
+        None, ge=1e-12, le=1e6,
+        description="a number from 1e-12 to 1e+06, in kg m^2: the moment of inertia",
+    )  # fmt: skip
+    fixed: list[Name] | None = Field(
+        None, description='["mass"] (["inertia"] on a rotary axis), where a fit holds it'
+    )
+    travel: Annotated[tuple[Place, Place], AfterValidator(_ordered)] | None = Field(
+        None, strict=False,
+        description="two numbers, the low one first, in m (rad on a rotary axis)",
+    )  # fmt: skip
+    force_constant: float | None = _quantity("N/A", "force of the drive per current")
+    force_limit: float | None = Field(
+        None, gt=0.0, allow_inf_nan=True,
+        description="a number above 0, in N (N m on a rotary axis): most force of the drive",
+    )  # fmt: skip
+    encoder_resolution: float | None = _quantity("m", "step of the readings", zero=True, most=1.0)
+    encoder_noise: float | None = _quantity("m", "rms of the readings' noise", zero=True, most=1.0)
+    current_noise: float | None = _quantity("A", "rms of the current's noise", zero=True, most=1e3)
+    velocity: float | None = _quantity("m/s", "fastest move", most=1e6)
+    acceleration: float | None = _quantity("m/s^2", "fastest move")
+    jerk: float | None = _quantity("m/s^3", "fastest move")
+    bandwidth: float | None = _quantity("Hz", "of the position loop", most=1e6)
+    effects: dict[str, EffectEntry] = Field(
+        {}, description="a table for each effect, as in [axes.x.effects.cogging]"
+    )
+
+
+class HistoryEntry(Entries):
+    """A step of the model's growth. What a later version writes as well is passed over."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    action: str = Field(description='a text, such as "add"')
+    effect: str = Field(description="the name of an effect")
+    axis: str = Field(description="the name of an axis")
+    fit_error_before: float = Field(description="a finite number")
+    fit_error_after: float = Field(description="a finite number")
+    holdout_error_before: float | None = Field(None, description="a finite number")
+    holdout_error_after: float | None = Field(None, description="a finite number")
+    unit: str = Field("N", description="a unit in quotes")
+    notes: list[str] = Field([], description="a list of texts")
+
+    def step(self) -> HistoryStep:
+        """As the model holds it."""
+        return HistoryStep(**{**self.model_dump(), "notes": tuple(self.notes)})
+
+
+class ModelFile(Entries):
+    """A whole machine model."""
+
+    name: str | None = Field(None, max_length=200, description="a text of up to 200 characters")
+    mujoco: str | None = Field(
+        None, pattern=r"^[^/\\\x00]+$",
+        description="the name of an MJCF file that is beside this one, without folders",
+    )  # fmt: skip
+    sample_rate: float = Field(
+        10_000.0, gt=0.0, le=1e7, description="a number above 0, at most 1e+07, in Hz"
+    )
+    axes: dict[Annotated[str, Field(pattern=AXIS_NAME, max_length=40)], AxisEntry] = Field(
+        min_length=1, max_length=MOST_AXES,
+        description="a table for each of 1 to 64 axes, as [axes.x]; a name has letters, digits "
+        "and underscores",
+    )  # fmt: skip
+    intervals: dict[str, dict[str, Pair]] = Field(
+        {}, description="two finite numbers, low and high, by axis and parameter, from the last fit"
+    )
+    history: list[HistoryEntry] = Field([], description="the model's growth, as [[history]]")
+
+
+def json_schema(catalogue: Mapping[str, Effect]) -> dict[str, Any]:
+    """The JSON schema of a model file, with the effects of a catalogue and their parameters."""
+    schema = ModelFile.model_json_schema()
+    schema["title"] = "Machine model of the Proton twin"
+    effects = schema["$defs"]["AxisEntry"]["properties"]["effects"]
+    effects["properties"] = {name: _effect_schema(effect) for name, effect in catalogue.items()}
+    return schema
+
+
+def _effect_schema(effect: Effect) -> dict[str, Any]:
+    names = [p.name for p in effect.parameters]
+    parameters = {
+        p.name: {
+            "type": "number",
+            **{k: b for k, b in (("minimum", p.lower), ("maximum", p.upper)) if abs(b) < 1e300},
+            "default": p.start,
+            "description": f"{p.unit}, {p.meaning}",
+        }
+        for p in effect.parameters
+    }
+    fixed = {"type": "array", "items": {"enum": names} if effect.of_size is None else {}}
+    return {
+        "type": "object",
+        "description": f"{effect.summary}: {effect.equation}",
+        "properties": {**parameters, "fixed": fixed},
+        # A larger size has more parameters than the catalogue's own.
+        "additionalProperties": effect.of_size is not None,
+    }

@@ -1,0 +1,16 @@
+"""Numbers that a user gives."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a finite number; True is none, nor is an integer beyond every double."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        return False
+    size: Any = abs(value)
+    return bool(size <= sys.float_info.max)
