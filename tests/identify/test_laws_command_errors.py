@@ -111,7 +111,7 @@ def test_identification_holds_no_more_of_a_log_than_it_reads(monkeypatch):
         1000.0, {"x": AxisLog({**own, "velocity": late}, force_constant=1.0)}, {"a": "b"},
         truth={"x": {"position": own["position"]}}, attachments={"model.toml": b""},
     )  # fmt: skip
-    monkeypatch.setattr("twin.log.read_log", lambda path: whole)
+    monkeypatch.setattr("twin.log.read_log", lambda path, truth: whole)
     found, findings = read_checked([Path("a.mcap")])
     assert findings == checked({"a.mcap": whole})
     assert any("velocity" in f for f in findings)
