@@ -81,7 +81,7 @@ def white_noise(signal: Array) -> float:
 
 
 def sliding_products(signal: Array, patterns: Array) -> Array:
-    """Products of patterns (..., m) with every stretch of a signal (n,), m <= n: (..., n - m + 1)."""
+    """Products (..., n - m + 1) of patterns (..., m) with every stretch of a signal (n,)."""
     size = 1 << (len(signal) - 1).bit_length()
     spectra = np.fft.rfft(signal, size) * np.conj(np.fft.rfft(patterns, size))
     return np.fft.irfft(spectra, size)[..., : len(signal) - patterns.shape[-1] + 1]
