@@ -78,7 +78,7 @@ def demo(
     final = diagnosis.model
     if diagnosis.effect is not None:
         say(f"3. the diagnosis names {diagnosis.effect.name} on {diagnosis.leading.dataset.axis}")
-        addition = workflow.add(
+        addition = workflow.add_named(diagnosis) or workflow.add(
             diagnosis.effect, diagnosis.model, logs, held, axis=diagnosis.leading.dataset.axis,
             progress=progress,
         )  # fmt: skip
@@ -90,7 +90,7 @@ def demo(
         report,
         title=f"{model.name}: what the model lacks",
         diagnosis=diagnosis,
-        comparison=workflow.compare(diagnosis.model, {**logs, **held}),
+        comparison=diagnosis.comparison,
         history=final.history,
         additions=[addition] if addition else [],
     )

@@ -212,14 +212,32 @@ def add(
     tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]
     best = max(tried, key=lambda c: c.delta_bic)
     progress("adding", 1, 1)
-    return _addition(best, before, given)
+    return _addition(best, before.fits[best.axis], before.datasets, before.model, given)
 
 
-def _addition(best: Candidate, before: FitResult, given: MachineModel) -> Addition:
+def add_named(found: Diagnosis) -> Addition | None:
+    """What ``add`` makes of the effect that a diagnosis names first, which it has fitted already.
+
+    None where it names none, or names it as one of a pair.
+    """
+    leading, best = found.leading, found.leading.best
+    if best is None or not any(c is best for c in leading.ranking):
+        return None
+    prepared = {axis: one.dataset for axis, one in found.axes.items()}
+    return _addition(best, leading.base, prepared, found.model, found.model)
+
+
+def _addition(
+    best: Candidate,
+    base: Fit,
+    prepared: Mapping[str, Dataset],
+    model: MachineModel,
+    given: MachineModel,
+) -> Addition:
+    """The candidate added to a fitted model; ``given``: the model before that was fitted."""
     name = best.axis
-    base, dataset = before.fits[name], before.datasets[name]
     moved = moved_parameters(base, best.fit)
-    left = before.model.axes[name].names
+    left = model.axes[name].names
     set_aside = tuple(n for n in given.axes[name].names if n not in left)
     step = HistoryStep(
         action="add",
@@ -227,21 +245,21 @@ def _addition(best: Candidate, before: FitResult, given: MachineModel) -> Additi
         axis=name,
         fit_error_before=base.error,
         fit_error_after=best.fit.error,
-        holdout_error_before=holdout_error(base, dataset),
-        holdout_error_after=holdout_error(best.fit, dataset),
+        holdout_error_before=holdout_error(base, prepared[name]),
+        holdout_error_after=holdout_error(best.fit, prepared[name]),
         unit=best.fit.axis.units.force,
         notes=addition_notes(best, moved, set_aside),
     )
-    new = before.model.with_axis(name, best.fit.axis).with_history(step)
+    new = model.with_axis(name, best.fit.axis).with_history(step)
     new = new.with_intervals(name, found_intervals(estimates(best.fit)))
-    first = next(iter(by_log(before.datasets).values()))
+    first = next(iter(by_log(prepared).values()))
     return Addition(
         model=new,
         step=step,
         candidate=best,
         kept=best.supported,
         position_error=(
-            rms_error(free_run(before.model, first), name),
+            rms_error(free_run(model, first), name),
             rms_error(free_run(new, first), name),
         ),
         replayed=rms_error(free_run(new, first, MujocoSimulator), name),
@@ -283,6 +301,7 @@ __all__ = [
     "Diagnosis",
     "FitResult",
     "add",
+    "add_named",
     "agree",
     "cable_force",
     "compare",

@@ -80,8 +80,8 @@ def white_noise(signal: Array) -> float:
     return usual_size(np.diff(signal, 4)) / 70**0.5
 
 
-def sliding_products(signal: Array, pattern: Array) -> Array:
-    """Product of a pattern (m,) with every stretch of a signal (n,), m <= n: (n - m + 1,)."""
+def sliding_products(signal: Array, patterns: Array) -> Array:
+    """Products (..., n - m + 1) of patterns (..., m) with every stretch of a signal (n,)."""
     size = 1 << (len(signal) - 1).bit_length()
-    spectrum = np.fft.rfft(signal, size) * np.conj(np.fft.rfft(pattern, size))
-    return np.fft.irfft(spectrum, size)[: len(signal) - len(pattern) + 1]
+    spectra = np.fft.rfft(signal, size) * np.conj(np.fft.rfft(patterns, size))
+    return np.fft.irfft(spectra, size)[..., : len(signal) - patterns.shape[-1] + 1]

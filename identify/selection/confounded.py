@@ -6,21 +6,23 @@ and the mass) is absorbed by the fit and never found missing. It shows as a chan
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, rms
-from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.force_balance import changes, jacobian, residual
 from identify.estimation.intervals import half_widths
 from identify.estimation.subspace import orthonormal, unabsorbed
 from identify.selection.candidates import absent_effects
-from twin.effect import Kind
+from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel, Fitted
-from twin.model.parameters import ParameterReference, read, write
+from twin.model.parameters import ParameterReference, read
 from twin.model.units import LINEAR
 
 Array = NDArray[np.float64]
@@ -63,40 +65,72 @@ def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
     if not error > RULE.at_floor * max(fit.floor, fit.error):
         return Refit(error, fit.error, (), units.force)
     where = fit.scaling.where
-    values = zip(where, read(given, where), read(fit.axis, where), half_widths(fit), strict=True)
+    before, after = read(given, where), read(fit.axis, where)
+    moved = np.flatnonzero(np.abs(after - before) > half_widths(fit))
+    backs = changes(fit.axis, fit.logs, [where[j] for j in moved], (before - after)[moved])
     found: list[tuple[Change, Array]] = []
-    for c, before, after, half in values:
-        if abs(after - before) > half:
-            back = residual(write(fit.axis, [c], [before]), fit.logs)[fit.kept] - fit.residual
-            change = Change(
-                c.label, float(before), float(after), units(c.parameter.unit), rms(back),
-                force_unit=units.force,
-            )  # fmt: skip
-            found.append((change, back))
+    for j, back in zip(moved, backs[:, fit.kept], strict=True):
+        c = where[j]
+        change = Change(
+            c.label, float(before[j]), float(after[j]), units(c.parameter.unit), rms(back),
+            force_unit=units.force,
+        )  # fmt: skip
+        found.append((change, back))
     found = [t for t in found if t[0].force > LEAST_FORCE * error]
     found = sorted(found, key=lambda t: -t[0].force)[:MOST_CHANGES]
-    bases = linear_bases(fit, catalogue) if found else {}
-    changes = tuple(
-        replace(change, alike=tuple(name for name, basis in bases.items() if _within(back, basis)))
-        for change, back in found
-    )
-    return Refit(error, fit.error, changes, units.force)
+    alike = _alike(fit, catalogue, [back for _, back in found])
+    told = (replace(change, alike=own) for (change, _), own in zip(found, alike, strict=True))
+    return Refit(error, fit.error, tuple(told), units.force)
+
+
+def _alike(fit: Fit, catalogue: Catalogue, forces: Sequence[Array]) -> list[tuple[str, ...]]:
+    """For each force (n,) N the absent linear effects that can produce it.
+
+    What an effect leaves of a force on one log by itself is less than what it leaves there when it
+    is fitted on all, so that the first log rules out most.
+    """
+    found: list[list[str]] = [[] for _ in forces]
+    first = fit.kept[: len(fit.logs[0])]
+    for effect in _linear_effects(fit, catalogue) if forces else ():
+        begun = orthonormal(_columns(fit, effect, fit.logs[:1])[first])
+        possible = [f for f in forces if _size_left(f[: len(begun)], begun) < _same(f)]
+        if not possible:
+            continue
+        basis = orthonormal(_columns(fit, effect, fit.logs)[fit.kept])
+        for names, force in zip(found, forces, strict=True):
+            if _size_left(force, basis) < _same(force):
+                names.append(effect.name)
+    return [tuple(names) for names in found]
 
 
 def linear_bases(fit: Fit, catalogue: Catalogue) -> dict[str, Array]:
     """Orthonormal basis (n, k) of the force of each absent effect that is linear, by name."""
-    out = {}
-    for effect in absent_effects(fit.axis, catalogue):
-        if effect.kind is Kind.FRICTION or len(effect.strengths) < len(effect.parameters):
-            continue
-        where = [ParameterReference(effect.name, p) for p in effect.strengths]
-        with_it = fit.axis.with_effect(Fitted.at_start(effect))
-        out[effect.name] = orthonormal(jacobian(with_it, fit.logs, where)[fit.kept])
-    return out
+    return {
+        effect.name: orthonormal(_columns(fit, effect, fit.logs)[fit.kept])
+        for effect in _linear_effects(fit, catalogue)
+    }
 
 
-def _within(force: Array, basis: Array) -> bool:
-    return rms(unabsorbed(force, basis)) < SAME_FORCE * rms(force)
+def _linear_effects(fit: Fit, catalogue: Catalogue) -> list[Effect]:
+    """Effects that the fitted axis lacks and whose parameters are all linear, but no friction."""
+    absent = (e for e in absent_effects(fit.axis, catalogue) if e.kind is not Kind.FRICTION)
+    return [e for e in absent if len(e.strengths) == len(e.parameters)]
+
+
+def _columns(fit: Fit, effect: Effect, logs: Sequence[PreparedLog]) -> Array:
+    """Derivative (n, k) of the residual by the parameters of a linear effect beside a fit."""
+    where = [ParameterReference(effect.name, p) for p in effect.strengths]
+    return jacobian(fit.axis.with_effect(Fitted.at_start(effect)), logs, where)
+
+
+def _size_left(force: Array, basis: Array) -> float:
+    """Size of what a basis leaves of a force (n,): root of the sum of squares, N."""
+    return float(np.linalg.norm(unabsorbed(force, basis)))
+
+
+def _same(force: Array) -> float:
+    """Size below which what is left of a force is nothing."""
+    return SAME_FORCE * float(np.linalg.norm(force))
 
 
 @dataclass(frozen=True)

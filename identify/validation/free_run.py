@@ -54,11 +54,13 @@ def free_run(
     starts = np.arange(side, n - side, count)
     table = model.table()
     origin = _time_origin(logs)
-    states = _states_at(table, position, command, period, starts, origin)
+    accelerated = any(f.effect.reads("A_OTHER") for a in model.axes.values() for f in a.effects)
+    states = _states_at(table, position, command, period, starts, origin, accelerated)
+    around = position[np.arange(-side, side + 1)[:, None] + starts]
+    begun = zip(starts, states, *local_cubic(around, period), strict=True)
     out = np.full((n, len(model.axes)), np.nan)
     simulation: Stepper = simulator(model, table)
-    for start, state in zip(starts, states, strict=True):
-        x, v, a = local_cubic(position[start - side : start + side + 1], period)
+    for start, state, x, v, a in begun:
         state[table.axes[:, 2] + LAST_ACCELERATION] = a
         state[table.axes[:, 2] + LAST_VELOCITY] = v - period * a
         # The stepped position leads the true one by half a sample (see twin.core.loop).
@@ -135,12 +137,18 @@ def _states_at(
     period: float,
     starts: NDArray[np.int64],
     origin: float,
+    accelerated: bool = True,
 ) -> Array:
-    """Effect states (n_starts, n_states) after following the measured motion up to each start."""
+    """Effect states (n_starts, n_states) after following the measured motion up to each start.
+
+    accelerated: whether a law reads the acceleration of the other axis.
+    """
     middle = 0.5 * (position[1:] + position[:-1]).T
     velocity = between(position.T, period)
     pair = len(table.axes) == 2  # no law of a larger machine reads the other axis
-    acceleration = _smooth_acceleration(velocity, period) if pair else np.zeros_like(velocity)
+    acceleration = np.zeros_like(velocity)
+    if pair and accelerated:
+        acceleration = _smooth_acceleration(velocity, period)
     states = np.zeros(table.n_states)
     out = np.empty((len(starts), table.n_states))
     rows = np.empty((len(table.entries), middle.shape[1]))

@@ -223,8 +223,9 @@ def test_an_axis_whose_experiment_cannot_run_says_why(monkeypatch):
 
 def test_an_effect_is_added_where_it_helps_most(monkeypatch):
     both = SimpleNamespace(
-        fits={"x": built_fit(3.0), "y": built_fit(4.0)}, datasets={"x": "sx", "y": "sy"}
-    )
+        fits={"x": built_fit(3.0), "y": built_fit(4.0)}, datasets={"x": "sx", "y": "sy"},
+        model=made.MODEL,
+    )  # fmt: skip
     tried = []
 
     def attempt(fit, dataset, effect):
@@ -234,10 +235,10 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
     seen = []
     monkeypatch.setattr(workflow, "fit", lambda *a, **k: seen.append((a, k)) or both)
     monkeypatch.setattr(workflow, "try_effect", attempt)
-    monkeypatch.setattr(workflow, "_addition", lambda best, before, given: (best, given))
+    monkeypatch.setattr(workflow, "_addition", lambda best, base, *_: (best, base))
     wear = CATALOGUE["wear"]
-    best, _ = add(wear, made.MODEL, "logs", "held", test_function=0.07)
-    assert best.axis == "y"
+    best, base = add(wear, made.MODEL, "logs", "held", test_function=0.07)
+    assert (best.axis, base) == ("y", both.fits["y"])
     assert [t[1:] for t in tried] == [("sx", "wear"), ("sy", "wear")]
     assert [t[0] for t in tried] == list(both.fits.values())
     assert seen[0][0][1:] == ("logs", "held")
@@ -259,10 +260,7 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     base = built_fit(7.3)
     best = built("cogging", fit=built_fit(2.9, axis=axis_of(fitted("cogging"))), t=9 if kept else 1)
     dataset = replace(made.STUDY, holdout=("held",))
-    before = SimpleNamespace(
-        fits={"x": base}, datasets={"x": dataset},
-        model=MachineModel("m", {"x": PLAIN, "y": replace(PLAIN, mass=3.0)}),
-    )  # fmt: skip
+    model = MachineModel("m", {"x": PLAIN, "y": replace(PLAIN, mass=3.0)})
     runs = []
 
     def run(model, logs, simulator="reduced"):
@@ -283,8 +281,8 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
         "moved_parameters",
         lambda a, b: (replace(made.MOVED, before=a.error, after=b.error),),
     )
-    whole = before.model.with_axis("x", axis_of(fitted("empirical_map")))
-    found = _addition(best, before, whole)
+    whole = model.with_axis("x", axis_of(fitted("empirical_map")))
+    found = _addition(best, base, {"x": dataset}, model, whole)
     step = found.step
     assert (step.action, step.effect, step.axis) == ("add", "cogging", "x")
     assert (step.fit_error_before, step.fit_error_after) == pytest.approx((7.3, 2.9))
@@ -300,3 +298,18 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     assert found.model.axes["x"] is best.fit.axis
     assert found.model.history == (step,)
     assert found.kept is kept
+
+
+def test_what_a_diagnosis_names_is_added_as_it_was_fitted(monkeypatch):
+    """One of a pair was fitted beside the other, so that it has to be fitted by itself."""
+    monkeypatch.setattr(workflow, "_addition", lambda best, base, *_: (best, base))
+
+    def added(found):
+        return workflow.add_named(workflow.Diagnosis(made.MODEL, {"x": found}, made.compared()))
+
+    paired = axis_with(Verdict.MISSING_EFFECT)
+    assert paired.best is not None
+    alone = replace(paired, ranking=(paired.best,))
+    assert added(alone) == (alone.best, alone.base)
+    assert added(paired) is None
+    assert added(axis_with(Verdict.UNEXPLAINED)) is None

@@ -55,18 +55,22 @@ def test_a_change_is_told_with_the_force_that_it_makes(monkeypatch, dataset):
     assert refit_of(monkeypatch, dataset, off, widths=0.51)[0].changes == ()
 
 
+def within(force, basis) -> bool:
+    return given._size_left(force, basis) < given._same(force)
+
+
 def test_only_effects_without_a_shape_can_be_a_parameter_by_another_name(dataset):
     fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
     names = ("payload_mass", "axis_coupling", "cogging", "lugre", "coulomb_viscous")
     found = given.linear_bases(fit, Catalogue([CATALOGUE[n] for n in names]))
     assert {n: b.shape[1] for n, b in found.items()} == {"axis_coupling": 2, "payload_mass": 1}
     for basis in found.values():
-        assert given._within(basis @ np.arange(1.0, 1.0 + basis.shape[1]), basis)
+        assert within(basis @ np.arange(1.0, 1.0 + basis.shape[1]), basis)
         inside = basis[:, 0]
         other = np.roll(inside, 7) - basis @ (basis.T @ np.roll(inside, 7))
         size = rms(inside) / rms(other)
-        assert given._within(inside + 0.0099 * size * other, basis)
-        assert not given._within(inside + 0.0101 * size * other, basis)
+        assert within(inside + 0.0099 * size * other, basis)
+        assert not within(inside + 0.0101 * size * other, basis)
 
 
 @pytest.mark.parametrize(("part", "told"), [(0.99, False), (1.01, True)])

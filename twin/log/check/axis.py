@@ -19,6 +19,9 @@ _SLOW = 0.02  # times the highest speed: below, Coulomb friction is not yet full
 _TINY = float(np.finfo(float).tiny)
 _COVERED = 15.0  # rms of noise; of 3 million samples white noise covers 10
 _MOVING = 5.0  # speed, in units of its noise
+_MOST_HELD = 20  # samples
+_PHASE = 0.95  # of the changes fall on one of every m samples where a signal is held
+_FEWEST_CHANGES = 50
 _LEAST_MOTION = 0.3  # s; a loop that is closed at rest settles within half of that
 
 
@@ -50,6 +53,27 @@ class Axis:
     def position_noise(self) -> float:
         """Noise of the position in m rms: its white part, or the rounding to its step."""
         return max(white_noise(self.log.position), self.position_step / 12**0.5)
+
+    @cached_property
+    def position_held(self) -> int:
+        """For how many samples each value of the position is held, where it is; else 0."""
+        return held_samples(self.log.position)
+
+    @cached_property
+    def force_held(self) -> int:
+        """The same of the command."""
+        return held_samples(self.log.force)
+
+    @cached_property
+    def force_noise(self) -> float:
+        """White part of the command, N rms."""
+        return white_noise(self.log.force)
+
+    @cached_property
+    def force_size(self) -> float:
+        """What 99 % of the command stays within about its median, N."""
+        force = self.log.force
+        return float(np.quantile(np.abs(force - np.median(force)), 0.99))
 
     @cached_property
     def velocity(self) -> Array:
@@ -142,3 +166,18 @@ class Axis:
                 position - position.mean(),
             ]
         )
+
+
+def held_samples(signal: Array) -> int:
+    """For how many samples each value of a signal is held, where it is; else 0."""
+    change = np.flatnonzero(np.diff(signal))
+    if len(change) < _FEWEST_CHANGES:
+        return 0
+    steps = np.diff(change)
+    if np.count_nonzero(steps == 1) > len(steps) // 2:  # so is their median
+        return 0
+    count = int(np.median(steps))
+    if not 2 <= count <= _MOST_HELD:
+        return 0
+    share = np.bincount(change % count).max() / len(change)
+    return count if share >= _PHASE else 0

@@ -31,9 +31,6 @@ _SHORT_GAP = 0.05  # s, over which the speed may change, and which makes two bre
 _A_SAMPLE = 2.0  # times the motion of a sample
 _MANY = 12  # places from which on it is not this and that, but the clock
 _EVERYWHERE = 1.0  # bends a second at least, where the clock is uneven
-_MOST_HELD = 20  # samples
-_PHASE = 0.95  # of the changes fall on one of every m samples where a signal is held
-_FEWEST_CHANGES = 50
 
 
 class Kind(Enum):
@@ -64,7 +61,7 @@ class Break:
 
 def check(axis: Axis) -> Iterator[Finding]:
     """What breaks the position, each kind once."""
-    if count := held_samples(axis.log.position):
+    if count := axis.position_held:
         yield held(axis, "the position", count)
         return
     if is_uneven(axis):
@@ -79,7 +76,7 @@ def check(axis: Axis) -> Iterator[Finding]:
 
 def find_breaks(axis: Axis) -> list[Break]:
     """All breaks in the order of time; none where the position is held for some samples each."""
-    if held_samples(axis.log.position):
+    if axis.position_held:
         return []
     stuck = list(_stuck(axis))
     bends = np.flatnonzero(axis.jumps) + 1
@@ -105,19 +102,6 @@ def _undone(breaks: list[Break], axis: Axis) -> list[Break]:
                 continue
         out.append(b)
     return out
-
-
-def held_samples(signal: Array) -> int:
-    """For how many samples each value of a signal is held, where it is; else 0."""
-    change = np.flatnonzero(np.diff(signal))
-    if len(change) < _FEWEST_CHANGES:
-        return 0
-    steps = np.diff(change)
-    count = int(np.median(steps))
-    if not 2 <= count <= _MOST_HELD:
-        return 0
-    share = np.bincount(change % count).max() / len(change)
-    return count if share >= _PHASE else 0
 
 
 def _stuck(axis: Axis) -> Iterator[Break]:
@@ -222,7 +206,7 @@ def _finding(axis: Axis, kind: Kind, found: list[Break]) -> Finding:
 def is_uneven(axis: Axis) -> bool:
     """Whether the position bends everywhere: then it is the clock, and not this and that."""
     bends = _bends_of_a_clock(axis)
-    if not len(bends) or held_samples(axis.log.position):
+    if not len(bends) or axis.position_held:
         return False
     places = 1 + np.count_nonzero(np.diff(bends) > _SHORT_GAP * axis.sample_rate)
     return bool(places >= max(_MANY, _EVERYWHERE * axis.duration))

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from twin.log.check.axis import Axis
-from twin.log.check.breaks import held, held_samples
+from twin.log.check.breaks import held
 from twin.log.check.report import Fault, Finding, Severity
-from twin.signals import Array, white_noise
+from twin.signals import Array
 
 _NOISY = 0.05  # noise of the command, as a part of it
 _HIDES = 0.4  # averaged noise, as a part of what the motion leaves unexplained
 _ALONE = 60.0  # times what 99 % of the samples are off their neighbours
 _LARGE = 0.3  # of the command
 _BURST, _MOST_TOGETHER = 21, 3  # more in so many samples are a burst, and no single ones
-_AROUND = 5  # samples whose median tells what one should be
 
 
 def check(axis: Axis) -> Iterator[Finding]:
@@ -25,13 +23,12 @@ def check(axis: Axis) -> Iterator[Finding]:
     if not axis.moves:
         return
     force, unit = axis.log.force, axis.log.units["force"]
-    if count := held_samples(force):
+    if count := axis.force_held:
         yield held(axis, "the force", count)
         return
-    size = np.abs(force - np.median(force))
     off = off_course(force)
     # A sample at a steep edge may be off by as much; noise is no single sample.
-    most = max(_ALONE * float(np.quantile(off, 0.99)), _LARGE * float(np.quantile(size, 0.99)))
+    most = max(_ALONE * float(np.quantile(off, 0.99)), _LARGE * axis.force_size)
     bad = off > most
     together = np.convolve(bad, np.ones(_BURST), "same")
     single = np.flatnonzero(bad & (together <= _MOST_TOGETHER))
@@ -48,7 +45,7 @@ def check(axis: Axis) -> Iterator[Finding]:
 
 def _noise(axis: Axis) -> Iterator[Finding]:
     """Noise that hides what the motion does not explain, even when it is averaged."""
-    noise, unit = white_noise(axis.log.force), axis.log.units["force"]
+    noise, unit = axis.force_noise, axis.log.units["force"]
     left = float(np.median(np.abs(axis.dynamics.residual)))
     averaged = axis.smoother.held_noise(noise)
     if not axis.dynamics.explains or averaged < _HIDES * left:
@@ -64,10 +61,13 @@ def _noise(axis: Axis) -> Iterator[Finding]:
 
 
 def off_course(signal: Array) -> Array:
-    """(n,) by how much each sample is off the median of those around it; 0 at the ends."""
+    """(n,) by how much each sample is off the median of the five around it; 0 at the ends."""
     off = np.zeros(len(signal))
-    half = _AROUND // 2
-    if len(signal) > _AROUND:
-        around = np.median(sliding_window_view(signal, _AROUND), axis=1)
-        off[half:-half] = np.abs(signal[half:-half] - around)
+    if len(signal) > 5:
+        a, b, c, d = signal[:-4], signal[1:-3], signal[3:-1], signal[4:]
+        # The median of five is that of one and of the middle two of the other four.
+        low = np.maximum(np.minimum(a, b), np.minimum(c, d))
+        high = np.minimum(np.maximum(a, b), np.maximum(c, d))
+        low, high = np.minimum(low, high), np.maximum(low, high)
+        off[2:-2] = np.abs(signal[2:-2] - np.clip(signal[2:-2], low, high))
     return off

@@ -41,7 +41,7 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
     basis = np.linalg.qr(_unit_columns(explained_by[inner] * weights[:, None]))[0]
     centred = signal - signal.mean()
     total = sliding_products(centred**2, weights)
-    found = sum(sliding_products(centred, column) ** 2 for column in basis.T)
+    found = np.sum(sliding_products(centred, basis.T) ** 2, axis=0)
     residual = np.maximum(total - found, 0.0)
     dips = 1 + np.flatnonzero((residual[1:-1] <= residual[:-2]) & (residual[1:-1] < residual[2:]))
     if not len(dips):
@@ -106,7 +106,7 @@ def _period(signal: Array) -> float:
     """Samples (inf where it does not) after which a signal (n,) of zero mean repeats itself."""
     half = len(signal) // 2
     power = np.concatenate([[0.0], np.cumsum(signal**2)])
-    spectrum = np.fft.rfft(signal, 2 * len(signal))
+    spectrum = np.fft.rfft(signal, 1 << (2 * len(signal) - 1).bit_length())
     total = np.fft.irfft(np.abs(spectrum) ** 2)[:half]
     lags = np.arange(half)
     overlap = np.sqrt((power[len(signal) - lags]) * (power[-1] - power[lags]))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.log.check.axis import Axis
-from twin.log.check.breaks import find_breaks, held_samples, is_uneven
+from twin.log.check.breaks import find_breaks, is_uneven
 from twin.log.check.report import Fault, Finding, Severity
 from twin.signals import Array
 
@@ -43,7 +43,7 @@ def check(axis: Axis) -> Iterator[Finding]:
 
 def _unexplained_jumps(axis: Axis) -> NDArray[np.intp]:
     """Samples (k,) where the position bends, but for those that another check names."""
-    if held_samples(axis.log.position) or is_uneven(axis):
+    if axis.position_held or is_uneven(axis):
         return np.empty(0, dtype=np.intp)
     jumps = np.flatnonzero(axis.jumps) + 1
     for found in find_breaks(axis):
@@ -55,8 +55,7 @@ def _rough_command(axis: Axis) -> Array:
     """Times (k,) in s within bursts of noise on the command."""
     force = axis.log.force
     second = np.abs(np.diff(force, 2))
-    size = np.quantile(np.abs(force - np.median(force)), 0.99)
-    rough = second > max(_UNUSUAL * _usual(axis, second), _ROUGH * size)
+    rough = second > max(_UNUSUAL * _usual(axis, second), _ROUGH * axis.force_size)
     span = max(round(_ROUGH_SPAN * axis.sample_rate), 2 * _FEWEST_ROUGH)
     if np.count_nonzero(rough) < span // 2:
         return np.empty(0)

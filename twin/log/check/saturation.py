@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from twin.log.check.axis import Axis
 from twin.log.check.report import Fault, Finding, Severity
-from twin.signals import Array, white_noise
+from twin.signals import Array
 
 _STUCK = 5e-3  # s at one value exactly
 _STUCK_SAMPLES = 5
@@ -53,7 +53,7 @@ def _exactly(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | 
 def _but_for_noise(axis: Axis, height: Array) -> tuple[float, float] | None:
     """Likewise, of a low-passed command (m,): a level with steep edges at its top."""
     smoother = axis.smoother
-    noise = smoother.held_noise(white_noise(axis.log.force))
+    noise = smoother.held_noise(axis.force_noise)
     if np.ptp(height) < _LIVELY * noise:
         return None
     starts, near = _runs(height >= height.max() - _NEAR * noise)
