@@ -2,7 +2,9 @@
 
 A curve of hats over the coordinate that the law assumes is put beside the law: what it takes of the
 squared test error in one linear step is what the law's own shape cannot. It is proved as an absent
-effect is, against the same curve shifted in time. The number of hats is chosen on the fit logs.
+effect is, against the same curve shifted in time. The number of hats is chosen on the fit logs, and
+whether the curve lets go at standstill. Of a friction, test functions with standstill are left out:
+there it may be anything.
 """
 
 from __future__ import annotations
@@ -13,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.prepared_log import PreparedLog, sticks
+from identify.dataset.prepared_log import REST_SPEED, PreparedLog, sticks
 from identify.estimation.fit import Fit
 from identify.selection.decoys import Proof, beside_decoys
-from twin.effect import Coordinate, Curve
+from twin.effect import Coordinate, Curve, Kind
 from twin.model.machine import Fitted
 from twin.signals import Array
 
@@ -42,37 +44,47 @@ def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
 
 
 def _tried(fit: Fit, fitted: Fitted, dataset: Dataset) -> WrongShape:
-    """The curve with as many hats as the fit logs, by blocks left out, say are best."""
+    """The curve with as many hats, and at standstill, as blocks left out of the fit logs say."""
     assert fitted.effect.curve is not None
     among = replace(dataset, holdout=())
-    sticking = sticks(fit.axis)
+    is_force = fitted.effect.kind is Kind.FORCE
+    sticking = sticks(fit.axis) or not is_force
+    rests = (False, True) if is_force and fitted.effect.curve.by_direction else (False,)
 
-    def gain(hats: int) -> float:
-        columns = _Hats.of(fitted, dataset.fit, hats).columns
-        return beside_decoys(fit, columns, among, sticking=sticking, ridge=RIDGE, decoys=0).gain
+    def tried(hats: _Hats) -> Proof:
+        return beside_decoys(fit, hats.columns, among, sticking=sticking, ridge=RIDGE, decoys=0)
 
-    best = _Hats.of(fitted, dataset.fit, max(HATS, key=gain)).columns
+    forms = [_Hats.of(fitted, dataset.fit, n, at_rest=r) for n in HATS for r in rests]
+    best = max(forms, key=lambda hats: tried(hats).gain).columns
     found = beside_decoys(fit, best, dataset, sticking=sticking, ridge=RIDGE, decoys=DECOYS)
     return WrongShape(fitted.effect.name, fitted.effect.curve, found)
 
 
 @dataclass(frozen=True, eq=False)
 class _Hats:
-    """Hats over a curve's coordinate. knots (k,): in its unit, or parts of its period."""
+    """Hats over a curve's coordinate. knots (k,): in its unit, or parts of its period.
+
+    at_rest: whether a curve of each direction stays at standstill as it was before.
+    """
 
     curve: Curve
     period: float | None
     knots: Array
+    at_rest: bool
 
     @classmethod
-    def of(cls, fitted: Fitted, logs: Sequence[PreparedLog], count: int) -> _Hats:
+    def of(
+        cls, fitted: Fitted, logs: Sequence[PreparedLog], count: int, *, at_rest: bool = False
+    ) -> _Hats:
         curve = fitted.effect.curve
         assert curve is not None
         if curve.period is not None:
-            return cls(curve, fitted.values[curve.period], np.linspace(0.0, 1.0, count + 1))
+            knots = np.linspace(0.0, 1.0, count + 1)
+            return cls(curve, fitted.values[curve.period], knots, at_rest)
         where = np.concatenate([_coordinate(curve, log) for log in logs])
         # As many samples to a hat as to any other: a friction curve bends where speeds are low.
-        return cls(curve, None, np.unique(np.quantile(where, np.linspace(0.0, 1.0, count))))
+        knots = np.unique(np.quantile(where, np.linspace(0.0, 1.0, count)))
+        return cls(curve, None, knots, at_rest)
 
     def columns(self, logs: Sequence[PreparedLog]) -> list[Array]:
         """Means of the hats by test functions, (m, k) for each log; k doubles by direction."""
@@ -87,9 +99,18 @@ class _Hats:
             hats[0] += hats[-1]
             hats = hats[:-1]
         if self.curve.by_direction:
-            velocity = log.motion.velocity
-            hats = np.concatenate([hats * (velocity > 0.0), hats * (velocity < 0.0)])
+            direction = self._direction(log.motion.velocity)
+            hats = np.concatenate([hats * (direction > 0.0), hats * (direction < 0.0)])
         return log.test_function.mean(hats).T
+
+    def _direction(self, velocity: Array) -> Array:
+        """Sign (n,) of the velocity; at standstill 0, or as it was before."""
+        moving = np.abs(velocity) > REST_SPEED * np.abs(velocity).max()
+        direction = np.where(moving, np.sign(velocity), 0.0)
+        if self.at_rest:
+            last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), 0))
+            direction = direction[last]
+        return direction
 
 
 def _coordinate(curve: Curve, log: PreparedLog) -> Array:

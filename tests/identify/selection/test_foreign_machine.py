@@ -86,6 +86,17 @@ def test_bumps_of_another_form_are_no_reason_to_name_another_effect(seed):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_bumps_that_let_go_at_rest_are_told_as_bumps_of_another_shape(seed):
+    machine = drawn(np.random.default_rng(seed), RATE, bump=gaussian).having(turn=0.0)
+    answer = diagnosed(STAGE, machine, seed).with_findings()
+    assert answer.best is None
+    if not answer.base.at_floor:
+        assert answer.verdict is Verdict.WRONG_SHAPE
+        assert [f.effect for f in answer.findings] == ["roller_spikes"]
+
+
+@pytest.mark.slow
 def test_a_hysteresis_that_leaves_no_dry_friction_may_be_one():
     """Slip elements of the friction are to the motion what those of a cable would be."""
     machine = drawn(np.random.default_rng(1), 2e3)

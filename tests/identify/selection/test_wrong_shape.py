@@ -73,10 +73,18 @@ def test_hats_are_a_partition_by_direction(study) -> None:
     for name in ("cogging", "cable_slab", "position_dependent_friction", "lugre"):
         hats = _Hats.of(fitted(name), study.fit, 12)
         (columns,) = hats.columns([log])
-        moving = np.abs(np.sign(log.motion.velocity)) if hats.curve.by_direction else 1.0
+        moving = np.abs(hats._direction(log.motion.velocity)) if hats.curve.by_direction else 1.0
         whole = log.test_function.mean(moving * np.ones(len(log.motion.time)))
         np.testing.assert_allclose(columns.sum(axis=1), whole, atol=1e-9)
         assert columns.shape[1] <= 12 * (2 if hats.curve.by_direction else 1)
+
+
+def test_at_standstill_a_curve_stays_or_lets_go() -> None:
+    velocity = np.array([0.1, 1e-6, -1e-6, 0.0, -0.2, 0.0, 0.1])
+    curve = CATALOGUE["roller_spikes"].curve
+    held, free = (_Hats(curve, 0.034, np.linspace(0, 1, 3), r) for r in (True, False))
+    assert held._direction(velocity).tolist() == [1, 1, 1, 1, -1, -1, 1]
+    assert free._direction(velocity).tolist() == [1, 0, 0, 0, -1, 0, 1]
 
 
 def test_a_shape_is_the_verdict_where_it_is_all_that_is_found(study) -> None:
