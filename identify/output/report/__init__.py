@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -28,6 +27,7 @@ from identify.output.report.subject import Subject
 from identify.output.report.units import quantity
 from identify.output.results import Addition, Comparison, Diagnosis
 from twin.files import require_writable, write_atomically
+from twin.log.writer import software_version
 from twin.model.machine import HistoryStep
 
 SECTIONS: tuple[Callable[[Subject], Section | None], ...] = (
@@ -87,7 +87,7 @@ def render(subject: Subject, shown: Sequence[Section]) -> str:
         title=subject.title,
         facts=_facts(subject),
         sections=shown,
-        version=importlib.metadata.version("proton-twin"),
+        version=software_version(),
     )
 
 
