@@ -1,13 +1,33 @@
-"""The model against measurements: fit, compare, diagnose, add, plan, agree."""
+"""The model against measurements: fit, compare, diagnose, add, plan, agree, reproduce."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from identify.workflow import add, agree, compare, diagnose, fit, plan
+    from identify.workflow import (
+        add,
+        agree,
+        cable_force,
+        compare,
+        diagnose,
+        fit,
+        plan,
+        reproduce,
+        velocity_map,
+    )
 
-__all__ = ["add", "agree", "compare", "diagnose", "fit", "plan"]
+__all__ = [
+    "add",
+    "agree",
+    "cable_force",
+    "compare",
+    "diagnose",
+    "fit",
+    "plan",
+    "reproduce",
+    "velocity_map",
+]
 
 
 def __getattr__(name: str) -> Any:

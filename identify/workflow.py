@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -14,6 +14,7 @@ from identify.estimation.fit import Fit, error_on, rms
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates, found_intervals
 from identify.experiment_design.plan import Plan, next_experiment, plan
+from identify.measure import cable_force, velocity_map
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
 from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate, score, try_effect, usable
@@ -21,6 +22,8 @@ from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
+from identify.thesis.study import Reproduction
+from identify.thesis.study import reproduce as study
 from identify.validation.agreement import Agreement, agreement
 from identify.validation.free_run import free_run, rms_error
 from identify.validation.misfit_maps import compare_axis, position_errors
@@ -281,6 +284,16 @@ def agree(
     return agreement(a, b, load_catalogue() if catalogue is None else catalogue)
 
 
+def reproduce(
+    chapters: Sequence[str] = (), *, small: bool = False, seed: int = 1, progress: Progress = silent
+) -> Reproduction:
+    """Run chapters of the thesis's study on the twin, all where none is named. Raises InputError.
+
+    small: fewer speeds, trials and passes.
+    """
+    return study(load_catalogue(), chapters, small=small, seed=seed, progress=progress)
+
+
 __all__ = [
     "Addition",
     "Agreement",
@@ -290,9 +303,12 @@ __all__ = [
     "add",
     "add_named",
     "agree",
+    "cable_force",
     "compare",
     "diagnose",
     "fit",
     "plan",
+    "reproduce",
     "score",
+    "velocity_map",
 ]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import sys
 
-from identify.cli import agree, loop, machine, plan, selftest
+from identify.cli import agree, loop, machine, plan, reproduce, selftest
 from identify.cli.shared import app
 from twin.errors import InputError
 
-__all__ = ["agree", "loop", "machine", "main", "plan", "selftest"]
+__all__ = ["agree", "loop", "machine", "main", "plan", "reproduce", "selftest"]
 
 INTERRUPTED = 130  # exit code that typer makes of Ctrl-C, without a word
 

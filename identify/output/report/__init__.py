@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from identify.output.report import (
     answer,
     equations,
@@ -22,12 +20,12 @@ from identify.output.report import (
     whiteness,
 )
 from identify.output.report.blocks import Section
-from identify.output.report.drawing import data_uri, drawing_style
+from identify.output.report.drawing import drawing_style
+from identify.output.report.page import page
 from identify.output.report.subject import Subject
 from identify.output.report.units import quantity
 from identify.output.results import Addition, Comparison, Diagnosis
 from twin.files import require_writable, write_atomically
-from twin.log.writer import software_version
 from twin.model.machine import HistoryStep
 
 SECTIONS: tuple[Callable[[Subject], Section | None], ...] = (
@@ -63,8 +61,8 @@ def write_report(
     require_writable(path)
     subject = Subject(title, diagnosis, comparison, tuple(history), tuple(additions))
     with drawing_style():
-        page = render(subject, sections(subject))
-    write_atomically(path, page.encode("utf-8"))
+        text = render(subject, sections(subject))
+    write_atomically(path, text.encode("utf-8"))
 
 
 def sections(subject: Subject) -> list[Section]:
@@ -74,21 +72,8 @@ def sections(subject: Subject) -> list[Section]:
 
 
 def render(subject: Subject, shown: Sequence[Section]) -> str:
-    """The page as HTML text; every text is escaped by the template."""
-    environment = Environment(
-        loader=PackageLoader("identify.output.report", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["data_uri"] = data_uri
-    return environment.get_template("report.html.j2").render(
-        title=subject.title,
-        facts=_facts(subject),
-        sections=shown,
-        version=software_version(),
-    )
+    """The page as HTML text."""
+    return page(subject.title, _facts(subject), shown)
 
 
 def _facts(subject: Subject) -> list[tuple[str, str]]:

@@ -97,6 +97,11 @@ def settle(figure: Figure) -> None:
         axes.set_position(tuple(np.round(axes.get_position().bounds, 4)))
 
 
+def plain_tick(value: float, _: int) -> str:
+    """Label of a logarithmic scale without mathematical notation, which is not parsed."""
+    return f"{value:g}"
+
+
 def noise_band(axes: Axes, floor: float) -> None:
     """The noise floor (RMS) as a band about zero."""
     axes.axhspan(-floor, floor, color=FLOOR, alpha=0.7, linewidth=0, label="noise floor (± RMS)")

@@ -1,0 +1,124 @@
+"""Chapter "cable": the passes, the spikes, and the cable's force beside the planted one."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from identify.output.report.blocks import (
+    Answer,
+    Block,
+    Column,
+    Picture,
+    Row,
+    Section,
+    Table,
+    Tile,
+    Tone,
+)
+from identify.output.report.drawing import BLUE, FLOOR, GREY, INK, ORANGE, new_figure
+from identify.output.report.units import quantity
+from identify.output.words.numbers import capitalised
+from identify.output.words.reproduction import cable_in_words
+from identify.thesis.cable import CableStudy
+
+
+def section(study: CableStudy) -> Section:
+    """The chapter."""
+    blocks: list[Block] = [
+        _answer(study),
+        Picture(
+            _passes(study),
+            "The mean force over the passes of each direction. Shaded: where a spike was found; it "
+            "is kept out of the cable's force.",
+        ),
+        Picture(
+            _recovered(study),
+            "The cable's force found and planted, and below the error with its 90 % band; orange: "
+            "the error if the spikes are left in, as in the thesis.",
+        ),
+        _spikes(study),
+    ]
+    return Section("cable", "Cable slab", blocks)
+
+
+def _answer(study: CableStudy) -> Answer:
+    tiles = [
+        Tile("RMS error", quantity(study.rms_error, "N"), "found less planted"),
+        Tile("with the spikes in", quantity(study.rms_error_with_all, "N"), "as in the thesis"),
+        Tile("inside the 90 % band", f"{100 * study.within_band:.0f} %", "of the track"),
+    ]
+    if study.pitch is not None:
+        off = 1e3 * (study.pitch.mean - study.pitch.true)
+        value = f"{1e3 * study.pitch.mean:.3f} mm"
+        tiles.append(
+            Tile(
+                "pitch of the spikes", value, f"{off:+.4f} mm off the planted one".replace("-", "−")
+            )
+        )
+    first, *others = [capitalised(said) for said in cable_in_words(study)]
+    headline = f"The cable's force is recovered to {quantity(study.rms_error, 'N')} RMS"
+    return Answer(headline, first, tiles, others, Tone.STRONG)
+
+
+def _passes(study: CableStudy) -> Figure:
+    figure = new_figure(3.6)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    found = study.found.passes
+    place = 1e3 * found.position
+    upper.plot(place, found.forwards.mean(axis=0), color=BLUE, label="forwards")
+    lower.plot(place, found.backwards.mean(axis=0), color=ORANGE, label="backwards")
+    for axes in (upper, lower):
+        low, high = axes.get_ylim()
+        axes.fill_between(place, low, high, where=~study.found.kept, color=FLOOR, alpha=0.6)
+        axes.set_ylim(low, high)
+        axes.set_ylabel("Force (N)")
+        axes.legend(loc="upper left")
+    lower.set_xlabel("Position (mm)")
+    return figure
+
+
+def _recovered(study: CableStudy) -> Figure:
+    figure = new_figure(4.2)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    place = 1e3 * study.found.position
+    upper.plot(place, study.planted, color=GREY, linewidth=4.0, alpha=0.6, label="planted")
+    upper.plot(place, study.found.force, color=INK, label="found")
+    upper.set_ylabel("Cable force (N)")
+    upper.legend()
+    error, band = 1e3 * study.error, 1e3 * study.found.band
+    lower.fill_between(place, error - band, error + band, color=FLOOR, label="90 % band")
+    lower.plot(place, error, color=BLUE, label="error")
+    left_in = 1e3 * (study.found.with_all - study.planted)
+    lower.plot(place, left_in, color=ORANGE, linewidth=0.9, label="spikes left in")
+    lower.axhline(0.0, color=INK, linewidth=0.7)
+    lower.set_xlabel("Position (mm)")
+    lower.set_ylabel("Error (mN)")
+    reach = 1.1 * float(np.abs([left_in, error + band, error - band]).max())
+    lower.set_ylim(-reach, reach)
+    lower.legend(ncols=3, loc="upper left")
+    return figure
+
+
+def _spikes(study: CableStudy) -> Table:
+    columns = (
+        Column("Spike"),
+        Column("Centre (mm)", numeric=True),
+        Column("Width seen (mm)", numeric=True),
+        Column("Braking forwards (mN)", numeric=True),
+        Column("Braking backwards (mN)", numeric=True),
+    )
+    rows = [
+        Row(
+            (
+                str(i),
+                *(
+                    f"{1e3 * x:.2f}".replace("-", "−")
+                    for x in (s.centre, s.width, s.ahead, s.behind)
+                ),
+            )
+        )
+        for i, s in enumerate(study.found.spikes, 1)
+    ]
+    return Table(columns, rows, "Tops as seen through test functions of 20 ms, which are 2 mm long "
+                 "at this speed and lower them.")  # fmt: skip

@@ -1,0 +1,75 @@
+"""Sentences about the reproduced study."""
+
+from __future__ import annotations
+
+from identify.thesis.cable import CableStudy
+from identify.thesis.chapter import Recovered
+from identify.thesis.simulation import STATIC, SimulationStudy
+
+ALLOWED = 1e-3  # of the planted value, by which a mean may be off
+
+
+def recovered_in_words(name: str, r: Recovered) -> str:
+    """One parameter: planted, found and printed."""
+    printed = "" if r.printed is None else f", thesis {r.printed:.7g}"
+    return (
+        f"{name}: planted {r.true:.7g} {r.unit}, found {r.mean:.7g} +- {r.sd:.1g} "
+        f"({100.0 * r.error:+.4f} %){printed}"
+    )
+
+
+def worst(study: SimulationStudy) -> tuple[str, Recovered]:
+    """The parameter whose mean is furthest from the planted value, in parts of it."""
+    return max(study.parameters.items(), key=lambda item: abs(item[1].error))
+
+
+def simulation_headline(study: SimulationStudy) -> str:
+    """Whether every mean is as near to the planted value as it should be."""
+    name, r = worst(study)
+    if abs(r.error) <= ALLOWED:
+        return f"Every mean is within {100.0 * ALLOWED:g} % of the planted value"
+    return f"The mean of {name} is more than {100.0 * ALLOWED:g} % from the planted value"
+
+
+def simulation_in_words(study: SimulationStudy) -> list[str]:
+    """The largest error of a mean, the printed one, and what the cost reacts to."""
+    name, r = worst(study)
+    said = [
+        f"of the means of {study.trials} trials at {study.snr:g} dB none is further than "
+        f"{100.0 * abs(r.error):.2g} % from the planted value ({name})"
+    ]
+    printed = {
+        k: p.printed / p.true - 1.0 for k, p in study.parameters.items() if p.printed is not None
+    }
+    if printed:
+        furthest = max(printed, key=lambda k: abs(printed[k]))
+        said.append(
+            f"of the thesis's printed means {furthest} is furthest: "
+            f"{100.0 * printed[furthest]:+.2f} %"
+        )
+    most, least = reactions(study)
+    said.append(f"of the static parameters the cost reacts most to {most}, least to {least}")
+    return said
+
+
+def reactions(study: SimulationStudy) -> tuple[str, str]:
+    """The static parameters to which the force on the map reacts most and least."""
+    ends = {p: float(study.sensitivity.force[p].max()) for p in STATIC}
+    return max(ends, key=lambda p: ends[p]), min(ends, key=lambda p: ends[p])
+
+
+def cable_in_words(study: CableStudy) -> list[str]:
+    """How well the cable's force was recovered, and the pitch of the spikes."""
+    said = [
+        f"cable force from {study.repeats} passes each way: {study.rms_error:.2g} N RMS from the "
+        f"planted one, at most {study.largest_error:.2g} N; {100.0 * study.within_band:.0f} % of "
+        "it inside its 90 % band",
+        f"with the spikes left in, as in the thesis: {study.rms_error_with_all:.2g} N RMS",
+    ]
+    if study.pitch is None or study.found.pitch is None:
+        return [*said, "fewer than three spikes were found, so there is no pitch"]
+    return [
+        *said,
+        f"{len(study.found.spikes)} spikes, pitch {1e3 * study.pitch.mean:.4f} +- "
+        f"{1e3 * study.found.pitch.standard_error:.2g} mm (planted {1e3 * study.pitch.true:g} mm)",
+    ]

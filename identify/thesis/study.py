@@ -1,0 +1,79 @@
+"""All chapters of the study, by name, in the order of the thesis."""
+
+from __future__ import annotations
+
+import difflib
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.thesis import cable, simulation
+from identify.thesis.chapter import Progress
+from twin.effects import Catalogue
+from twin.errors import InputError
+from twin.model.file import load_model
+
+SIMULATED = "thesis_simulation"  # model files of the package
+STAGE = "proton_xy"
+
+Result = simulation.SimulationStudy | cable.CableStudy
+Run = Callable[[Catalogue, bool, np.random.Generator, Progress], Result]
+
+
+def _simulation(
+    catalogue: Catalogue, small: bool, rng: np.random.Generator, progress: Progress
+) -> Result:
+    size = simulation.SMALL if small else simulation.FULL
+    return simulation.simulation_study(load_model(SIMULATED, catalogue), size, rng, progress)
+
+
+def _cable(
+    catalogue: Catalogue, small: bool, rng: np.random.Generator, progress: Progress
+) -> Result:
+    size = cable.SMALL if small else cable.FULL
+    return cable.cable_study(load_model(STAGE, catalogue), size, rng, progress)
+
+
+CHAPTERS: Mapping[str, Run] = {"simulation": _simulation, "cable": _cable}
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """Results of the chapters that were run, and the seconds that each took."""
+
+    chapters: Mapping[str, Result]
+    seconds: Mapping[str, float]
+    small: bool
+
+    def __repr__(self) -> str:
+        return f"<Reproduction of {', '.join(self.chapters)}>"
+
+
+def reproduce(
+    catalogue: Catalogue,
+    chapters: Sequence[str] = (),
+    *,
+    small: bool = False,
+    seed: int = 1,
+    progress: Progress,
+) -> Reproduction:
+    """Run chapters of the study on the twin, all where none is named.
+
+    small: a quick version, of fewer speeds and trials. The same seed gives the same numbers, and
+    each chapter the same whether it runs alone or not. Raises InputError for an unknown chapter.
+    """
+    for name in chapters:
+        if name not in CHAPTERS:
+            near = difflib.get_close_matches(name, CHAPTERS, n=1, cutoff=0.4)
+            hint = f"did you mean '{near[0]}'? " if near else ""
+            raise InputError(f"unknown chapter '{name}'; {hint}there are {', '.join(CHAPTERS)}")
+    results, seconds = {}, {}
+    for i, (name, run) in enumerate(CHAPTERS.items()):
+        if chapters and name not in chapters:
+            continue
+        start = time.monotonic()
+        results[name] = run(catalogue, small, np.random.default_rng([seed, i]), progress)
+        seconds[name] = time.monotonic() - start
+    return Reproduction(results, seconds, small)

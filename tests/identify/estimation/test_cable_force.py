@@ -1,0 +1,65 @@
+"""The force of the cable from passes, and the spikes that are kept out of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import identify
+from identify.estimation.passes import Passes, smoother
+from identify.estimation.spikes import Spike, find_spikes, pitch_of
+from twin.effects import load_catalogue
+from twin.errors import InputError
+from twin.experiments.named import simulate
+from twin.model.file import load_model
+from twin.model.machine import MachineModel
+from twin.simulator import ReducedSimulator
+
+STAGE = load_model("proton_xy", load_catalogue())
+ONE = MachineModel("slide", {"x": STAGE.axes["x"]}, STAGE.sample_rate)
+PLACE = np.linspace(-0.14, 0.14, 600)
+CABLE = -(0.05 + 1.5 * PLACE - 2.0 * PLACE**2)
+
+
+def made(ahead: float, behind: float, rng: np.random.Generator, pitch: float = 0.03) -> Passes:
+    """Five passes each way with friction, a cable and bumps that brake by that much (N)."""
+    apart = (PLACE - 0.004 + 0.5 * pitch) % pitch - 0.5 * pitch
+    bump = np.maximum(1.0 - (apart / 0.002) ** 2, 0.0) ** 2
+    noise = 1e-3 * rng.standard_normal((2, 5, len(PLACE)))
+    return Passes(
+        PLACE, 0.3 - CABLE + ahead * bump + noise[0], -0.3 - CABLE - behind * bump + noise[1]
+    )
+
+
+@pytest.mark.parametrize(("ahead", "behind"), [(0.05, 0.05), (0.06, -0.06), (-0.05, 0.02)])
+def test_spikes_are_found_whichever_way_they_push(ahead: float, behind: float) -> None:
+    spikes = find_spikes(made(ahead, behind, np.random.default_rng(1)))
+    found = pitch_of(spikes)
+    assert len(spikes) == 9
+    assert found is not None
+    assert found.value == pytest.approx(0.03, abs=2e-5)
+    assert abs(found.value - 0.03) < 4.0 * found.standard_error
+    assert np.mean([s.ahead for s in spikes]) == pytest.approx(ahead, abs=5e-3)
+
+
+def test_a_track_without_spikes_has_none() -> None:
+    assert find_spikes(made(0.0, 0.0, np.random.default_rng(2))) == ()
+    assert pitch_of(()) is None
+
+
+def test_a_spike_that_was_not_found_leaves_the_pitch_as_it_is() -> None:
+    places = np.array([0.0, 1.0, 2.0, 4.0, 5.0]) * 0.03
+    found = pitch_of(tuple(Spike(p, 0.004, 0.05, 0.05) for p in places))
+    assert found is not None
+    assert found.value == pytest.approx(0.03)
+
+
+def test_the_smoother_keeps_parabolas_even_where_something_is_left_out() -> None:
+    kept = np.abs(PLACE) > 0.003
+    assert smoother(PLACE, kept) @ np.where(kept, CABLE, 9.9) == pytest.approx(CABLE, abs=1e-9)
+
+
+def test_passes_are_needed_in_both_directions() -> None:
+    log = simulate(ONE, "tracking", seed=1, duration=3.0, simulator=ReducedSimulator)
+    with pytest.raises(InputError, match="two each way"):
+        identify.cable_force(ONE, {"log": log})

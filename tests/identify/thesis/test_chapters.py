@@ -1,0 +1,63 @@
+"""The thesis's study in small: chapters run, recover what was planted, and are written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from cli_runs import twin
+
+import identify
+from twin.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("thesis")
+    done = twin("reproduce", "-o", "out", "--small", "--json", folder=folder)
+    assert done.returncode == 0, done.stderr
+    (folder / "printed.json").write_text(done.stdout)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def chapters(written: Path) -> dict:
+    return json.loads((written / "printed.json").read_text())["chapters"]
+
+
+def test_every_mean_of_the_simulation_study_is_within_a_thousandth(chapters) -> None:
+    study = chapters["simulation"]
+    assert study["snr_db"] == 80.0
+    for name, p in study["parameters"].items():
+        assert p["mean"] == pytest.approx(p["true"], rel=1e-3), name
+        assert p["printed"] == pytest.approx(p["true"], rel=6e-3)
+    noisy = study["by_snr_db"]["40"]
+    assert noisy["sigma2"]["sd"] > 30.0 * study["parameters"]["sigma2"]["sd"]
+
+
+def test_the_cable_and_the_pitch_are_recovered(chapters) -> None:
+    cable = chapters["cable"]
+    assert cable["rms_error"] < 3e-4
+    assert cable["rms_error"] < 0.4 * cable["rms_error_with_spikes"]
+    assert cable["pitch"]["mean"] == pytest.approx(cable["pitch"]["true"], abs=1e-4)
+    assert len(cable["spikes"]) == 8
+
+
+def test_the_report_holds_every_chapter_and_needs_nothing_else(written: Path, chapters) -> None:
+    page = (written / "out" / "thesis.html").read_text()
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    assert all(f'id="{name}"' in page for name in chapters)
+    kept = json.loads((written / "out" / "thesis.json").read_text())
+    assert kept["chapters"].keys() == chapters.keys()
+
+
+def test_a_chapter_alone_gives_the_same_numbers(chapters) -> None:
+    alone = identify.reproduce(["cable"], small=True)
+    assert list(alone.chapters) == ["cable"]
+    assert alone.chapters["cable"].rms_error == chapters["cable"]["rms_error"]
+
+
+def test_an_unknown_chapter_suggests_the_nearest() -> None:
+    with pytest.raises(InputError, match="did you mean 'cable'"):
+        identify.reproduce(["cables"])
