@@ -149,6 +149,26 @@ class Parameter:
         return min(max(value, self.lower), self.upper)
 
 
+class Coordinate(Enum):
+    """What a curve is drawn over."""
+
+    POSITION = "position"
+    SPEED = "speed"
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The curve that a law assumes, which on a machine may have another shape.
+
+    over: its coordinate. period: name of the parameter that is the length after which it repeats;
+    None where it does not. by_direction: whether each direction of motion has a curve of its own.
+    """
+
+    over: Coordinate
+    period: str | None = None
+    by_direction: bool = False
+
+
 @dataclass(frozen=True)
 class Part:
     """Strengths of a nonparametric effect that belong to one curve, and how it is smoothed.
@@ -178,7 +198,8 @@ class Effect:
     sticks: whether it is a friction that holds the axis at rest with any force up to a level.
     simplest: the same force with simpler values, such as a shorter pitch where only harmonics were
     used. parts: the curves of a nonparametric effect, whose force is linear in its strengths; such
-    an effect is never the answer of a diagnosis.
+    an effect is never the answer of a diagnosis. curve: that which the law assumes, where a
+    diagnosis may ask whether a free curve does better.
     """
 
     kind: Kind
@@ -196,6 +217,7 @@ class Effect:
     sticks: bool = False
     simplest: Callable[[Mapping[str, float]], dict[str, float]] | None = None
     parts: tuple[Part, ...] = ()
+    curve: Curve | None = None
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]

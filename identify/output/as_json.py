@@ -183,7 +183,7 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
 def _finding(f: Finding) -> dict[str, Any]:
     return {
         "effect": f.effect,
-        "kind": "missing",
+        "kind": f.kind.value,
         "explains": f.explains,
         "indistinguishable_from": list(f.tied),
         "test_error_before": f.error_before,

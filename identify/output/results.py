@@ -95,8 +95,8 @@ class Diagnosis:
     @property
     def leading(self) -> AxisDiagnosis:
         """The axis that the answer is about."""
-        order = [Verdict.NOTHING_MISSING, Verdict.UNEXPLAINED, Verdict.AMBIGUOUS]
-        order.append(Verdict.MISSING_EFFECT)
+        order = [Verdict.NOTHING_MISSING, Verdict.UNEXPLAINED, Verdict.WRONG_SHAPE]
+        order += [Verdict.AMBIGUOUS, Verdict.MISSING_EFFECT]
 
         def weight(d: AxisDiagnosis) -> tuple[bool, int, float]:
             bic = d.ranking[0].delta_bic if d.ranking else 0.0

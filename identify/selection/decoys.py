@@ -9,7 +9,7 @@ left out where there are none.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,7 @@ from twin.model.machine import AxisModel, Fitted
 from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
+Columns = Callable[[Sequence[PreparedLog]], list[Array]]
 
 DECOYS = 40
 SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
@@ -65,15 +66,38 @@ def proof(without: Fit, fitted: Fitted, dataset: Dataset) -> Proof | None:
     timed = depends_on_time_origin(_alone(axis, fitted), dataset)
     if fitted.effect.kind is Kind.FRICTION or timed or not where:
         return None
-    fit, held = (_Part.of(without, axis, where, logs) for logs in (dataset.fit, dataset.holdout))
+
+    def columns(logs: Sequence[PreparedLog]) -> list[Array]:
+        ends = np.cumsum([len(log) for log in logs])[:-1]
+        return np.split(jacobian(axis, logs, where), ends)
+
+    return beside_decoys(without, columns, dataset, sticking=sticks(axis))
+
+
+def beside_decoys(
+    base: Fit,
+    columns: Columns,
+    dataset: Dataset,
+    *,
+    sticking: bool,
+    ridge: float = RIDGE,
+    decoys: int = DECOYS,
+) -> Proof:
+    """What columns take of a fit's squared test error in one linear step, and their decoys.
+
+    columns: logs -> forces (m, j) of each log, N. sticking: whether test functions with standstill
+    are left out. ridge: of the length of a column.
+    """
+    fit = _Part.of(base, columns, dataset.fit, sticking)
+    held = _Part.of(base, columns, dataset.holdout, sticking) if dataset.holdout else None
     rng = np.random.default_rng(SEED)
-    before = _left(fit, held, None)
-    gain = 1.0 - _left(fit, held, np.zeros(len(dataset.logs))) / before
-    decoys = (
-        1.0 - _left(fit, held, rng.uniform(*SHIFTS, len(dataset.logs))) / before
-        for _ in range(DECOYS)
+    before = _left(fit, held, None, ridge)
+    gain = 1.0 - _left(fit, held, np.zeros(len(dataset.logs)), ridge) / before
+    untrue = (
+        1.0 - _left(fit, held, rng.uniform(*SHIFTS, len(dataset.logs)), ridge) / before
+        for _ in range(decoys)
     )
-    return Proof(float(gain), float(max(decoys)))
+    return Proof(float(gain), float(max(untrue, default=-np.inf)))
 
 
 def _alone(axis: AxisModel, fitted: Fitted) -> AxisModel:
@@ -96,21 +120,12 @@ class _Part:
     kept: NDArray[np.bool_]
 
     @classmethod
-    def of(
-        cls,
-        without: Fit,
-        axis: AxisModel,
-        where: Sequence[ParameterReference],
-        logs: Sequence[PreparedLog],
-    ) -> _Part | None:
-        if not logs:
-            return None
-        kept = moving(logs, sticks(axis))
-        ends = np.cumsum([len(log) for log in logs])[:-1]
+    def of(cls, base: Fit, columns: Columns, logs: Sequence[PreparedLog], sticking: bool) -> _Part:
+        kept = moving(logs, sticking)
         return cls(
-            residual(without.axis, logs)[kept],
-            jacobian(without.axis, logs, without.scaling.where)[kept],
-            np.split(jacobian(axis, logs, where), ends),
+            residual(base.axis, logs)[kept],
+            jacobian(base.axis, logs, base.scaling.where)[kept],
+            columns(logs),
             kept,
         )
 
@@ -125,17 +140,16 @@ class _Part:
         return np.hstack([self.base, np.concatenate(moved)[self.kept]])
 
 
-def _left(fit: _Part | None, held: _Part | None, shifts: Array | None) -> float:
+def _left(fit: _Part, held: _Part | None, shifts: Array | None, ridge: float) -> float:
     """Mean squared test error N^2 after a linear step with the effect so shifted."""
-    assert fit is not None
     there = None if shifts is None else shifts[: len(fit.columns)]
     columns = fit.with_effect(there)
     norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     columns = columns / norms
-    normal = columns.T @ columns + RIDGE**2 * np.eye(len(norms))
+    normal = columns.T @ columns + ridge**2 * np.eye(len(norms))
     step = np.linalg.solve(normal, columns.T @ fit.force)
     if held is None:
         solved = fit.force - columns @ step
-        return float(np.mean(left_out(solved, columns, np.full(len(norms), RIDGE)) ** 2))
+        return float(np.mean(left_out(solved, columns, np.full(len(norms), ridge)) ** 2))
     rest = None if shifts is None else shifts[len(fit.columns) :]
     return float(np.mean((held.force - held.with_effect(rest) / norms @ step) ** 2))

@@ -10,9 +10,10 @@ from functools import cached_property
 from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit
 from identify.selection.candidates import Candidate
-from identify.selection.findings import Finding, found
+from identify.selection.findings import Finding, found, found_wrong
 from identify.selection.repeating_force import Repeat, not_general
 from identify.selection.residual_dependence import Dependence
+from identify.selection.wrong_shape import wrong_shape
 
 
 class Verdict(Enum):
@@ -21,6 +22,7 @@ class Verdict(Enum):
     MISSING_EFFECT = "missing effect"
     NOTHING_MISSING = "nothing missing"
     AMBIGUOUS = "ambiguous"
+    WRONG_SHAPE = "wrong shape"
     UNEXPLAINED = "unexplained"
 
 
@@ -100,15 +102,22 @@ class AxisDiagnosis:
         return self._proved[0].tied if self.named else ()
 
     def with_findings(self) -> AxisDiagnosis:
-        """The same with what each named effect explains, which takes a refit for each."""
-        steps = self._proved if self.named else []
-        return replace(
-            self,
-            findings=tuple(
-                found(s.candidate.effect, s.tied, self.base, self.final, self.dataset)
-                for s in steps
-            ),
-        )
+        """The same with what each named effect explains, and with a law of the wrong shape.
+
+        It takes a refit for each. A shape is asked about where error remains beside what is named.
+        """
+        final = self.final if self.named else self.base
+        findings = [
+            found(s.candidate.effect, s.tied, self.base, final, self.dataset)
+            for s in (self._proved if self.named else ())
+        ]
+        shape = None if self.unexplained is None else wrong_shape(final, self.dataset)
+        if shape is None:
+            return replace(self, findings=tuple(findings))
+        findings.append(found_wrong(shape, self.base, final, self.dataset))
+        alone = self.verdict is Verdict.UNEXPLAINED
+        verdict = Verdict.WRONG_SHAPE if alone else self.verdict
+        return replace(self, findings=tuple(findings), verdict=verdict)
 
     @property
     def _proved(self) -> list[Step]:

@@ -1,24 +1,34 @@
-"""Findings: what a missing effect explains of the test error, and how it does beside decoys."""
+"""Findings: what a missing effect, or another shape, explains of the test error."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit, error_on, rms
 from identify.selection.decoys import Proof, proof
 from identify.selection.ranking import less
+from identify.selection.wrong_shape import WrongShape
 from twin.effect import Effect
+
+
+class FindingKind(Enum):
+    """What is wrong with the model."""
+
+    MISSING = "missing"
+    WRONG_SHAPE = "wrong_shape"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A missing effect that the data prove.
+    """A missing effect, or one whose law has the wrong shape, that the data prove.
 
     tied: effects that these data cannot separate from it. explains: part of the squared test error
     above the noise floor that comes back when it alone is taken out, about 0..1. error_before,
-    error_after: RMS test error in ``unit`` without it and with it. parameters: of its law.
-    proof: beside decoys; None where a shift in time makes none.
+    error_after: RMS test error in ``unit`` without it and with it; of a wrong shape with the law
+    and with a free curve beside it, as one linear step predicts. parameters: of its law. proof:
+    beside decoys; None where a shift in time makes none.
     """
 
     effect: str
@@ -29,6 +39,7 @@ class Finding:
     unit: str
     parameters: dict[str, float]
     proof: Proof | None
+    kind: FindingKind = FindingKind.MISSING
 
 
 def found(
@@ -47,6 +58,23 @@ def found(
         unit=final.axis.units.force,
         parameters=dict(final.axis[effect.name].values),
         proof=proof(without, final.axis[effect.name], dataset),
+    )
+
+
+def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> Finding:
+    """The finding of a law with the wrong shape in a final fit."""
+    before, first = test_error(final, dataset), test_error(base, dataset)
+    taken, above = shape.proof.gain * before**2, first**2 - base.floor**2
+    return Finding(
+        effect=shape.effect,
+        tied=(),
+        explains=taken / above if above > 0.0 else 0.0,
+        error_before=before,
+        error_after=(before**2 - taken) ** 0.5,
+        unit=final.axis.units.force,
+        parameters=dict(final.axis[shape.effect].values),
+        proof=shape.proof,
+        kind=FindingKind.WRONG_SHAPE,
     )
 
 

@@ -78,6 +78,8 @@ def _headline(found: AxisDiagnosis) -> str:
     match found.verdict:
         case Verdict.MISSING_EFFECT | Verdict.AMBIGUOUS:
             return f"{' and '.join([either, *more])} {'are' if more else 'is'} missing"
+        case Verdict.WRONG_SHAPE:
+            return f"{spaced(found.findings[0].effect)} has another shape"
         case Verdict.UNEXPLAINED:
             return "something outside the catalogue is missing"
         case Verdict.NOTHING_MISSING:

@@ -10,7 +10,7 @@ from identify.output.words.numbers import PLAIN, Numbers
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.findings import Finding
+from identify.selection.findings import Finding, FindingKind
 from identify.selection.nonparametric import followed
 from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
@@ -25,6 +25,9 @@ VERDICTS = {
     Verdict.NOTHING_MISSING: "Nothing is missing: the force error is at its noise floor.",
     Verdict.AMBIGUOUS: (
         "Several effects explain the error equally well; these data cannot separate them."
+    ),
+    Verdict.WRONG_SHAPE: (
+        "The model has the effect, but its law has another shape than the force of the machine."
     ),
     Verdict.UNEXPLAINED: (
         "The error is above the noise floor, and no effect of the catalogue explains it."
@@ -41,11 +44,14 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     """E.g. "cogging explains 93 % of the squared error above the noise floor: ..."."""
     unit = finding.unit
     error = units_of(unit).words("test error")
+    before, after = (numbers.amount(e, unit) for e in (finding.error_before, finding.error_after))
+    what, without, with_it = f"{finding.effect} explains", "without it", "with it"
+    if finding.kind is FindingKind.WRONG_SHAPE:
+        what = f"{finding.effect} has another shape: a free curve beside its law explains"
+        without, with_it = "with the law", "with the curve"
     text = (
-        f"{finding.effect} explains {100.0 * finding.explains:.0f} % of the squared error above "
-        f"the noise floor: without it the {error} is "
-        f"{numbers.amount(finding.error_before, unit)}, with it "
-        f"{numbers.amount(finding.error_after, unit)}"
+        f"{what} {100.0 * finding.explains:.0f} % of the squared error above the noise floor: "
+        f"{without} the {error} is {before}, {with_it} {after}"
     )
     if finding.proof is None:
         return text
@@ -55,10 +61,12 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
 
 def remainder_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str | None:
     """How large the error is that remains beside what was named, or None where it is noise."""
-    if not found.named or found.unexplained is None:
+    if not found.findings or found.unexplained is None:
         return None
-    error = numbers.amount(found.final.error, found.final.axis.units.force)
-    return f"what remains is {error}, {found.final.ratio:.1f} times the noise floor"
+    fit = found.final if found.named else found.base
+    error = numbers.amount(fit.error, fit.axis.units.force)
+    beside = " beside the named effects" if found.named else ""
+    return f"what remains{beside} is {error}, {fit.ratio:.1f} times the noise floor"
 
 
 def change_in_words(change: Change) -> str:

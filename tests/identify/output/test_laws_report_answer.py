@@ -103,8 +103,8 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     left = made.diagnosis_of(unexplained=made.STRUCTURE, findings=made.FOUND)
     card, _ = cards(made.diagnosed(left))
     assert card.sentence.startswith(
-        f"{verdict_in_words(Verdict.AMBIGUOUS)} What remains is 3.19 N, 1.6 times the noise floor. "
-        "The error depends most on other axis position"
+        f"{verdict_in_words(Verdict.AMBIGUOUS)} What remains beside the named effects is 3.19 N, "
+        "1.6 times the noise floor. The error depends most on other axis position"
     )
     assert [r.split(" explains ")[0] for r in card.remarks[:2]] == ["Cogging", "Lugre"]
     assert "without it the test error is 7.17 N, with it 2.19 N; in one" in card.remarks[0]

@@ -138,7 +138,7 @@ def test_a_diagnosis():
         "14 %",
         "lugre explains 12 % of the squared error above the noise floor: without it the test error "
         "is 3.23 N, with it 2.19 N",
-        "what remains is 3.19 N, 1.6 times the noise floor",
+        "what remains beside the named effects is 3.19 N, 1.6 times the noise floor",
     ]
     rest = rest[3:]
     assert rest[:2] == [
