@@ -21,6 +21,7 @@ from twin.experiments.named import simulate
 from twin.log import Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import Fitted, MachineModel
+from twin.simulator import ReducedSimulator
 
 DURATION = 20.0  # s of each log
 EXPERIMENTS = ("tracking", "moves", "tracking")  # the last is held out
@@ -129,7 +130,10 @@ def hidden_machine(
     machine = model
     for name, axis in model.axes.items():
         machine = machine.with_axis(name, other_machine(axis, rng))
-    log = simulate(machine, "tracking", seed=int(rng.integers(1 << 30)), duration=DURATION)
+    log = simulate(
+        machine, "tracking", seed=int(rng.integers(1 << 30)), duration=DURATION,
+        simulator=ReducedSimulator,
+    )  # fmt: skip
     name = _first(machine)
     dataset = datasets(machine, {"log": log}, {})[name]
     base = fit_axis(machine.axes[name], dataset.fit)

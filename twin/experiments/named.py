@@ -7,7 +7,6 @@ sine; tracking is the rich motion on which models are fitted and tested.
 from __future__ import annotations
 
 import difflib
-import importlib.metadata
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -31,6 +30,7 @@ from twin.experiments.trajectory import Limits
 from twin.experiments.trajectory.setpoint import Setpoint
 from twin.log import AxisLog, Log
 from twin.log.log import LINEAR_UNITS, ROTARY_UNITS
+from twin.log.writer import software_version
 from twin.model.file import format_model
 from twin.model.machine import MachineModel
 from twin.simulator import MujocoSimulator, Progress, ReducedSimulator, Run, run
@@ -205,8 +205,8 @@ def _log(
         "source": "simulation",
         "experiment": experiment,
         "seed": str(seed),
-        "software": f"proton-twin {importlib.metadata.version('proton-twin')}",
-        "mujoco": importlib.metadata.version("mujoco"),
+        "software": f"proton-twin {software_version()}",
+        "mujoco": software_version("mujoco"),
     }
     attachments = {"model.toml": text.encode()}
     if model.mjcf:

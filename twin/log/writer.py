@@ -6,6 +6,7 @@ import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import PurePath
 from typing import BinaryIO
@@ -178,9 +179,10 @@ class McapWriter:
         return start, len(data)
 
 
-def software_version() -> str:
-    """The version of this package, or that it is not installed."""
+@cache  # a package's metadata are pages, parsed line by line
+def software_version(package: str = "proton-twin") -> str:
+    """The version of a package, or that it is not installed."""
     try:
-        return version("proton-twin")
+        return version(package)
     except PackageNotFoundError:
         return "uninstalled"

@@ -52,7 +52,12 @@ class Axis:
     @cached_property
     def position_noise(self) -> float:
         """Noise of the position in m rms: its white part, or the rounding to its step."""
-        return max(white_noise(self.log.position), self.position_step / 12**0.5)
+        return max(self.position_white, self.position_step / 12**0.5)
+
+    @cached_property
+    def position_white(self) -> float:
+        """White part of the position, m rms."""
+        return white_noise(self.log.position)
 
     @cached_property
     def position_held(self) -> int:

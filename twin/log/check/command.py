@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.log.check.axis import Axis
 from twin.log.check.breaks import held
@@ -27,11 +28,7 @@ def check(axis: Axis) -> Iterator[Finding]:
         yield held(axis, "the force", count)
         return
     off = off_course(force)
-    # A sample at a steep edge may be off by as much; noise is no single sample.
-    most = max(_ALONE * float(np.quantile(off, 0.99)), _LARGE * axis.force_size)
-    bad = off > most
-    together = np.convolve(bad, np.ones(_BURST), "same")
-    single = np.flatnonzero(bad & (together <= _MOST_TOGETHER))
+    single = _single(off, _LARGE * axis.force_size)
     if len(single):
         first = single[0] / axis.sample_rate
         more = f" and {len(single) - 1} more times" if len(single) > 1 else ""
@@ -41,6 +38,16 @@ def check(axis: Axis) -> Iterator[Finding]:
             f"{first:.6g} s{more}", "repair these samples, or cut the log there",
         )  # fmt: skip
     yield from _noise(axis)
+
+
+def _single(off: Array, least: float) -> NDArray[np.intp]:
+    """Samples (k,) that are off their neighbours by more than ``least``, few of them together."""
+    bad = off > least
+    if not bad.any():
+        return np.flatnonzero(bad)
+    bad &= off > _ALONE * float(np.quantile(off, 0.99))  # one at a steep edge is off by as much
+    together = np.convolve(bad, np.ones(_BURST), "same")
+    return np.flatnonzero(bad & (together <= _MOST_TOGETHER))  # noise is no single sample
 
 
 def _noise(axis: Axis) -> Iterator[Finding]:

@@ -8,7 +8,6 @@ import numpy as np
 
 from twin.log.check.axis import Axis
 from twin.log.check.report import Fault, Finding, Severity
-from twin.signals import white_noise
 
 _COARSE = 0.3  # acceleration noise as a part of the acceleration
 _ROUNDED = 0.05  # the same, where it is the rounding: that is no noise and does not average out
@@ -64,7 +63,7 @@ def _directions(axis: Axis) -> Iterator[Finding]:
 def _coarse(axis: Axis) -> Iterator[Finding]:
     noise = axis.smoother.acceleration_noise(axis.position_noise)
     rms = float(np.sqrt(np.mean(axis.acceleration**2)))
-    rounded = white_noise(axis.log.position) < _ROUNDING * axis.position_step
+    rounded = axis.position_white < _ROUNDING * axis.position_step
     if noise < (_ROUNDED if rounded else _COARSE) * rms:
         return
     unit = axis.log.units["position"]

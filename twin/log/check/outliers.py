@@ -55,8 +55,10 @@ def _rough_command(axis: Axis) -> Array:
     """Times (k,) in s within bursts of noise on the command."""
     force = axis.log.force
     second = np.abs(np.diff(force, 2))
-    rough = second > max(_UNUSUAL * _usual(axis, second), _ROUGH * axis.force_size)
+    rough = second > _ROUGH * axis.force_size
     span = max(round(_ROUGH_SPAN * axis.sample_rate), 2 * _FEWEST_ROUGH)
+    if np.count_nonzero(rough) >= span // 2:
+        rough &= second > _UNUSUAL * _usual(axis, second)
     if np.count_nonzero(rough) < span // 2:
         return np.empty(0)
     dense = np.convolve(rough, np.ones(span), "same") > span // 2
