@@ -20,6 +20,7 @@ from scipy.special import stdtrit
 from identify.estimation.evidence import left_out
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
+from twin.model.intervals import AxisIntervals
 from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]
@@ -114,13 +115,28 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
     return (*free, *_held(fit))
 
 
-def found_intervals(found: Sequence[Estimate]) -> dict[str, tuple[float, float]]:
-    """Low and high end by label, of the estimates that have an interval."""
-    return {
+def intervals_to_keep(fit: Fit, found: Sequence[Estimate]) -> AxisIntervals:
+    """The intervals of a fit's estimates, for its model's file.
+
+    Where all of them are refused because the model is wrong, the scatter of the blocks is kept with
+    the ratio that tells so: whether two machines are alike can be asked of wrong models too.
+    """
+    ends = {
         e.label: (float(e.low), float(e.high))
         for e in found
         if e.low is not None and e.high is not None
     }
+    if isinstance(refusal(fit), ModelWrong):
+        twins = inseparable(fit)
+        values = zip(
+            fit.scaling.where, read(fit.axis, fit.scaling.where), half_widths(fit), strict=True
+        )
+        ends = {
+            c.label: (float(value - half), float(value + half))
+            for c, value, half in values
+            if np.isfinite(half) and c.label not in twins and not open_side(fit, c, half)
+        }
+    return AxisIntervals(ends, float(fit.ratio) if len(fit.residual) else 1.0)
 
 
 def open_side(fit: Fit, c: ParameterReference, half: float) -> Side | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import tomlkit
@@ -14,30 +15,55 @@ if TYPE_CHECKING:
     from twin.model.machine import AxisModel, MachineModel
 
 Interval = tuple[float, float]
-Intervals = Mapping[str, Mapping[str, Interval]]  # axis -> label of a parameter -> low, high
 
 ENTRY = "intervals"  # of the TOML document
+ABOVE_FLOOR = "above_floor"
 COMMENT = "90 % intervals of the fit that wrote this file; for `twin agree`"
 
 
-def read_intervals(document: Mapping[str, Any], axes: Mapping[str, AxisModel]) -> Intervals:
+@dataclass(frozen=True)
+class AxisIntervals:
+    """Low and high ends (90 %) by parameter label, in the parameters' units.
+
+    above_floor: force error of the fit over its noise floor. Where it is large the model is wrong,
+    and the ends tell how far the values scatter from one part of the logs to another, no more.
+    """
+
+    ends: Mapping[str, Interval]
+    above_floor: float
+
+
+def read_intervals(
+    document: Mapping[str, Any], axes: Mapping[str, AxisModel]
+) -> dict[str, AxisIntervals]:
     """The intervals in a model's TOML document; raises InputError for one that is none.
 
     An interval that does not hold its parameter's value belongs to another fit: the value was
     edited afterwards. It is left out.
     """
-    found: dict[str, dict[str, Interval]] = {}
+    found = {}
     for axis, entries in document.get(ENTRY, {}).items():
         if axis not in axes:
             raise InputError(f"{ENTRY}: the model has no axis '{axis}'; it has {', '.join(axes)}")
-        values = _values(axes[axis])
-        for label, ends in entries.items():
-            low, high = _ends(label, ends)
+        values, ends = _values(axes[axis]), {}
+        for label, given in entries.items():
+            if label == ABOVE_FLOOR:
+                continue
+            low, high = _ends(label, given)
             if label not in values:
                 raise InputError(f"{ENTRY}: axis {axis} has no parameter '{label}'; remove it")
             if low <= values[label] <= high:
-                found.setdefault(axis, {})[label] = (low, high)
+                ends[label] = low, high
+        found[axis] = AxisIntervals(ends, _ratio(entries.get(ABOVE_FLOOR, 1.0)))
     return found
+
+
+def _ratio(given: Any) -> float:
+    if isinstance(given, int | float) and not math.isnan(given) and given >= 0.0:
+        return float(given)
+    raise InputError(
+        f"{ENTRY}: {ABOVE_FLOOR} = {given}: give force error over noise floor, 0 or more"
+    )
 
 
 def _ends(label: str, ends: Any) -> Interval:
@@ -64,7 +90,9 @@ def intervals_table(model: MachineModel) -> tomlkit.items.Table:
         units = model.axes[axis].units
         entries = tomlkit.table()
         entries.comment(COMMENT)
-        for label, ends in intervals.items():
+        meaning = units.words("1, force error over noise floor")
+        entries[ABOVE_FLOOR] = tomlkit.item(intervals.above_floor).comment(meaning)
+        for label, ends in intervals.ends.items():
             unit = units(_unit(model.axes[axis], label))
             entries.append(tomlkit.key([label]), tomlkit.item(list(ends)).comment(unit))
         table[axis] = entries

@@ -8,7 +8,7 @@ from typing import Any
 
 from identify.output.report.blocks import Section
 from identify.output.report.drawing import drawing_style
-from identify.output.report.page import page
+from identify.output.report.html import page
 from identify.output.report.thesis import cable, simulation
 from identify.thesis.study import Reproduction
 from twin.model.file import write_atomically
