@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from identify.output.agreement import agree_json
 from identify.output.words.reproduction import (
     cable_in_words,
     recovered_in_words,
     simulation_in_words,
+    twin_in_words,
 )
 from identify.thesis.cable import CableStudy
 from identify.thesis.chapter import Recovered
 from identify.thesis.simulation import SimulationStudy
 from identify.thesis.study import Reproduction
+from identify.thesis.twin import TwinStudy
 
 
 def reproduction_json(result: Reproduction) -> dict[str, Any]:
@@ -91,11 +94,24 @@ def _cable(study: CableStudy) -> dict[str, Any]:
     }
 
 
-JSON: Mapping[str, Callable[[Any], dict[str, Any]]] = {"simulation": _simulation, "cable": _cable}
+def _twin(study: TwinStudy) -> dict[str, Any]:
+    return {
+        "alike": agree_json(study.alike),
+        "changed": {**agree_json(study.changed), "added_mass": study.added, "unit": "kg"},
+        "closed_loop_error": {k: {"found": v, "unit": "1"} for k, v in study.errors.items()},
+    }
+
+
+JSON: Mapping[str, Callable[[Any], dict[str, Any]]] = {
+    "simulation": _simulation,
+    "cable": _cable,
+    "twin": _twin,
+}
 TEXT: Mapping[str, Callable[[Any], list[str]]] = {
     "simulation": lambda study: [
         *simulation_in_words(study),
         *(recovered_in_words(name, r) for name, r in study.parameters.items()),
     ],
     "cable": cable_in_words,
+    "twin": twin_in_words,
 }

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.thesis import cable, simulation
+from identify.thesis import cable, simulation, twin
 from identify.thesis.chapter import Progress
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -18,7 +18,7 @@ from twin.model.file import load_model
 SIMULATED = "thesis_simulation"  # model files of the package
 STAGE = "proton_xy"
 
-Result = simulation.SimulationStudy | cable.CableStudy
+Result = simulation.SimulationStudy | cable.CableStudy | twin.TwinStudy
 Run = Callable[[Catalogue, bool, np.random.Generator, Progress], Result]
 
 
@@ -36,7 +36,14 @@ def _cable(
     return cable.cable_study(load_model(STAGE, catalogue), size, rng, progress)
 
 
-CHAPTERS: Mapping[str, Run] = {"simulation": _simulation, "cable": _cable}
+def _twin(
+    catalogue: Catalogue, small: bool, rng: np.random.Generator, progress: Progress
+) -> Result:
+    size = twin.SMALL if small else twin.FULL
+    return twin.twin_study(load_model(STAGE, catalogue), catalogue, size, rng, progress)
+
+
+CHAPTERS: Mapping[str, Run] = {"simulation": _simulation, "cable": _cable, "twin": _twin}
 
 
 @dataclass(frozen=True, eq=False)

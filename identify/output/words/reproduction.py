@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from identify.output.words.agreement import (
+    agreement_in_words,
+    causes_in_words,
+    difference_in_words,
+)
 from identify.thesis.cable import CableStudy
 from identify.thesis.chapter import Recovered
 from identify.thesis.simulation import STATIC, SimulationStudy
+from identify.thesis.twin import TwinStudy
 
 ALLOWED = 1e-3  # of the planted value, by which a mean may be off
 
@@ -73,3 +79,17 @@ def cable_in_words(study: CableStudy) -> list[str]:
         f"{len(study.found.spikes)} spikes, pitch {1e3 * study.pitch.mean:.4f} +- "
         f"{1e3 * study.found.pitch.standard_error:.2g} mm (planted {1e3 * study.pitch.true:g} mm)",
     ]
+
+
+def twin_in_words(study: TwinStudy) -> list[str]:
+    """Whether machine and twin agree, and what is said of a machine that was changed."""
+    said = [f"machine and twin: {agreement_in_words(*item)}" for item in study.alike.axes.items()]
+    errors = ", ".join(f"{signal} {100.0 * e:.2g} %" for signal, e in study.errors.items())
+    said.append(f"closed-loop errors of the twin on the machine's reference: {errors}")
+    for axis, found in study.changed.axes.items():
+        said.append(
+            f"the machine with {study.added:.3g} kg more: {agreement_in_words(axis, found)}"
+        )
+        said += [difference_in_words(d) for d in found.differing]
+        said += causes_in_words(found)
+    return said

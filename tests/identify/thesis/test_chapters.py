@@ -44,6 +44,17 @@ def test_the_cable_and_the_pitch_are_recovered(chapters) -> None:
     assert len(cable["spikes"]) == 8
 
 
+def test_machine_and_twin_agree_and_a_changed_mass_is_named(chapters) -> None:
+    study = chapters["twin"]
+    assert study["alike"]["agree"]
+    changed = study["changed"]["axes"]["x"]
+    assert changed["differing"] == ["mass"]
+    mass = changed["parameters"]["mass"]
+    assert mass["difference"] == pytest.approx(study["changed"]["added_mass"], rel=0.02)
+    assert "payload_mass" in [c["effect"] for c in changed["causes"]]
+    assert study["closed_loop_error"]["position"]["found"] < 1e-6
+
+
 def test_the_report_holds_every_chapter_and_needs_nothing_else(written: Path, chapters) -> None:
     page = (written / "out" / "thesis.html").read_text()
     assert "http://" not in page.replace("http://www.w3.org", "")
