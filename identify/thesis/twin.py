@@ -1,4 +1,4 @@
-"""Chapter "twin": the machine is identified; its twin follows the same reference, is identified too.
+"""Chapter "twin": the machine is identified; its twin follows the same reference and is, too.
 
 Fits of both must agree within their uncertainties, and the closed loops must move alike. Of a
 machine that was changed the comparison must say what changed. A simulated machine is stepped ten

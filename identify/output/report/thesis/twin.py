@@ -19,7 +19,7 @@ from identify.output.report.blocks import (
     Tone,
 )
 from identify.output.report.drawing import BLUE, FLOOR, INK, ORANGE, new_figure
-from identify.output.report.units import number
+from identify.output.report.units import number, pretty
 from identify.output.words.numbers import capitalised
 from identify.output.words.reproduction import twin_in_words
 from identify.thesis.twin import TwinStudy
@@ -93,7 +93,7 @@ def _table(study: TwinStudy) -> Table:
         Column("Unit"),
     )
     rows = [
-        Row((d.label, f"{d.a:.6g}", f"{d.b:.6g}", number(d.standard_error), d.unit))
+        Row((d.label, f"{d.a:.6g}", f"{d.b:.6g}", number(d.standard_error), pretty(d.unit)))
         for d in _differences(study.alike)
     ]
     return Table(columns, rows)
