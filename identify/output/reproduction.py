@@ -9,11 +9,13 @@ from identify.output.agreement import agree_json
 from identify.output.words.reproduction import (
     cable_in_words,
     recovered_in_words,
+    residuals_in_words,
     simulation_in_words,
     twin_in_words,
 )
 from identify.thesis.cable import CableStudy
 from identify.thesis.chapter import Recovered
+from identify.thesis.residuals import ResidualStudy
 from identify.thesis.simulation import SimulationStudy
 from identify.thesis.study import Reproduction
 from identify.thesis.twin import TwinStudy
@@ -94,6 +96,29 @@ def _cable(study: CableStudy) -> dict[str, Any]:
     }
 
 
+def _residuals(study: ResidualStudy) -> dict[str, Any]:
+    tests = {"before": study.before, "after": study.after}
+    return {
+        "fitted": study.first,
+        "planted": study.planted,
+        "verdict": study.verdict.name.lower(),
+        "named": list(study.named),
+        "ranking": [
+            {"effect": c.name, "delta_bic": c.delta_bic, "error_over_noise_floor": c.over_floor}
+            for c in study.ranking
+        ],
+        "test_error_before": study.error_before,
+        "test_error_after": study.error_after,
+        "noise_floor": study.floor,
+        "unit": "N",
+        "white": {name: t.passes for name, t in tests.items()},
+        "outside_90_bounds": {
+            name: {c.signal: c.outside for c in t.correlations} for name, t in tests.items()
+        },
+        "parameters": {k: _recovered(r) for k, r in study.values.items()},
+    }
+
+
 def _twin(study: TwinStudy) -> dict[str, Any]:
     return {
         "alike": agree_json(study.alike),
@@ -105,6 +130,7 @@ def _twin(study: TwinStudy) -> dict[str, Any]:
 JSON: Mapping[str, Callable[[Any], dict[str, Any]]] = {
     "simulation": _simulation,
     "cable": _cable,
+    "residuals": _residuals,
     "twin": _twin,
 }
 TEXT: Mapping[str, Callable[[Any], list[str]]] = {
@@ -113,5 +139,6 @@ TEXT: Mapping[str, Callable[[Any], list[str]]] = {
         *(recovered_in_words(name, r) for name, r in study.parameters.items()),
     ],
     "cable": cable_in_words,
+    "residuals": residuals_in_words,
     "twin": twin_in_words,
 }

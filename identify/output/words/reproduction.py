@@ -9,6 +9,7 @@ from identify.output.words.agreement import (
 )
 from identify.thesis.cable import CableStudy
 from identify.thesis.chapter import Recovered
+from identify.thesis.residuals import ResidualStudy
 from identify.thesis.simulation import STATIC, SimulationStudy
 from identify.thesis.twin import TwinStudy
 
@@ -78,6 +79,21 @@ def cable_in_words(study: CableStudy) -> list[str]:
         *said,
         f"{len(study.found.spikes)} spikes, pitch {1e3 * study.pitch.mean:.4f} +- "
         f"{1e3 * study.found.pitch.standard_error:.2g} mm (planted {1e3 * study.pitch.true:g} mm)",
+    ]
+
+
+def residuals_in_words(study: ResidualStudy) -> list[str]:
+    """What the tests say of the first friction, what the diagnosis names, and what is left."""
+    white = {True: "white", False: "not white"}
+    named = ", ".join(study.named) or "nothing"
+    return [
+        f"{study.first} fitted to a machine with {study.planted}: test error "
+        f"{study.error_before:.3g} N, {study.error_before / study.floor:.1f} times the noise "
+        f"floor, and its residual is {white[study.before.passes]}",
+        f"the diagnosis names {named} ({study.verdict.name.lower().replace('_', ' ')})",
+        f"with it the test error is {study.error_after:.3g} N, "
+        f"{study.error_after / study.floor:.2f} times the noise floor, and the residual is "
+        f"{white[study.after.passes]}",
     ]
 
 

@@ -11,11 +11,14 @@ from cli_runs import twin
 import identify
 from twin.errors import InputError
 
+QUICK = ("simulation", "cable", "twin")
+
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("thesis")
-    done = twin("reproduce", "-o", "out", "--small", "--json", folder=folder)
+    asked = [part for name in QUICK for part in ("--chapter", name)]
+    done = twin("reproduce", "-o", "out", "--small", "--json", *asked, folder=folder)
     assert done.returncode == 0, done.stderr
     (folder / "printed.json").write_text(done.stdout)
     return folder
@@ -42,6 +45,20 @@ def test_the_cable_and_the_pitch_are_recovered(chapters) -> None:
     assert cable["rms_error"] < 0.4 * cable["rms_error_with_spikes"]
     assert cable["pitch"]["mean"] == pytest.approx(cable["pitch"]["true"], abs=1e-4)
     assert len(cable["spikes"]) == 8
+
+
+@pytest.mark.slow
+def test_the_missing_memory_is_named_and_the_error_falls_to_the_noise_floor(
+    tmp_path: Path,
+) -> None:
+    done = twin("reproduce", "--chapter", "residuals", "--small", "--json", folder=tmp_path)
+    study = json.loads(done.stdout)["chapters"]["residuals"]
+    assert study["planted"] != study["fitted"]
+    assert study["named"] == [study["planted"]]
+    assert study["test_error_before"] > 5.0 * study["noise_floor"]
+    assert study["test_error_after"] < 1.2 * study["noise_floor"]
+    assert study["white"] == {"before": False, "after": True}
+    assert study["parameters"]["spread"]["mean"] == pytest.approx(10.0, rel=0.01)
 
 
 def test_machine_and_twin_agree_and_a_changed_mass_is_named(chapters) -> None:
