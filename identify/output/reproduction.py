@@ -11,6 +11,7 @@ from identify.output.words.reproduction import (
     recovered_in_words,
     residuals_in_words,
     simulation_in_words,
+    track_in_words,
     twin_in_words,
 )
 from identify.thesis.cable import CableStudy
@@ -18,6 +19,7 @@ from identify.thesis.chapter import Recovered
 from identify.thesis.residuals import ResidualStudy
 from identify.thesis.simulation import SimulationStudy
 from identify.thesis.study import Reproduction
+from identify.thesis.track import Along, TrackStudy
 from identify.thesis.twin import TwinStudy
 
 
@@ -96,6 +98,29 @@ def _cable(study: CableStudy) -> dict[str, Any]:
     }
 
 
+def _track(study: TrackStudy) -> dict[str, Any]:
+    return {
+        "position": study.places.tolist(),
+        "position_unit": "m",
+        **{
+            way: {
+                DIRECTIONS[d]: {k: _along(a) for k, a in found.items()} for d, found in by.items()
+            }
+            for way, by in (("map", study.maps), ("fit", study.fits))
+        },
+    }
+
+
+DIRECTIONS = {1.0: "forwards", -1.0: "backwards"}
+
+
+def _along(a: Along) -> dict[str, Any]:
+    return {
+        "true": a.planted.tolist(), "found": a.found.tolist(), "half_width_90": a.half.tolist(),
+        "within": a.within, "largest_error": a.largest_error, "unit": a.unit, "printed": None,
+    }  # fmt: skip
+
+
 def _residuals(study: ResidualStudy) -> dict[str, Any]:
     tests = {"before": study.before, "after": study.after}
     return {
@@ -130,6 +155,7 @@ def _twin(study: TwinStudy) -> dict[str, Any]:
 JSON: Mapping[str, Callable[[Any], dict[str, Any]]] = {
     "simulation": _simulation,
     "cable": _cable,
+    "track": _track,
     "residuals": _residuals,
     "twin": _twin,
 }
@@ -139,6 +165,7 @@ TEXT: Mapping[str, Callable[[Any], list[str]]] = {
         *(recovered_in_words(name, r) for name, r in study.parameters.items()),
     ],
     "cable": cable_in_words,
+    "track": track_in_words,
     "residuals": residuals_in_words,
     "twin": twin_in_words,
 }

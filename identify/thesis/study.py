@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.thesis import cable, residuals, simulation, twin
+from identify.thesis import cable, residuals, simulation, track, twin
 from identify.thesis.chapter import Progress
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -18,9 +18,16 @@ from twin.model.file import load_model
 
 SIMULATED = "thesis_simulation"  # model files of the package
 STAGE = "proton_xy"
+TRACK = "thesis_track"
 MEMORY = "thesis_memory"
 
-Result = simulation.SimulationStudy | cable.CableStudy | residuals.ResidualStudy | twin.TwinStudy
+Result = (
+    simulation.SimulationStudy
+    | cable.CableStudy
+    | track.TrackStudy
+    | residuals.ResidualStudy
+    | twin.TwinStudy
+)
 Run = Callable[[Catalogue, bool, np.random.Generator, Progress], Result]
 
 
@@ -45,6 +52,13 @@ def _twin(
     return twin.twin_study(load_model(STAGE, catalogue), catalogue, size, rng, progress)
 
 
+def _track(
+    catalogue: Catalogue, small: bool, rng: np.random.Generator, progress: Progress
+) -> Result:
+    size = track.SMALL if small else track.FULL
+    return track.track_study(load_model(TRACK, catalogue), size, rng, progress)
+
+
 def _residuals(
     catalogue: Catalogue, small: bool, rng: np.random.Generator, progress: Progress
 ) -> Result:
@@ -56,6 +70,7 @@ def _residuals(
 CHAPTERS: Mapping[str, Run] = {
     "simulation": _simulation,
     "cable": _cable,
+    "track": _track,
     "residuals": _residuals,
     "twin": _twin,
 }

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from identify.output.words.agreement import (
     agreement_in_words,
     causes_in_words,
@@ -11,7 +14,10 @@ from identify.thesis.cable import CableStudy
 from identify.thesis.chapter import Recovered
 from identify.thesis.residuals import ResidualStudy
 from identify.thesis.simulation import STATIC, SimulationStudy
+from identify.thesis.track import Along, TrackStudy
 from identify.thesis.twin import TwinStudy
+
+Array = NDArray[np.float64]
 
 ALLOWED = 1e-3  # of the planted value, by which a mean may be off
 
@@ -80,6 +86,37 @@ def cable_in_words(study: CableStudy) -> list[str]:
         f"{len(study.found.spikes)} spikes, pitch {1e3 * study.pitch.mean:.4f} +- "
         f"{1e3 * study.found.pitch.standard_error:.2g} mm (planted {1e3 * study.pitch.true:g} mm)",
     ]
+
+
+def track_in_words(study: TrackStudy) -> list[str]:
+    """How far the levels found are from those planted, by the thesis's way and by ours."""
+    said = []
+    for way, by_direction in (("the curve through the map", study.maps), ("the fit", study.fits)):
+        for name in LEVELS:
+            both = [found[name] for found in by_direction.values()]
+            off = max(a.largest_error for a in both)
+            held = sum(float(a.within) for a in both) / len(both)
+            said.append(
+                f"{name} by {way}: at most {100.0 * off:.2g} % from the planted level at "
+                f"{len(study.places)} places; {100.0 * held:.0f} % of the 90 % intervals hold it"
+            )
+    for name in ("v0", "sigma2"):
+        slopes = [trend(study.places, found[name]) for found in study.fits.values()]
+        seen = any(abs(slope) > TREND * error for slope, error in slopes)
+        said.append(f"{name} shows {'a' if seen else 'no'} trend along the track")
+    return said
+
+
+LEVELS = ("Fc", "Fs")
+TREND = 3.0  # standard errors of a slope, from which there is a trend
+
+
+def trend(places: Array, found: Along) -> tuple[float, float]:
+    """Slope of a parameter along the track, per m, and its standard error by the scatter."""
+    if len(places) < 4:
+        return 0.0, 1.0
+    (slope, _), spread = np.polyfit(places, found.found, 1, cov=True)
+    return float(slope), float(np.sqrt(spread[0, 0]))
 
 
 def residuals_in_words(study: ResidualStudy) -> list[str]:

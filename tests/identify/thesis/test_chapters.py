@@ -89,3 +89,14 @@ def test_a_chapter_alone_gives_the_same_numbers(chapters) -> None:
 def test_an_unknown_chapter_suggests_the_nearest() -> None:
     with pytest.raises(InputError, match="did you mean 'cable'"):
         identify.reproduce(["cables"])
+
+
+def test_levels_are_recovered_along_the_track_where_the_map_reads_them_too_low() -> None:
+    study = identify.reproduce(["track"], small=True).chapters["track"]
+    for direction in (1.0, -1.0):
+        assert study.fits[direction]["Fs"].largest_error < 1e-3
+        assert study.maps[direction]["Fs"].largest_error > 3e-3
+        assert study.fits[direction]["Fc"].largest_error < 3e-3
+    ahead, back = (study.fits[way]["Fs"].found for way in (1.0, -1.0))
+    assert all(ahead > back)  # as planted: friction is lower backwards
+    assert ahead[0] > ahead[1]  # and falls along the track

@@ -9,13 +9,14 @@ from typing import Any
 from identify.output.report.blocks import Section
 from identify.output.report.drawing import drawing_style
 from identify.output.report.html import page
-from identify.output.report.thesis import cable, residuals, simulation, twin
+from identify.output.report.thesis import cable, residuals, simulation, track, twin
 from identify.thesis.study import Reproduction
 from twin.model.file import write_atomically
 
 SECTIONS: Mapping[str, Callable[[Any], Section]] = {
     "simulation": simulation.section,
     "cable": cable.section,
+    "track": track.section,
     "residuals": residuals.section,
     "twin": twin.section,
 }
