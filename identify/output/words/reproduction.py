@@ -97,14 +97,14 @@ def track_in_words(study: TrackStudy) -> list[str]:
             off = max(a.largest_error for a in both)
             held = sum(float(a.within) for a in both) / len(both)
             said.append(
-                f"{name} by {way}: at most {100.0 * off:.2g} % from the planted level at "
+                f"by {way} {name} is within {100.0 * off:.2g} % of the planted level at "
                 f"{len(study.places)} places; {100.0 * held:.0f} % of the 90 % intervals hold it"
             )
     for name in ("v0", "sigma2"):
         slopes = [trend(study.places, found[name]) for found in study.fits.values()]
         seen = any(abs(slope) > TREND * error for slope, error in slopes)
-        said.append(f"{name} shows {'a' if seen else 'no'} trend along the track")
-    return said
+        said.append(f"along the track {name} shows {'a' if seen else 'no'} trend")
+    return [*said, "where a level varies within a move, its interval is too narrow"]
 
 
 LEVELS = ("Fc", "Fs")
@@ -124,7 +124,7 @@ def residuals_in_words(study: ResidualStudy) -> list[str]:
     white = {True: "white", False: "not white"}
     named = ", ".join(study.named) or "nothing"
     return [
-        f"{study.first} fitted to a machine with {study.planted}: test error "
+        f"with {study.first} fitted to a machine with {study.planted} the test error is "
         f"{study.error_before:.3g} N, {study.error_before / study.floor:.1f} times the noise "
         f"floor, and its residual is {white[study.before.passes]}",
         f"the diagnosis names {named} ({study.verdict.name.lower().replace('_', ' ')})",
