@@ -23,9 +23,9 @@ Array = NDArray[np.float64]
 
 PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of the stiffness of the start rule
 HEAD = 3.0  # s of each log, on which the start is chosen
-FIRST_EVALUATIONS = 6  # of the search from each, after which the best goes on with all
+FIRST_EVALUATIONS = 3  # of the search from each, after which the best goes on with all
 MOST_EVALUATIONS = 200
-TOLERANCE = 1e-9
+TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
