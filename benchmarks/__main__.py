@@ -22,13 +22,14 @@ from benchmarks import (
     selftest,
     simulation,
     stages,
+    thesis,
 )
 from benchmarks.figures import Figure, write_results
 from benchmarks.mutation import noticed
 
 ALL = (
     simulation, second_start, peer_fits, diagnosis, passes, stages, mcap_logs, effect_cost,
-    import_time, selftest, fuzz, noticed,
+    import_time, thesis, selftest, fuzz, noticed,
 )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.fit import Fit, error_on, rms
 from identify.estimation.force_balance import residual
-from identify.estimation.intervals import estimates, found_intervals
+from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.measure import cable_force, velocity_map
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
@@ -70,7 +70,7 @@ def fit(
     intervals = {a: estimates(f) for a, f in fits.items()}
     for axis, result in fits.items():
         model = model.with_axis(axis, result.axis)
-        model = model.with_intervals(axis, found_intervals(intervals[axis]))
+        model = model.with_intervals(axis, intervals_to_keep(result, intervals[axis]))
     return FitResult(model, found, fits, intervals, held, given, known)
 
 
@@ -251,7 +251,7 @@ def _addition(
         notes=addition_notes(best, moved, set_aside),
     )
     new = model.with_axis(name, best.fit.axis).with_history(step)
-    new = new.with_intervals(name, found_intervals(estimates(best.fit)))
+    new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
     first = next(iter(by_log(prepared).values()))
     return Addition(
         model=new,

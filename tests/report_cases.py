@@ -96,7 +96,7 @@ BLANK = "data:image/svg+xml;base64," + base64.b64encode(b"<svg/>").decode()
 
 def without_drawing() -> AbstractContextManager[object]:
     """Inside, pictures are blank: drawing them takes most of a report's time."""
-    return patch("identify.output.report.page.data_uri", lambda figure: BLANK)
+    return patch("identify.output.report.html.data_uri", lambda figure: BLANK)
 
 
 def pictures_in(page: str) -> list[str]:

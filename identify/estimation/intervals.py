@@ -20,6 +20,7 @@ from scipy.special import stdtrit
 from identify.estimation.evidence import left_out
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import changes
+from twin.model.intervals import AxisIntervals
 from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]
@@ -119,13 +120,28 @@ def _reasons(fit: Fit, half: Array) -> dict[str, NoInterval]:
     return out | {label: OpenSided(side) for label, side in sides.items()}
 
 
-def found_intervals(found: Sequence[Estimate]) -> dict[str, tuple[float, float]]:
-    """Low and high end by label, of the estimates that have an interval."""
-    return {
+def intervals_to_keep(fit: Fit, found: Sequence[Estimate]) -> AxisIntervals:
+    """The intervals of a fit's estimates, for its model's file.
+
+    Where all of them are refused because the model is wrong, the scatter of the blocks is kept with
+    the ratio that tells so: whether two machines are alike can be asked of wrong models too.
+    """
+    ends = {
         e.label: (float(e.low), float(e.high))
         for e in found
         if e.low is not None and e.high is not None
     }
+    if isinstance(refusal(fit), ModelWrong):
+        where, half = fit.scaling.where, half_widths(fit)
+        told = np.isfinite(half)
+        asked = [c for c, known in zip(where, told, strict=True) if known]
+        without = inseparable(fit).keys() | open_sides(fit, asked, half[told]).keys()
+        ends = {
+            c.label: (float(value - h), float(value + h))
+            for c, value, h in zip(where, read(fit.axis, where), half, strict=True)
+            if np.isfinite(h) and c.label not in without
+        }
+    return AxisIntervals(ends, float(fit.ratio) if len(fit.residual) else 1.0)
 
 
 def open_sides(fit: Fit, where: Sequence[ParameterReference], half: Array) -> dict[str, Side]:

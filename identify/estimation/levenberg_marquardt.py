@@ -27,6 +27,7 @@ FIRST_DAMPING = 1e-2
 MOST_DAMPING = 1e8
 LEAST_DAMPING = 1e-6
 KEPT = 0.75  # of the fall that the columns promise, from which they are followed by a secant
+ROUNDING = 1e-15  # of the cost, below which a promised fall is rounding
 POOR = 0.5  # of that fall, up to which the damping stays
 
 
@@ -68,7 +69,8 @@ def minimise(
         if trial_cost <= cost:
             expected = _cost(force + columns @ (moved - x))
             fall = 1.0 - trial_cost / cost if cost > 0.0 else 0.0
-            kept = (cost - trial_cost) / max(cost - expected, np.finfo(float).tiny)
+            least = max(ROUNDING * cost, np.finfo(float).tiny)
+            kept = (cost - trial_cost) / max(cost - expected, least)
             good = kept > KEPT
             if fall < tolerance and exact:
                 return Solution(moved, True)

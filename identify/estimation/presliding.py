@@ -22,9 +22,10 @@ from twin.model.parameters import ParameterReference, write
 Array = NDArray[np.float64]
 
 PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of the stiffness of the start rule
-FIRST_EVALUATIONS = 6  # of the search from each, after which the best goes on
+HEAD = 3.0  # s of each log, on which the start is chosen
+FIRST_EVALUATIONS = 3  # of the search from each, after which the best goes on with all
 MOST_EVALUATIONS = 200
-TOLERANCE = 1e-9
+TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +50,9 @@ class Presliding:
         deflection = max(float(np.ptp(log.motion.position)) for log in logs) / 2.0
         first = static / deflection
         starts = [np.array([p * first, rng.uniform(0.0, p * first)]) for p in PARTS]
-        tried = [self._search(axis, logs, start, FIRST_EVALUATIONS) for start in starts]
-        best = min(tried, key=lambda s: self._cost(axis, logs, s.x))
+        heads = [PreparedLog.of(w.motion.head(HEAD), w.test_function.length) for w in logs]
+        tried = [self._search(axis, heads, start, FIRST_EVALUATIONS) for start in starts]
+        best = min(tried, key=lambda s: self._cost(axis, heads, s.x))
         found = self._search(axis, logs, best.x, MOST_EVALUATIONS)
         return write(axis, self.where, found.x)
 

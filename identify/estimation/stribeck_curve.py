@@ -2,7 +2,8 @@
 
 F(v) = Fc + (Fs - Fc) exp(-(v/v0)^n) + sigma2 v for v > 0; L. Jia 2023, eq. 2.5, with its start
 rules: Fc is the least friction, v0 the speed there, Fs the friction at the lowest speed, sigma2 the
-slope from the least friction to that at the highest speed.
+slope from the least friction to that at the highest speed. Noise at high speeds can put the least
+friction far from the Stribeck velocity, so the search also begins from parts of that speed.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ Array = NDArray[np.float64]
 
 TOLERANCE = 1e-14  # of the sum of squares: the map of a simulation has hardly any noise
 MOST_EVALUATIONS = 200
+PARTS = (1.0, 0.3, 0.1)  # of the start rule's v0, from which the search begins
 SLOWEST = 1e-3  # of the lowest speed, least Stribeck velocity that is tried
 
 
@@ -83,11 +85,14 @@ def fit_stribeck(
 
     low = np.array([0.0, 0.0, SLOWEST * speed.min(), 0.0])
     high = np.array([np.inf, np.inf, 10.0 * speed.max(), np.inf])
-    found = minimise(
-        residual, jacobian, start, (low, high),
-        tolerance=TOLERANCE, most_evaluations=MOST_EVALUATIONS,
-    )  # fmt: skip
-    return _curve(found.x, n)
+    ends = [
+        minimise(
+            residual, jacobian, start * (1.0, 1.0, part, 1.0), (low, high),
+            tolerance=TOLERANCE, most_evaluations=MOST_EVALUATIONS,
+        ).x
+        for part in PARTS
+    ]  # fmt: skip
+    return _curve(min(ends, key=lambda x: float(np.sum(residual(x) ** 2))), n)
 
 
 def _curve(x: Array, n: float) -> StribeckCurve:

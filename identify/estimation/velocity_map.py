@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from identify.dataset.drive import parts_of
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import total_force
-from identify.dataset.test_function import TestFunction
+from identify.dataset.test_function import LEAST_BLOCKS, TestFunction
 from twin.effect import Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 USED = 0.5  # last part of a plateau, by time, that is averaged
 STEADY = 0.02  # of its velocity, by which a plateau's may change within one test function
-LENGTH = 0.05  # s of the test functions that tell where the velocity is constant
+LENGTH = 0.02  # s of the test functions that tell where the velocity is constant
 FEWEST = 32  # blocks that make a plateau
 
 
@@ -75,7 +75,7 @@ def velocity_map(axis: AxisModel, motion: Motion, used: float = USED) -> Velocit
     ]
     if not rows:
         raise InputError(
-            f"{motion.name}: axis {motion.axis} holds no constant speed for {LENGTH:g} s; a "
+            f"{motion.name}: axis {motion.axis} holds no constant speed for long enough; a "
             "velocity map needs moves that do (`twin simulate velocity_map`)"
         )
     return VelocityMap(*np.array(rows).T)
@@ -102,9 +102,9 @@ def plateaus(motion: Motion) -> list[tuple[int, int]]:
 
     From the end of its first test function to the start of its last, so that no ramp is inside.
     """
-    window = TestFunction.of_length(LENGTH, motion.period)
+    window = TestFunction.of_length(max(LENGTH, LEAST_BLOCKS * motion.period), motion.period)
     velocity = window.mean(motion.velocity)
-    change = np.abs(window.acceleration(motion.velocity)) * LENGTH
+    change = np.abs(window.acceleration(motion.velocity)) * window.length
     moving = np.abs(velocity) > STEADY * np.abs(motion.velocity).max()
     steady = moving & (change < STEADY * np.abs(velocity))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], steady, [0]])))

@@ -9,6 +9,7 @@ from identify.output.words.agreement import (
     causes_in_words,
     difference_in_words,
     not_compared_in_words,
+    wrong_models_in_words,
 )
 from identify.validation.agreement import Agreement, AxisAgreement, Difference
 
@@ -20,6 +21,8 @@ def agree_text(result: Agreement) -> str:
         lines.append(agreement_in_words(axis, found))
         lines += [f"  {difference_in_words(d)}" for d in found.differing]
         lines += [f"  {cause}" for cause in causes_in_words(found)]
+        if doubt := wrong_models_in_words(found):
+            lines.append(f"  {doubt}")
         if skipped := not_compared_in_words(found):
             lines.append(f"  {skipped}")
     lines += [f"axis {axis}: not compared, as it has no intervals" for axis in result.not_compared]
@@ -43,6 +46,7 @@ def _axis(found: AxisAgreement) -> dict[str, Any]:
         "not_compared": list(found.not_compared),
         "only_in_a": list(found.only_a),
         "only_in_b": list(found.only_b),
+        "error_over_noise_floor": list(found.above_floor),
         "force": found.force,
         "force_unit": found.unit,
         "causes": [

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import difflib
 import time
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from identify.thesis import cable, simulation
+from identify.thesis import cable, residuals, simulation, track, twin
 from identify.thesis.chapter import Progress
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -17,8 +18,16 @@ from twin.model.file import load_model
 
 SIMULATED = "thesis_simulation"  # model files of the package
 STAGE = "proton_xy"
+TRACK = "thesis_track"
+MEMORY = "thesis_memory"
 
-Result = simulation.SimulationStudy | cable.CableStudy
+Result = (
+    simulation.SimulationStudy
+    | cable.CableStudy
+    | track.TrackStudy
+    | residuals.ResidualStudy
+    | twin.TwinStudy
+)
 Run = Callable[[Catalogue, bool, np.random.Generator, Progress], Result]
 
 
@@ -36,7 +45,35 @@ def _cable(
     return cable.cable_study(load_model(STAGE, catalogue), size, rng, progress)
 
 
-CHAPTERS: Mapping[str, Run] = {"simulation": _simulation, "cable": _cable}
+def _twin(
+    catalogue: Catalogue, small: bool, rng: np.random.Generator, progress: Progress
+) -> Result:
+    size = twin.SMALL if small else twin.FULL
+    return twin.twin_study(load_model(STAGE, catalogue), catalogue, size, rng, progress)
+
+
+def _track(
+    catalogue: Catalogue, small: bool, rng: np.random.Generator, progress: Progress
+) -> Result:
+    size = track.SMALL if small else track.FULL
+    return track.track_study(load_model(TRACK, catalogue), size, rng, progress)
+
+
+def _residuals(
+    catalogue: Catalogue, small: bool, rng: np.random.Generator, progress: Progress
+) -> Result:
+    size = residuals.SMALL if small else residuals.FULL
+    machine, stage = (load_model(name, catalogue) for name in (MEMORY, STAGE))
+    return residuals.residual_study(machine, stage, catalogue, size, rng, progress)
+
+
+CHAPTERS: Mapping[str, Run] = {
+    "simulation": _simulation,
+    "cable": _cable,
+    "track": _track,
+    "residuals": _residuals,
+    "twin": _twin,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +107,12 @@ def reproduce(
             hint = f"did you mean '{near[0]}'? " if near else ""
             raise InputError(f"unknown chapter '{name}'; {hint}there are {', '.join(CHAPTERS)}")
     results, seconds = {}, {}
-    for i, (name, run) in enumerate(CHAPTERS.items()):
+    for name, run in CHAPTERS.items():
         if chapters and name not in chapters:
             continue
         start = time.monotonic()
-        results[name] = run(catalogue, small, np.random.default_rng([seed, i]), progress)
+        results[name] = run(
+            catalogue, small, np.random.default_rng([seed, zlib.crc32(name.encode())]), progress
+        )
         seconds[name] = time.monotonic() - start
     return Reproduction(results, seconds, small)

@@ -18,7 +18,7 @@ from scipy.special import stdtrit
 from identify.dataset.dataset import datasets
 from identify.estimation.fit import Fit, Outcome, finished, rms
 from identify.estimation.force_balance import residual
-from identify.estimation.intervals import BLOCKS, CONFIDENCE
+from identify.estimation.intervals import BLOCKS, CONFIDENCE, LARGEST_RATIO
 from identify.estimation.subspace import orthonormal, unabsorbed
 from identify.selection.candidates import usable
 from identify.selection.confounded import linear_bases
@@ -79,15 +79,17 @@ class AxisAgreement:
     """Two fits of one axis.
 
     not_compared: labels without an interval, or held at different values. only_a, only_b: effects
-    that one of the fits has alone. force: RMS force (in ``unit``) of the parameters that differ,
-    along a simulated motion; None where nothing differs or no motion can be simulated. causes:
-    effects that together could make the difference, the largest share first.
+    that one of the fits has alone. above_floor: force error over noise floor of both fits. force:
+    RMS force (in ``unit``) of the parameters that differ, along a simulated motion; None where
+    nothing differs or no motion can be simulated. causes: effects that together could make the
+    difference, the largest share first.
     """
 
     differences: Sequence[Difference]
     not_compared: Sequence[str]
     only_a: Sequence[str]
     only_b: Sequence[str]
+    above_floor: tuple[float, float]
     unit: str
     force: float | None = None
     causes: Sequence[Cause] = ()
@@ -96,6 +98,11 @@ class AxisAgreement:
     def differing(self) -> list[Difference]:
         """The parameters that differ, the surest first."""
         return sorted((d for d in self.differences if d.differs), key=lambda d: -abs(d.ratio))
+
+    @property
+    def of_wrong_models(self) -> bool:
+        """Whether a fit is far above its noise floor, so that its intervals are scatter alone."""
+        return max(self.above_floor) > LARGEST_RATIO
 
 
 @dataclass(frozen=True)
@@ -120,7 +127,7 @@ def agreement(a: MachineModel, b: MachineModel, catalogue: Catalogue) -> Agreeme
     shared = [axis for axis in a.axes if axis in b.axes]
     axes = {}
     for axis in shared:
-        if not (a.intervals.get(axis) and b.intervals.get(axis)):
+        if not all(axis in fit.intervals and fit.intervals[axis].ends for fit in (a, b)):
             continue
         found = _compared(a, b, axis)
         if found.differences:
@@ -161,6 +168,7 @@ def _compared(a: MachineModel, b: MachineModel, axis: str) -> AxisAgreement:
     )
     return AxisAgreement(
         differences, tuple(skipped), tuple(sorted(own - other)), tuple(sorted(other - own)),
+        (a.intervals[axis].above_floor, b.intervals[axis].above_floor),
         units.force,
     )  # fmt: skip
 
@@ -176,7 +184,7 @@ class _Number:
 
 def _numbers(model: MachineModel, axis: str) -> dict[str, _Number]:
     """All parameters of an axis by label, the mass too."""
-    stage, intervals = model.axes[axis], model.intervals.get(axis, {})
+    stage, intervals = model.axes[axis], model.intervals[axis].ends
     free = {c.label for c in free_parameters(stage)}
     quantile = float(stdtrit(BLOCKS - 1, 0.5 + CONFIDENCE / 2.0))
     out = {}
@@ -221,8 +229,8 @@ def _explained(
     apart = [n for n in known if n not in b.axes[axis].names]
     bases = linear_bases(base, Catalogue([known[n] for n in apart]))
     return AxisAgreement(
-        found.differences, found.not_compared, found.only_a, found.only_b, found.unit,
-        rms(force), _causes(force, bases),
+        found.differences, found.not_compared, found.only_a, found.only_b,
+        found.above_floor, found.unit, rms(force), _causes(force, bases),
     )  # fmt: skip
 
 

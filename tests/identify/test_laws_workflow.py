@@ -115,7 +115,7 @@ def handed(monkeypatch):
     monkeypatch.setattr(workflow, "datasets", read)
     monkeypatch.setattr(workflow, "fit_aligned", aligned)
     monkeypatch.setattr(workflow, "estimates", lambda fit: ("estimates", fit))
-    monkeypatch.setattr(workflow, "found_intervals", lambda found: {"mass": (0.0, found[1].error)})
+    monkeypatch.setattr(workflow, "intervals_to_keep", lambda fit, found: (fit.error, found))
     monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
     monkeypatch.setattr(workflow, "error_on", lambda axis, logs: np.full(5, axis.mass * len(logs)))
     monkeypatch.setattr(results, "refit", lambda *given: given)
@@ -134,7 +134,7 @@ def test_a_fit_takes_over_the_values_and_the_shift_of_each_axis(monkeypatch):
     assert {a: m.mass for a, m in found.model.axes.items()} == {"x": 10.6, "y": 15.8}
     assert {a: s.channel_delay for a, s in found.datasets.items()} == {"x": 5.3e-4, "y": 7.9e-4}
     assert found.holdout_error == pytest.approx({"x": 10.6, "y": 15.8})
-    assert found.model.intervals == {a: {"mass": (0.0, f.error)} for a, f in found.fits.items()}
+    assert found.model.intervals == {a: (f.error, ("estimates", f)) for a, f in found.fits.items()}
     assert all(found.estimates[a] == ("estimates", found.fits[a]) for a in "xy")
     assert found.refits == {a: (made.MODEL.axes[a], found.fits[a], "known") for a in "xy"}
     bare = replace(made.STUDY, holdout=())
@@ -270,7 +270,7 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
 
     errors = {(1, "reduced"): 5.1, (2, "reduced"): 1.7}
     monkeypatch.setattr(workflow, "estimates", lambda fit: (fit,))
-    monkeypatch.setattr(workflow, "found_intervals", lambda found: {"mass": (0.0, found[0].error)})
+    monkeypatch.setattr(workflow, "intervals_to_keep", lambda fit, found: (fit.error, found))
     monkeypatch.setattr(workflow, "free_run", run)
     monkeypatch.setattr(workflow, "rms_error", lambda r, axis: errors.get(r, 1.9))
     monkeypatch.setattr(

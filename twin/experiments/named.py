@@ -142,11 +142,32 @@ def simulate(
         }
     setpoint = chosen.setpoint(model, motion_rng)
     controllers = None if chosen.closed_loop else {a: Controller() for a in model.axes}
-    result = run(
-        model, setpoint, noise_rng, simulator=simulator, controllers=controllers, progress=progress
-    )
-    log = _log(model, name, seed, setpoint, result, current_rng)
+    log = follow(
+        model, setpoint, (noise_rng, current_rng), name=name, seed=seed, simulator=simulator,
+        controllers=controllers, progress=progress,
+    )  # fmt: skip
     return replace(log, attachments={**log.attachments, **attached})
+
+
+def follow(
+    model: MachineModel,
+    setpoint: Setpoint,
+    noise: tuple[np.random.Generator, np.random.Generator],
+    *,
+    name: str,
+    seed: int,
+    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    controllers: Mapping[str, Controller] | None = None,
+    progress: Progress | None = None,
+) -> Log:
+    """The log of the twin that follows a setpoint. noise: draws that of encoders and currents.
+
+    name, seed: for the log's metadata. controllers: by axis; the model's own where None.
+    """
+    result = run(
+        model, setpoint, noise[0], simulator=simulator, controllers=controllers, progress=progress
+    )
+    return _log(model, name, seed, setpoint, result, noise[1])
 
 
 def outside_travel(model: MachineModel, log: Log) -> tuple[str, ...]:

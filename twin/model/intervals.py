@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import tomlkit
@@ -13,37 +14,58 @@ if TYPE_CHECKING:
     from twin.model.machine import AxisModel, MachineModel
 
 Interval = tuple[float, float]
-Intervals = Mapping[str, Mapping[str, Interval]]  # axis -> label of a parameter -> low, high
 
 ENTRY = "intervals"  # of the TOML document
+ABOVE_FLOOR = "above_floor"
 COMMENT = "90 % intervals of the fit that wrote this file; for `twin agree`"
 
 
+@dataclass(frozen=True)
+class AxisIntervals:
+    """Low and high ends (90 %) by parameter label, in the parameters' units.
+
+    above_floor: force error of the fit over its noise floor. Where it is large the model is wrong,
+    and the ends tell how far the values scatter from one part of the logs to another, no more.
+    """
+
+    ends: Mapping[str, Interval]
+    above_floor: float
+
+
 def read_intervals(
-    given: Mapping[str, Mapping[str, Sequence[float]]], axes: Mapping[str, AxisModel]
-) -> Intervals:
+    given: Mapping[str, Mapping[str, Sequence[float] | float]], axes: Mapping[str, AxisModel]
+) -> dict[str, AxisIntervals]:
     """The intervals that a model's file gives; raises InputError for one that is none.
 
     An interval that does not hold its parameter's value belongs to another fit: the value was
     edited afterwards. It is left out.
     """
-    found: dict[str, dict[str, Interval]] = {}
+    found = {}
     for axis, entries in given.items():
         if axis not in axes:
             raise InputError(f"{ENTRY}: the model has no axis '{axis}'; it has {', '.join(axes)}")
-        values = _values(axes[axis])
-        for label, ends in entries.items():
-            low, high = _ends(label, ends)
+        values, ends = _values(axes[axis]), {}
+        for label, pair in entries.items():
+            if label == ABOVE_FLOOR:
+                continue
+            low, high = _ends(label, pair)
             if label not in values:
                 raise InputError(f"{ENTRY}: axis {axis} has no parameter '{label}'; remove it")
             if low <= values[label] <= high:
-                found.setdefault(axis, {})[label] = (low, high)
+                ends[label] = low, high
+        found[axis] = AxisIntervals(ends, _ratio(entries.get(ABOVE_FLOOR, 1.0)))
     return found
 
 
-def _ends(label: str, ends: Sequence[float]) -> Interval:
-    if not ends[0] <= ends[1]:
-        raise InputError(f"{ENTRY}: {label} = {list(ends)}: give the low end first")
+def _ratio(given: Sequence[float] | float) -> float:
+    if isinstance(given, float):
+        return given
+    raise InputError(f"{ENTRY}: {ABOVE_FLOOR} = {given}: give one number, error over noise floor")
+
+
+def _ends(label: str, ends: Sequence[float] | float) -> Interval:
+    if isinstance(ends, float) or not ends[0] <= ends[1]:
+        raise InputError(f"{ENTRY}: {label} = {ends}: give two numbers, the low one first")
     return ends[0], ends[1]
 
 
@@ -60,7 +82,9 @@ def intervals_table(model: MachineModel) -> tomlkit.items.Table:
         units = model.axes[axis].units
         entries = tomlkit.table()
         entries.comment(COMMENT)
-        for label, ends in intervals.items():
+        meaning = units.words("1, force error over noise floor")
+        entries[ABOVE_FLOOR] = tomlkit.item(intervals.above_floor).comment(meaning)
+        for label, ends in intervals.ends.items():
             unit = units(_unit(model.axes[axis], label))
             entries.append(tomlkit.key([label]), tomlkit.item(list(ends)).comment(unit))
         table[axis] = entries

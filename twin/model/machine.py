@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, Effect, Kind, Parameter
 from twin.errors import InputError
-from twin.model.intervals import Interval, Intervals
+from twin.model.intervals import AxisIntervals
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 from twin.numbers import is_number
 
@@ -192,8 +192,8 @@ class MachineModel:
     Raises InputError where it has more than two axes and an effect that depends on the other one.
 
     mjcf: MJCF text of the stage, or None for plain slides and hinges, one for each axis. intervals:
-    by axis and parameter label, what the last fit of the axis found (90 %); none where it was
-    exchanged since.
+    by axis, of the parameters that the last fit of the axis found; none where it was exchanged
+    since.
     """
 
     name: str
@@ -202,7 +202,7 @@ class MachineModel:
     mjcf: str | None = None
     mjcf_name: str | None = None
     history: tuple[HistoryStep, ...] = field(default=())
-    intervals: Intervals = field(default_factory=dict)
+    intervals: Mapping[str, AxisIntervals] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, axis in self.axes.items():
@@ -238,8 +238,8 @@ class MachineModel:
         kept = {a: i for a, i in self.intervals.items() if a != name}
         return replace(self, axes={**self.axes, name: axis}, intervals=kept)
 
-    def with_intervals(self, name: str, found: Mapping[str, Interval]) -> MachineModel:
-        """This stage with the intervals of one axis, by parameter label."""
+    def with_intervals(self, name: str, found: AxisIntervals) -> MachineModel:
+        """This stage with the intervals of one axis."""
         return replace(self, intervals={**self.intervals, name: found})
 
     def with_history(self, step: HistoryStep) -> MachineModel:

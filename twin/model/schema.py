@@ -16,6 +16,7 @@ AXIS_NAME = r"^[A-Za-z_][A-Za-z0-9_]*$"
 MOST_AXES = 64
 Name = Annotated[str, Field(max_length=80)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Ratio = Annotated[float, Field(ge=0.0)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
@@ -117,7 +118,7 @@ class ModelFile(Entries):
         description="a table for each of 1 to 64 axes, as [axes.x]; a name has letters, digits "
         "and underscores",
     )  # fmt: skip
-    intervals: dict[str, dict[str, Pair]] = Field(
+    intervals: dict[str, dict[str, Pair | Ratio]] = Field(
         {}, description="two finite numbers, low and high, by axis and parameter, from the last fit"
     )
     history: list[HistoryEntry] = Field([], description="the model's growth, as [[history]]")

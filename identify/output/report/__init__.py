@@ -21,7 +21,7 @@ from identify.output.report import (
 )
 from identify.output.report.blocks import Section
 from identify.output.report.drawing import drawing_style
-from identify.output.report.page import page
+from identify.output.report.html import page
 from identify.output.report.subject import Subject
 from identify.output.report.units import quantity
 from identify.output.results import Addition, Comparison, Diagnosis

@@ -12,7 +12,6 @@ from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, inverse
 from identify.output.words.numbers import capitalised
 from identify.output.words.validation import correlation_in_words, loop_in_words
-from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import Correlation, ResidualTests
 from twin.model.units import AxisUnits
 
@@ -23,7 +22,7 @@ def section(subject: Subject) -> Section:
     for axis in subject.axes:
         if heading := subject.heading(axis.axis):
             blocks.append(Heading(heading))
-        blocks += _blocks(axis)
+        blocks += residual_test_blocks(axis.tests, axis.units)
     blocks.append(Listing(_reasons(subject)))
     return Section("tests", "Is the residual noise?", blocks)
 
@@ -35,16 +34,16 @@ def _reasons(subject: Subject) -> tuple[str, ...]:
     )
 
 
-def _blocks(axis: AxisComparison) -> list[Block]:
-    tests = axis.tests
+def residual_test_blocks(tests: ResidualTests, units: AxisUnits) -> list[Block]:
+    """The picture of some residual tests, and their numbers in sentences."""
     caption = (
         f"The force residual on {tests.samples} test functions that do not overlap. Bars: its "
         "histogram beside the normal distribution of the noise floor. Grey bands: 90 % bounds, "
         "±1.645/√n for n test functions; a tenth of a white residual's values lie outside. Faint "
         "values are not tested."
     )
-    items = [axis.units.words(capitalised(correlation_in_words(c))) for c in tests.correlations]
-    return [Picture(_figure(tests, axis.units), axis.units.words(caption)), Listing(items)]
+    items = [units.words(capitalised(correlation_in_words(c))) for c in tests.correlations]
+    return [Picture(_figure(tests, units), units.words(caption)), Listing(items)]
 
 
 def _figure(tests: ResidualTests, units: AxisUnits) -> Figure:

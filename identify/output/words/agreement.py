@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from identify.output.words.numbers import PLAIN, Numbers
 from identify.validation.agreement import AxisAgreement, Difference
+from twin.model.units import units_of
 
 
 def difference_in_words(d: Difference, numbers: Numbers = PLAIN) -> str:
@@ -33,12 +34,26 @@ def causes_in_words(found: AxisAgreement) -> list[str]:
         return said
     said.append(f"the parameters that differ amount to {found.force:.3g} {found.unit} RMS")
     if not found.causes:
-        said.append("no absent effect of the catalogue with linear parameters has such a force")
+        said.append(
+            units_of(found.unit).words("no absent effect with linear parameters has such a force")
+        )
+    words = units_of(found.unit).words
     return said + [
         f"{' or '.join([c.effect, *c.alike])} would make {100.0 * c.share:.0f} % of this "
-        "difference (squared force)"
+        f"difference ({words('squared force')})"
         for c in found.causes
     ]
+
+
+def wrong_models_in_words(found: AxisAgreement) -> str | None:
+    """What the answer is worth where a model is wrong, or None."""
+    if not found.of_wrong_models:
+        return None
+    first, second = found.above_floor
+    return (
+        f"the errors are {first:.1f} and {second:.1f} times the noise floor: the model is wrong, "
+        "so this tells whether the machines are alike, not whether the values are right"
+    )
 
 
 def not_compared_in_words(found: AxisAgreement) -> str | None:

@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.output.words.agreement import (
+    agreement_in_words,
+    causes_in_words,
+    difference_in_words,
+)
 from identify.thesis.cable import CableStudy
 from identify.thesis.chapter import Recovered
+from identify.thesis.residuals import ResidualStudy
 from identify.thesis.simulation import STATIC, SimulationStudy
+from identify.thesis.track import Along, TrackStudy
+from identify.thesis.twin import TwinStudy
+
+Array = NDArray[np.float64]
 
 ALLOWED = 1e-3  # of the planted value, by which a mean may be off
 
@@ -73,3 +86,63 @@ def cable_in_words(study: CableStudy) -> list[str]:
         f"{len(study.found.spikes)} spikes, pitch {1e3 * study.pitch.mean:.4f} +- "
         f"{1e3 * study.found.pitch.standard_error:.2g} mm (planted {1e3 * study.pitch.true:g} mm)",
     ]
+
+
+def track_in_words(study: TrackStudy) -> list[str]:
+    """How far the levels found are from those planted, by the thesis's way and by ours."""
+    said = []
+    for way, by_direction in (("the curve through the map", study.maps), ("the fit", study.fits)):
+        for name in LEVELS:
+            both = [found[name] for found in by_direction.values()]
+            off = max(a.largest_error for a in both)
+            held = sum(float(a.within) for a in both) / len(both)
+            said.append(
+                f"by {way} {name} is within {100.0 * off:.2g} % of the planted level at "
+                f"{len(study.places)} places; {100.0 * held:.0f} % of the 90 % intervals hold it"
+            )
+    for name in ("v0", "sigma2"):
+        slopes = [trend(study.places, found[name]) for found in study.fits.values()]
+        seen = any(abs(slope) > TREND * error for slope, error in slopes)
+        said.append(f"along the track {name} shows {'a' if seen else 'no'} trend")
+    return [*said, "where a level varies within a move, its interval is too narrow"]
+
+
+LEVELS = ("Fc", "Fs")
+TREND = 3.0  # standard errors of a slope, from which there is a trend
+
+
+def trend(places: Array, found: Along) -> tuple[float, float]:
+    """Slope of a parameter along the track, per m, and its standard error by the scatter."""
+    if len(places) < 4:
+        return 0.0, 1.0
+    (slope, _), spread = np.polyfit(places, found.found, 1, cov=True)
+    return float(slope), float(np.sqrt(spread[0, 0]))
+
+
+def residuals_in_words(study: ResidualStudy) -> list[str]:
+    """What the tests say of the first friction, what the diagnosis names, and what is left."""
+    white = {True: "white", False: "not white"}
+    named = ", ".join(study.named) or "nothing"
+    return [
+        f"with {study.first} fitted to a machine with {study.planted} the test error is "
+        f"{study.error_before:.3g} N, {study.error_before / study.floor:.1f} times the noise "
+        f"floor, and its residual is {white[study.before.passes]}",
+        f"the diagnosis names {named} ({study.verdict.name.lower().replace('_', ' ')})",
+        f"with it the test error is {study.error_after:.3g} N, "
+        f"{study.error_after / study.floor:.2f} times the noise floor, and the residual is "
+        f"{white[study.after.passes]}",
+    ]
+
+
+def twin_in_words(study: TwinStudy) -> list[str]:
+    """Whether machine and twin agree, and what is said of a machine that was changed."""
+    said = [f"machine and twin: {agreement_in_words(*item)}" for item in study.alike.axes.items()]
+    errors = ", ".join(f"{signal} {100.0 * e:.2g} %" for signal, e in study.errors.items())
+    said.append(f"closed-loop errors of the twin on the machine's reference: {errors}")
+    for axis, found in study.changed.axes.items():
+        said.append(
+            f"the machine with {study.added:.3g} kg more: {agreement_in_words(axis, found)}"
+        )
+        said += [difference_in_words(d) for d in found.differing]
+        said += causes_in_words(found)
+    return said

@@ -11,11 +11,14 @@ from cli_runs import twin
 import identify
 from twin.errors import InputError
 
+QUICK = ("simulation", "cable", "twin")
+
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("thesis")
-    done = twin("reproduce", "-o", "out", "--small", "--json", folder=folder)
+    asked = [part for name in QUICK for part in ("--chapter", name)]
+    done = twin("reproduce", "-o", "out", "--small", "--json", *asked, folder=folder)
     assert done.returncode == 0, done.stderr
     (folder / "printed.json").write_text(done.stdout)
     return folder
@@ -44,6 +47,31 @@ def test_the_cable_and_the_pitch_are_recovered(chapters) -> None:
     assert len(cable["spikes"]) == 8
 
 
+@pytest.mark.slow
+def test_the_missing_memory_is_named_and_the_error_falls_to_the_noise_floor(
+    tmp_path: Path,
+) -> None:
+    done = twin("reproduce", "--chapter", "residuals", "--small", "--json", folder=tmp_path)
+    study = json.loads(done.stdout)["chapters"]["residuals"]
+    assert study["planted"] != study["fitted"]
+    assert study["named"] == [study["planted"]]
+    assert study["test_error_before"] > 5.0 * study["noise_floor"]
+    assert study["test_error_after"] < 1.2 * study["noise_floor"]
+    assert study["white"] == {"before": False, "after": True}
+    assert study["parameters"]["spread"]["mean"] == pytest.approx(10.0, rel=0.01)
+
+
+def test_machine_and_twin_agree_and_a_changed_mass_is_named(chapters) -> None:
+    study = chapters["twin"]
+    assert study["alike"]["agree"]
+    changed = study["changed"]["axes"]["x"]
+    assert changed["differing"] == ["mass"]
+    mass = changed["parameters"]["mass"]
+    assert mass["difference"] == pytest.approx(study["changed"]["added_mass"], rel=0.02)
+    assert "payload_mass" in [c["effect"] for c in changed["causes"]]
+    assert study["closed_loop_error"]["position"]["found"] < 1e-6
+
+
 def test_the_report_holds_every_chapter_and_needs_nothing_else(written: Path, chapters) -> None:
     page = (written / "out" / "thesis.html").read_text()
     assert "http://" not in page.replace("http://www.w3.org", "")
@@ -61,3 +89,14 @@ def test_a_chapter_alone_gives_the_same_numbers(chapters) -> None:
 def test_an_unknown_chapter_suggests_the_nearest() -> None:
     with pytest.raises(InputError, match="did you mean 'cable'"):
         identify.reproduce(["cables"])
+
+
+def test_levels_are_recovered_along_the_track_where_the_map_reads_them_too_low() -> None:
+    study = identify.reproduce(["track"], small=True).chapters["track"]
+    for direction in (1.0, -1.0):
+        assert study.fits[direction]["Fs"].largest_error < 1e-3
+        assert study.maps[direction]["Fs"].largest_error > 3e-3
+        assert study.fits[direction]["Fc"].largest_error < 3e-3
+    ahead, back = (study.fits[way]["Fs"].found for way in (1.0, -1.0))
+    assert all(ahead > back)  # as planted: friction is lower backwards
+    assert ahead[0] > ahead[1]  # and falls along the track

@@ -15,6 +15,7 @@ from identify.validation.agreement import agreement
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.model.file import load_model, save_model
+from twin.model.intervals import AxisIntervals
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.parameters import free_parameters, read, write
 
@@ -24,7 +25,7 @@ FEW = Catalogue(
 CATALOGUE = load_catalogue()
 
 
-def fitted(width: float = 0.01, **moved: float) -> MachineModel:
+def fitted(width: float = 0.01, above: float = 1.1, **moved: float) -> MachineModel:
     """A slide whose parameters have intervals of this relative half width, some of them moved."""
     friction = Fitted.at_start(CATALOGUE["coulomb_viscous"], {"Fc": 0.3, "Fs": 0.3, "sigma2": 0.2})
     cable = Fitted.at_start(CATALOGUE["cable_slab"], {"offset": 0.1, "k1": 1.0})
@@ -34,7 +35,9 @@ def fitted(width: float = 0.01, **moved: float) -> MachineModel:
     values |= {name.replace("__", "."): v for name, v in moved.items()}
     axis = write(axis, where, list(values.values()))
     ends = {k: (v - width * abs(v) - 1e-4, v + width * abs(v) + 1e-4) for k, v in values.items()}
-    return MachineModel("slide", {"x": axis}, 2000.0).with_intervals("x", ends)
+    return MachineModel("slide", {"x": axis}, 2000.0).with_intervals(
+        "x", AxisIntervals(ends, above)
+    )
 
 
 def test_a_fit_agrees_with_itself_and_with_one_within_its_interval() -> None:
@@ -59,8 +62,8 @@ def test_an_effect_that_one_fit_has_alone_is_one_of_no_strength_in_the_other() -
     more = Fitted.at_start(CATALOGUE["constant_force"], {"F0": 0.2})
     base = fitted()
     axis = base.axes["x"].with_effect(more)
-    ends = {**base.intervals["x"], "constant_force.F0": (0.19, 0.21)}
-    richer = base.with_axis("x", axis).with_intervals("x", ends)
+    ends = {**base.intervals["x"].ends, "constant_force.F0": (0.19, 0.21)}
+    richer = base.with_axis("x", axis).with_intervals("x", AxisIntervals(ends, 1.0))
     found = agreement(base, richer, FEW).axes["x"]
     assert found.only_b == ("constant_force",)
     assert [d.label for d in found.differing] == ["constant_force.F0"]
@@ -73,11 +76,17 @@ def test_intervals_travel_with_the_file_and_leave_with_what_they_belong_to(tmp_p
     assert read_back.intervals == fitted().intervals
     edited = path.read_text().replace("mass = 10.0", "mass = 12.0")
     path.write_text(edited)
-    assert "mass" not in load_model(path, CATALOGUE).intervals["x"]
+    assert "mass" not in load_model(path, CATALOGUE).intervals["x"].ends
     changed = read_back.with_axis("x", replace(read_back.axes["x"], mass=9.0))
     assert "x" not in changed.intervals
     start = edited.split("[intervals")[0]
-    for entry in ('x."gms.k9" = [1, 2]', "x.mass = [3, 2]", 'x.mass = "wide"', "z.mass = [1, 2]"):
+    for entry in (
+        'x."gms.k9" = [1, 2]',
+        "x.mass = [3, 2]",
+        'x.above_floor = "a"',
+        'x.mass = "wide"',
+        "z.mass = [1, 2]",
+    ):
         path.write_text(f"{start}\n[intervals]\n{entry}\n")
         with pytest.raises(InputError, match="intervals"):
             load_model(path, CATALOGUE)
@@ -89,6 +98,8 @@ def test_the_helper_for_other_peoples_tests_says_what_differs(tmp_path: Path) ->
     assert_agree(path, fitted(), catalogue=CATALOGUE)
     with pytest.raises(AssertionError, match=r"mass differs by 1 kg.*\n.*RMS"):
         assert_agree(str(path), fitted(mass=11.0), catalogue=CATALOGUE)
+    with pytest.raises(AssertionError, match="the model is wrong"):
+        assert_agree(path, fitted(above=9.0, mass=11.0), catalogue=CATALOGUE)
     with pytest.raises(InputError, match="nothing can be compared"):
         assert_agree(path, load_model("proton_xy", CATALOGUE))
 

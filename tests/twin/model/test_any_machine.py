@@ -129,7 +129,7 @@ def gone_round(request, tmp_path_factory) -> Round:
     added = workflow.add(found.effect, model, logs, held)
     with pytest.MonkeyPatch.context() as patch:
         # Drawing takes most of the time, and tests/test_report.py sees to it.
-        patch.setattr("identify.output.report.page.data_uri", labels_alone)
+        patch.setattr("identify.output.report.html.data_uri", labels_alone)
         write_report(
             folder / "report.html", title="machine", diagnosis=found, comparison=found.comparison,
             history=added.model.history, additions=[added],

@@ -8,14 +8,17 @@ from typing import Any
 
 from identify.output.report.blocks import Section
 from identify.output.report.drawing import drawing_style
-from identify.output.report.page import page
-from identify.output.report.thesis import cable, simulation
+from identify.output.report.html import page
+from identify.output.report.thesis import cable, residuals, simulation, track, twin
 from identify.thesis.study import Reproduction
 from twin.model.file import write_atomically
 
 SECTIONS: Mapping[str, Callable[[Any], Section]] = {
     "simulation": simulation.section,
     "cable": cable.section,
+    "track": track.section,
+    "residuals": residuals.section,
+    "twin": twin.section,
 }
 TITLE = "Friction identification on the gantry stage, reproduced on its twin"
 

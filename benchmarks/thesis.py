@@ -1,0 +1,114 @@
+"""The thesis's study on the twin: how near to the planted values, and in what time.
+
+The dynamic identification is held against the thesis's own method as a SciPy user would write it:
+LuGre in `solve_ivp` (RK45), its position error in a Nelder-Mead search, from the thesis's start.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize
+
+import identify
+from benchmarks.figures import Figure, Target
+from identify.dataset.dataset import datasets
+from identify.estimation.presliding import Presliding
+from identify.thesis.simulation import DYNAMIC, SimulationStudy
+from twin.effect import Kind
+from twin.effects import load_catalogue
+from twin.experiments.kinds import OpenLoopSine
+from twin.experiments.named import simulate
+from twin.model.file import load_model
+from twin.model.parameters import ParameterReference, read
+
+Array = NDArray[np.float64]
+
+TITLE = "The thesis reproduced"
+AMPLITUDE, PERIOD, DURATION = 0.21, 3.0, 30.0  # N, s, s: the thesis's open-loop sine
+TEST_FUNCTION = 0.2  # s
+SEED = 0
+TOLERANCES = {"xatol": 1e-4, "fatol": 1e-14, "maxfev": 400}
+
+
+def measure() -> list[Figure]:
+    """The whole study, then the speed of its dynamic identification."""
+    return [*_study(), *_dynamic()]
+
+
+def _study() -> list[Figure]:
+    done = identify.reproduce()
+    figures = [Figure("all chapters", sum(done.seconds.values()), "s", Target(high=600.0))]
+    study = done.chapters["simulation"]
+    assert isinstance(study, SimulationStudy)
+    figures += [
+        Figure(f"mean of {name} off the planted value", abs(p.error), "1", Target(high=1e-3))
+        for name, p in study.parameters.items()
+    ]
+    cable = done.chapters["cable"]
+    off = abs(cable.pitch.mean - cable.pitch.true)
+    return [
+        *figures,
+        Figure("pitch of the spikes off", 1e3 * off, "mm", Target(high=0.1)),
+        Figure("cable force off, RMS", 1e3 * cable.rms_error, "mN"),
+    ]
+
+
+def _dynamic() -> list[Figure]:
+    model = load_model("thesis_simulation", load_catalogue())
+    name, axis = next(iter(model.axes.items()))
+    friction = next(f for f in axis.effects if f.effect.kind is Kind.FRICTION)
+    log = simulate(model, OpenLoopSine(name, DURATION, amplitude=AMPLITUDE, period=PERIOD))
+    references = [ParameterReference(friction.effect.name, friction.effect.parameter(p))
+                  for p in DYNAMIC]  # fmt: skip
+    true = read(axis, references)
+
+    def ours() -> Array:
+        prepared = datasets(model, {"sine": log}, {}, TEST_FUNCTION)[name].fit
+        rng = np.random.default_rng(SEED)
+        return read(
+            Presliding(*references).fit(axis, prepared, friction.values["Fs"], rng), references
+        )
+
+    ours()  # what is compiled is compiled
+    begun = perf_counter()
+    found = ours()
+    own = perf_counter() - begun
+    begun = perf_counter()
+    simplex = _simplex(log.axes[name].position, log.period, axis.mass, dict(friction.values))
+    theirs = perf_counter() - begun
+    errors = [float(np.abs(x / true - 1.0).max()) for x in (found, simplex)]
+    return [
+        Figure("dynamic part, RK45 in Nelder-Mead over ours", theirs / own, "1",
+               Target(low=300.0), f"{theirs:.1f} s against {own:.2f} s"),
+        Figure("its error, ours", errors[0], "1", Target(high=max(errors[1], 1e-4))),
+        Figure("its error, RK45 in Nelder-Mead", errors[1]),
+    ]  # fmt: skip
+
+
+def _simplex(position: Array, period: float, mass: float, v: dict[str, float]) -> Array:
+    """Stiffness and damping by the thesis's method."""
+    time = period * np.arange(len(position))
+
+    def motion(t: float, state: Array, stiffness: float, damping: float) -> list[float]:
+        _, speed, z = state
+        level = v["Fc"] + (v["Fs"] - v["Fc"]) * np.exp(-((speed / v["v0"]) ** 2))
+        rate = speed - stiffness * abs(speed) / level * z
+        friction = stiffness * z + damping * rate + v["sigma2"] * speed
+        return [speed, (AMPLITUDE * np.sin(2.0 * np.pi * t / PERIOD) - friction) / mass, rate]
+
+    def cost(x: Array) -> float:
+        run = solve_ivp(
+            motion, (0.0, time[-1]), [position[0], 0.0, 0.0], t_eval=time, args=tuple(x),
+            rtol=1e-6, atol=1e-9,
+        )  # fmt: skip
+        return float(np.sum((run.y[0] - position) ** 2)) if run.success else np.inf
+
+    first = v["Fs"] / (np.ptp(position) / 2.0)
+    start = (first, np.random.default_rng(SEED).uniform(0.0, first))
+    bounds = [(1.0, None), (1e-6, None)]
+    found = minimize(cost, start, method="Nelder-Mead", bounds=bounds, options=TOLERANCES)
+    return np.asarray(found.x)

@@ -1,0 +1,99 @@
+"""Chapter "twin": whether machine and twin agree, and what changed on a changed machine."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from identify.output.report.blocks import (
+    Answer,
+    Block,
+    Column,
+    Listing,
+    Picture,
+    Row,
+    Section,
+    Table,
+    Tile,
+    Tone,
+)
+from identify.output.report.drawing import BLUE, FLOOR, INK, ORANGE, new_figure
+from identify.output.report.units import number, pretty
+from identify.output.words.numbers import capitalised
+from identify.output.words.reproduction import twin_in_words
+from identify.thesis.twin import TwinStudy
+from identify.validation.agreement import Agreement, Difference
+
+REACH = 8.0  # joint standard errors that the picture shows
+
+
+def section(study: TwinStudy) -> Section:
+    """The chapter."""
+    blocks: list[Block] = [
+        _answer(study),
+        Picture(
+            _figure(study),
+            "Difference of the parameters of two fits, in joint standard errors. Grey: what the "
+            "uncertainties of all comparisons together allow; a parameter beyond the picture is "
+            "drawn at its edge.",
+        ),
+        _table(study),
+        Listing([capitalised(said) for said in twin_in_words(study)]),
+    ]
+    return Section("twin", "Twin against machine", blocks)
+
+
+def _answer(study: TwinStudy) -> Answer:
+    headline = "Machine and twin agree" if study.alike.agrees else "Machine and twin differ"
+    named = [d.label for axis in study.changed.axes.values() for d in axis.differing]
+    tiles = [
+        Tile(f"closed loop, {signal}", f"{number(100.0 * error)} %", "twin less machine, RMS")
+        for signal, error in study.errors.items()
+    ]
+    remark = f"Of a machine with {study.added:.3g} kg more these differ: {', '.join(named)}."
+    sentence = (
+        "The machine is identified, its twin follows the same reference in MuJoCo and is "
+        "identified in turn."
+    )
+    return Answer(headline, sentence, tiles, [remark], Tone.STRONG)
+
+
+def _differences(found: Agreement) -> list[Difference]:
+    return [d for axis in found.axes.values() for d in axis.differences]
+
+
+def _figure(study: TwinStudy) -> Figure:
+    figure = new_figure(4.2)
+    left, right = figure.subplots(1, 2)
+    _draw(left, _differences(study.alike), "machine and twin", BLUE)
+    _draw(right, _differences(study.changed), "machine before and after the change", ORANGE)
+    return figure
+
+
+def _draw(axes: Axes, found: list[Difference], title: str, color: str) -> None:
+    ratios = np.clip([d.ratio for d in found], -REACH, REACH)
+    limit = max((d.limit for d in found), default=0.0)
+    place = np.arange(len(found))[::-1]
+    axes.axvspan(-limit, limit, color=FLOOR, alpha=0.6, linewidth=0)
+    axes.axvline(0.0, color=INK, linewidth=0.7)
+    axes.plot(ratios, place, "o", color=color, markersize=4)
+    axes.set_yticks(place, [d.label for d in found])
+    axes.set_xlim(-1.1 * REACH, 1.1 * REACH)
+    axes.set_title(title)
+    axes.set_xlabel("Difference (joint standard errors)")
+
+
+def _table(study: TwinStudy) -> Table:
+    columns = (
+        Column("Parameter"),
+        Column("Machine", numeric=True),
+        Column("Twin", numeric=True),
+        Column("Joint standard error", numeric=True),
+        Column("Unit"),
+    )
+    rows = [
+        Row((d.label, f"{d.a:.6g}", f"{d.b:.6g}", number(d.standard_error), pretty(d.unit)))
+        for d in _differences(study.alike)
+    ]
+    return Table(columns, rows)

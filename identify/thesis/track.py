@@ -1,0 +1,224 @@
+"""Chapter "track": friction at nine places between the rollers, each direction apart.
+
+Moves of 10 mm at the thesis's speeds, recorded at 1 kHz, are read in two ways. The thesis's: a map
+of the last half of each move, and a curve through it. Ours: the whole law fitted to the logs of the
+place, so that bristles which have not settled after 5 mm cost nothing. The cable's force is taken
+off with the model, which knows it from passes (chapter "cable"). What is planted at a place is the
+friction that the machine's laws reach when they go on at that place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from identify.dataset.dataset import datasets
+from identify.dataset.drive import parts_of
+from identify.dataset.motion import Motion, motion_of
+from identify.dataset.prepared_log import total_force
+from identify.estimation.fit import Fit, fit_axis
+from identify.estimation.intervals import CONFIDENCE, half_widths
+from identify.estimation.stribeck_curve import fit_stribeck
+from identify.estimation.velocity_map import VelocityMap, velocity_map
+from identify.thesis.chapter import Progress
+from twin.effect import Kind
+from twin.experiments.kinds import Staircase
+from twin.experiments.named import simulate
+from twin.log import Log
+from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
+from twin.model.parameters import read, write
+from twin.simulator import MujocoSimulator, ReducedSimulator
+
+Array = NDArray[np.float64]
+
+NAMES = ("Fc", "Fs", "v0", "sigma2")
+SPAN = 0.01  # m
+FIRST, APART = -0.136, 34e-3  # m, of the thesis's places
+DIRECTIONS = (1.0, -1.0)
+BRISK = 0.004  # m/s, above which moves are so short that they are repeated
+FASTEST = 0.3  # of the velocity limit, which a move of 10 mm reaches and holds
+STEADY_TRAVEL, STEPS = 0.1, 2000  # m and steps over which a law settles at one place
+
+
+@dataclass(frozen=True)
+class Size:
+    """speeds: m/s; those that a move does not hold are left out. repeats: of the brisk ones."""
+
+    places: int
+    speeds: Sequence[float]
+    repeats: int
+    simulator: type[MujocoSimulator] | type[ReducedSimulator]
+
+
+SPEEDS = (
+    *(k / 1e4 for k in range(1, 10)), *(k / 1e3 for k in range(1, 15)),
+    *(k / 1e3 for k in range(15, 250, 10)),
+)  # fmt: skip
+FULL = Size(9, SPEEDS, 6, MujocoSimulator)
+SMALL = Size(2, (0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.03, 0.06), 2, ReducedSimulator)
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """One parameter in one direction at the places: found, half width (90 %), planted (k,)."""
+
+    found: Array
+    half: Array
+    planted: Array
+    unit: str
+
+    @property
+    def within(self) -> float:
+        """Share of places whose interval holds what was planted."""
+        return float(np.mean(np.abs(self.found - self.planted) <= self.half))
+
+    @property
+    def largest_error(self) -> float:
+        """Over the planted value."""
+        return float(np.abs(self.found / self.planted - 1.0).max())
+
+
+@dataclass(frozen=True, eq=False)
+class TrackStudy:
+    """The chapter's results. places (k,) m.
+
+    maps, fits: by the thesis's way and by ours, direction (+1 or -1) -> parameters by name.
+    """
+
+    places: Array
+    maps: Mapping[float, Mapping[str, Along]]
+    fits: Mapping[float, Mapping[str, Along]]
+
+
+Found = tuple[Array, Array]  # parameters (4,), half widths (4,) of their 90 % intervals
+
+
+def track_study(
+    model: MachineModel, size: Size, rng: np.random.Generator, progress: Progress
+) -> TrackStudy:
+    """Measure the friction of the first axis of a machine at each place, in both ways."""
+    name, axis = next(iter(model.axes.items()))
+    apart = 9 // size.places
+    places = np.array([FIRST + APART * apart * i for i in range(size.places)])
+    maps: dict[float, list[Found]] = {way: [] for way in DIRECTIONS}
+    fits: dict[float, list[Found]] = {way: [] for way in DIRECTIONS}
+    planted: dict[float, list[Array]] = {way: [] for way in DIRECTIONS}
+    for i, place in enumerate(places):
+        progress("friction along the track", i, len(places))
+        logs = _logs(model, name, float(place), size, rng)
+        motions = [motion_of(log, name, label) for label, log in logs.items()]
+        found = VelocityMap.joined([velocity_map(axis, motion) for motion in motions])
+        speeds = np.array(sorted({round(float(abs(v)), 6) for v in found.velocity}))
+        local = _local_fit(model, name, logs, found)
+        for way in DIRECTIONS:
+            maps[way].append(_through(found.towards(way)))
+            fits[way].append(_of_law(local, float(place), way * speeds))
+            planted[way].append(_curve(axis, float(place), way * speeds))
+    return TrackStudy(
+        places,
+        {way: _along(axis, maps[way], planted[way]) for way in DIRECTIONS},
+        {way: _along(axis, fits[way], planted[way]) for way in DIRECTIONS},
+    )
+
+
+def _along(axis: AxisModel, found: Sequence[Found], planted: Sequence[Array]) -> dict[str, Along]:
+    units = {p.name: p.unit for f in axis.effects for p in f.effect.parameters}
+    return {
+        name: Along(
+            np.array([values[j] for values, _ in found]),
+            np.array([half[j] for _, half in found]),
+            np.array([values[j] for values in planted]),
+            units[name],
+        )
+        for j, name in enumerate(NAMES)
+    }
+
+
+def _logs(
+    model: MachineModel, name: str, place: float, size: Size, rng: np.random.Generator
+) -> dict[str, Log]:
+    """A log of moves at each speed, to and fro."""
+    logs = {}
+    fastest = FASTEST * model.axes[name].hardware.velocity
+    for speed in (s for s in size.speeds if s <= fastest):
+        count = size.repeats if speed > BRISK else 1
+        moves = Staircase(
+            name, speeds=(speed,) * count, span=SPAN, longest_plateau=1e4, at=(place,)
+        )
+        seed = int(rng.integers(2**31))
+        logs[f"{speed:g} m/s"] = simulate(model, moves, seed=seed, simulator=size.simulator)
+    return logs
+
+
+def _through(one_way: VelocityMap) -> Found:
+    """The curve through a map."""
+    speed, weight = np.abs(one_way.velocity), np.sqrt(one_way.samples)
+    curve = fit_stribeck(speed, one_way.friction, weight)
+    left = weight * (curve(speed) - one_way.friction)
+    columns = weight[:, None] * curve.slopes(speed)
+    freedom = len(speed) - len(NAMES)
+    covariance = np.linalg.pinv(columns.T @ columns) * float(left @ left) / freedom
+    quantile = stdtrit(freedom, 0.5 + CONFIDENCE / 2.0)
+    return np.array(astuple(curve)[: len(NAMES)]), quantile * np.sqrt(np.diag(covariance))
+
+
+def _local_fit(model: MachineModel, name: str, logs: Mapping[str, Log], found: VelocityMap) -> Fit:
+    """Friction and its modifiers fitted to the logs of one place, from the curve through its map.
+
+    What varies along the track is left out, as it is one number here.
+    """
+    axis = model.axes[name]
+    start = dict(
+        zip(NAMES, _through(replace(found, velocity=np.abs(found.velocity)))[0], strict=True)
+    )
+    effects = []
+    for f in axis.effects:
+        if f.effect.kind is Kind.FRICTION:
+            known = {p.name: float(start[p.name]) for p in f.effect.parameters if p.name in start}
+            begun = Fitted.at_start(f.effect, {**f.effect.starts(), **known})
+            effects.append(replace(begun, fixed=f.fixed))
+        elif f.effect.kind is Kind.MODIFIER and not f.effect.reads("X"):
+            effects.append(Fitted.at_start(f.effect))
+        elif f.effect.kind is not Kind.MODIFIER and not any(p.period for p in f.effect.parameters):
+            effects.append(replace(f, fixed=frozenset(f.values)))
+    axis = replace(axis, effects=tuple(effects), mass_fixed=True)
+    return fit_axis(axis, datasets(model, logs, {})[name].fit)
+
+
+def _of_law(fit: Fit, place: float, velocity: Array) -> Found:
+    """The curve of a fitted law in one direction, at these velocities (k,) m/s."""
+    where, half = fit.scaling.where, half_widths(fit)
+    centre, values = _curve(fit.axis, place, velocity), read(fit.axis, where)
+    spread = np.zeros(len(NAMES))
+    for c, value, width in zip(where, values, half, strict=True):
+        moved = _curve(write(fit.axis, [c], [value + PART * width]), place, velocity)
+        spread += ((moved - centre) / PART) ** 2
+    return centre, np.sqrt(spread)
+
+
+def _curve(axis: AxisModel, place: float, velocity: Array) -> Array:
+    """Parameters (4,) of the curve through the friction that an axis reaches at one place."""
+    friction = np.array([steady_friction(axis, place, float(v)) for v in velocity])
+    return np.array(astuple(fit_stribeck(np.abs(velocity), friction))[: len(NAMES)])
+
+
+PART = 0.1  # of a half width, the step of a difference
+
+
+def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
+    """Friction (N, positive where it opposes the motion) after a long way at one place.
+
+    place: m; velocity: m/s, not zero.
+    """
+    period = STEADY_TRAVEL / STEPS / abs(velocity)
+    signals = np.repeat([[place], [velocity], [0.0]], STEPS, axis=1)
+    motion = Motion(
+        name="", axis="", signals=signals, others=np.zeros_like(signals), period=period, start=0.0,
+        sample_period=period, position_noise=0.0, raw=signals[1:],
+    )  # fmt: skip
+    law = axis_table({"": parts_of(axis, Kind.FRICTION, Kind.MODIFIER)})
+    return float(-np.sign(velocity) * total_force(law, motion)[-1])
