@@ -156,7 +156,7 @@ def test_a_friction_is_scaled_until_the_model_falls_short_by_the_strength(
 
 def test_a_demonstration_holds_out_its_third_log_and_writes_what_it_found(monkeypatch, tmp_path):
     hidden, said, calls, recorded = fitted("cogging"), [], {}, []
-    found = made.diagnosed()
+    found, as_fitted = made.diagnosed(), {}
 
     def record(machine, experiment, path, seed, progress):
         recorded.append((machine, experiment, path.name, seed))
@@ -174,7 +174,7 @@ def test_a_demonstration_holds_out_its_third_log_and_writes_what_it_found(monkey
     monkeypatch.setattr(demo, "_record", record)
     monkeypatch.setattr(demo.workflow, "diagnose", diagnose)
     monkeypatch.setattr(demo.workflow, "add", add)
-    monkeypatch.setattr(demo.workflow, "compare", lambda model, logs: ("compared", dict(logs)))
+    monkeypatch.setattr(demo.workflow, "add_named", lambda diagnosis: as_fitted.get(diagnosis))
     monkeypatch.setattr(demo, "save_model", lambda *given: calls.update(save=given))
     monkeypatch.setattr(demo, "write_report", lambda *given, **named: calls.update(report=named))
     model = MachineModel("m", {"x": PLAIN})
@@ -187,12 +187,17 @@ def test_a_demonstration_holds_out_its_third_log_and_writes_what_it_found(monkey
     assert calls["diagnose"] == (model, fit, held)
     assert calls["add"] == ("cogging", found.model, fit, held, "x")
     assert calls["save"] == (made.MODEL, tmp_path / "new" / "better.toml")
-    assert calls["report"]["comparison"] == ("compared", {**fit, **held})
+    assert calls["report"]["comparison"] is found.comparison
     assert out.named
     assert out.report == tmp_path / "new" / "report.html"
     assert [line[:2] for line in said] == ["1.", "2.", "3.", "4."]
     assert "cogging on x" in said[2]
     assert not replace(out, hidden=fitted("wear")).named
+    del calls["add"]
+    as_fitted[found] = made.addition()  # the diagnosis has the fit already
+    again = demo.demo(model, CATALOGUE, tmp_path / "new", 4, said.append)
+    assert again.addition is as_fitted[found]
+    assert "add" not in calls
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be made"):
         demo.demo(model, CATALOGUE, Path(tmp_path / "file" / "in"), 4, said.append)
