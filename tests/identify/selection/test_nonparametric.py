@@ -210,6 +210,7 @@ def test_the_map_has_any_number_of_intervals(tmp_path: Path) -> None:
     assert "x_5" not in values
 
 
+@SLOW
 def test_a_physical_effect_takes_the_place_of_a_description(tmp_path: Path) -> None:
     machine = with_x(CATALOGUE["cogging"], a1=0.05, p=0.03)
     logs = recorded(machine, (1,), SHORT)

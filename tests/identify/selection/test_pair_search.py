@@ -43,6 +43,7 @@ def test_both_are_named_on_most_machines():
     assert sum(set(named) == set(PLANTED) for named in found) >= 3
 
 
+@pytest.mark.slow
 def test_both_are_named(case):
     found = diagnose_axis(*case, FEW)
     assert found.verdict is Verdict.MISSING_EFFECT

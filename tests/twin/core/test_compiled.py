@@ -201,8 +201,9 @@ def test_a_law_may_call_functions_of_its_own_file(before, mark, tmp_path: Path) 
 
 def test_a_change_of_a_function_that_a_law_calls_changes_its_digest(tmp_path: Path) -> None:
     digests = set()
-    for sign in ("1.0", "2.0"):
-        path = tmp_path / "steady.py"
+    for sign in ("1.0", "2.0"):  # a folder each: Python keeps a module by its second and size
+        path = tmp_path / sign / "steady.py"
+        path.parent.mkdir()
         path.write_text(LAW.format(before="", mark="").replace("copysign(1.0", f"copysign({sign}"))
         digests.add(digest(load_catalogue([path])["steady"].law))
     assert len(digests) == 2
