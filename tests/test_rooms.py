@@ -19,7 +19,7 @@ ROOMS = (
     "dataset", "estimation", "selection", "validation", "experiment_design", "selftest",
     "thesis", "measure", "output", "workflow", "testing", "demo", "cli", "start",
 )  # fmt: skip
-MOST_FLOORS = 11
+MOST_FLOORS = 10
 ONE_OF_EACH = re.compile(r"np\.gradient|savgol|0\.6745|np\.diff\([^)]*\) / ")
 UNIT_SELECTORS = re.compile(r"""\bunit\s*(==|!=|in|not in)\s*[(\[{]?["'](?!1["'])""")
 
