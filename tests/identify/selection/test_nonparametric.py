@@ -163,7 +163,7 @@ def noisy(judged: str) -> FitResult:
 @pytest.mark.parametrize(
     ("name", "judged"),
     [
-        (MAP, "by held-out logs"),
+        pytest.param(MAP, "by held-out logs", marks=SLOW),
         pytest.param(LEARNED, "by left-out blocks", marks=SLOW),
         pytest.param(MAP, "by left-out blocks", marks=SLOW),
         pytest.param(LEARNED, "by held-out logs", marks=SLOW),
