@@ -10,7 +10,7 @@ import numpy as np
 from identify.dataset.dataset import Dataset, by_log, datasets
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.channel_delay import aligned, fit_aligned
-from identify.estimation.fit import Fit, error_on, rms
+from identify.estimation.fit import Fit, holdout_error
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.experiment_design.plan import Plan, next_experiment, plan
@@ -92,11 +92,6 @@ def require_residual(axis: AxisModel, dataset: Dataset) -> None:
             f"{np.count_nonzero(kept)} test functions of {names}; check the values of its effects, "
             "or leave them out to begin with their start values"
         )
-
-
-def holdout_error(fitted: Fit, dataset: Dataset) -> float | None:
-    """RMS force error on the held-out logs in N, or None where there are none."""
-    return rms(error_on(fitted.axis, dataset.holdout)) if dataset.holdout else None
 
 
 def compare(

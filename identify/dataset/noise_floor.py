@@ -19,7 +19,7 @@ from scipy.optimize import nnls
 
 from identify.dataset.drive import actual_force, is_noise
 from identify.dataset.motion import Motion
-from identify.dataset.prepared_log import REST_SPEED, PreparedLog, on_blocks, sticks, total_force
+from identify.dataset.prepared_log import PreparedLog, at_rest, on_blocks, sticks, total_force
 from identify.dataset.spectrum import densities, pieces_of
 from identify.dataset.test_function import TestFunction
 from twin.model.machine import AxisModel
@@ -128,8 +128,7 @@ def _at_rest(axis: AxisModel, motion: Motion) -> NDArray[np.bool_]:
 
     Static friction then balances the command and its noise, whatever they are.
     """
-    speed = np.abs(motion.velocity)
-    still = speed < REST_SPEED * speed.max()
+    still = at_rest(motion.velocity)
     samples = motion.raw.shape[1] // len(still)
     return np.asarray(np.repeat(still & sticks(axis), samples)[1:])
 

@@ -87,11 +87,23 @@ def sticks(axis: AxisModel) -> bool:
     return any(f.effect.sticks for f in axis.effects)
 
 
+def at_rest(velocity: Array) -> NDArray[np.bool_]:
+    """Where velocities (n,) m/s are so small beside the highest that the axis may stick."""
+    speed = np.abs(velocity)
+    return np.asarray(speed < REST_SPEED * speed.max())
+
+
+def last_direction(velocity: Array) -> Array:
+    """Sign (n,) of the velocity m/s, at rest as it was before; 0 before the first motion."""
+    direction = np.where(at_rest(velocity), 0.0, np.sign(velocity))
+    index = np.maximum.accumulate(np.where(direction != 0.0, np.arange(len(direction)), 0))
+    return np.asarray(direction[index])
+
+
 def moving(logs: Sequence[PreparedLog], sticks: bool) -> NDArray[np.bool_]:
     """Which test functions carry information: with static friction, those without standstill."""
     masks = []
     for log in logs:
-        speed = np.abs(log.motion.velocity)
-        still = (speed < REST_SPEED * speed.max()).astype(float)
+        still = at_rest(log.motion.velocity).astype(float)
         masks.append(log.test_function.mean(still) < 0.02 if sticks else np.ones(len(log), bool))
     return np.concatenate(masks)

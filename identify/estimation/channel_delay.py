@@ -19,7 +19,7 @@ from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import evidence
 from identify.estimation.fit import Fit, Outcome, error_on, finished, fit_axis, rms
-from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.subspace import unabsorbed
 from identify.estimation.time_origin import depends_on_time_origin, synchronised, with_time_origins
 from identify.estimation.variable_projection import fit_thoroughly
 from twin.model.machine import AxisModel
@@ -75,8 +75,7 @@ def misalignment(fit: Fit, dataset: Dataset) -> float:
     a whole is never negative.
     """
     rate = np.concatenate([w.fine.acceleration(w.motion.raw[1]) for w in dataset.fit])[fit.kept]
-    basis = orthonormal(fit.jacobian)
-    left, own = unabsorbed(fit.residual, basis), unabsorbed(rate, basis)
+    left, own = unabsorbed(fit.residual, fit.basis), unabsorbed(rate, fit.basis)
     power = float(own @ own)
     if power <= 1e-12 * float(rate @ rate):
         return 0.0

@@ -107,9 +107,14 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
 
 def _reasons(fit: Fit, half: Array) -> dict[str, NoInterval]:
     """Why free parameters have no interval, by label; those that have one are left out."""
-    where = fit.scaling.where
     if (common := refusal(fit)) is not None:
-        return {c.label: common for c in where}
+        return {c.label: common for c in fit.scaling.where}
+    return _undetermined(fit, half)
+
+
+def _undetermined(fit: Fit, half: Array) -> dict[str, NoInterval]:
+    """Why parameters have none of their own, however good the model is."""
+    where = fit.scaling.where
     out: dict[str, NoInterval] = {
         c.label: NotExcited() for c, width in zip(where, half, strict=True) if not width < np.inf
     }
@@ -133,13 +138,11 @@ def intervals_to_keep(fit: Fit, found: Sequence[Estimate]) -> AxisIntervals:
     }
     if isinstance(refusal(fit), ModelWrong):
         where, half = fit.scaling.where, half_widths(fit)
-        told = np.isfinite(half)
-        asked = [c for c, known in zip(where, told, strict=True) if known]
-        without = inseparable(fit).keys() | open_sides(fit, asked, half[told]).keys()
+        without = _undetermined(fit, half)
         ends = {
             c.label: (float(value - h), float(value + h))
             for c, value, h in zip(where, read(fit.axis, where), half, strict=True)
-            if np.isfinite(h) and c.label not in without
+            if c.label not in without
         }
     return AxisIntervals(ends, float(fit.ratio) if len(fit.residual) else 1.0)
 

@@ -55,6 +55,14 @@ class Start:
         """N^2, sum over the test functions of what is left."""
         return float(self.left @ self.left)
 
+    def gain(self, base: Fit) -> float:
+        """Twice the gain in log likelihood over the base, on all of its logs."""
+        before = float(base.residual @ base.residual)
+        if before == 0.0:
+            return 0.0
+        part = before / max(self.squared_error, 1e-12 * before)
+        return float(effective_samples(base.residual) * np.log(part))
+
 
 def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     """The effect at its best shapes beside the base, best first; at least one.
@@ -86,10 +94,7 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
 
 def _beyond_chance(base: Fit, start: Start) -> bool:
     """Whether a shape gains more on all of the logs than a scan of noise would."""
-    before = float(base.residual @ base.residual)
-    gain = np.log(before / max(start.squared_error, 1e-12 * before))
-    free = len(start.fitted.effect.strengths)
-    return bool(effective_samples(base.residual) * gain > CHANCE * free)
+    return start.gain(base) > CHANCE * len(start.fitted.effect.strengths)
 
 
 def _best(

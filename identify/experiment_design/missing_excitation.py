@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.motion import Motion
-from identify.dataset.prepared_log import REST_SPEED, PreparedLog
+from identify.dataset.prepared_log import PreparedLog, at_rest
 from identify.selection.residual_dependence import since_reversal
 from twin.model.units import LINEAR
 
@@ -65,7 +65,7 @@ def _speed(log: PreparedLog) -> Array:
 def _rest(log: PreparedLog) -> Array:
     """Rest (s) before the last start of motion, rounded to 0.1 s because settling is gradual."""
     m = log.motion
-    still = np.abs(m.velocity) < REST_SPEED * np.abs(m.velocity).max()
+    still = at_rest(m.velocity)
     index = np.arange(len(still))
     begun = np.maximum.accumulate(np.where(still, 0, index + 1))
     stood = np.where(still, index + 1 - begun, 0.0)

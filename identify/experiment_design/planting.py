@@ -14,7 +14,7 @@ from identify.dataset.drive import is_noise, reading_error
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import Fit, rms
 from identify.estimation.force_balance import residual
-from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.subspace import unabsorbed
 from twin.effect import Effect, Excitation, Parameter
 from twin.model.machine import AxisModel, Fitted
 from twin.model.parameters import free_parameters, read, write
@@ -67,7 +67,7 @@ def draw_effect(
         if not (p.strength or p.fixed):
             values[p.name] = _drawn_shape(p, values[p.name], excitation, rng)
     base = residual(axis, logs)
-    basis = orthonormal(beside.jacobian) if beside else np.zeros((len(base), 0))
+    basis = beside.basis if beside else np.zeros((len(base), 0))
     kept = beside.kept if beside else np.ones(len(base), dtype=bool)
 
     def added(fitted: Fitted) -> Array:
@@ -150,7 +150,7 @@ def _scale(size: Callable[[float], float], wanted: float) -> float:
 def visible_force(fitted: Fitted, base: Fit, dataset: Dataset) -> float:
     """RMS force (N) of an effect that the parameters of a fit cannot reproduce."""
     force = _beside(fitted, base, dataset)
-    return rms(unabsorbed(force, orthonormal(base.jacobian)))
+    return rms(unabsorbed(force, base.basis))
 
 
 def hidden_part(fitted: Fitted, base: Fit, dataset: Dataset) -> float:

@@ -156,13 +156,9 @@ def refitted(base: Fit, dataset: Dataset, look: Look) -> Candidate:
 
 def _promising(base: Fit, start: Start) -> bool:
     """Whether the gain of the linear step is large enough that a refit may give evidence."""
-    samples = effective_samples(base.residual)
-    before = float(np.sum(base.residual**2))
-    if before == 0.0:
-        return False
-    gain = samples * np.log(before / max(start.squared_error, 1e-12 * before))
     free = len(start.fitted.effect.parameters) - len(start.fitted.fixed)
-    return bool(gain > RULE.promise * (RULE.least_bic + free * np.log(samples)))
+    asked = RULE.least_bic + free * np.log(effective_samples(base.residual))
+    return bool(start.gain(base) > RULE.promise * asked)
 
 
 def _fitted_to_heads(base: Fit, dataset: Dataset, fitted: Fitted) -> Fit | None:

@@ -10,7 +10,7 @@ left out where there are none.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.time_origin import depends_on_time_origin
 from twin.effect import Kind
-from twin.model.machine import AxisModel, Fitted
+from twin.model.machine import Fitted
 from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def proof(without: Fit, fitted: Fitted, dataset: Dataset) -> Proof | None:
         for p in fitted.effect.strengths
         if p.name not in fitted.fixed
     ]
-    timed = depends_on_time_origin(_alone(axis, fitted), dataset)
+    timed = depends_on_time_origin(replace(axis, effects=(fitted,)), dataset)
     if fitted.effect.kind is Kind.FRICTION or timed or not where:
         return None
 
@@ -71,66 +71,72 @@ def proof(without: Fit, fitted: Fitted, dataset: Dataset) -> Proof | None:
         ends = np.cumsum([len(log) for log in logs])[:-1]
         return np.split(jacobian(axis, logs, where), ends)
 
-    return beside_decoys(without, columns, dataset, sticking=sticks(axis))
+    return Trial.of(without, dataset).proof(columns, sticking=sticks(axis))
 
 
-def beside_decoys(
-    base: Fit,
-    columns: Columns,
-    dataset: Dataset,
-    *,
-    sticking: bool,
-    ridge: float = RIDGE,
-    decoys: int = DECOYS,
-) -> Proof:
-    """What columns take of a fit's squared test error in one linear step, and their decoys.
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A fit beside which forces and their decoys are tried, on its own logs and the held-out ones.
 
-    columns: logs -> forces (m, j) of each log, N. sticking: whether test functions with standstill
-    are left out. ridge: of the length of a column.
+    held: None where blocks of the fit logs are left out instead.
     """
-    fit = _Part.of(base, columns, dataset.fit, sticking)
-    held = _Part.of(base, columns, dataset.holdout, sticking) if dataset.holdout else None
-    rng = np.random.default_rng(SEED)
-    before = _left(fit, held, None, ridge)
-    gain = 1.0 - _left(fit, held, np.zeros(len(dataset.logs)), ridge) / before
-    untrue = (
-        1.0 - _left(fit, held, rng.uniform(*SHIFTS, len(dataset.logs)), ridge) / before
-        for _ in range(decoys)
-    )
-    return Proof(float(gain), float(max(untrue, default=-np.inf)))
 
+    fit: _Part
+    held: _Part | None
 
-def _alone(axis: AxisModel, fitted: Fitted) -> AxisModel:
-    others = [n for n in axis.names if n != fitted.effect.name]
-    for name in others:
-        axis = axis.without(name)
-    return axis
+    @classmethod
+    def of(cls, base: Fit, dataset: Dataset) -> Trial:
+        """The trial on the logs of a dataset."""
+        held = _Part.of(base, dataset.holdout) if dataset.holdout else None
+        return cls(_Part.of(base, dataset.fit), held)
+
+    def proof(
+        self, columns: Columns, *, sticking: bool, ridge: float = RIDGE, decoys: int = DECOYS
+    ) -> Proof:
+        """What columns take of the fit's squared test error in one linear step, and their decoys.
+
+        columns: logs -> forces (m, j) of each log, N. sticking: whether test functions with
+        standstill are left out. ridge: of the length of a column.
+        """
+        fit = self.fit.with_columns(columns, sticking)
+        held = self.held and self.held.with_columns(columns, sticking)
+        count = len(fit.columns) + (len(held.columns) if held else 0)
+        rng = np.random.default_rng(SEED)
+        before = _left(fit, held, None, ridge)
+        gain = 1.0 - _left(fit, held, np.zeros(count), ridge) / before
+        untrue = (
+            1.0 - _left(fit, held, rng.uniform(*SHIFTS, count), ridge) / before
+            for _ in range(decoys)
+        )
+        return Proof(float(gain), float(max(untrue, default=-np.inf)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Some logs: residual (n,) N and the base's columns (n, k) where the axis moves (kept).
+    """Some logs: residual (n,) N and the base's columns (n, k), of the test functions kept.
 
-    columns: of the effect, (m, j) for each log.
+    columns: those that are tried, (m, j) for each log.
     """
 
+    logs: Sequence[PreparedLog]
     force: Array
     base: Array
-    columns: Sequence[Array]
     kept: NDArray[np.bool_]
+    columns: Sequence[Array] = ()
 
     @classmethod
-    def of(cls, base: Fit, columns: Columns, logs: Sequence[PreparedLog], sticking: bool) -> _Part:
-        kept = moving(logs, sticking)
-        return cls(
-            residual(base.axis, logs)[kept],
-            jacobian(base.axis, logs, base.scaling.where)[kept],
-            columns(logs),
-            kept,
-        )
+    def of(cls, base: Fit, logs: Sequence[PreparedLog]) -> _Part:
+        force = residual(base.axis, logs)
+        own = jacobian(base.axis, logs, base.scaling.where)
+        return cls(logs, force, own, np.ones(len(force), dtype=bool))
 
-    def with_effect(self, shifts: Array | None) -> Array:
-        """Columns (n, k + j) of base and effect, shifted by parts of each log; None: base alone."""
+    def with_columns(self, columns: Columns, sticking: bool) -> _Part:
+        """The same with columns to try; sticking: without test functions with standstill."""
+        kept = moving(self.logs, sticking)
+        return _Part(self.logs, self.force[kept], self.base[kept], kept, columns(self.logs))
+
+    def shifted(self, shifts: Array | None) -> Array:
+        """Columns (n, k + j) of base and trial, shifted by parts of each log; None: base alone."""
         if shifts is None:
             return self.base
         moved = [
@@ -141,9 +147,9 @@ class _Part:
 
 
 def _left(fit: _Part, held: _Part | None, shifts: Array | None, ridge: float) -> float:
-    """Mean squared test error N^2 after a linear step with the effect so shifted."""
-    there = None if shifts is None else shifts[: len(fit.columns)]
-    columns = fit.with_effect(there)
+    """Mean squared test error N^2 after a linear step with columns so shifted."""
+    first = len(fit.columns)
+    columns = fit.shifted(None if shifts is None else shifts[:first])
     norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     columns = columns / norms
     normal = columns.T @ columns + ridge**2 * np.eye(len(norms))
@@ -151,5 +157,5 @@ def _left(fit: _Part, held: _Part | None, shifts: Array | None, ridge: float) ->
     if held is None:
         solved = fit.force - columns @ step
         return float(np.mean(left_out(solved, columns, np.full(len(norms), ridge)) ** 2))
-    rest = None if shifts is None else shifts[len(fit.columns) :]
-    return float(np.mean((held.force - held.with_effect(rest) / norms @ step) ** 2))
+    there = held.shifted(None if shifts is None else shifts[first:])
+    return float(np.mean((held.force - there / norms @ step) ** 2))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.fit import Fit, error_on, rms
+from identify.estimation.fit import Fit, holdout_error
 from identify.selection.decoys import Proof, proof
 from identify.selection.ranking import less
 from identify.selection.wrong_shape import WrongShape
@@ -47,28 +47,28 @@ def found(
 ) -> Finding:
     """The finding of one effect of a final fit, all others left in it."""
     without = less(effect, final, base, dataset)
-    before, after, first = (test_error(f, dataset) for f in (without, final, base))
-    above = first**2 - base.floor**2
+    before, after = (_unseen(f, dataset) for f in (without, final))
+    fitted = final.axis[effect.name]
     return Finding(
         effect=effect.name,
         tied=tied,
-        explains=(before**2 - after**2) / above if above > 0.0 else 0.0,
+        explains=_share(before**2 - after**2, base, dataset),
         error_before=before,
         error_after=after,
         unit=final.axis.units.force,
-        parameters=dict(final.axis[effect.name].values),
-        proof=proof(without, final.axis[effect.name], dataset),
+        parameters=dict(fitted.values),
+        proof=proof(without, fitted, dataset),
     )
 
 
 def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> Finding:
     """The finding of a law with the wrong shape in a final fit."""
-    before, first = test_error(final, dataset), test_error(base, dataset)
-    taken, above = shape.proof.gain * before**2, first**2 - base.floor**2
+    before = _unseen(final, dataset)
+    taken = shape.proof.gain * before**2
     return Finding(
         effect=shape.effect,
         tied=(),
-        explains=taken / above if above > 0.0 else 0.0,
+        explains=_share(taken, base, dataset),
         error_before=before,
         error_after=(before**2 - taken) ** 0.5,
         unit=final.axis.units.force,
@@ -78,6 +78,13 @@ def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> F
     )
 
 
-def test_error(fit: Fit, dataset: Dataset) -> float:
-    """RMS force error (N) on the held-out logs, or on the fit logs where there are none."""
-    return rms(error_on(fit.axis, dataset.holdout)) if dataset.holdout else fit.error
+def _share(taken: float, base: Fit, dataset: Dataset) -> float:
+    """Part of the base's squared test error above the noise floor that this much (N^2) is."""
+    above = _unseen(base, dataset) ** 2 - base.floor**2
+    return taken / above if above > 0.0 else 0.0
+
+
+def _unseen(fit: Fit, dataset: Dataset) -> float:
+    """RMS test error (N): on the held-out logs, or on the fit logs where there are none."""
+    held = holdout_error(fit, dataset)
+    return fit.error if held is None else held

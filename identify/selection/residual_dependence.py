@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import Motion
-from identify.dataset.prepared_log import PreparedLog
+from identify.dataset.prepared_log import PreparedLog, last_direction
 from identify.dataset.spectral_lines import find_lines
 from identify.dataset.spectrum import Record
 from identify.estimation.decision import RULE
@@ -104,10 +104,7 @@ def coordinates_of(log: PreparedLog) -> dict[str, Array]:
 
 def since_reversal(velocity: Array, period: float) -> Array:
     """Distance (n,) m travelled since the last change of direction."""
-    fast = np.abs(velocity) > 1e-3 * np.abs(velocity).max()
-    direction = np.sign(np.where(fast, velocity, 0.0))
-    index = np.maximum.accumulate(np.where(direction != 0, np.arange(len(direction)), 0))
-    direction = direction[index]
+    direction = last_direction(velocity)
     travelled = np.cumsum(np.abs(velocity)) * period
     turned = np.flatnonzero(np.diff(direction) != 0) + 1
     start = np.zeros(len(velocity))

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.prepared_log import REST_SPEED, PreparedLog, sticks
+from identify.dataset.prepared_log import PreparedLog, at_rest, last_direction, sticks
 from identify.estimation.fit import Fit
-from identify.selection.decoys import Proof, beside_decoys
+from identify.selection.decoys import Proof, Trial
 from twin.effect import Coordinate, Curve, Kind
 from twin.model.machine import Fitted
 from twin.signals import Array
@@ -38,26 +38,28 @@ class WrongShape:
 
 def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
     """The effect whose free curve takes most of a fit's squared test error, if it is proved."""
-    tried = [_tried(fit, f, dataset) for f in fit.axis.effects if f.effect.curve]
+    curved = [f for f in fit.axis.effects if f.effect.curve]
+    trial = Trial.of(fit, dataset)
+    tried = [_tried(trial, f, dataset.fit, sticks(fit.axis)) for f in curved]
     best = max(tried, key=lambda w: w.proof.gain, default=None)
     return best if best and best.proof.holds else None
 
 
-def _tried(fit: Fit, fitted: Fitted, dataset: Dataset) -> WrongShape:
+def _tried(trial: Trial, fitted: Fitted, logs: Sequence[PreparedLog], sticking: bool) -> WrongShape:
     """The curve with as many hats, and at standstill, as blocks left out of the fit logs say."""
-    assert fitted.effect.curve is not None
-    among = replace(dataset, holdout=())
+    curve = fitted.effect.curve
+    assert curve is not None
     is_force = fitted.effect.kind is Kind.FORCE
-    sticking = sticks(fit.axis) or not is_force
-    rests = (False, True) if is_force and fitted.effect.curve.by_direction else (False,)
+    sticking = sticking or not is_force
+    rests = (False, True) if is_force and curve.by_direction else (False,)
+    among = replace(trial, held=None)
 
-    def tried(hats: _Hats) -> Proof:
-        return beside_decoys(fit, hats.columns, among, sticking=sticking, ridge=RIDGE, decoys=0)
+    def gain(hats: _Hats) -> float:
+        return among.proof(hats.columns, sticking=sticking, ridge=RIDGE, decoys=0).gain
 
-    forms = [_Hats.of(fitted, dataset.fit, n, at_rest=r) for n in HATS for r in rests]
-    best = max(forms, key=lambda hats: tried(hats).gain).columns
-    found = beside_decoys(fit, best, dataset, sticking=sticking, ridge=RIDGE, decoys=DECOYS)
-    return WrongShape(fitted.effect.name, fitted.effect.curve, found)
+    best = max((_Hats.of(fitted, logs, n, at_rest=r) for n in HATS for r in rests), key=gain)
+    found = trial.proof(best.columns, sticking=sticking, ridge=RIDGE, decoys=DECOYS)
+    return WrongShape(fitted.effect.name, curve, found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,12 +107,8 @@ class _Hats:
 
     def _direction(self, velocity: Array) -> Array:
         """Sign (n,) of the velocity; at standstill 0, or as it was before."""
-        moving = np.abs(velocity) > REST_SPEED * np.abs(velocity).max()
-        direction = np.where(moving, np.sign(velocity), 0.0)
-        if self.at_rest:
-            last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), 0))
-            direction = direction[last]
-        return direction
+        direction = last_direction(velocity)
+        return direction if self.at_rest else np.where(at_rest(velocity), 0.0, direction)
 
 
 def _coordinate(curve: Curve, log: PreparedLog) -> Array:

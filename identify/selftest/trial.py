@@ -14,7 +14,7 @@ from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates
-from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.subspace import unabsorbed
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.residual_dependence import dependences
@@ -137,7 +137,7 @@ def _planted_force(planted: tuple[Fitted, ...], base: Fit, dataset: Dataset) -> 
     for fitted in planted:
         axis = axis.with_effect(fitted)
     force = base.residual - residual(axis, dataset.fit)[base.kept]
-    return unabsorbed(force, orthonormal(base.jacobian))
+    return unabsorbed(force, base.basis)
 
 
 def _covered(built: Machine, found: AxisDiagnosis) -> tuple[tuple[str, bool], ...]:

@@ -11,7 +11,7 @@ from scipy.special import chdtri
 
 from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.noise_floor import floor_of
-from identify.dataset.prepared_log import REST_SPEED, PreparedLog, moving, sticks
+from identify.dataset.prepared_log import PreparedLog, at_rest, moving, sticks
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import rms
 from identify.estimation.force_balance import residual
@@ -150,8 +150,8 @@ def _coordinates(axis: AxisModel, logs: Sequence[PreparedLog]) -> dict[str, Arra
     """Coordinates (n,) along which the error is shown: of the motion, and periods of the model."""
     where = gathered(logs)
     where["command"] = np.concatenate([log.command for log in logs])
-    speeds = np.concatenate([np.abs(log.test_function.mean(log.motion.velocity)) for log in logs])
-    where["standstill"] = (speeds < REST_SPEED * speeds.max()).astype(float)
+    velocity = np.concatenate([log.test_function.mean(log.motion.velocity) for log in logs])
+    where["standstill"] = at_rest(velocity).astype(float)
     for name, period in periods(axis).items():
         where[phase_name(name)] = np.mod(where["position"], period)
     return where
