@@ -11,7 +11,7 @@ import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, fitted
 
 from identify import workflow
-from identify.estimation import fit as fits
+from identify.estimation import fit as estimation_fit
 from identify.output import results
 from identify.output.words.selection import moved_in_words
 from identify.selection import confounded
@@ -119,7 +119,7 @@ def handed(monkeypatch):
     monkeypatch.setattr(workflow, "intervals_to_keep", lambda fit, found: (fit.error, found))
     monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
     monkeypatch.setattr(
-        estimation, "error_on", lambda axis, logs: np.full(5, axis.mass * len(logs))
+        estimation_fit, "error_on", lambda axis, logs: np.full(5, axis.mass * len(logs))
     )
     monkeypatch.setattr(results, "refit", lambda *given: given)
     monkeypatch.setattr(workflow, "require_residual", lambda axis, dataset: None)
