@@ -100,7 +100,7 @@ def stage(fit: Fit, *steps: Step) -> SelectionState:
     return SelectionState(tuple(steps), fit)
 
 
-def study_stub(holdout: Sequence[object] = (), fit: Sequence[object] = ()) -> SimpleNamespace:
+def dataset_stub(holdout: Sequence[object] = (), fit: Sequence[object] = ()) -> SimpleNamespace:
     """What the rules ask of a dataset, with no logs in it."""
     return SimpleNamespace(axis="x", holdout=tuple(holdout), fit=tuple(fit), channel_delay=0.0)
 
@@ -121,7 +121,7 @@ def built_motion(name: str = "run", seconds: float = 3.0, seed: int = 1, slow: f
     )  # fmt: skip
 
 
-def built_study(*names: str, held: Sequence[str] = (), window: float = 0.04) -> Dataset:
+def built_dataset(*names: str, held: Sequence[str] = (), window: float = 0.04) -> Dataset:
     """A dataset of built motions, of a length and seed of their own each."""
 
     def logs(which: Sequence[str], first: int) -> tuple[PreparedLog, ...]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
-from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_study, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted
 
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import Estimate, NotExcited
@@ -26,7 +26,7 @@ from twin.effects import Catalogue
 from twin.experiments.kinds import Passes, Tracking
 from twin.model.machine import HistoryStep, MachineModel
 
-STUDY = replace(built_study("run 1", "run 2", held=("held 1",)), channel_delay=0.000217)
+DATASET = replace(built_dataset("run 1", "run 2", held=("held 1",)), channel_delay=0.000217)
 RNG = np.random.default_rng(9)
 
 
@@ -58,9 +58,9 @@ LATER = candidate("lugre", 0.44, bic=205.0)
 
 CHOSEN = Passes("x", 0.0831, 0.0127, 7)
 TRIALS = (
-    SimulatedExperiment(CHOSEN, 8.3, 0.0412, 0.0113, 57.3, STUDY.fit[0], np.array([0.3, 0.1])),
+    SimulatedExperiment(CHOSEN, 8.3, 0.0412, 0.0113, 57.3, DATASET.fit[0], np.array([0.3, 0.1])),
     SimulatedExperiment(
-        Tracking(9.7), 9.9, 0.0287, 0.0107, 31.9, STUDY.fit[1], np.array([0.2, 0.1])
+        Tracking(9.7), 9.9, 0.0287, 0.0107, 31.9, DATASET.fit[1], np.array([0.2, 0.1])
     ),
 )
 
@@ -80,7 +80,7 @@ def diagnosis_of(verdict: Verdict = Verdict.AMBIGUOUS, **changes: object) -> Axi
     )
     base = built_fit(8.37, 2.11, PLAIN)
     final = built_fit(3.19, 2.03, LATER.fit.axis)
-    found = AxisDiagnosis(STUDY, base, (BEST, RIVAL, WEAK), steps, final, verdict, None, **{})
+    found = AxisDiagnosis(DATASET, base, (BEST, RIVAL, WEAK), steps, final, verdict, None, **{})
     found = replace(found, **changes)
     found.__dict__["repeat"] = None
     return found
@@ -127,7 +127,7 @@ def whiteness_of(o: float = 0.0) -> ResidualTests:
 
 
 def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:
-    residual = np.concatenate([RNG.standard_normal(len(w)) for w in STUDY.fit])
+    residual = np.concatenate([RNG.standard_normal(len(w)) for w in DATASET.fit])
     position = np.linspace(-0.031, 0.047, len(residual))
     return AxisComparison(
         axis=axis,
@@ -136,7 +136,7 @@ def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:
         position_error={"run 1": 3.17e-6 + o, "run 2": 4.29e-6 + o},
         position_floor={"run 1": 2.13e-7 + o, "run 2": 2.57e-7 + o},
         residual=residual * (0.0647 + o) / np.sqrt(np.mean(residual**2)),
-        logs=STUDY.fit,
+        logs=DATASET.fit,
         coordinates={
             "position": position, "velocity": 3.0 * position[::-1],
             "roller_spikes_phase": np.mod(position, 0.034),
@@ -159,7 +159,7 @@ def compared() -> Comparison:
 
 def diagnosed(x: AxisDiagnosis | None = None) -> Diagnosis:
     """x as given, and y where nothing is missing."""
-    other = replace(STUDY, axis="y", channel_delay=0.0)
+    other = replace(DATASET, axis="y", channel_delay=0.0)
     y = AxisDiagnosis(
         other, built_fit(1.07, 0.97), (replace(WEAK, axis="y"),), (), built_fit(1.07, 0.97),
         Verdict.NOTHING_MISSING, None,
@@ -173,7 +173,7 @@ def diagnosed(x: AxisDiagnosis | None = None) -> Diagnosis:
 def fit_result() -> FitResult:
     x = built_fit(0.0513, 0.0127, outcome=Outcome.AT_BOUND)
     y = built_fit(0.0317, 0.0131)
-    datasets = {"x": STUDY, "y": replace(STUDY, axis="y", channel_delay=0.0)}
+    datasets = {"x": DATASET, "y": replace(DATASET, axis="y", channel_delay=0.0)}
     result = FitResult(
         MODEL, datasets, {"x": x, "y": y}, {"x": estimates(0.0), "y": estimates(0.02)},
         {"x": 0.0611, "y": None}, MODEL, Catalogue([]),

@@ -102,7 +102,7 @@ def test_a_strength_collapsed_where_less_than_a_third_is_left(monkeypatch, f0, s
 
 def handed(monkeypatch):
     """The loop's parts stubbed: each says what it was given."""
-    datasets = {a: replace(made.STUDY, axis=a) for a in ("x", "y")}
+    datasets = {a: replace(made.DATASET, axis=a) for a in ("x", "y")}
     seen = {}
 
     def read(*asked):
@@ -110,8 +110,8 @@ def handed(monkeypatch):
         return dict(datasets)
 
     def aligned(axis, dataset):
-        aligned_study = replace(dataset, channel_delay=axis.mass / 1e4)
-        return aligned_study, built_fit(axis.mass, axis=replace(axis, mass=2 * axis.mass))
+        aligned_dataset = replace(dataset, channel_delay=axis.mass / 1e4)
+        return aligned_dataset, built_fit(axis.mass, axis=replace(axis, mass=2 * axis.mass))
 
     monkeypatch.setattr(workflow, "datasets", read)
     monkeypatch.setattr(workflow, "fit_aligned", aligned)
@@ -140,7 +140,7 @@ def test_a_fit_takes_over_the_values_and_the_shift_of_each_axis(monkeypatch):
     assert found.model.intervals == {a: (f.error, ("estimates", f)) for a, f in found.fits.items()}
     assert all(found.estimates[a] == ("estimates", found.fits[a]) for a in "xy")
     assert found.refits == {a: (made.MODEL.axes[a], found.fits[a], "known") for a in "xy"}
-    bare = replace(made.STUDY, holdout=())
+    bare = replace(made.DATASET, holdout=())
     assert workflow.holdout_error(found.fits["x"], bare) is None
     assert len(workflow.fit(made.MODEL, "logs").catalogue) == 0
     assert seen["datasets"][2] == {}
@@ -171,7 +171,7 @@ def test_a_comparison_is_of_the_axes_that_move(monkeypatch):
     assert found.model is made.MODEL
 
 
-def test_a_diagnosis_hands_each_axis_its_own_fit_and_study(monkeypatch):
+def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
     described = made.MODEL.with_axis("x", axis_of(fitted("empirical_map")))
     result = made.fit_result()
     asked, plans = {}, {"x": None, "y": "plan y"}
@@ -262,7 +262,7 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
 def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     base = built_fit(7.3)
     best = built("cogging", fit=built_fit(2.9, axis=axis_of(fitted("cogging"))), t=9 if kept else 1)
-    dataset = replace(made.STUDY, holdout=("held",))
+    dataset = replace(made.DATASET, holdout=("held",))
     model = MachineModel("m", {"x": PLAIN, "y": replace(PLAIN, mass=3.0)})
     runs = []
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, built_fit, built_study, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, built_fit, fitted
 
 from identify.estimation import variable_projection as search
 from identify.estimation.evidence import effective_samples
@@ -40,7 +40,7 @@ SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
 
 @pytest.fixture(scope="module")
 def dataset():
-    return built_study("one", "two")
+    return built_dataset("one", "two")
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +145,7 @@ def test_a_friction_is_tried_in_the_place_of_the_old_one(dataset, base):
 
 
 def test_a_ground_on_the_heads_is_that_part_of_the_whole(base, monkeypatch):
-    dataset = built_study("one", "two")
+    dataset = built_dataset("one", "two")
     heads = tuple(type(w).of(w.motion.head(1.1), w.test_function.length) for w in dataset.fit)
     dataset.__dict__["heads"] = heads
     head = _Ground.of(base, dataset, CATALOGUE["cogging"], SEEN, on_heads=True)

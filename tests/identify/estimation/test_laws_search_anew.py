@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from built_fits import PLAIN, axis_of, built_fit, built_study, fitted
+from built_fits import PLAIN, axis_of, built_dataset, built_fit, fitted
 
 from identify.estimation import variable_projection as search
 from identify.estimation.fit import Outcome, finished
@@ -30,7 +30,7 @@ SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
 
 @pytest.fixture(scope="module")
 def dataset():
-    return built_study("one", "two")
+    return built_dataset("one", "two")
 
 
 @pytest.fixture(scope="module")

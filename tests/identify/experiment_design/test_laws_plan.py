@@ -148,7 +148,7 @@ def planned(monkeypatch):
 
     def dataset(*given):
         asked.update(dataset=given)
-        return made.STUDY
+        return made.DATASET
 
     monkeypatch.setattr(plans, "_planned", choose)
     monkeypatch.setattr(plans, "_dataset", dataset)
@@ -171,8 +171,8 @@ def test_a_plan_between_rivals_hands_on_what_it_was_asked(monkeypatch, logs):
     assert asked["given"] == (7.0, 6, not logs, effects, bar)
     chosen = asked["arena"]
     assert (chosen.machine, chosen.name, chosen.test_function) == (STAGE, "x", 0.07)
-    assert chosen.explanations == (rivals, STAGE, made.STUDY, bool(logs))
-    assert chosen.logs == (made.STUDY.fit if logs else ())
+    assert chosen.explanations == (rivals, STAGE, made.DATASET, bool(logs))
+    assert chosen.logs == (made.DATASET.fit if logs else ())
     with pytest.raises(InputError, match="no axis"):
         plans.plan(STAGE, catalogue={}, axis="z")
 
@@ -194,7 +194,7 @@ def test_without_rivals_a_plan_asks_what_the_diagnosis_leaves_open(monkeypatch, 
     plans.plan(STAGE, {"a": "log"}, catalogue={})
     found = asked["arena"].explanations
     assert tuple(e.name for e in found) == between
-    assert asked["arena"].logs == made.STUDY.fit
+    assert asked["arena"].logs == made.DATASET.fit
     if between == ("s",):
         assert found[0].axis is TWO
     plans.plan(STAGE, catalogue={})
@@ -202,7 +202,7 @@ def test_without_rivals_a_plan_asks_what_the_diagnosis_leaves_open(monkeypatch, 
     assert asked["arena"].logs == ()
 
 
-def test_the_study_is_that_of_the_axis_in_question(monkeypatch):
+def test_the_dataset_is_that_of_the_axis_in_question(monkeypatch):
     every = {"y": "dataset y", "x": "dataset x"}
     monkeypatch.setattr(plans, "datasets", lambda *given: every)
     monkeypatch.setattr(plans, "simulated_dataset", lambda stage, axis: f"trial {axis}")

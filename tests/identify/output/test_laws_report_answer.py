@@ -129,7 +129,7 @@ def test_the_answer_for_one_effect_that_leaves_more():
     best = replace(made.BEST, fit=built_fit(3.1, 1.0, made.BEST.fit.axis))
     steps = (replace(made.diagnosis_of().steps[0], candidate=best, tied=()),)
     one = made.diagnosis_of(
-        Verdict.MISSING_EFFECT, steps=steps, dataset=replace(made.STUDY, holdout=())
+        Verdict.MISSING_EFFECT, steps=steps, dataset=replace(made.DATASET, holdout=())
     )
     found = made.diagnosed(one)
     card, _ = cards(replace(found, next_experiments={"x": made.plan_of("a", "b", ranking=(
@@ -251,7 +251,7 @@ def test_the_line_under_the_title_and_the_order_of_axes():
     y_first = replace(
         found,
         axes={
-            "x": replace(found.axes["y"], dataset=made.STUDY),
+            "x": replace(found.axes["y"], dataset=made.DATASET),
             "y": replace(found.axes["x"], dataset=found.axes["y"].dataset),
         },
     )

@@ -41,7 +41,7 @@ def subject_of(diagnosis=None, **changes) -> Subject:
 
 
 def test_forces_add_up_to_the_command_less_inertia():
-    log = made.STUDY.fit[0]
+    log = made.DATASET.fit[0]
     sliding = axis_of(mass=4.9).with_effect(fitted("lugre"))
     richer = sliding.with_effect(fitted("constant_force", F0=0.7))
     found = log_forces(log, sliding, richer)
@@ -53,7 +53,7 @@ def test_forces_add_up_to_the_command_less_inertia():
 
 
 def test_a_friction_at_rest_is_not_shown():
-    log = made.STUDY.fit[0]
+    log = made.DATASET.fit[0]
     still = np.where(np.arange(len(log.motion.velocity)) < 600, 0.0, log.motion.velocity)
     rest = replace(
         log, motion=replace(log.motion, signals=np.stack([log.motion.position, still,

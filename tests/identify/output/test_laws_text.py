@@ -185,7 +185,7 @@ def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
     best = replace(made.BEST, fit=replace(made.BEST.fit, outcome=Outcome.AT_BOUND))
     steps = (Step(best, ()),)
     loose = replace(
-        x, base=bad, steps=steps, dataset=replace(made.STUDY, channel_delay=0.0, holdout=())
+        x, base=bad, steps=steps, dataset=replace(made.DATASET, channel_delay=0.0, holdout=())
     )
     loose.__dict__["repeat"] = made.REPEAT
     found = remarks(loose, None)

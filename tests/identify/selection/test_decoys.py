@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, built_study, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, fitted
 
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import averaged_force
@@ -19,12 +19,12 @@ COGGING = fitted("cogging", p=0.013, a1=0.4, b1=0.2)
 
 
 @pytest.fixture(scope="module", params=[(), ("held",)], ids=["left out", "held out"])
-def study(request):
-    return built_study("one", "two", held=request.param)
+def dataset(request):
+    return built_dataset("one", "two", held=request.param)
 
 
-def with_force(study, added, size: float):
-    """The study with a force added to what its model leaves; size: N RMS of a smooth remainder."""
+def with_force(dataset, added, size: float):
+    """The dataset with a force that its model lacks; size: N RMS of a smooth remainder."""
 
     def moved(log):
         knots = RNG.standard_normal(9)
@@ -32,32 +32,32 @@ def with_force(study, added, size: float):
         return replace(log, command=log.command - averaged_force(added, [log]) + size * smooth)
 
     return replace(
-        study, fit=tuple(map(moved, study.fit)), holdout=tuple(map(moved, study.holdout))
+        dataset, fit=tuple(map(moved, dataset.fit)), holdout=tuple(map(moved, dataset.holdout))
     )
 
 
-def base_of(study):
-    return finished(PLAIN, PLAIN, study.fit, Outcome.CONVERGED)
+def base_of(dataset):
+    return finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
 
 
-def test_an_effect_that_is_there_is_proved_beside_a_remainder(study) -> None:
-    there = with_force(study, AxisModel(1.0, effects=(COGGING,)), 0.1)
+def test_an_effect_that_is_there_is_proved_beside_a_remainder(dataset) -> None:
+    there = with_force(dataset, AxisModel(1.0, effects=(COGGING,)), 0.1)
     found = proof(base_of(there), COGGING, there)
     assert found is not None
     assert found.holds
     assert found.gain > 0.6 > found.best_decoy
 
 
-def test_an_effect_that_is_not_there_is_not_proved(study) -> None:
-    nothing = with_force(study, AxisModel(1.0), 0.1)
+def test_an_effect_that_is_not_there_is_not_proved(dataset) -> None:
+    nothing = with_force(dataset, AxisModel(1.0), 0.1)
     found = proof(base_of(nothing), COGGING, nothing)
     assert found is not None
     assert not found.holds
     assert found.gain < 0.2
 
 
-def test_the_same_is_told_every_time(study) -> None:
-    there = with_force(study, AxisModel(1.0, effects=(COGGING,)), 0.1)
+def test_the_same_is_told_every_time(dataset) -> None:
+    there = with_force(dataset, AxisModel(1.0, effects=(COGGING,)), 0.1)
     assert proof(base_of(there), COGGING, there) == proof(base_of(there), COGGING, there)
     assert DECOYS >= 20
 
@@ -72,11 +72,11 @@ def test_it_must_leave_a_fifth_less_than_its_best_decoy(gain, decoy, holds) -> N
     assert (1.0 - gain < BESIDE_DECOYS * (1.0 - decoy)) is holds
 
 
-def test_a_shift_in_time_makes_no_decoy_for_a_friction_or_for_what_repeats_in_time(study) -> None:
-    base = base_of(study)
-    assert proof(base, fitted("lugre"), study) is None
-    assert proof(base, fitted("periodic_disturbance", f=3.0, a=0.1), study) is None
+def test_a_shift_in_time_makes_no_decoy_for_a_friction_or_for_what_repeats_in_time(dataset) -> None:
+    base = base_of(dataset)
+    assert proof(base, fitted("lugre"), dataset) is None
+    assert proof(base, fitted("periodic_disturbance", f=3.0, a=0.1), dataset) is None
     held = replace(COGGING, fixed=frozenset(p.name for p in COGGING.effect.strengths))
-    assert proof(base, held, study) is None
+    assert proof(base, held, dataset) is None
     assert axis_of(COGGING).names
     assert CATALOGUE["cogging"] is COGGING.effect

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from foreign_diagnoses import CATALOGUE, STAGE, diagnosed, model_for
 from foreign_effects import INSIDE, OUTSIDE
 from foreign_kernel import SLIP_ELEMENTS
 from foreign_machine import AHEAD, BEHIND, FORCE, drawn, gaussian
-from foreign_study import CATALOGUE, STAGE, diagnosed, model_for
 
 from identify.selection.diagnosis import Verdict
 from identify.selection.forward_selection import diagnose_axis

@@ -14,10 +14,10 @@ from built_fits import (
     PLAIN,
     axis_of,
     built,
+    built_dataset,
     built_fit,
-    built_study,
+    dataset_stub,
     fitted,
-    study_stub,
 )
 
 from identify.estimation.evidence import Evidence, Gain, effective_samples, evidence
@@ -105,7 +105,7 @@ def test_only_windows_that_both_fits_can_use_are_compared(quiet):
         jacobian=np.ones((other.sum(), 1)),
     )  # fmt: skip
     base.__dict__["jacobian"] = np.ones((one.sum(), 1))
-    found = score(base, fit, study_stub(), CATALOGUE["constant_force"])
+    found = score(base, fit, dataset_stub(), CATALOGUE["constant_force"])
     shared = one & other
     assert found.evidence == evidence(a[shared], b[shared], 1)
     assert (found.fit, found.axis, found.effect.name) == (fit, "x", "constant_force")
@@ -117,14 +117,14 @@ def test_evidence_counts_the_parameters_that_the_fit_has_more(quiet, name):
     base, fit = built_fit(2.0), built_fit(1.9, axis=axis)
     free = len(fit.scaling.where) - len(base.scaling.where)
     effect = CATALOGUE[name]
-    assert score(base, fit, study_stub(), effect).evidence.parameters == free
-    assert score(fit, base, study_stub(), effect).evidence.parameters == 1
+    assert score(base, fit, dataset_stub(), effect).evidence.parameters == free
+    assert score(fit, base, dataset_stub(), effect).evidence.parameters == 1
 
 
 def test_phases_found_count_as_parameters(monkeypatch):
     monkeypatch.setattr(candidates, "phases_found", lambda axis, name, dataset: 3)
     fit = built_fit(1.9, axis=axis_of(fitted("constant_force")))
-    found = score(built_fit(2.0), fit, study_stub(), CATALOGUE["constant_force"])
+    found = score(built_fit(2.0), fit, dataset_stub(), CATALOGUE["constant_force"])
     assert found.evidence.parameters == 4
 
 
@@ -132,13 +132,15 @@ def test_a_motor_made_weak_is_no_smaller_error(quiet):
     axis = axis_of(fitted("actuator_deadband"))
     noise = RNG.standard_normal(300)
     weak = built_fit(0, axis=axis, residual=0.25 * noise, lessened=0.25)
-    found = score(built_fit(0, residual=noise), weak, study_stub(), CATALOGUE["actuator_deadband"])
+    found = score(
+        built_fit(0, residual=noise), weak, dataset_stub(), CATALOGUE["actuator_deadband"]
+    )
     assert found.evidence.log_gain == pytest.approx(0.0, abs=1e-12)
     assert found.gain == Gain(found.gain.before, found.gain.before, 0.0)
 
 
 def test_the_held_out_logs_judge_before_and_after_in_that_order(quiet):
-    dataset = built_study("fit", held=("held",))
+    dataset = built_dataset("fit", held=("held",))
     base = built_fit(0.4, 0.02)
     richer = axis_of(fitted("constant_force", F0=2.0))
     fit = built_fit(0.1, 0.02, richer)
@@ -165,7 +167,7 @@ def test_held_out_windows_at_rest_are_left_out_where_either_friction_sticks(quie
     monkeypatch.setattr(candidates, "residual", lambda axis, logs: RNG.standard_normal(300))
     monkeypatch.setattr(candidates, "forces_lessened", lambda axis, motions: 1.0)
     held = SimpleNamespace(motion=None)
-    dataset, lugre = study_stub(holdout=(held,)), PLAIN.with_effect(fitted("lugre"))
+    dataset, lugre = dataset_stub(holdout=(held,)), PLAIN.with_effect(fitted("lugre"))
     for one, two in ((PLAIN, lugre), (lugre, PLAIN), (lugre, lugre)):
         score(built_fit(2.0, axis=one), built_fit(1.0, axis=two), dataset, CATALOGUE["lugre"])
     assert asked == [True, True, False]
@@ -176,10 +178,10 @@ def test_blocks_are_left_out_only_where_evidence_asks(quiet, monkeypatch):
     fit = built_fit(0, axis=axis_of(fitted("constant_force")), residual=noise)
     monkeypatch.setattr(candidates, "_cross_validated", lambda f, rows: 3.0 * f.residual[rows])
     effect = CATALOGUE["constant_force"]
-    strong = score(built_fit(0, residual=2.0 * noise), fit, study_stub(), effect)
+    strong = score(built_fit(0, residual=2.0 * noise), fit, dataset_stub(), effect)
     size = np.sqrt(np.mean(noise**2))
     assert (strong.gain.before, strong.gain.after) == pytest.approx((6.0 * size, 3.0 * size))
-    weak = score(built_fit(0, residual=1.001 * noise), fit, study_stub(), effect)
+    weak = score(built_fit(0, residual=1.001 * noise), fit, dataset_stub(), effect)
     assert weak.gain.after == pytest.approx(size)
 
 
@@ -228,10 +230,10 @@ def test_a_noise_is_told_where_it_alone_makes_the_error_noise(
     monkeypatch.setattr(candidates, "error_on", lambda axis, logs: seen * noise)
     monkeypatch.setattr(candidates, "floor_of", floor)
     base.__dict__["floor"], fit.__dict__["floor"] = 1.0, 1.05
-    own = score(base, fit, study_stub(fit=("fit",)), NOISE)  # on the logs that it was fitted to
+    own = score(base, fit, dataset_stub(fit=("fit",)), NOISE)  # on the logs that it was fitted to
     assert not asked
     assert own.gain.after == pytest.approx(fit.error)
-    dataset = study_stub(holdout=("held",), fit=("fit",))
+    dataset = dataset_stub(holdout=("held",), fit=("fit",))
     found = score(base, fit, dataset, NOISE)
     assert {logs for _, logs in asked} == {dataset.holdout}
     assert (found.evidence.log_gain != 0.0) is told

@@ -12,10 +12,10 @@ from built_fits import (
     PLAIN,
     axis_of,
     built,
+    built_dataset,
     built_fit,
-    built_study,
+    dataset_stub,
     fitted,
-    study_stub,
 )
 
 from identify.estimation.evidence import effective_samples
@@ -70,13 +70,13 @@ def test_simpler_values_may_cost_a_hundredth(monkeypatch, error, simpler):
         return built_fit(2.0 * (1.0 + (SAME_ERROR - 1.0) * error), axis=axis)
 
     monkeypatch.setattr(candidates, "fit_axis", refit)
-    found = simplified(fit, study_stub(), CATALOGUE["cogging"])
+    found = simplified(fit, dataset_stub(), CATALOGUE["cogging"])
     assert (again["p"], again["a1"]) == (0.03, 0.5)
     assert (found is not fit) is simpler
     plain = built_fit(2.0, axis=axis_of(fitted("cogging", p=0.06, a1=0.5)))
-    assert simplified(plain, study_stub(), CATALOGUE["cogging"]) is plain
+    assert simplified(plain, dataset_stub(), CATALOGUE["cogging"]) is plain
     other = built_fit(2.0, axis=axis_of(fitted("wear")))
-    assert simplified(other, study_stub(), CATALOGUE["wear"]) is other
+    assert simplified(other, dataset_stub(), CATALOGUE["wear"]) is other
 
 
 def tried(
@@ -87,7 +87,7 @@ def tried(
     begun, left = [], list(errors)
     starts = [of_size(float(i), fitted(effect)) for i in (1, 2)]
     other = axis_of(mass=9.9)
-    base, dataset = built_fit(2.0, 0.1, begun=other), study_stub()
+    base, dataset = built_fit(2.0, 0.1, begun=other), dataset_stub()
 
     def given(fit):
         """A part that is asked about this base, dataset and start, in that order."""
@@ -170,7 +170,7 @@ def test_a_noise_is_scored_without_a_refit(monkeypatch):
 
 def auditioned(monkeypatch, *, after, head=40, whole=100):
     noise = RNG.standard_normal(400)
-    dataset = study_stub(fit=[range(whole)])
+    dataset = dataset_stub(fit=[range(whole)])
     dataset.heads = [range(head)]
     new_axis = axis_of(mass=7.7).with_effect(fitted("dahl"))
 
@@ -211,7 +211,7 @@ def test_a_friction_passes_where_the_heads_show_it_better(monkeypatch, part, pas
 def test_the_heads_are_fitted_once_for_all_frictions(monkeypatch):
     fitted_on = []
     monkeypatch.setattr(candidates, "fit_axis", lambda axis, logs: fitted_on.append((axis, logs)))
-    base, dataset = built_fit(1.0), built_study("fit")
+    base, dataset = built_fit(1.0), built_dataset("fit")
     for _ in range(2):
         candidates._on_heads(base, dataset)
     assert fitted_on == [(PLAIN, dataset.heads)]

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import built_results as made
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, built_fit, built_study, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, built_fit, fitted
 
 from identify import demo
 from identify.estimation.fit import Outcome, finished, rms
@@ -31,7 +31,7 @@ LEAST_FORCE, AT_FLOOR, MOST_TOLD = 0.1, 1.3, 3
 
 @pytest.fixture(scope="module")
 def dataset():
-    return built_study("run")
+    return built_dataset("run")
 
 
 def refit_of(monkeypatch, dataset, given_axis, widths=1e-9, floor=1e-3, catalogue=()):

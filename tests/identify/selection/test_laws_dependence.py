@@ -98,7 +98,7 @@ def where_of(log) -> dict:
 
 
 LONG = [windowed(moved(np.random.default_rng(s), 6.0, 1000.0), 0.02) for s in (1, 2)]
-STUDY = dataset_of(*LONG)
+DATASET = dataset_of(*LONG)
 WHERE = {k: np.concatenate([where_of(w)[k] for w in LONG]) for k in where_of(LONG[0])}
 KEPT = np.ones(len(WHERE["time"]), bool)
 
@@ -113,24 +113,24 @@ def test_what_a_residual_depends_on_is_found(name):
     x = (WHERE[name] - WHERE[name].mean()) / np.std(WHERE[name])
     forwards = np.tanh(2.0 * x) + 0.4 * x**2
     force = forwards + noise
-    found = find_dependence(fit_leaving(force), STUDY)
+    found = find_dependence(fit_leaving(force), DATASET)
     assert found.depends_on == name
     assert found.share_of_error > 0.85
     assert found.unit == {"position": "m", "acceleration": "m/s^2"}.get(name, "m/s")
-    assert found.shares == dependences(force, fit_leaving(force), STUDY)
+    assert found.shares == dependences(force, fit_leaving(force), DATASET)
     turned = forwards * WHERE["direction"] + noise  # a friction that depends on it
     if name != "velocity":
-        assert find_dependence(fit_leaving(turned), STUDY).shares[name] > 0.8
+        assert find_dependence(fit_leaving(turned), DATASET).shares[name] > 0.8
 
 
 def test_a_residual_that_repeats_has_a_period_in_position_or_time():
     noise = np.random.default_rng(4).normal(0.0, 0.1, len(KEPT))
     place = np.sin(2.0 * np.pi * WHERE["position"] / 0.0083)
-    found = find_dependence(fit_leaving(place + noise), STUDY)
+    found = find_dependence(fit_leaving(place + noise), DATASET)
     assert (found.depends_on, found.unit) == ("position", "m")
     assert found.period == pytest.approx(0.0083, rel=0.02)
     pump = np.sin(2.0 * np.pi * WHERE["time"] / 0.113 + (np.arange(len(KEPT)) < len(LONG[0])))
-    found = find_dependence(fit_leaving(pump + noise), STUDY)
+    found = find_dependence(fit_leaving(pump + noise), DATASET)
     assert (found.depends_on, found.unit) == ("time", "s")
     assert found.period == pytest.approx(0.113, rel=0.01)
     shares, periods = _shares(pump + noise, WHERE)
@@ -143,14 +143,14 @@ def test_an_explanation_takes_away_what_the_residual_depended_on_most():
     cable = np.tanh(2.0 * WHERE["position"] / np.std(WHERE["position"]))
     pump = np.sin(2.0 * np.pi * WHERE["time"] / 0.113)
     before = fit_leaving(cable + 0.3 * pump + noise)
-    assert explains(before, fit_leaving(0.3 * pump + noise), STUDY)
-    assert not explains(before, fit_leaving(cable + noise), STUDY)
+    assert explains(before, fit_leaving(0.3 * pump + noise), DATASET)
+    assert not explains(before, fit_leaving(cable + noise), DATASET)
     smaller, larger = (fit_leaving(f * RULE.left_over * cable + pump + noise) for f in (0.6, 1.3))
-    assert explains(before, smaller, STUDY)
-    assert not explains(before, larger, STUDY)
+    assert explains(before, smaller, DATASET)
+    assert not explains(before, larger, DATASET)
     weak = fit_leaving(0.02 * cable + noise)
-    assert max(dependences(weak.residual, weak, STUDY).values()) < RULE.least_share
-    assert not explains(weak, fit_leaving(noise), STUDY)
+    assert max(dependences(weak.residual, weak, DATASET).values()) < RULE.least_share
+    assert not explains(weak, fit_leaving(noise), DATASET)
 
 
 # --- whiteness ----------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_study, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted
 
 from identify.estimation.evidence import BLOCKS, effective_samples
 from identify.estimation.fit import Outcome, finished
@@ -163,7 +163,7 @@ def test_the_part_that_helps_most_comes_first_and_is_tuned_again():
 
 @pytest.mark.parametrize(("ratio", "rounds"), [(BETTER + 0.01, 2), (BETTER - 0.01, 1 + ROUNDS)])
 def test_rounds_go_on_while_the_error_falls(monkeypatch, ratio, rounds):
-    base, dataset, grounds = built_fit(8.0), built_study("run"), []
+    base, dataset, grounds = built_fit(8.0), built_dataset("run"), []
 
     def attempt(given, ground, where, empty):
         assert (given, where) == (base, dataset)
@@ -185,7 +185,7 @@ def test_rounds_go_on_while_the_error_falls(monkeypatch, ratio, rounds):
 @pytest.fixture(scope="module")
 def about():
     """A description about a fit of a built motion."""
-    dataset = built_study("run")
+    dataset = built_dataset("run")
     base = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
     empty = Fitted.at_start(MAP)
     return base, dataset, empty, _Linear.about(base, dataset, empty)
@@ -235,7 +235,7 @@ def test_parts_that_were_not_chosen_are_zero_and_held(about):
 def test_an_attempt_is_judged_by_the_degrees_of_freedom_it_takes(monkeypatch, about, held):
     base, dataset, empty, found = about
     stiffness = {PARTS[0]: 0.1}
-    dataset = built_study("run", held=("held",)) if held else dataset
+    dataset = built_dataset("run", held=("held",)) if held else dataset
     after = axis_of(fitted("constant_force", F0=0.7)).with_effect(fitted("lugre"))
     fit = built_fit(0, 0.02, after, residual=0.5 * base.residual + 0.01)
     monkeypatch.setattr(module._Linear, "about", classmethod(lambda cls, *_: found))

@@ -7,8 +7,8 @@ from built_fits import (
     axis_of,
     built,
     built_fit,
+    dataset_stub,
     fitted,
-    study_stub,
 )
 
 from identify.selection import pair_search as lookahead
@@ -16,7 +16,7 @@ from identify.selection.pair_search import held_at_floor, search_pairs
 
 # The rules as they were decided.
 AT_FLOOR, COLLAPSE, SETTLED, FIRSTS, LEAST_PART = 1.3, 0.3, 0.999, 3, 0.1
-STUDY = study_stub()
+DATASET = dataset_stub()
 NAMES = ("cogging", "end_stop", "gms", "quadratic_drag", "wear")
 
 
@@ -29,7 +29,7 @@ def names(found) -> list[str]:
 
 def test_held_out_logs_are_explained_where_their_error_is_at_the_floor(monkeypatch):
     fit = built_fit(9.0, 2.0)
-    dataset = study_stub(holdout=("log",))
+    dataset = dataset_stub(holdout=("log",))
     for error, held in ((2.0 * AT_FLOOR - 0.01, True), (2.0 * AT_FLOOR + 0.01, False)):
 
         def error_on(axis, logs, e=error):
@@ -38,7 +38,7 @@ def test_held_out_logs_are_explained_where_their_error_is_at_the_floor(monkeypat
 
         monkeypatch.setattr(lookahead, "error_on", error_on)
         assert held_at_floor(fit, dataset) is held
-        assert not held_at_floor(fit, study_stub())
+        assert not held_at_floor(fit, dataset_stub())
 
 
 def ahead(monkeypatch, made, seconds, *, base=None, needed=True, together=True, held=False):
@@ -55,7 +55,7 @@ def ahead(monkeypatch, made, seconds, *, base=None, needed=True, together=True, 
 
     def score(smaller, fit, dataset, effect):
         assert smaller is base or smaller.axis == fit.axis.without(effect.name)
-        assert (dataset, fit.axis.names[-1]) == (STUDY, last)
+        assert (dataset, fit.axis.names[-1]) == (DATASET, last)
         calls.append((smaller is base, effect.name))
         good = together if smaller is base else needed
         return built(effect, bic=fit.error * 100, t=9.0 if good else 1.0, fit=fit)
@@ -68,11 +68,11 @@ def ahead(monkeypatch, made, seconds, *, base=None, needed=True, together=True, 
     monkeypatch.setattr(lookahead, "less", less_of)
 
     def at_floor(fit, dataset):
-        assert (dataset, fit.axis.names[-1]) == (STUDY, last)
+        assert (dataset, fit.axis.names[-1]) == (DATASET, last)
         return held
 
     monkeypatch.setattr(lookahead, "held_at_floor", at_floor)
-    return search_pairs(base, STUDY, made, ranked), beside, calls
+    return search_pairs(base, DATASET, made, ranked), beside, calls
 
 
 def second(name, first, error=1.1, t=9.0):

@@ -13,8 +13,8 @@ from built_fits import (
     axis_of,
     built,
     built_fit,
+    dataset_stub,
     fitted,
-    study_stub,
 )
 
 from identify.estimation.evidence import Evidence, effective_samples, held_out_gain
@@ -27,7 +27,7 @@ from twin.model.machine import Fitted
 # The rules as they were decided.
 AT_FLOOR, COLLAPSE, SETTLED, FIRSTS, LEAST_PART = 1.3, 0.3, 0.999, 3, 0.1
 CONTENDER = 0.1
-STUDY = study_stub()
+DATASET = dataset_stub()
 NAMES = ("cogging", "end_stop", "gms", "quadratic_drag", "wear")
 
 
@@ -80,7 +80,7 @@ def ranked(monkeypatch, ratio, t=9.0, left=3.0):
         return again
 
     def look_at(given, dataset, effect):
-        assert (given, dataset) == (base, STUDY)
+        assert (given, dataset) == (base, DATASET)
         fit = built_fit(left, axis=axis_of(fitted(effect.name)))
         return Look(effect, (), 0.0, built(effect, bic=bics[effect.name], t=t, fit=fit))
 
@@ -88,12 +88,12 @@ def ranked(monkeypatch, ratio, t=9.0, left=3.0):
     monkeypatch.setattr(ranking, "less", less_of)
 
     def score(given, fit, dataset, effect):
-        assert (dataset, fit.axis.names[-1]) == (STUDY, effect.name)
+        assert (dataset, fit.axis.names[-1]) == (DATASET, effect.name)
         return built(effect, bic=1e3 * given.error, fit=fit)
 
     monkeypatch.setattr(ranking, "score", score)
     catalogue = Catalogue([CATALOGUE[n] for n in bics])
-    found = rank(base, STUDY, catalogue, lambda *done: bars.append(done), workers=1)
+    found = rank(base, DATASET, catalogue, lambda *done: bars.append(done), workers=1)
     assert bars == [(1, 2), (2, 2)]
     return found, base, again, asked
 
@@ -127,7 +127,7 @@ def refits(monkeypatch, shares, explained, t=9.0):
     catalogue = Catalogue([CATALOGUE[n] for n in shares])
     shares = {e.name: shares[e.name] for e in catalogue.values()}
     order = iter(shares.items())
-    _, found = rank(base, STUDY, catalogue, workers=1)
+    _, found = rank(base, DATASET, catalogue, workers=1)
     assert sorted(names(found)) == sorted(shares)
     return fitted_again, looked
 
@@ -176,7 +176,7 @@ def test_without_support_the_base_stays(monkeypatch):
 
 def test_less_an_effect_the_friction_that_it_replaced_is_back(monkeypatch):
     monkeypatch.setattr(ranking, "fit_axis", lambda axis, logs: (axis, logs))
-    dataset = study_stub(fit=("log",))
+    dataset = dataset_stub(fit=("log",))
     rich = axis_of(fitted("cogging")).with_effect(fitted("lugre"))
     axis, logs = less(CATALOGUE["lugre"], built_fit(1.0, axis=rich), built_fit(1.0), dataset)
     assert axis.names == ("cogging", "coulomb_viscous")
@@ -214,7 +214,7 @@ def tied(monkeypatch, best_scale, other_scale, gains=(1.0, 1.0), logs=("held out
 
     monkeypatch.setattr(ranking, "residual", residual)
     monkeypatch.setattr(ranking, "moving", lambda given, either: np.ones(len(NOISY), dtype=bool))
-    dataset = study_stub(holdout=logs, fit=("fit",))
+    dataset = dataset_stub(holdout=logs, fit=("fit",))
     return tie(dataset, best, other), seen
 
 
@@ -263,14 +263,14 @@ def test_windows_at_rest_are_left_out_where_either_sticks(monkeypatch):
     pairs = [(PLAIN, sliding), (sliding, PLAIN), (sliding, sliding)]
     for one, two in pairs:
         made = [built("wear", fit=built_fit(1.0, axis=axis)) for axis in (one, two)]
-        tie(study_stub(holdout=(1,)), *made)
+        tie(dataset_stub(holdout=(1,)), *made)
     assert asked == [True, True, False]
 
 
 def test_what_only_makes_noise_ties_with_nothing(monkeypatch):
     monkeypatch.setattr(ranking, "residual", lambda *_: pytest.fail("compared"))
-    assert not tie(STUDY, built(NOISE), built("wear"))
-    assert not tie(STUDY, built("wear"), built(NOISE))
+    assert not tie(DATASET, built(NOISE), built("wear"))
+    assert not tie(DATASET, built("wear"), built(NOISE))
 
 
 # --- friction -------------------------------------------------------------------------------

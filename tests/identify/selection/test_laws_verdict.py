@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import NOISE, PLAIN, built, built_fit, stage, step, study_stub
+from built_fits import NOISE, PLAIN, built, built_fit, dataset_stub, stage, step
 
 from identify.selection.forward_selection import (
     _convincing,
@@ -21,7 +21,7 @@ from identify.selection.forward_selection import (
 module = importlib.import_module("identify.selection.forward_selection")
 # The rules as they were decided.
 BEYOND_DOUBT, FLOOR_SURE, MOST_STEPS = 100.0, (0.85, 1.15), 5
-STUDY = study_stub()
+DATASET = dataset_stub()
 HIGH, LOW = built_fit(8.0), built_fit(1.1)  # over a floor of 1 N
 
 
@@ -101,7 +101,7 @@ def told(monkeypatch, *, held=False, explains=False):
         asked.append((before, after))
         return explains
 
-    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is STUDY)
+    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is DATASET)
     monkeypatch.setattr(module, "explains", explained)
     return asked
 
@@ -130,16 +130,16 @@ def test_the_floor_or_nearly_all_or_the_foremost_convinces(
     monkeypatch, base, after, held, explains, convinced
 ):
     told(monkeypatch, held=held, explains=explains)
-    assert _convincing(stage(base), stage(after, ONE), STUDY) is convinced
+    assert _convincing(stage(base), stage(after, ONE), DATASET) is convinced
 
 
 def test_only_the_first_effect_that_was_added_must_be_proven(monkeypatch):
     asked = told(monkeypatch, explains=True)
     after = fit_with_part(0.6)
     weak, strong = step("cogging", bic=50.0), step("wear", bic=50.1)
-    assert _gone(BASE, after, [strong, weak], STUDY)
+    assert _gone(BASE, after, [strong, weak], DATASET)
     assert asked == [(BASE, after)]
-    assert not _gone(BASE, after, [weak, strong], STUDY)
+    assert not _gone(BASE, after, [weak, strong], DATASET)
     earlier = stage(BASE, weak)
-    assert _convincing(earlier, stage(after, weak, strong), STUDY)
-    assert not _convincing(stage(BASE), stage(after, weak, strong), STUDY)
+    assert _convincing(earlier, stage(after, weak, strong), DATASET)
+    assert not _convincing(stage(BASE), stage(after, weak, strong), DATASET)

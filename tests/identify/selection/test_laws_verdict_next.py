@@ -6,7 +6,7 @@ import importlib
 
 import numpy as np
 import pytest
-from built_fits import built, built_fit, step, study_stub
+from built_fits import built, built_fit, dataset_stub, step
 
 from identify.selection.diagnosis import SelectionState
 from identify.selection.forward_selection import _next, diagnose_axis
@@ -16,7 +16,7 @@ from twin.effects import Catalogue
 module = importlib.import_module("identify.selection.forward_selection")
 # The rules as they were decided.
 BEYOND_DOUBT, FLOOR_SURE, MOST_STEPS = 100.0, (0.85, 1.15), 5
-STUDY = study_stub()
+DATASET = dataset_stub()
 HIGH, LOW = built_fit(8.0), built_fit(1.1)  # over a floor of 1 N
 
 
@@ -36,7 +36,7 @@ def test_the_best_is_added_with_the_supported_rivals_that_tie(monkeypatch):
         built("cogging", gain=5.0), built("wear", gain=4.5), built("end_stop", gain=4.5),
         built("lugre", gain=4.5, t=1.0), built("dahl", gain=3.0),
     ]  # fmt: skip
-    (found,) = _next(HIGH, STUDY, ranking, None)
+    (found,) = _next(HIGH, DATASET, ranking, None)
     assert found.candidate is ranking[0]
     assert found.tied == ("wear",)
     assert [r.effect.name for r in found.rivals] == ["wear", "end_stop"]
@@ -44,10 +44,10 @@ def test_the_best_is_added_with_the_supported_rivals_that_tie(monkeypatch):
 
 @pytest.mark.parametrize(("base", "held"), [(LOW, False), (HIGH, True)])
 def test_no_pair_is_sought_at_the_floor(monkeypatch, base, held):
-    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is STUDY)
+    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is DATASET)
     monkeypatch.setattr(module, "search_pairs", lambda *_: pytest.fail("sought"))
-    assert _next(base, STUDY, [built(t=1.0)], None) == []
-    assert _next(base, STUDY, [], None) == []
+    assert _next(base, DATASET, [built(t=1.0)], None) == []
+    assert _next(base, DATASET, [], None) == []
 
 
 def test_a_pair_is_added_with_the_others_that_tie_with_it(monkeypatch):
@@ -60,11 +60,11 @@ def test_a_pair_is_added_with_the_others_that_tie_with_it(monkeypatch):
     monkeypatch.setattr(
         module, "tie", lambda s, a, b: a is pairs[0].together and b is pairs[1].together
     )
-    first, second = _next(HIGH, STUDY, [built(t=1.0)], None)
+    first, second = _next(HIGH, DATASET, [built(t=1.0)], None)
     assert (first.candidate, first.tied, first.beside) == (pairs[0].first, ("dahl",), "cogging")
     assert (second.candidate, second.tied, second.beside) == (pairs[0].second, (), "wear")
     monkeypatch.setattr(module, "search_pairs", lambda *_: [])
-    assert _next(HIGH, STUDY, [], None) == []
+    assert _next(HIGH, DATASET, [], None) == []
 
 
 # --- the loop -------------------------------------------------------------------------------
@@ -95,7 +95,7 @@ def looped(monkeypatch, errors, *, moved=(), shifts=2):
     monkeypatch.setattr(module, "moved_by", lambda fit, dataset: next(moves, None))
     monkeypatch.setattr(module, "fit_axis", lambda axis, logs: built_fit(6.0, axis=axis))
     monkeypatch.setattr(module, "synchronised", lambda fit, dataset: (dataset, fit))
-    diagnose_axis(HIGH, STUDY, Catalogue([]), shifts=shifts)
+    diagnose_axis(HIGH, DATASET, Catalogue([]), shifts=shifts)
     return seen, calls
 
 
@@ -119,12 +119,12 @@ def test_nothing_more_is_sought_where_error_and_floor_agree(monkeypatch, error, 
 
 
 def test_all_begins_anew_after_a_shift_as_often_as_allowed(monkeypatch):
-    other = study_stub(fit=("moved",))
+    other = dataset_stub(fit=("moved",))
     seen, _ = looped(monkeypatch, [7.0, 6.0, 5.0], moved=[other, other, other])
     assert seen["dataset"] is other
     assert [s.fit.error for s in seen["stages"]] == pytest.approx([6.0, 5.0])
     seen, _ = looped(monkeypatch, [7.0, 6.0], moved=[other, other], shifts=0)
-    assert seen["dataset"] is STUDY
+    assert seen["dataset"] is DATASET
 
 
 def test_a_stage_knows_the_fit_it_led_to():

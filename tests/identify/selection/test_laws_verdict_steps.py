@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import axis_of, built, built_fit, fitted, stage, step, study_stub
+from built_fits import axis_of, built, built_fit, dataset_stub, fitted, stage, step
 
 from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, kept
@@ -23,7 +23,7 @@ module = importlib.import_module("identify.selection.forward_selection")
 diagnoses = importlib.import_module("identify.selection.diagnosis")
 # The rules as they were decided.
 BEYOND_DOUBT, FLOOR_SURE, MOST_STEPS = 100.0, (0.85, 1.15), 5
-STUDY = study_stub()
+DATASET = dataset_stub()
 HIGH, LOW = built_fit(8.0), built_fit(1.1)  # over a floor of 1 N
 
 
@@ -38,7 +38,7 @@ def fit_with_part(part: float, base_error: float = 5.0, base_floor: float = 3.0)
 
 
 def diagnosis(verdict: Verdict, *steps, ranking=()) -> AxisDiagnosis:
-    return AxisDiagnosis(STUDY, HIGH, tuple(ranking), steps, LOW, verdict, None)
+    return AxisDiagnosis(DATASET, HIGH, tuple(ranking), steps, LOW, verdict, None)
 
 
 def test_what_a_later_step_made_needless_is_not_an_answer():
@@ -70,7 +70,7 @@ def test_a_force_that_repeats_is_only_sought_where_error_is_left(monkeypatch):
     )
     assert diagnosis(Verdict.UNEXPLAINED).repeat is None
     assert replace(diagnosis(Verdict.UNEXPLAINED), final=HIGH).repeat == 7
-    assert seen == [(HIGH, STUDY)]
+    assert seen == [(HIGH, DATASET)]
 
 
 def looked_back(monkeypatch, needed):
@@ -89,7 +89,7 @@ def looked_back(monkeypatch, needed):
     monkeypatch.setattr(module, "score", score)
     monkeypatch.setattr(module, "fit_thoroughly", lambda axis, dataset: built_fit(3.0, axis=axis))
     earlier = [built("cogging"), built("wear")]
-    fit, dropped = _eliminated_backwards(HIGH, full, STUDY, earlier)
+    fit, dropped = _eliminated_backwards(HIGH, full, DATASET, earlier)
     return fit, dropped, scored, full
 
 
@@ -140,12 +140,12 @@ def test_ties_are_told_again_only_beside_several_effects(monkeypatch):
         step("lugre", ("dahl",)),
         step("gms", (), dropped=("lugre",)),
     )
-    again = _compared_again([stage(HIGH), stage(final, *steps)], STUDY)
+    again = _compared_again([stage(HIGH), stage(final, *steps)], DATASET)
     assert [s.tied for s in again] == [("constant_force",), (), ("payload_mass",), ("dahl",), ()]
     assert ties == [("cogging", True, "constant_force"), ("cogging", True, "quadratic_drag")]
     assert fits == [("wear", "end_stop", r) for r in ("constant_force", "quadratic_drag")]
     alone = (steps[0],)
-    assert _compared_again([stage(HIGH), stage(final, *alone)], STUDY) == alone
+    assert _compared_again([stage(HIGH), stage(final, *alone)], DATASET) == alone
 
 
 # --- the verdict ----------------------------------------------------------------------------
@@ -166,9 +166,9 @@ def decided(monkeypatch, stages, convinced, held=False, graded=None):
     )
     monkeypatch.setattr(module, "_compared_again", lambda stages, dataset: stages[-1].steps)
     monkeypatch.setattr(module, "find_dependence", structure)
-    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is STUDY)
+    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is DATASET)
     monkeypatch.setattr(module, "_graded", lambda states, sure, dataset: graded)
-    found = _decided(STUDY, (built("wear"),), stages)
+    found = _decided(DATASET, (built("wear"),), stages)
     return found, sought
 
 
@@ -244,7 +244,7 @@ def test_a_step_is_named_that_is_sure_or_beats_its_decoys(monkeypatch, holds, su
     )
     monkeypatch.setattr(module, "proof", proof)
     monkeypatch.setattr(module, "fit_axis", lambda axis, logs: built_fit(4.5, axis=axis))
-    found = _graded(states, sure, study_stub())
+    found = _graded(states, sure, dataset_stub())
     assert all(name not in names for names, name in asked)
     assert not set(sure) & {name for _, name in asked}
     if named is None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import PLAIN, axis_of, built_study, fitted
+from built_fits import PLAIN, axis_of, built_dataset, fitted
 
 from identify.estimation.fit import Outcome, finished
 from identify.selection.decoys import Proof
@@ -23,8 +23,8 @@ CABLE = fitted("cable_slab", k1=1.5)
 MODEL = axis_of(CABLE, fitted("cogging", p=0.017, a1=0.1))
 
 
-def machine(study, force):
-    """The study with a force of position (n,) m -> N, and noise, beyond what the model gives."""
+def machine(dataset, force):
+    """The dataset with a force of position (n,) m -> N, and noise, beyond what the model gives."""
 
     def moved(log):
         added = log.test_function.mean(force(log.motion.position))
@@ -35,17 +35,17 @@ def machine(study, force):
         return replace(log, command=log.command - rest + added + noise)
 
     return replace(
-        study, fit=tuple(map(moved, study.fit)), holdout=tuple(map(moved, study.holdout))
+        dataset, fit=tuple(map(moved, dataset.fit)), holdout=tuple(map(moved, dataset.holdout))
     )
 
 
 @pytest.fixture(scope="module", params=[(), ("held",)], ids=["left out", "held out"])
-def study(request):
-    return built_study("one", "two", held=request.param)
+def dataset(request):
+    return built_dataset("one", "two", held=request.param)
 
 
-def base_of(study):
-    return finished(MODEL, MODEL, study.fit, Outcome.CONVERGED)
+def base_of(dataset):
+    return finished(MODEL, MODEL, dataset.fit, Outcome.CONVERGED)
 
 
 @pytest.mark.parametrize(
@@ -56,8 +56,8 @@ def base_of(study):
         (lambda x: 0.0 * x, None),
     ],
 )
-def test_the_law_whose_curve_differs_is_told(study, force, effect) -> None:
-    there = machine(study, force)
+def test_the_law_whose_curve_differs_is_told(dataset, force, effect) -> None:
+    there = machine(dataset, force)
     found = wrong_shape(base_of(there), there)
     assert (found and found.effect) == effect
 
@@ -68,10 +68,10 @@ def test_a_curve_is_declared_over_what_the_law_reads(effect) -> None:
     assert not effect.is_nonparametric
 
 
-def test_hats_are_a_partition_by_direction(study) -> None:
-    log = study.fit[0]
+def test_hats_are_a_partition_by_direction(dataset) -> None:
+    log = dataset.fit[0]
     for name in ("cogging", "cable_slab", "position_dependent_friction", "lugre"):
-        hats = _Hats.of(fitted(name), study.fit, 12)
+        hats = _Hats.of(fitted(name), dataset.fit, 12)
         (columns,) = hats.columns([log])
         moving = np.abs(hats._direction(log.motion.velocity)) if hats.curve.by_direction else 1.0
         whole = log.test_function.mean(moving * np.ones(len(log.motion.time)))
@@ -87,8 +87,8 @@ def test_at_standstill_a_curve_stays_or_lets_go() -> None:
     assert free._direction(velocity).tolist() == [1, 0, 0, 0, -1, 0, 1]
 
 
-def test_a_shape_is_the_verdict_where_it_is_all_that_is_found(study) -> None:
-    there = machine(study, lambda x: 0.2 * np.tanh(x / 0.004))
+def test_a_shape_is_the_verdict_where_it_is_all_that_is_found(dataset) -> None:
+    there = machine(dataset, lambda x: 0.2 * np.tanh(x / 0.004))
     base = base_of(there)
     rest = Dependence(0.5, "position", None, "m", {"position": 0.5})
     lost = AxisDiagnosis(there, base, (), (), base, Verdict.UNEXPLAINED, rest)

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_study, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted
 
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
@@ -209,7 +209,7 @@ def test_two_frictions_are_never_planted_together():
 
 @pytest.fixture(scope="module")
 def dataset():
-    return built_study("run")
+    return built_dataset("run")
 
 
 def test_the_right_coordinates_are_those_near_the_strongest_dependence(monkeypatch, dataset):

@@ -1,4 +1,4 @@
-"""Diagnosis of machines of the second simulator, by hand: python tests/foreign_study.py --help."""
+"""Diagnosis of machines of the second simulator: python tests/foreign_diagnoses.py --help."""
 
 from __future__ import annotations
 
