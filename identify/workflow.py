@@ -202,6 +202,7 @@ def add(
     if not open_axes:
         raise InputError(
             f"axis {', '.join(names)} has the effect '{effect.name}' already; `twin fit` refits it"
+            f"{f', {effect.numbered(effect.number + 1).name} is another' if effect.several else ''}"
         )
     attempt = fit_nonparametric if effect.is_nonparametric else try_effect
     tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]

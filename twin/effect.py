@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
@@ -199,7 +199,8 @@ class Effect:
     simplest: the same force with simpler values, such as a shorter pitch where only harmonics were
     used. parts: the curves of a nonparametric effect, whose force is linear in its strengths; such
     an effect is never the answer of a diagnosis. curve: that which the law assumes, where a
-    diagnosis may ask whether a free curve does better.
+    diagnosis may ask whether a free curve does better. several: whether an axis may have the effect
+    more than once, as cogging of poles and of slots; number: which of these it is.
     """
 
     kind: Kind
@@ -218,6 +219,8 @@ class Effect:
     simplest: Callable[[Mapping[str, float]], dict[str, float]] | None = None
     parts: tuple[Part, ...] = ()
     curve: Curve | None = None
+    several: bool = False
+    number: int = 1
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]
@@ -247,8 +250,13 @@ class Effect:
 
     @cached_property
     def name(self) -> str:
-        """The name of the file that holds the law."""
-        return Path(inspect.getfile(self.law)).stem
+        """The name of the file that holds the law, and from the second of several on its number."""
+        stem = Path(inspect.getfile(self.law)).stem
+        return stem if self.number == 1 else f"{stem}_{self.number}"
+
+    def numbered(self, number: int) -> Effect:
+        """The same effect as that one of several."""
+        return self if number == self.number else replace(self, number=number)
 
     @property
     def is_nonparametric(self) -> bool:

@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cache, cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.beginning import beginnings
 from identify.dataset.excitation import excitation
-from identify.dataset.motion import Motion, motion_of
-from identify.dataset.noise_floor import noise_floor
+from identify.dataset.motion import LONGEST_BLOCK, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.dataset.test_function import LEAST_BLOCKS, TestFunction
+from identify.dataset.test_function import LEAST_BLOCKS
+from identify.dataset.time_scale import choose_length
 from twin.effect import Excitation
 from twin.errors import InputError
 from twin.log import Log
 from twin.log.check import moves
-from twin.model.machine import INERTIA, MASS, AxisModel, MachineModel
+from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import AxisUnits
 
 Array = NDArray[np.float64]
 
-TEST_FUNCTIONS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
 TRIED = 8.0  # s of motion on which nonlinear parameters are scanned before all of it is used
 SHORTEST_HEAD = 2.0  # s of each log
-QUIET = 0.01  # largest noise floor, as a part of the force that the inertia does not explain
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,7 +35,8 @@ class Dataset:
     The held-out logs take part in the choice of effects; no parameter is fitted on them.
     covered: gives what the fit logs cover, which takes a while. channel_delay: s, by which the
     force of the logs was shifted to earlier samples. still: names of logs that were left out
-    because the axis stands still in them.
+    because the axis stands still in them. begun: s that were left out at the beginning of logs, by
+    name, as the axis did not yet move freely.
     """
 
     axis: str
@@ -45,6 +45,7 @@ class Dataset:
     covered: Callable[[], Excitation]
     channel_delay: float = 0.0
     still: tuple[str, ...] = ()
+    begun: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return (
@@ -92,25 +93,30 @@ def datasets(
 ) -> dict[str, Dataset]:
     """A dataset for each axis of the model that the logs hold and in which it moves.
 
-    logs, holdout: by name, for messages. test_function: length in s; chosen from the noise where
-    None. Raises InputError where no axis of the model moves in any log, where a signal is not a
-    number, and where a held-out log is also one to fit.
+    logs, holdout: by name, for messages. test_function: length in s; where None, chosen from what
+    the logs hold. Raises InputError where no axis of the model moves in any log, where a signal is
+    not a number, and where a held-out log is also one to fit.
     """
     _require_apart(logs, holdout)
     out: dict[str, Dataset] = {}
     for name, axis in model.axes.items():
         _require_one_kind({**logs, **holdout}, name, axis)
-        fit, still = _moving(logs, name, tuple(model.axes))
-        if not fit:
+        going, still = _moving(logs, name)
+        if not going:
             continue
-        held, still_held = _moving(holdout, name, tuple(model.axes))
-        length = test_function or choose_test_function(fit, held)
+        held_going, still_held = _moving(holdout, name)
+        motions_at = cache(partial(_motions, going, held_going, name, tuple(model.axes)))
+        length = test_function or choose_length(motions_at)
+        fit, held = motions_at(length)
+        begun = beginnings([*fit, *held])
+        fit, held = ([m.after(begun.get(m.name, 0.0)) for m in some] for some in (fit, held))
         out[name] = Dataset(
             axis=name,
             fit=tuple(PreparedLog.of(m, length) for m in fit),
             holdout=tuple(PreparedLog.of(m, length) for m in held),
             covered=cache(partial(excitation, fit, axis.hardware.travel)),
             still=(*still, *still_held),
+            begun=begun,
         )
     if not out:
         known = sorted({a for log in logs.values() for a in log.axes})
@@ -162,18 +168,31 @@ def _require_one_kind(logs: Mapping[str, Log], name: str, axis: AxisModel) -> No
             )
 
 
-def _moving(
-    logs: Mapping[str, Log], axis: str, machine: Sequence[str]
-) -> tuple[list[Motion], list[str]]:
-    """Motions of the logs in which the axis moves, and the names of those in which it does not."""
+def _moving(logs: Mapping[str, Log], axis: str) -> tuple[dict[str, Log], list[str]]:
+    """The logs in which the axis moves, by name, and the names of those in which it does not."""
     held = {name: log for name, log in logs.items() if axis in log.axes}
     for name, log in held.items():
         _require_numbers(name, log, axis, "position", log.axes[axis].position)
     going = {name: log for name, log in held.items() if moves(log, axis)}
     for name, log in going.items():
         _require_numbers(name, log, axis, "force", log.axes[axis].force)
-    still = [name for name in held if name not in going]
-    return [motion_of(log, axis, name, machine) for name, log in going.items()], still
+    return going, [name for name in held if name not in going]
+
+
+def _motions(
+    logs: Mapping[str, Log],
+    holdout: Mapping[str, Log],
+    axis: str,
+    machine: tuple[str, ...],
+    length: float | None,
+) -> tuple[list[Motion], list[Motion]]:
+    """Motions to fit and held out, in blocks short enough for test functions of a length (s)."""
+    longest = LONGEST_BLOCK if length is None else length / LEAST_BLOCKS
+    fit, held = (
+        [motion_of(log, axis, name, machine, longest) for name, log in some.items()]
+        for some in (logs, holdout)
+    )
+    return fit, held
 
 
 def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array) -> None:
@@ -184,43 +203,3 @@ def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array)
             f"{name}: {signal} of axis {axis} is not a finite number in {len(bad)} of {len(log)} "
             f"samples, from {bad[0] * log.period:.6g} s; cut the log there, or give another"
         )
-
-
-def choose_test_function(motions: Sequence[Motion], others: Sequence[Motion] = ()) -> float:
-    """The shortest test function (s) whose noise floor is small against the force to be explained.
-
-    others: motions whose blocks it must also be long enough for.
-    """
-    mass = inertia(motions)
-    longest_block = max(m.period for m in (*motions, *others))
-    for length in TEST_FUNCTIONS:
-        if length < LEAST_BLOCKS * longest_block:
-            continue
-        windows = [TestFunction.of_length(length, m.period) for m in motions]
-        rest = np.concatenate(
-            [
-                w.mean(m.command) - mass * w.acceleration(m.velocity)
-                for m, w in zip(motions, windows, strict=True)
-            ]
-        )
-        floor = noise_floor(AxisModel(mass), list(zip(motions, windows, strict=True)))
-        if floor < QUIET * np.sqrt(np.mean(rest**2)):
-            return length
-    return TEST_FUNCTIONS[-1]
-
-
-def inertia(motions: Sequence[Motion], length: float = 0.1) -> float:
-    """Rough moved mass (kg): command regressed on acceleration, direction and speed."""
-    rows, forces = [], []
-    for m in motions:
-        w = TestFunction.of_length(length, m.period)
-        direction = w.mean(np.sign(m.velocity))
-        rows.append(
-            np.stack(
-                [w.acceleration(m.velocity), direction, w.mean(m.velocity), np.ones_like(direction)]
-            )
-        )
-        forces.append(w.mean(m.command))
-    solution = np.linalg.lstsq(np.hstack(rows).T, np.concatenate(forces), rcond=None)[0]
-    least = INERTIA.lower if motions[0].units.rotary else MASS.lower
-    return float(max(solution[0], least))

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from identify.dataset.velocity import together
 from twin.errors import InputError
 from twin.log import AxisLog, Log
 from twin.model.machine import MOST_AXES_OF_A_PAIR
@@ -24,6 +25,7 @@ SHORTEST_BLOCK = 1e-3  # s
 LONGEST_BLOCK = 1e-2  # s
 SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
 SHORTEST_LOG = 1.0  # s
+EQUAL = 1e-9  # relative difference by which whole samples may miss a length
 READ_BACK = 32  # readings that a controller is supposed to use
 ENOUGH = 200_000  # samples that tell the noise of a command
 SMOOTHED = 11  # samples over which readings are smoothed to undo their errors
@@ -51,7 +53,8 @@ class Motion:
     rate. time_origin: s, when the log began, by the phase of what repeats in time. follows: whether
     the position follows a logged setpoint; None where none was logged. units, other_units: of the
     axis and of the other one, by which m, N and so on are to be read. beside: on a machine with
-    more than two axes the others, by name.
+    more than two axes the others, by name. velocity_weight: 1, of a measured velocity beside the
+    readings (identify.dataset.velocity); 0 where there is none.
     """
 
     name: str
@@ -68,6 +71,7 @@ class Motion:
     units: AxisUnits = LINEAR
     other_units: AxisUnits = LINEAR
     beside: Mapping[str, OtherAxis] = field(default_factory=dict)
+    velocity_weight: float = 0.0
 
     def __repr__(self) -> str:
         return (
@@ -84,6 +88,18 @@ class Motion:
             others=np.ascontiguousarray(self.others[:, :n]),
             raw=self.raw[:, : n * samples],
             beside={a: replace(o, signals=o.signals[:, :n]) for a, o in self.beside.items()},
+        )
+
+    def after(self, instant: float) -> Motion:
+        """What follows its first ``instant`` seconds, as a log that begins there."""
+        first = min(round(instant / self.period), self.signals.shape[1] - 1)
+        samples = self.raw.shape[1] // self.signals.shape[1]
+        return replace(
+            self,
+            signals=np.ascontiguousarray(self.signals[:, first:]),
+            others=np.ascontiguousarray(self.others[:, first:]),
+            raw=np.ascontiguousarray(self.raw[:, first * samples :]),
+            beside={a: replace(o, signals=o.signals[:, first:]) for a, o in self.beside.items()},
         )
 
     def with_force_ahead(self, shift: float) -> Motion:
@@ -184,23 +200,32 @@ class Motion:
         return readings - np.interp(np.arange(len(readings)), at + 0.5, middle)
 
 
-def motion_of(log: Log, axis: str, name: str, machine: Sequence[str] = ()) -> Motion:
+def motion_of(
+    log: Log,
+    axis: str,
+    name: str,
+    machine: Sequence[str] = (),
+    longest_block: float = LONGEST_BLOCK,
+) -> Motion:
     """The motion of one axis of a log.
 
     machine: the axes of the machine; on one of two axes others that were logged do not matter.
+    longest_block: s; a noisy position asks for long blocks.
     Raises InputError where the axis is not in the log, does not move or is shorter than 1 s.
     """
     if axis not in log.axes:
         raise InputError(f"{name}: has no axis '{axis}'; it has {', '.join(log.axes)}")
-    position = log.axes[axis].position
+    readings = log.axes[axis].position
     if len(log) * log.period < SHORTEST_LOG:
         raise InputError(
             f"{name}: lasts {len(log) * log.period:.3g} s; identification needs {SHORTEST_LOG:g} s"
         )
-    if np.ptp(position) == 0.0:
+    if np.ptp(readings) == 0.0:
         raise InputError(f"{name}: axis {axis} stands still; give a log in which it moves")
+    told = together(readings, log.axes[axis].columns.get("velocity"), log.period)
+    position = told.position
     noise = white_noise(position)
-    block = _block_samples(position, noise, log.period)
+    block = _block_samples(position, noise, log.period, longest_block)
     force = log.axes[axis].force
     signals = _blocks(*_midpoints(position, force, log.period), block)
     found = {a: _other(log, a, block) for a in _other_axes(log, axis, machine)}
@@ -220,6 +245,7 @@ def motion_of(log: Log, axis: str, name: str, machine: Sequence[str] = ()) -> Mo
         position_noise=noise,
         raw=np.stack([between(position, log.period), force[:-1]])[:, : block * signals.shape[1]],
         follows=_follows(log.axes[axis]),
+        velocity_weight=told.weight,
     )
 
 
@@ -250,12 +276,13 @@ def _other(log: Log, axis: str, block: int) -> OtherAxis:
     return OtherAxis(np.stack([position, velocity, acceleration]), log.axes[axis].kind)
 
 
-def _block_samples(position: Array, noise: float, period: float) -> int:
-    """Samples a block: 1 ms, or longer where the encoder's noise asks for it."""
+def _block_samples(position: Array, noise: float, period: float, longest: float) -> int:
+    """Samples a block: 1 ms, or as long as the encoder's noise asks for, up to a length (s)."""
     span = max(round(SHORTEST_BLOCK / period), 1)
     fastest = np.abs(position[span:] - position[:-span]).max() / (span * period)
     quiet = np.sqrt(2.0) * noise / (SPEED_NOISE * fastest)
-    return max(round(min(max(SHORTEST_BLOCK, quiet), LONGEST_BLOCK) / period), 1)
+    most = int(longest / period * (1.0 + EQUAL))
+    return max(min(round(max(SHORTEST_BLOCK, quiet) / period), most), 1)
 
 
 def _midpoints(position: Array, force: Array, period: float) -> tuple[Array, Array, Array]:

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
-from scipy.optimize import nnls
 
 from identify.dataset.drive import actual_force, is_noise
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, at_rest, on_blocks, sticks, total_force
 from identify.dataset.spectrum import densities, pieces_of
 from identify.dataset.test_function import TestFunction
+from identify.dataset.velocity import part_left, rate_gain
+from identify.dataset.whittle import fitted_levels
 from twin.model.machine import AxisModel
 from twin.signals import between
 
@@ -30,9 +30,8 @@ Array = NDArray[np.float64]
 SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
 LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
 MOST_SEGMENTS = 64  # whose median is sure enough: with as many frequencies, to 1 % of the power
-ROUNDS = 12
-TOLERATED = 0.5  # log of power over fit at which a frequency has half its weight
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
+BAND_OF_BOTH = 0.25  # its end beside a measured velocity, whose noise vanishes towards 0.5
 PLAIN = 3.0  # times the reading's noise where the band begins; above it the force's noise shows
 
 
@@ -92,7 +91,8 @@ def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
 def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
     """Power gain (k,) from a position error m to the apparent force N."""
     dt = motion.sample_period
-    return ((2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * dt)) * axis.mass / dt**2) ** 2
+    gain = rate_gain(frequency, dt)
+    return np.asarray((gain * axis.mass) ** 2 * part_left(motion.velocity_weight, frequency, dt))
 
 
 def noise_of(axis: AxisModel, motion: Motion) -> Noise:
@@ -110,8 +110,9 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     frequency, power = _median_spectrum(raw, segment, dt, _at_rest(axis, motion))
     half = np.cos(np.pi * frequency * dt) ** 2
     bend = _bend(axis, motion, frequency)
-    band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < BAND[2] / dt)
-    force, reading = map(float, _fit_levels(np.stack([half, bend], axis=1)[band], power[band]))
+    top = BAND[2] if motion.velocity_weight == 0.0 else BAND_OF_BOTH
+    band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < top / dt)
+    force, reading = map(float, fitted_levels(np.stack([half, bend], axis=1)[band], power[band]))
     if force < PLAIN * reading * bend[band][0]:
         force = motion.command_noise
     return Noise(frequency, force, reading, bend, segment)
@@ -156,24 +157,3 @@ def _less_lines(pieces: Array) -> Array:
     ramp = np.linspace(-1.0, 1.0, pieces.shape[1])
     slope = (pieces @ ramp) / (ramp @ ramp)
     return np.asarray(pieces - (pieces.mean(axis=1, keepdims=True) + slope[:, None] * ramp))
-
-
-def _fit_levels(shapes: Array, power: Array) -> Array:
-    """Non-negative levels by least squares on the relative error, repeated: a Whittle fit.
-
-    A frequency above the fit, such as a resonance, has the less weight the higher it is.
-    """
-    model = _underneath(power)
-    levels = np.zeros(shapes.shape[1])
-    for _ in range(ROUNDS):
-        above = np.maximum(np.log(power / model), 0.0) / TOLERATED
-        weight = 1.0 / (1.0 + above**2)
-        levels, _ = nnls(shapes * (weight / model)[:, None], power / model * weight)
-        model = np.maximum(shapes @ levels, 1e-12 * power.max())
-    return levels
-
-
-def _underneath(power: Array) -> Array:
-    """The smallest power at this or any higher frequency: noise of these shapes never falls."""
-    smooth = uniform_filter1d(power, 9, mode="nearest")
-    return np.maximum(np.minimum.accumulate(smooth[::-1])[::-1], 1e-300)

@@ -18,10 +18,10 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.dataset import choose_test_function
 from identify.dataset.motion import SHORTEST_LOG, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.test_function import LEAST_BLOCKS
+from identify.dataset.time_scale import choose_test_function
 from identify.estimation.evidence import effective_samples, evidence
 from identify.estimation.fit import fit_axis, rms
 from identify.estimation.force_balance import jacobian, residual

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from identify.estimation.fit import Outcome
-from identify.output.words.estimation import channel_delay_in_words, outcome_in_words
+from identify.output.words.estimation import outcome_in_words, prepared_in_words
 from identify.output.words.selection import moved_in_words, refit_in_words, repeat_in_words
 from identify.selection.confounded import Refit, moved_parameters
 from identify.selection.diagnosis import AxisDiagnosis
@@ -37,8 +37,7 @@ def remarks(
     out = []
     if refit and (changed := refit_in_words(refit)):
         out.append(changed)
-    if shifted := channel_delay_in_words(found.dataset):
-        out.append(shifted)
+    out += prepared_in_words(found.dataset)
     if found.base.ended is not Outcome.CONVERGED:
         out.append(words(outcome_in_words(found.base.ended)))
     if found.best is not None:

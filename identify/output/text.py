@@ -10,9 +10,9 @@ from identify.experiment_design.plan import Plan
 from identify.experiment_design.rival_hypotheses import STRENGTH
 from identify.output.remarks import remarks_on
 from identify.output.words.estimation import (
-    channel_delay_in_words,
     no_interval_in_words,
     outcome_in_words,
+    prepared_in_words,
 )
 from identify.output.words.experiment_design import gap_in_words, not_run_in_words
 from identify.output.words.selection import (
@@ -51,8 +51,7 @@ def fit_text(result: FitResult) -> str:
         )
         lines.append(f"  {words(outcome_in_words(fit.ended))}")
         lines += [f"  at its bound: {label}" for label in fit.at_bound]
-        if shifted := channel_delay_in_words(result.datasets[axis]):
-            lines.append(f"  {shifted}")
+        lines += [f"  {said}" for said in prepared_in_words(result.datasets[axis])]
         if result.left_out[axis]:
             still = ", ".join(result.left_out[axis])
             lines.append(f"  not fitted on {still}, where axis {axis} stands still")

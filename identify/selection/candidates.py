@@ -75,10 +75,8 @@ def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
     has_friction = any(f.effect.kind is Kind.FRICTION for f in axis.effects)
     return [
         e
-        for e in catalogue.values()
-        if e.name not in axis.names
-        and (e.kind is not Kind.MODIFIER or has_friction)
-        and not e.is_nonparametric
+        for e in catalogue.after(axis.names)
+        if (e.kind is not Kind.MODIFIER or has_friction) and not e.is_nonparametric
     ]
 
 

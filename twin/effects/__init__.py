@@ -8,15 +8,18 @@ from __future__ import annotations
 import difflib
 import importlib
 import importlib.util
+import itertools
 import pkgutil
+import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 
 from twin.effect import Effect
 from twin.errors import InputError
 
+MOST_OF_ONE = 6  # of one effect on an axis
 LONGEST_TRIAL = 30.0  # s for loading, trying and compiling a user's file
 
 
@@ -27,19 +30,34 @@ class Catalogue(Mapping[str, Effect]):
         self._effects = {e.name: e for e in sorted(effects, key=lambda e: e.name)}
 
     def __getitem__(self, name: str) -> Effect:
-        try:
-            return self._effects[name]
-        except KeyError:
-            raise InputError(self._unknown(name)) from None
+        found = self._found(name)
+        if found is None:
+            raise InputError(self._unknown(name))
+        return found
 
     def __contains__(self, name: object) -> bool:
-        return name in self._effects
+        return self._found(name) is not None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._effects)
 
     def __len__(self) -> int:
         return len(self._effects)
+
+    def _found(self, name: object) -> Effect | None:
+        """The effect of that name, or the one of several, such as ``cogging_2``."""
+        if name in self._effects:
+            return self._effects[str(name)]
+        several = re.fullmatch(r"(\w+)_([2-9])", str(name))
+        first = self._effects.get(several[1]) if several else None
+        return first.numbered(int(several[2])) if several and first and first.several else None
+
+    def after(self, taken: Collection[str]) -> Iterator[Effect]:
+        """The effects that can be added to those taken: absent ones, and the next of several."""
+        for effect in self.values():
+            numbers = range(1, MOST_OF_ONE + 1 if effect.several else 2)
+            free = (e for e in map(effect.numbered, numbers) if e.name not in taken)
+            yield from itertools.islice(free, 1)
 
     def _unknown(self, name: str) -> str:
         near = difflib.get_close_matches(name, self._effects, n=1, cutoff=0.4)

@@ -63,6 +63,7 @@ EFFECT = Effect(
     law=law,
     simplest=simplest,
     curve=Curve(Coordinate.POSITION, period="p"),
+    several=True,
     fingerprint="residual repeats along the track, the same in both directions and at every force",
     excited_by="constant-speed passes over many magnet pitches",
 )  # fmt: skip

@@ -45,6 +45,7 @@ EFFECT = Effect(
         ),
     ),
     law=law,
+    several=True,
     fingerprint="residual repeats along the track in proportion to the motor force there",
     excited_by="strong accelerations both ways at many places, over many magnet pitches",
 )

@@ -34,6 +34,7 @@ EFFECT = Effect(
         Parameter("b", "N", 0.0, -1e4, 1e4, "cosine term", strength=True),
     ),
     law=law,
+    several=True,
     fingerprint="residual repeats in time at one frequency, whatever the axis does",
     excited_by="any motion; a log of many periods, also at rest",
 )

@@ -51,6 +51,20 @@ def no_interval_in_words(reason: NoInterval) -> str:
     return f"no interval: {why}"
 
 
+def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
+    """What was done to the logs before they were fitted, that a reader should know."""
+    shifted, words = channel_delay_in_words(dataset), dataset.units.words
+    return (
+        *((shifted,) if shifted else ()),
+        *(
+            f"{log}: the first {end:.2g} s of axis {dataset.axis} are left out, as its "
+            f"{words('force')} there fits nothing that follows: the axis did not yet move freely. "
+            "Cut the log, or begin it in motion"
+            for log, end in dataset.begun.items()
+        ),
+    )
+
+
 def channel_delay_in_words(dataset: Dataset) -> str | None:
     """By how much the force channel was corrected, or None."""
     if dataset.channel_delay == 0.0:

@@ -11,27 +11,20 @@ import pytest
 from constructed import STICKY, effect, log_of, moved, waves, windowed
 from scipy.signal import welch
 
-from identify.dataset.dataset import (
-    QUIET,
-    TEST_FUNCTIONS,
-    Dataset,
-    choose_test_function,
-    datasets,
-    inertia,
-)
+from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.motion import motion_of
 from identify.dataset.noise_floor import (
     _at_rest,
     _between_samples,
-    _fit_levels,
     _median_spectrum,
-    _underneath,
     floor_of,
     noise_floor,
     noise_of,
 )
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, on_blocks, total_force
 from identify.dataset.test_function import TestFunction
+from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
+from identify.dataset.whittle import _underneath, fitted_levels
 from identify.validation.error_spectrum import _edges, bands
 from twin.errors import InputError
 from twin.log.check import moves
@@ -159,10 +152,10 @@ def test_levels_are_found_beneath_what_stands_out():
     k = np.linspace(0.02, 1.0, 400)
     shapes = np.stack([np.cos(0.3 * np.pi * k) ** 2, 1e3 * k**4], axis=1)
     flat = shapes @ [0.7, 0.02]
-    np.testing.assert_allclose(_fit_levels(shapes, flat), [0.7, 0.02], rtol=1e-6)
+    np.testing.assert_allclose(fitted_levels(shapes, flat), [0.7, 0.02], rtol=1e-6)
     peak = flat * (1.0 + 300.0 * np.exp(-(((k - 0.3) / 0.02) ** 2)))
-    np.testing.assert_allclose(_fit_levels(shapes, peak), [0.7, 0.02], rtol=0.05)
-    only = _fit_levels(shapes, 5.0 * shapes[:, 1])
+    np.testing.assert_allclose(fitted_levels(shapes, peak), [0.7, 0.02], rtol=0.05)
+    only = fitted_levels(shapes, 5.0 * shapes[:, 1])
     np.testing.assert_allclose(only, [0.0, 5.0], atol=1e-3)
     under = _underneath(np.concatenate([np.full(50, 9.0), np.full(50, 2.0), np.full(50, 5.0)]))
     assert (under[:90] == 2.0).all()

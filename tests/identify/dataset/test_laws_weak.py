@@ -220,12 +220,14 @@ def test_logs_that_tell_nothing_are_refused():
 def test_blocks_are_a_millisecond_and_longer_where_the_encoder_is_noisy():
     """sqrt(2) noise over the block is a thousandth of the highest speed."""
     ramp = 0.5 * np.arange(8001) / 8000.0  # 0.5 m/s
-    assert _block_samples(ramp, 0.0, 1.0 / 8000.0) == 8
-    assert _block_samples(ramp, 2e-6, 1.0 / 8000.0) == round(np.sqrt(2) * 2e-6 / 5e-4 * 8000)
-    assert _block_samples(ramp, 2e-5, 1.0 / 8000.0) == round(LONGEST_BLOCK * 8000)
-    assert _block_samples(ramp, 0.0, 3e-3) == 1
-    backwards = _block_samples(-ramp, 2e-6, 1.0 / 8000.0)
-    assert backwards == _block_samples(ramp, 2e-6, 1.0 / 8000.0)
+    assert _block_samples(ramp, 0.0, 1.0 / 8000.0, LONGEST_BLOCK) == 8
+    noisy = round(np.sqrt(2) * 2e-6 / 5e-4 * 8000)
+    assert _block_samples(ramp, 2e-6, 1.0 / 8000.0, LONGEST_BLOCK) == noisy
+    assert _block_samples(ramp, 2e-5, 1.0 / 8000.0, LONGEST_BLOCK) == round(LONGEST_BLOCK * 8000)
+    assert _block_samples(ramp, 0.0, 3e-3, LONGEST_BLOCK) == 1
+    assert _block_samples(ramp, 2e-5, 1.0 / 8000.0, 2.49e-3) == 19  # no longer than asked
+    backwards = _block_samples(-ramp, 2e-6, 1.0 / 8000.0, LONGEST_BLOCK)
+    assert backwards == _block_samples(ramp, 2e-6, 1.0 / 8000.0, LONGEST_BLOCK)
 
 
 def test_white_noise_is_found_beside_a_smooth_signal():

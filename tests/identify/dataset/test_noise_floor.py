@@ -5,8 +5,9 @@ import pytest
 from foreign_machine import FORCE_CONSTANT, drawn, run
 
 from identify import workflow
-from identify.dataset.dataset import choose_test_function, datasets
+from identify.dataset.dataset import datasets
 from identify.dataset.noise_floor import noise_of
+from identify.dataset.time_scale import choose_test_function
 from twin.effects import load_catalogue
 from twin.model.file import load_model
 

@@ -1,0 +1,127 @@
+"""How long test functions should be, from what the logs hold.
+
+Long ones are quiet, as they average noise away, and with it all that is fast: the cogging of a
+motor at speed, bumps passed in a hundredth of a second. The shortest that is quiet is taken, or a
+shorter one at which a force shows that the quiet one hides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.dataset.motion import Motion
+from identify.dataset.noise_floor import noise_floor
+from identify.dataset.test_function import LEAST_BLOCKS, TestFunction
+from twin.model.machine import INERTIA, MASS, AxisModel
+from twin.signals import Array
+
+TEST_FUNCTIONS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
+QUIET = 0.01  # largest noise floor, as a part of the force that the inertia does not explain
+SHOWS = 2.0  # times the noise floor, from which a force that is not explained shows
+HIDES = 2.0  # times as large as at the quiet length, from which that length hides a force
+
+Motions = Sequence[Motion]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What shows at one length: N RMS of the force that a mass, friction and a constant leave.
+
+    floor: N RMS, what noise alone leaves.
+    """
+
+    length: float
+    left: float
+    floor: float
+
+    @property
+    def structure(self) -> float:
+        """N RMS of what is left beyond noise."""
+        return float(np.sqrt(max(self.left**2 - self.floor**2, 0.0)))
+
+    def shows_more_than(self, quiet: Scale) -> bool:
+        """Whether it holds a force, sure beside its noise, that a quieter scale hides."""
+        return self.left > SHOWS * self.floor and self.structure > HIDES * quiet.structure
+
+    @classmethod
+    def of(cls, length: float, motions: Motions) -> Scale:
+        columns, forces, test_functions = regressors(motions, length)
+        gains = np.linalg.lstsq(columns.T, forces, rcond=None)[0]
+        left = forces - columns.T @ gains
+        mass = max(float(gains[0]), _least_mass(motions))
+        floor = noise_floor(AxisModel(mass), list(zip(motions, test_functions, strict=True)))
+        return cls(length, float(np.sqrt(np.mean(left**2))), floor)
+
+
+def choose_length(motions_at: Callable[[float | None], tuple[Motions, Motions]]) -> float:
+    """Length of the test functions, s, for the logs to fit and the held-out ones.
+
+    motions_at: these for test functions of a length, whose blocks are short enough for it; for
+    None as long as their noise asks for.
+    """
+    motions, others = motions_at(None)
+    chosen = choose_test_function(motions, others)
+    shorter = [length for length in TEST_FUNCTIONS if length < chosen]
+    if not shorter:
+        return chosen
+    quiet = Scale.of(chosen, motions)
+    for length in shorter:
+        finer = motions_at(length)[0]
+        if length < LEAST_BLOCKS * max(m.period for m in finer):
+            continue
+        if Scale.of(length, finer).shows_more_than(quiet):
+            return length
+    return chosen
+
+
+def choose_test_function(motions: Motions, others: Motions = ()) -> float:
+    """The shortest test function (s) whose noise floor is small against the force to be explained.
+
+    others: motions whose blocks it must also be long enough for.
+    """
+    mass = inertia(motions)
+    longest_block = max(m.period for m in (*motions, *others))
+    for length in TEST_FUNCTIONS:
+        if length < LEAST_BLOCKS * longest_block:
+            continue
+        test_functions = [TestFunction.of_length(length, m.period) for m in motions]
+        pairs = list(zip(motions, test_functions, strict=True))
+        rest = np.concatenate(
+            [w.mean(m.command) - mass * w.acceleration(m.velocity) for m, w in pairs]
+        )
+        if noise_floor(AxisModel(mass), pairs) < QUIET * np.sqrt(np.mean(rest**2)):
+            return length
+    return TEST_FUNCTIONS[-1]
+
+
+def inertia(motions: Motions, length: float = 0.1) -> float:
+    """Rough moved mass (kg): command regressed on acceleration, direction and speed."""
+    columns, forces, _ = regressors(motions, length)
+    gains = np.linalg.lstsq(columns.T, forces, rcond=None)[0]
+    return float(max(gains[0], _least_mass(motions)))
+
+
+def _least_mass(motions: Motions) -> float:
+    return INERTIA.lower if motions[0].units.rotary else MASS.lower
+
+
+def regressors(motions: Motions, length: float) -> tuple[Array, Array, list[TestFunction]]:
+    """Acceleration, direction, speed and 1 by test functions (4, n), the force (n,) N, and these.
+
+    length: s, of the test functions.
+    """
+    columns, forces, test_functions = [], [], []
+    for m in motions:
+        w = TestFunction.of_length(length, m.period)
+        direction = w.mean(np.sign(m.velocity))
+        columns.append(
+            np.stack(
+                [w.acceleration(m.velocity), direction, w.mean(m.velocity), np.ones_like(direction)]
+            )
+        )
+        forces.append(w.mean(m.command))
+        test_functions.append(w)
+    return np.hstack(columns), np.concatenate(forces), test_functions

@@ -1,0 +1,98 @@
+"""Test functions are as long as the logs ask for, and a hanging beginning is left out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from constructed import CATALOGUE, log_of
+
+from identify.dataset.beginning import FOREIGN, HELD, beginnings
+from identify.dataset.dataset import datasets
+from identify.dataset.motion import motion_of
+from identify.dataset.time_scale import HIDES, QUIET, SHOWS, Scale
+from identify.output.words.estimation import prepared_in_words
+from twin.model.machine import AxisModel, MachineModel
+
+RATE = 1000.0
+MASS = 2.0
+PLAIN = MachineModel("plain", {"x": AxisModel(MASS)}, sample_rate=RATE)
+
+
+def passes(seed: int, cogging: float, noise: float, hang: float = 0.0, extra: float = 0.0):
+    """A log of fast passes, 0.5 m/s back and forth, with cogging of 10 mm pitch (N), a noisy
+    encoder (m) and for the first ``hang`` s a force (N) that moves nothing."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(8001) / RATE
+    x = 0.25 * np.sin(2.0 * t)
+    force = -4.0 * MASS * x + np.sign(np.cos(2.0 * t)) + cogging * np.sin(2.0 * np.pi * x / 0.01)
+    force[t < hang] += extra
+    return log_of(RATE, x + rng.normal(0.0, noise, len(t)), force)
+
+
+def test_what_a_quiet_length_averages_away_asks_for_a_shorter_one():
+    noise = 2e-5  # m
+    still = datasets(PLAIN, {"log": passes(1, 0.0, noise)}, {})["x"].test_function_length
+    fast = datasets(PLAIN, {"log": passes(1, 1.5, noise)}, {})["x"].test_function_length
+    assert fast < still
+    # At 0.5 m/s a pitch is passed in 20 ms; the quiet length averages it away.
+    motion = motion_of(passes(1, 1.5, noise), "x", "log", longest_block=fast / 8.0)
+    short, long = (Scale.of(length, [motion]) for length in (fast, still))
+    assert short.shows_more_than(long)
+    assert not long.shows_more_than(short)
+
+
+@pytest.mark.parametrize(
+    ("left", "floor", "shows"),
+    [
+        (SHOWS * 1.01, 1.0, True),
+        (SHOWS * 0.99, 1.0, False),
+    ],
+)
+def test_a_shorter_length_must_show_a_force_beside_its_noise(left, floor, shows):
+    assert Scale(0.02, left, floor).shows_more_than(Scale(0.2, 0.1, 0.1)) is shows
+
+
+@pytest.mark.parametrize(("part", "shows"), [(0.99, True), (1.01, False)])
+def test_and_the_quiet_one_must_hide_it(part, shows):
+    short = Scale(0.02, 5.0, 1.0)
+    seen = part * short.structure / HIDES
+    assert short.shows_more_than(Scale(0.2, float(np.hypot(seen, 0.3)), 0.3)) is shows
+    assert QUIET < 1.0 / SHOWS  # what is quiet needs no shorter one
+
+
+def test_a_beginning_in_which_a_force_moves_nothing_is_left_out():
+    hanging = passes(2, 0.0, 1e-7, hang=0.5, extra=9.0)
+    free = passes(3, 0.0, 1e-7)
+    found = datasets(PLAIN, {"hanging": hanging, "free": free}, {})["x"]
+    assert list(found.begun) == ["hanging"]
+    assert found.begun["hanging"] == pytest.approx(0.5, abs=0.16)
+    assert len(found.fit[0]) < len(found.fit[1])
+    assert "hanging" in prepared_in_words(found)[0]
+    # Its positions are those of the log from there on.
+    at = round(found.begun["hanging"] * RATE)
+    first = found.fit[0].motion.position[0]
+    assert first == pytest.approx(hanging.axes["x"].position[at], abs=2e-3)
+
+
+def test_no_beginning_is_left_out_where_the_force_is_ordinary():
+    def told(extra: float, hang: float = 0.5):
+        log = passes(4, 0.3, 1e-7, hang=hang, extra=extra)
+        return beginnings([motion_of(log, "x", "log")])
+
+    assert told(9.0)
+    assert not told(0.0)
+    assert not told(0.2)  # not foreign beside the cogging
+    assert not told(9.0, hang=3.0)  # no beginning
+    assert FOREIGN > 1.0 > HELD
+
+
+def test_several_of_one_effect_have_a_number_each():
+    first, second = CATALOGUE["cogging"], CATALOGUE["cogging_2"]
+    assert second.name == "cogging_2"
+    assert second.law is first.law
+    assert "lugre_2" not in CATALOGUE
+    assert "cogging_1" not in CATALOGUE
+    names = [e.name for e in CATALOGUE.after({"cogging", "cogging_2", "lugre"})]
+    assert "cogging_3" in names
+    assert not {"cogging", "cogging_2", "lugre"} & set(names)
+    assert len(names) == len(CATALOGUE) - 1
