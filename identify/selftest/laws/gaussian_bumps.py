@@ -25,7 +25,7 @@ EFFECT = Effect(
     equation="F = -height(direction) tanh(v/0.2 mm/s) exp(-(d/(0.3 width))^2)",
     source="this project's choice",
     parameters=(
-        Parameter("pitch", "m", 0.034, 1e-4, 10.0, "distance between bumps", fixed=True),
+        Parameter("pitch", "m", 0.03, 1e-4, 10.0, "distance between bumps", fixed=True),
         Parameter("width", "m", 0.004, 1e-4, 0.1, "full width of a bump"),
         Parameter("phase", "m", 0.0, -1.0, 1.0, "position of one bump"),
         Parameter("ahead", "N", 0.0, -1e3, 1e3, "height moving forwards", strength=True),
