@@ -11,12 +11,13 @@ from collections.abc import Sequence
 
 from identify.output.words.selftest import trial_in_words
 from identify.selftest import TrialResult, levels, run_all
+from identify.selftest.calibration import answers_of
 from identify.selftest.design import DEVELOPMENT, FULL
 
 
 def table(results: Sequence[TrialResult]) -> str:
     """The two tables, as Python text."""
-    answers = [a for o in results for a in o.answers]
+    answers = answers_of(results)
     lines = []
     for name, beside in (("BESIDE_DECOYS", True), ("WITHOUT_DECOYS", False)):
         own = [a for a in answers if a.beside_decoys is beside]

@@ -29,7 +29,7 @@ class Tenth:
 
 def reliability(results: Sequence[TrialResult]) -> list[Tenth]:
     """Stated confidence against how often right, by tenths of it; empty tenths are left out."""
-    answers = [a for o in results for a in o.answers]
+    answers = answers_of(results)
     out = []
     for i in range(TENTHS):
         inside = [a for a in answers if min(int(a.confidence * TENTHS), TENTHS - 1) == i]
@@ -38,6 +38,15 @@ def reliability(results: Sequence[TrialResult]) -> list[Tenth]:
             rate = Rate(what, sum(a.right for a in inside), len(inside))
             out.append(Tenth(float(np.mean([a.confidence for a in inside])), rate))
     return out
+
+
+def answers_of(results: Sequence[TrialResult]) -> list[Answer]:
+    """The answers that confidence speaks of.
+
+    Less those where an effect was taken out of the catalogue: some laws contain that of another, so
+    that another name need not be wrong.
+    """
+    return [a for o in results if o.case.known for a in o.answers]
 
 
 def levels(answers: Sequence[Answer]) -> tuple[Level, ...]:

@@ -39,10 +39,10 @@ class Design:
     catalogue, all at STRONG.
     """
 
-    empty: int = 4
-    strong: int = 8
-    weak: int = 4
-    outside: int = 4
+    empty: int = 3
+    strong: int = 4
+    weak: int = 2
+    outside: int = 1
     pairs: int = 0
     left_out: int = 0
 
@@ -73,7 +73,7 @@ class Design:
 
 
 QUICK = Design()
-FULL = Design(empty=120, strong=120, weak=90, outside=60, pairs=30, left_out=30)
+FULL = Design(empty=80, strong=72, weak=48, outside=32, pairs=16, left_out=12)
 
 
 def release_seed() -> int:

@@ -59,17 +59,23 @@ def rates(results: Sequence[TrialResult]) -> list[Rate]:
         _rate("false findings, nothing planted", empty, _wrong, ALARMS),
         _rate("both of two named", [o for o in inside if len(o.case.effects) == 2], _right, PAIRS),
     ]
+    outside = [o for o in shown if o.case.known and _outside(o)]
     for where, trials, asked in (
         ("inside", inside, WRONG_INSIDE),
-        ("outside", [o for o in shown if _outside(o)], WRONG_OUTSIDE),
+        ("outside", outside, WRONG_OUTSIDE),
     ):
         text = f"planted {where} the catalogue"
         out.append(_rate(f"wrong names, {text}", trials, _wrong_name))
         out.append(_rate(f"confident wrong names, {text}", trials, _confident, asked))
     out.append(
         _rate("outside the catalogue: no name, and the right coordinate",
-              [o for o in shown if _outside(o)], _honest, COORDINATE)
+              outside, _honest, COORDINATE)
     )  # fmt: skip
+    # No target: some laws contain that of another, and some motions of the stage part no two.
+    left_out = [o for o in shown if not o.case.known]
+    out.append(
+        _rate("another name for an effect taken out of the catalogue", left_out, _wrong_name)
+    )
     out.append(
         _rate("test error within 1.3 of what noise leaves, where the answer is right",
               [o for o in one if o.right], lambda o: o.tested < NEAR_FLOOR)
@@ -80,7 +86,7 @@ def rates(results: Sequence[TrialResult]) -> list[Rate]:
 
 
 def by_stratum(results: Sequence[TrialResult]) -> dict[str, list[Rate]]:
-    """For each variation, and each planted effect: its rates of right and of wrong answers."""
+    """For each variation its rates of right and of wrong answers."""
     shown = [o for o in results if o.shown]
     groups: dict[str, list[TrialResult]] = {}
     for o in shown:
@@ -95,7 +101,7 @@ def _of_group(group: Sequence[TrialResult]) -> list[Rate]:
           for s in sorted({o.case.strength for o in one})),
         _rate("false", [o for o in group if not o.case.effects], _wrong),
         _rate("wrong inside", one, _wrong_name),
-        _rate("wrong outside", [o for o in group if _outside(o)], _wrong_name),
+        _rate("wrong outside", [o for o in group if o.case.known and _outside(o)], _wrong_name),
     ]  # fmt: skip
     return [r for r in found if r.trials]
 
