@@ -13,32 +13,58 @@ from identify.cli.shared import Json, app, require_folder, say
 
 @app.command()
 def selftest(
-    full: Annotated[bool, typer.Option("--full", help="All strengths, many machines.")] = False,
-    seed: Annotated[int, typer.Option(help="Draws the machines.")] = 1,
+    full: Annotated[
+        bool, typer.Option("--full", help="Many machines, drawn with the seed of this version.")
+    ] = False,
+    seed: Annotated[int | None, typer.Option(help="Draws the machines.")] = None,
     only: Annotated[
         list[str] | None, typer.Option("--only", help="Plant this effect only; may be repeated.")
     ] = None,
+    case: Annotated[
+        list[str] | None,
+        typer.Option("--case", help="One machine again, by the name printed; may be repeated."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Picture of the confusion matrix.")
+    ] = None,
+    reliability: Annotated[
+        Path | None,
+        typer.Option("--reliability", help="Picture of confidence against how often right."),
     ] = None,
     as_json_: Json = False,
 ) -> None:
     """Plant effects in machines drawn at random, and count how often they are named."""
     from identify.output.selftest import selftest_json, selftest_text
     from identify.output.words.selftest import trial_in_words
-    from identify.selftest import FULL, QUICK, draw, run_all
-    from identify.selftest.trial import TrialResult
+    from identify.selftest import (
+        FULL,
+        QUICK,
+        TrialResult,
+        draw,
+        draw_reliability,
+        parse_case,
+        release_seed,
+        run_all,
+    )  # fmt: skip
+    from identify.selftest.design import DEVELOPMENT
+    from identify.selftest.laws import OUTSIDE
+    from identify.selftest.variations import VARIATIONS
     from twin.effects import load_catalogue
 
-    if out:
-        require_folder(out)
+    for path in (out, reliability):
+        if path:
+            require_folder(path)
     catalogue = load_catalogue()
     names = [catalogue[name].name for name in only or ()] or None
+    chosen = seed if seed is not None else release_seed() if full else DEVELOPMENT
+    cases = [parse_case(text, {*catalogue, *OUTSIDE}, VARIATIONS) for text in case or ()]
 
     def tell(result: TrialResult, done: int, total: int) -> None:
         print(f"{done} of {total}: {trial_in_words(result)}", file=sys.stderr, flush=True)
 
-    results = run_all((FULL if full else QUICK).cases(seed, names), progress=tell)
+    results = run_all(cases or (FULL if full else QUICK).cases(chosen, names), progress=tell)
     if out:
         draw(results, out)
-    say(selftest_text(results), selftest_json(results), as_json_)
+    if reliability:
+        draw_reliability(results, reliability)
+    say(selftest_text(results, chosen), selftest_json(results, chosen), as_json_)

@@ -187,6 +187,7 @@ def _finding(f: Finding) -> dict[str, Any]:
         "effect": f.effect,
         "kind": f.kind.value,
         "explains": f.explains,
+        "confidence": f.confidence,
         "indistinguishable_from": list(f.tied),
         "test_error_before": f.error_before,
         "test_error_after": f.error_after,

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from math import log
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit, holdout_error
+from identify.selection.confidence import confidence
 from identify.selection.decoys import Proof, proof
 from identify.selection.ranking import less
 from identify.selection.wrong_shape import WrongShape
 from twin.effect import Effect
+
+ALL = 0.999999  # of the squared error; no effect takes more
 
 
 class FindingKind(Enum):
@@ -40,6 +44,19 @@ class Finding:
     parameters: dict[str, float]
     proof: Proof | None
     kind: FindingKind = FindingKind.MISSING
+
+    @property
+    def margin(self) -> float:
+        """Logarithm of how many times more error its best decoy leaves; none leaves all of it."""
+        if self.proof is None:
+            return 2.0 * log(self.error_before / self.error_after)
+        gain, decoy = (min(g, ALL) for g in (self.proof.gain, self.proof.best_decoy))
+        return log((1.0 - decoy) / (1.0 - gain))
+
+    @property
+    def confidence(self) -> float:
+        """How often such an answer was right on machines of the self-test, 0..1."""
+        return confidence(self.margin, beside_decoys=self.proof is not None)
 
 
 def found(

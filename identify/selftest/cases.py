@@ -7,29 +7,34 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.dataset.dataset import datasets
-from identify.dataset.noise_floor import floor_of
-from identify.estimation.fit import fit_axis
+from identify.dataset.dataset import Dataset, datasets
+from identify.estimation.fit import Fit, error_on, fit_axis, rms
+from identify.estimation.force_balance import residual
+from identify.estimation.subspace import unabsorbed
 from identify.experiment_design.planting import (
-    draw_effect,
+    added_force,
     hidden_part,
     other_machine,
+    strength_for,
     visible_force,
 )
+from identify.selftest.drawing import drawn_values, other_exponents
+from identify.selftest.laws import NOISE
+from identify.selftest.variations import MASS_OFF, VARIATIONS, Drawn
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.log import Log
-from twin.model.machine import Fitted, MachineModel
+from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import FineSimulator, ReducedSimulator
 
 AXIS = "x"
 DURATION = 12.0  # s of each log
-EXPERIMENTS = ("tracking", "moves", "tracking")  # the last is held out
+TRAINING, SELECTION, TEST = ("tracking", "moves"), "tracking", "moves"  # what is run for each role
 HIDDEN = 0.9  # part of an effect's force, absorbed by a fit, from which the mass is held fixed
 ROUNDS = 2  # corrections of a friction's level
-SPREAD = 0.3  # of the logarithm of a friction's own parameters
 REACHED = 0.7  # part of the wanted force that an effect must reach within its bounds
+TRIES = 6  # draws of an effect's values until it shows
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,14 +42,18 @@ class Machine:
     """A machine with planted effects, and its logs.
 
     model: the model that the diagnosis starts from. true: the machine. planted: effects that the
-    model lacks.
+    model lacks. reshaped: effects of the model whose law is not the machine's. right: other effects
+    that are right to name. logs, holdout: to fit, and to select by. test: decides nothing.
     """
 
     model: MachineModel
     true: MachineModel
     planted: tuple[Fitted, ...]
+    reshaped: frozenset[str]
+    right: frozenset[str]
     logs: Mapping[str, Log]
     holdout: Mapping[str, Log]
+    test: Mapping[str, Log]
 
 
 class NotShown(Exception):
@@ -52,43 +61,90 @@ class NotShown(Exception):
 
 
 def machine(
-    stage: MachineModel, effects: Sequence[Effect], strength: float, rng: np.random.Generator
+    stage: MachineModel,
+    effects: Sequence[Effect],
+    strength: float,
+    variation: str,
+    rng: np.random.Generator,
 ) -> Machine:
     """Draw a machine about a stage, plant effects of ``strength`` times the noise floor, log it.
 
-    Only the part of the force that the model's own parameters cannot reproduce counts for the
-    strength. Values and motion are random; the simulation steps ten times finer than the samples of
-    the logs. Raises NotShown.
+    variation: how it departs from the stage besides. The noise floor is what the machine's own laws
+    leave of its logs. Only the part of a force that the model's parameters cannot reproduce counts
+    for the strength. The simulation steps ten times finer than the samples. Raises NotShown.
     """
-    true = stage
-    for name, axis in stage.axes.items():
-        true = true.with_axis(name, other_machine(axis, rng))
-    seeds = [int(s) for s in rng.integers(1 << 31, size=len(EXPERIMENTS) + 1)]
-    model = replace(stage, axes={AXIS: stage.axes[AXIS]})
+    drawn = _about(stage, rng)
+    drawn = VARIATIONS[variation](drawn, AXIS, rng)
+    seeds = [int(s) for s in rng.integers(1, 1 << 31, size=5)]
     planted: list[Fitted] = []
     # Friction first, as its level is found with a model that lacks nothing else.
     for effect in sorted(effects, key=lambda e: e.kind is not Kind.FRICTION):
-        if effect.kind is Kind.FRICTION:
-            model = model.with_axis(
-                AXIS, model.axes[AXIS].with_effect(plain_friction(stage, effect))
-            )
-            true, fitted = _with_friction(true, model, effect, strength, seeds[-1], rng)
-        else:
-            true, fitted = _with_planted(true, effect, strength, seeds[-1], rng)
+        put = _with_friction if effect.kind is Kind.FRICTION else _with_planted
+        drawn, fitted = put(drawn, effect, strength, seeds[-1], rng)
         planted.append(fitted)
-    held = replace(model.axes[AXIS], mass_fixed=true.axes[AXIS].mass_fixed)
+    held = drawn.model.axes[AXIS].mass_fixed
+    if held:  # a mass that is not fitted was weighed
+        own = replace(drawn.model.axes[AXIS], mass=drawn.true.axes[AXIS].mass)
+        drawn = replace(drawn, model=drawn.model.with_axis(AXIS, own))
+    runs = (*TRAINING, SELECTION, TEST)
     logs = {
-        f"log {i}": simulate(true, run, seed=seed, duration=DURATION, simulator=FineSimulator)
-        for i, (run, seed) in enumerate(zip(EXPERIMENTS, seeds, strict=False), start=1)
+        f"log {i}": _logged(drawn.true, run, seed, FineSimulator)
+        for i, (run, seed) in enumerate(zip(runs, seeds, strict=False), start=1)
     }
-    last = list(logs)[-1]
+    test, selection = dict([logs.popitem()]), dict([logs.popitem()])
     return Machine(
-        model=model.with_axis(AXIS, held),
-        true=true,
-        planted=tuple(planted),
-        logs=logs,
-        holdout={last: logs.pop(last)},
+        drawn.model, drawn.true, tuple(planted), drawn.reshaped, drawn.right, logs, selection, test
     )
+
+
+def prepared(built: Machine) -> tuple[Dataset, Dataset]:
+    """The dataset of the diagnosis, and that of the test log, with the same test functions."""
+    dataset = datasets(built.model, built.logs, built.holdout)[AXIS]
+    return dataset, datasets(built.model, built.test, {}, dataset.test_function_length)[AXIS]
+
+
+def own_error(true: AxisModel, dataset: Dataset) -> float:
+    """RMS force (N) that a machine's own laws leave of its logs: what noise alone leaves."""
+    return rms(error_on(_quiet(true), dataset.fit))
+
+
+def _about(stage: MachineModel, rng: np.random.Generator) -> Drawn:
+    """A machine about a stage: all values off by up to 20 %, masses by up to 10 %."""
+    true = stage
+    for name, axis in stage.axes.items():
+        other = other_machine(axis, rng)
+        mass = axis.mass * (1.0 + MASS_OFF * rng.uniform(-1.0, 1.0))
+        true = true.with_axis(name, replace(other, mass=mass))
+    return Drawn(replace(stage, axes={AXIS: stage.axes[AXIS]}), true)
+
+
+def _logged(true: MachineModel, run: str, seed: int, simulator: type[ReducedSimulator]) -> Log:
+    """A log of the machine; its force noise begins anew in each."""
+    axis = true.axes[AXIS]
+    if NOISE.name in axis.names:
+        noise = Fitted.at_start(NOISE, {**axis[NOISE.name].values, "seed": float(seed - 1 or 1)})
+        true = true.with_axis(AXIS, axis.with_effect(noise))
+    return simulate(true, run, seed=seed, duration=DURATION, simulator=simulator)
+
+
+def _quiet(true: AxisModel) -> AxisModel:
+    return true.without(NOISE.name) if NOISE.name in true.names else true
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Training logs of the machine as it is, and the model's fit. floor: what noise leaves, N."""
+
+    dataset: Dataset
+    base: Fit
+    floor: float
+
+    @classmethod
+    def of(cls, drawn: Drawn, seed: int) -> _Trial:
+        logs = {run: _logged(drawn.true, run, seed, ReducedSimulator) for run in TRAINING}
+        dataset = datasets(drawn.model, logs, {})[AXIS]
+        base = fit_axis(drawn.model.axes[AXIS], dataset.fit)
+        return cls(dataset, base, own_error(drawn.true.axes[AXIS], dataset))
 
 
 def plain_friction(stage: MachineModel, other: Effect) -> Fitted:
@@ -107,60 +163,82 @@ def plain_friction(stage: MachineModel, other: Effect) -> Fitted:
 
 
 def _with_friction(
-    true: MachineModel,
-    model: MachineModel,
-    effect: Effect,
-    strength: float,
-    seed: int,
-    rng: np.random.Generator,
-) -> tuple[MachineModel, Fitted]:
-    """The machine with another friction, scaled until the model's error has that strength."""
-    own = next(f for f in true.axes[AXIS].effects if f.effect.kind is Kind.FRICTION)
-    free = [p for p in effect.parameters if not p.fixed]
-    shared = {p.name: own.values[p.name] for p in free if p.name in own.values}
-    drawn = {
-        p.name: p.start * float(np.exp(SPREAD * rng.uniform(-1.0, 1.0)))
-        for p in free
-        if p.name not in shared and p.lower < p.upper
-    }
-    fitted = Fitted.at_start(effect, {**effect.starts(), **drawn, **shared})
+    drawn: Drawn, effect: Effect, strength: float, seed: int, rng: np.random.Generator
+) -> tuple[Drawn, Fitted]:
+    """A machine with another friction, scaled until the model falls short by that strength.
 
-    def left(machine: MachineModel) -> float:
-        """Error of the model on that machine above the noise floor, as a multiple of it."""
-        trial = simulate(
-            machine, EXPERIMENTS[0], seed=seed, duration=DURATION, simulator=ReducedSimulator
-        )
-        dataset = datasets(model, {"trial": trial}, {})[AXIS]
-        base = fit_axis(model.axes[AXIS], dataset.fit)
-        floor = floor_of(machine.axes[AXIS], dataset.fit)
-        return float(np.sqrt(max(base.error**2 - floor**2, 1e-4 * floor**2)) / floor)
+    The model gets the simplest friction. What the model would leave with the right friction, such
+    as the form of the bumps, does not count.
+    """
+    plain = plain_friction(drawn.model, effect)
+    own = next(f for f in drawn.true.axes[AXIS].effects if f.effect.kind is Kind.FRICTION)
+    drawn = replace(
+        drawn,
+        model=drawn.model.with_axis(AXIS, drawn.model.axes[AXIS].with_effect(plain)),
+        reshaped=drawn.reshaped - {own.effect.name},
+    )
+    free = {p.name for p in effect.parameters if not p.fixed}
+    shared = {name: own.values[name] for name in free if name in own.values}
+    seen = _Trial.of(drawn, seed).dataset.excitation
+    fitted = Fitted.at_start(effect, {**drawn_values(effect, seen, rng), **shared})
+    fitted = other_exponents(fitted, rng)
 
-    machine = true.with_axis(AXIS, true.axes[AXIS].with_effect(fitted))
+    def having(new: Fitted) -> Drawn:
+        return drawn.on(AXIS, lambda a: a.with_effect(new))
+
+    def left(new: Fitted) -> float:
+        """Error of the model beyond that of one with the right friction, in noise floors."""
+        trial = _Trial.of(having(new), seed)
+        best = fit_axis(trial.base.axis.with_effect(new), trial.dataset.fit).error
+        beyond = max(trial.base.error**2 - max(best, trial.floor) ** 2, 1e-4 * trial.floor**2)
+        return float(np.sqrt(beyond) / trial.floor)
+
     for _ in range(ROUNDS):
-        scale = float(np.clip(strength / left(machine), 0.1, 10.0))
+        scale = float(np.clip(strength / left(fitted), 0.1, 10.0))
         scaled = {p.name: scale * fitted.values[p.name] for p in effect.strengths}
         fitted = Fitted.at_start(effect, {**fitted.values, **scaled})
-        machine = true.with_axis(AXIS, true.axes[AXIS].with_effect(fitted))
-    if left(machine) < REACHED * strength:
+    if left(fitted) < REACHED * strength:
         raise NotShown(effect.name)
-    return machine, fitted
+    return having(fitted), fitted
 
 
 def _with_planted(
-    true: MachineModel, effect: Effect, strength: float, seed: int, rng: np.random.Generator
-) -> tuple[MachineModel, Fitted]:
+    drawn: Drawn, effect: Effect, strength: float, seed: int, rng: np.random.Generator
+) -> tuple[Drawn, Fitted]:
     """The machine with one more effect; its mass is held where a fit would absorb the effect."""
-    trial = simulate(true, EXPERIMENTS[0], seed=seed, duration=DURATION, simulator=ReducedSimulator)
-    dataset = datasets(replace(true, axes={AXIS: true.axes[AXIS]}), {"trial": trial}, {})[AXIS]
-    base = fit_axis(true.axes[AXIS], dataset.fit)
-    at_start = draw_effect(
-        effect, base.axis, dataset.fit, dataset.excitation, base.floor, np.random.default_rng(seed)
-    )
-    if hidden_part(at_start, base, dataset) > HIDDEN:
-        base = fit_axis(replace(true.axes[AXIS], mass_fixed=True), dataset.fit)
-    wanted = strength * base.floor
-    fitted = draw_effect(effect, base.axis, dataset.fit, dataset.excitation, wanted, rng, base)
-    if visible_force(fitted, base, dataset) < REACHED * wanted:
+    trial = _Trial.of(drawn, seed)
+    for _ in range(TRIES):
+        values = drawn_values(effect, trial.dataset.excitation, rng)
+        fitted = _scaled(effect, values, strength, trial, rng)
+        if hidden_part(fitted, trial.base, trial.dataset) > HIDDEN:
+            own = replace(trial.base.axis, mass_fixed=True, mass=drawn.true.axes[AXIS].mass)
+            held = replace(trial, base=fit_axis(own, trial.dataset.fit))
+            fitted = _scaled(effect, values, strength, held, rng)
+        else:
+            held = trial
+        if visible_force(fitted, held.base, trial.dataset) >= REACHED * strength * trial.floor:
+            break
+    else:
         raise NotShown(effect.name)
-    axis = replace(true.axes[AXIS], mass_fixed=base.axis.mass_fixed)
-    return true.with_axis(AXIS, axis.with_effect(fitted)), fitted
+    model = drawn.model.axes[AXIS]
+    model = replace(model, mass_fixed=model.mass_fixed or held.base.axis.mass_fixed)
+    drawn = replace(drawn, model=drawn.model.with_axis(AXIS, model))
+    return drawn.on(AXIS, lambda a: a.with_effect(fitted)), fitted
+
+
+def _scaled(
+    effect: Effect,
+    values: Mapping[str, float],
+    strength: float,
+    trial: _Trial,
+    rng: np.random.Generator,
+) -> Fitted:
+    """The effect so strong that the model cannot reproduce ``strength`` noise floors of it."""
+    base, logs = trial.base, trial.dataset.fit
+    without = residual(base.axis, logs)
+
+    def beyond(fitted: Fitted) -> np.ndarray:
+        force = added_force(fitted, base.axis, logs, without)[base.kept]
+        return unabsorbed(force, base.basis)
+
+    return strength_for(effect, beyond, strength * trial.floor, values, rng)

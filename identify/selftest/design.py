@@ -4,64 +4,101 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, cycle, islice
+from typing import TypeVar
 
 import numpy as np
 
+from identify.selftest.case import Case
 from identify.selftest.cases import AXIS
-from identify.selftest.trial import STAGE, Case, TrialResult, run
+from identify.selftest.laws import OUTSIDE
+from identify.selftest.trial import STAGE, TrialResult, run
+from identify.selftest.variations import VARIATIONS
 from twin.effect import Kind
 from twin.effects import Catalogue, load_catalogue
+from twin.log.writer import software_version
 from twin.model.file import load_model
 
-PAIR_STRENGTH = 5.0  # times the noise floor, of each of two planted effects
+T = TypeVar("T")
+
+DEVELOPMENT = 1  # the seed with which the product is developed
+FIRST_RELEASE = 1000  # releases are judged with seeds from here on
+WEAK, STRONG = 2.0, 5.0  # times the noise floor
 
 
 @dataclass(frozen=True)
 class Design:
-    """The size of a self-test: strengths (times the noise floor), and machines of each sort.
+    """How many machines a self-test makes of each sort.
 
-    each: of every effect and strength. empty: with nothing planted. pairs: with two effects.
-    left_out: of every effect, at PAIR_STRENGTH, with the effect taken out of the catalogue.
+    empty: with nothing planted. weak, strong: with one effect, at WEAK and at STRONG; outside: with
+    one of no catalogue, pairs: with two effects, left_out: with one that is taken out of the
+    catalogue, all at STRONG.
     """
 
-    strengths: tuple[float, ...] = (5.0,)
-    each: int = 1
-    empty: int = 10
-    pairs: int = 10
-    left_out: int = 1
+    empty: int = 3
+    strong: int = 4
+    weak: int = 2
+    outside: int = 1
+    pairs: int = 0
+    left_out: int = 0
 
     def cases(self, seed: int, names: Sequence[str] | None = None) -> list[Case]:
-        """All machines; the same seed makes the same."""
-        catalogue = load_catalogue()
-        hidden = list(names or plantable(catalogue))
+        """All machines; the same seed makes the same.
+
+        Effects and variations come in turn, each in an order that the seed draws, so that every one
+        is met about as often.
+        """
         rng = np.random.default_rng(seed)
-        out = [Case((), 0.0, seed + i) for i in range(self.empty)]
-        for i in range(self.each):
-            out += [Case((n,), s, seed + i) for s in self.strengths for n in hidden]
-        together = [
-            pair
-            for pair in combinations(hidden, 2)
-            if any(catalogue[name].kind is not Kind.FRICTION for name in pair)
-        ]
-        for i in range(self.pairs if together else 0):
-            out.append(Case(together[rng.integers(len(together))], PAIR_STRENGTH, seed + i))
-        for i in range(self.left_out):
-            out += [Case((n,), PAIR_STRENGTH, seed + 1000 + i, known=False) for n in hidden]
+        hidden = list(names or plantable(load_catalogue()))
+        pairs = _pairs(hidden)
+        sorts = (
+            ([()], self.empty, 0.0, True),
+            ([(n,) for n in hidden], self.strong, STRONG, True),
+            ([(n,) for n in hidden], self.weak, WEAK, True),
+            ([(n,) for n in OUTSIDE], self.outside, STRONG, True),
+            (pairs, self.pairs if pairs else 0, STRONG, True),
+            ([(n,) for n in hidden], self.left_out, STRONG, False),
+        )
+        out = []
+        for effects, count, strength, known in sorts:
+            turns = zip(_in_turn(effects, rng), _in_turn(list(VARIATIONS), rng), strict=False)
+            for planted, variation in islice(turns, count):
+                drawn = int(rng.integers(1, 1 << 31))
+                out.append(Case(planted, strength, drawn, variation, known))
         return out
 
 
 QUICK = Design()
-FULL = Design(strengths=(2.0, 5.0, 20.0), each=3, empty=200, pairs=60, left_out=2)
+FULL = Design(empty=80, strong=72, weak=48, outside=32, pairs=16, left_out=12)
+
+
+def release_seed() -> int:
+    """The seed with which this version is judged: another for each version."""
+    return FIRST_RELEASE + zlib.crc32(software_version().encode())
 
 
 def plantable(catalogue: Catalogue) -> list[str]:
     """Physical effects that the stage of the self-test lacks."""
     own = load_model(STAGE, catalogue).axes[AXIS].names
     return [e.name for e in catalogue.values() if e.name not in own and not e.is_nonparametric]
+
+
+def _pairs(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Two effects of which one at most is a friction."""
+    catalogue = load_catalogue()
+    return [
+        pair
+        for pair in combinations(names, 2)
+        if any(catalogue[name].kind is not Kind.FRICTION for name in pair)
+    ]
+
+
+def _in_turn(items: Sequence[T], rng: np.random.Generator) -> Iterator[T]:
+    return cycle([items[i] for i in rng.permutation(len(items))])
 
 
 def run_all(

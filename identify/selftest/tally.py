@@ -1,11 +1,26 @@
-"""The rates of a self-test, with their counts."""
+"""The rates of a self-test, with their counts and what chance leaves open."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from scipy.special import betaincinv
+
+from identify.selection.findings import FindingKind
+from identify.selftest.case import NOTHING
+from identify.selftest.design import STRONG, WEAK
+from identify.selftest.laws import OUTSIDE
 from identify.selftest.trial import TrialResult
+
+Range = tuple[float, float]
+
+ALARMS, PAIRS, COORDINATE, COVERED = (0.0, 0.01), (0.85, 1.0), (0.80, 1.0), (0.85, 0.95)
+NAMED = {WEAK: (0.80, 1.0), STRONG: (0.95, 1.0)}  # by force over the noise floor
+WRONG_INSIDE, WRONG_OUTSIDE, HELD = (0.0, 0.01), (0.0, 0.03), (0.85, 1.0)
+CONFIDENT = 0.9  # stated confidence from which an engineer acts on a name
+LEVEL = 0.95  # of the interval of a rate
+NEAR_FLOOR = 1.3  # test error over what noise leaves
 
 
 @dataclass(frozen=True)
@@ -15,71 +30,102 @@ class Rate:
     what: str
     count: int
     trials: int
-    asked: tuple[float, float] | None = None
+    asked: Range | None = None
 
     @property
     def value(self) -> float:
         """0..1; not a number without trials."""
         return self.count / self.trials if self.trials else float("nan")
 
+    @property
+    def interval(self) -> Range:
+        """Interval (95 %) of the rate that these trials are a sample of, 0..1.
 
-ASKED = {5.0: (0.95, 1.0), 2.0: (0.80, 1.0)}  # by force over the noise floor
-ALARMS, PAIRS, OUTSIDE, COVERED = (0.0, 0.01), (0.85, 1.0), (0.80, 1.0), (0.85, 0.95)
+        C. J. Clopper, E. S. Pearson, Biometrika 26 (1934), 404-413.
+        """
+        k, n, tail = self.count, self.trials, 0.5 * (1.0 - LEVEL)
+        low = float(betaincinv(k, n - k + 1, tail)) if k else 0.0
+        return low, float(betaincinv(k + 1, n - k, 1.0 - tail)) if k < n else 1.0
 
 
 def rates(results: Sequence[TrialResult]) -> list[Rate]:
-    """All rates of a self-test."""
+    """All rates of a self-test; those without trials are left out."""
     shown = [o for o in results if o.shown]
-    one = [o for o in shown if len(o.case.effects) == 1 and o.case.known]
-    out = [
-        _rate(
-            f"named or in a declared ambiguity, force {s:g} times the noise floor",
-            [o for o in one if o.case.strength == s], _right, ASKED.get(s),
-        )
-        for s in sorted({o.case.strength for o in one})
-    ]  # fmt: skip
     empty = [o for o in shown if not o.case.effects]
-    two = [o for o in shown if len(o.case.effects) == 2]
-    out.append(_rate("false alarms, nothing planted", empty, _alarm, ALARMS))
-    out.append(_rate("wrong names given with confidence, one planted", one, _wrong))
-    out.append(_rate("both of two named", two, _right, PAIRS))
+    inside = [o for o in shown if o.case.effects and not _outside(o)]
+    one = [o for o in inside if len(o.case.effects) == 1]
+    out = [_named(one, strength) for strength in sorted({o.case.strength for o in one})]
+    out += [
+        _rate("false findings, nothing planted", empty, _wrong, ALARMS),
+        _rate("both of two named", [o for o in inside if len(o.case.effects) == 2], _right, PAIRS),
+    ]
+    outside = [o for o in shown if o.case.known and _outside(o)]
+    for where, trials, asked in (
+        ("inside", inside, WRONG_INSIDE),
+        ("outside", outside, WRONG_OUTSIDE),
+    ):
+        text = f"planted {where} the catalogue"
+        out.append(_rate(f"wrong names, {text}", trials, _wrong_name))
+        out.append(_rate(f"confident wrong names, {text}", trials, _confident, asked))
+    out.append(
+        _rate("outside the catalogue: no name, and the right coordinate",
+              outside, _honest, COORDINATE)
+    )  # fmt: skip
+    # No target: some laws contain that of another, and some motions of the stage part no two.
     left_out = [o for o in shown if not o.case.known]
     out.append(
-        _rate("effect outside the catalogue: floor reached or the right coordinate", left_out,
-              lambda o: o.honest, OUTSIDE)
+        _rate("another name for an effect taken out of the catalogue", left_out, _wrong_name)
+    )
+    out.append(
+        _rate("test error within 1.3 of what noise leaves, where the answer is right",
+              [o for o in one if o.right], lambda o: o.tested < NEAR_FLOOR)
     )  # fmt: skip
-    covered = [c for o in empty for _, c in o.covered]
-    out.append(Rate("90 % intervals that hold the truth", sum(covered), len(covered), COVERED))
+    out.append(coverage(empty, "90 % intervals that hold the truth, nothing missing", COVERED))
+    out += [_beside(one, strength) for strength in sorted({o.case.strength for o in one})]
     return [r for r in out if r.trials]
 
 
-def _rate(
-    what: str,
-    trials: Sequence[TrialResult],
-    good: Callable[[TrialResult], bool],
-    asked: tuple[float, float] | None = None,
+def by_stratum(results: Sequence[TrialResult]) -> dict[str, list[Rate]]:
+    """For each variation its rates of right and of wrong answers."""
+    shown = [o for o in results if o.shown]
+    groups: dict[str, list[TrialResult]] = {}
+    for o in shown:
+        groups.setdefault(o.case.variation, []).append(o)
+    return {name: _of_group(groups[name]) for name in sorted(groups)}
+
+
+def _of_group(group: Sequence[TrialResult]) -> list[Rate]:
+    one = [o for o in group if len(o.case.effects) == 1 and not _outside(o)]
+    found = [
+        *(_rate(f"named at {s:g}", [o for o in one if o.case.strength == s], _right)
+          for s in sorted({o.case.strength for o in one})),
+        _rate("false", [o for o in group if not o.case.effects], _wrong),
+        _rate("wrong inside", one, _wrong_name),
+        _rate("wrong outside", [o for o in group if o.case.known and _outside(o)], _wrong_name),
+    ]  # fmt: skip
+    return [r for r in found if r.trials]
+
+
+def failures(results: Iterable[TrialResult]) -> list[TrialResult]:
+    """The machines whose effect was not named, or on which something wrong was."""
+    return [o for o in results if o.shown and (o.wrong or not (o.right or _outside(o)))]
+
+
+def coverage(
+    results: Iterable[TrialResult], what: str, asked: Range | None = None, wider: float = 1.0
 ) -> Rate:
-    return Rate(what, sum(map(good, trials)), len(trials), asked)
+    """Of the intervals given, those that hold the truth, were they ``wider`` times as wide."""
+    given = [h.off <= wider for o in results for h in o.held if h.given]
+    return Rate(what, sum(given), len(given), asked)
 
 
-def _right(o: TrialResult) -> bool:
-    return o.right
-
-
-def _alarm(o: TrialResult) -> bool:
-    return not o.quiet
-
-
-def _wrong(o: TrialResult) -> bool:
-    return not o.quiet and not o.right
-
-
-def coverage(results: Sequence[TrialResult]) -> dict[str, Rate]:
+def coverage_by_parameter(results: Sequence[TrialResult]) -> dict[str, Rate]:
     """Coverage of the intervals by parameter, of machines with nothing planted."""
     found: dict[str, list[bool]] = {}
     for o in results:
-        for label, inside in o.covered:
-            found.setdefault(label, []).append(inside)
+        for h in o.held if not o.case.effects else ():
+            if h.given:
+                found.setdefault(h.label, []).append(h.off <= 1.0)
     return {k: Rate(k, sum(v), len(v), COVERED) for k, v in found.items()}
 
 
@@ -91,8 +137,7 @@ def confusion(results: Sequence[TrialResult]) -> dict[str, dict[str, float]]:
     one = [o for o in results if o.shown and o.case.known and len(o.case.effects) <= 1]
     table: dict[str, dict[str, float]] = {}
     for o in one:
-        planted = o.case.effects[0] if o.case.effects else NOTHING
-        row = table.setdefault(planted, {})
+        row = table.setdefault(_planted(o), {})
         row[_answer(o)] = row.get(_answer(o), 0.0) + 1.0
     return {
         name: {answer: n / sum(row.values()) for answer, n in row.items()}
@@ -100,13 +145,62 @@ def confusion(results: Sequence[TrialResult]) -> dict[str, dict[str, float]]:
     }
 
 
-NOTHING, UNEXPLAINED, AMBIGUOUS = "nothing", "unexplained", "ambiguous with it"
+SHAPE, UNEXPLAINED, AMBIGUOUS = "wrong shape", "unexplained", "ambiguous with it"
 
 
 def _answer(o: TrialResult) -> str:
-    if o.quiet:
-        return UNEXPLAINED if o.verdict == "UNEXPLAINED" else NOTHING
-    planted = o.case.effects[0] if o.case.effects else ""
-    if planted in o.named:
+    missing = [a.names for a in o.answers if a.kind is FindingKind.MISSING]
+    if not missing:
+        silent = UNEXPLAINED if o.verdict == "UNEXPLAINED" else NOTHING
+        return SHAPE if o.answers else silent
+    planted = _planted(o)
+    if any(names[0] == planted for names in missing):
         return planted
-    return AMBIGUOUS if any(planted in answer for answer in o.answers) else o.named[0]
+    return AMBIGUOUS if any(planted in names for names in missing) else missing[0][0]
+
+
+def _planted(o: TrialResult) -> str:
+    return o.case.effects[0] if o.case.effects else NOTHING
+
+
+def _named(one: Sequence[TrialResult], strength: float) -> Rate:
+    what = f"named or in a declared ambiguity, force {strength:g} times the noise floor"
+    return _rate(what, [o for o in one if o.case.strength == strength], _right, NAMED.get(strength))
+
+
+def _beside(one: Sequence[TrialResult], strength: float) -> Rate:
+    what = f"90 % intervals that hold the truth beside a missing effect of {strength:g} floors"
+    return coverage([o for o in one if o.case.strength == strength], what, HELD)
+
+
+def _rate(
+    what: str,
+    trials: Sequence[TrialResult],
+    good: Callable[[TrialResult], bool],
+    asked: Range | None = None,
+) -> Rate:
+    return Rate(what, sum(map(good, trials)), len(trials), asked)
+
+
+def _outside(o: TrialResult) -> bool:
+    return not o.case.known or any(name in OUTSIDE for name in o.case.effects)
+
+
+def _right(o: TrialResult) -> bool:
+    return o.right
+
+
+def _wrong(o: TrialResult) -> bool:
+    return bool(o.wrong)
+
+
+def _wrong_name(o: TrialResult) -> bool:
+    return any(a.kind is FindingKind.MISSING for a in o.wrong)
+
+
+def _confident(o: TrialResult) -> bool:
+    return any(a.confidence >= CONFIDENT for a in o.wrong)
+
+
+def _honest(o: TrialResult) -> bool:
+    return not o.wrong and o.depends_on in o.coordinates

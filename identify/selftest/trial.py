@@ -5,20 +5,24 @@ from __future__ import annotations
 import zlib
 from dataclasses import dataclass
 from itertools import permutations
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
-from identify.dataset.dataset import Dataset, datasets
-from identify.estimation.channel_delay import fit_aligned
-from identify.estimation.fit import Fit
+from identify.dataset.dataset import Dataset
+from identify.estimation.channel_delay import fit_aligned, realigned
+from identify.estimation.fit import Fit, error_on, rms
 from identify.estimation.force_balance import residual
-from identify.estimation.intervals import estimates
+from identify.estimation.intervals import estimates, half_widths
 from identify.estimation.subspace import unabsorbed
-from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from identify.estimation.time_origin import depends_on_time_origin, with_time_origins
+from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.findings import Finding, FindingKind
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.residual_dependence import dependences
-from identify.selftest.cases import AXIS, Machine, NotShown, machine
+from identify.selftest.case import Case
+from identify.selftest.cases import AXIS, Machine, NotShown, machine, own_error, prepared
+from identify.selftest.laws import OUTSIDE
 from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model
 from twin.model.machine import Fitted
@@ -29,68 +33,76 @@ NEARLY = 0.8  # part of the strongest dependence from which a coordinate counts 
 
 
 @dataclass(frozen=True)
-class Case:
-    """What is planted: effect names, their force over the noise floor, and the seed.
+class Answer:
+    """A finding of the diagnosis, and whether it is right.
 
-    known: whether the planted effects stay in the catalogue of the analysis.
+    names: the effect, and those declared as ambiguous with it. beside_decoys, margin: what its
+    confidence is read from. confidence: stated, 0..1.
     """
 
-    effects: tuple[str, ...]
-    strength: float
-    seed: int
-    known: bool = True
+    names: tuple[str, ...]
+    kind: FindingKind
+    right: bool
+    margin: float = np.nan
+    beside_decoys: bool = True
+    confidence: float = np.nan
+
+
+@dataclass(frozen=True)
+class Held:
+    """A parameter of the fitted model, and where the truth lies.
+
+    off: distance of the truth from the value over the half width of its interval. given: whether
+    the interval was given.
+    """
+
+    label: str
+    off: float
+    given: bool
 
 
 @dataclass(frozen=True)
 class TrialResult:
     """The result of a trial.
 
-    answers: for each effect that was named, in order, its name and those declared as ambiguous
-    with it. ratio, left: error over noise floor before and after. depends_on: of an unexplained
-    residual. coordinates: the right ones, from the planted force. covered: with nothing planted,
-    for each parameter with an interval whether it holds the truth. shown: whether the effect
-    could reach its strength on this motion.
+    answers: the findings. ratio, left: error over noise floor before and after, on the training
+    logs. tested: error after on the test log over what the machine's own laws leave there.
+    depends_on: of an unexplained residual. coordinates: the right ones, from the planted force.
+    held: the parameters of the fit that the diagnosis starts from. shown: whether the effect could
+    reach its strength on this motion. seconds: of one processor.
     """
 
     case: Case
     verdict: str = ""
-    answers: tuple[tuple[str, ...], ...] = ()
+    answers: tuple[Answer, ...] = ()
     ranking: tuple[tuple[str, float], ...] = ()
     ratio: float = np.nan
     left: float = np.nan
+    tested: float = np.nan
     depends_on: str | None = None
     coordinates: tuple[str, ...] = ()
-    covered: tuple[tuple[str, bool], ...] = ()
+    held: tuple[Held, ...] = ()
     seconds: float = 0.0
     shown: bool = True
 
     @property
-    def named(self) -> tuple[str, ...]:
-        """The effect named first in each answer."""
-        return tuple(answer[0] for answer in self.answers)
-
-    @property
-    def right(self) -> bool:
-        """Whether each planted effect is in an answer of its own, and there are no others."""
-        return len(self.answers) == len(self.case.effects) and any(
-            all(name in answer for name, answer in zip(order, self.answers, strict=True))
-            for order in permutations(self.case.effects)
+    def named(self) -> bool:
+        """Whether each planted effect is in an answer of its own, as missing."""
+        missing = [a.names for a in self.answers if a.kind is FindingKind.MISSING]
+        return any(
+            all(name in answer for name, answer in zip(self.case.effects, order, strict=True))
+            for order in permutations(missing, len(self.case.effects))
         )
 
     @property
-    def quiet(self) -> bool:
-        """Whether no name was given."""
-        return not self.answers
+    def wrong(self) -> tuple[Answer, ...]:
+        """The answers that are not right."""
+        return tuple(a for a in self.answers if not a.right)
 
     @property
-    def honest(self) -> bool:
-        """Of an effect outside the catalogue: floor reached, or unexplained with its coordinate."""
-        if self.verdict == Verdict.UNEXPLAINED.name:
-            return self.depends_on in self.coordinates
-        return self.left < FLOOR
-
-
-FLOOR = 1.3  # error over noise floor below which the error counts as noise
+    def right(self) -> bool:
+        """Whether each planted effect is named, and nothing wrong beside."""
+        return self.named and not self.wrong
 
 
 def run(case: Case) -> TrialResult:
@@ -98,27 +110,49 @@ def run(case: Case) -> TrialResult:
     catalogue = load_catalogue()
     stage = load_model(STAGE, catalogue)
     rng = np.random.default_rng([case.seed, *(zlib.crc32(e.encode()) for e in case.effects)])
+    effects = [OUTSIDE[e] if e in OUTSIDE else catalogue[e] for e in case.effects]
+    begun = process_time()
     try:
-        built = machine(stage, [catalogue[e] for e in case.effects], case.strength, rng)
+        built = machine(stage, effects, case.strength, case.variation, rng)
     except NotShown:
-        return TrialResult(case, shown=False)
+        return TrialResult(case, shown=False, seconds=process_time() - begun)
     known = [e for e in catalogue.values() if case.known or e.name not in case.effects]
-    begun = perf_counter()
-    dataset = datasets(built.model, built.logs, built.holdout)[AXIS]
+    dataset, test = prepared(built)
     dataset, base = fit_aligned(built.model.axes[AXIS], dataset)
-    found = diagnose_axis(base, dataset, Catalogue(known), workers=1)
+    found = diagnose_axis(base, dataset, Catalogue(known), workers=1).with_findings()
     return TrialResult(
         case=case,
         verdict=found.verdict.name,
-        answers=found.answers,
+        answers=tuple(_answer(f, built, case) for f in found.findings),
         ranking=tuple((c.effect.name, c.delta_bic) for c in found.ranking[:4]),
         ratio=base.ratio,
         left=found.final.ratio,
+        tested=_tested(found, test, built),
         depends_on=found.unexplained.depends_on if found.unexplained else None,
         coordinates=_right_coordinates(built, base, dataset),
-        covered=_covered(built, found) if not case.effects else (),
-        seconds=perf_counter() - begun,
+        held=_held(built, base),
+        seconds=process_time() - begun,
     )
+
+
+def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
+    """A finding as an answer; of a wrong shape, right where the machine's law has another."""
+    names = (finding.effect, *finding.tied)
+    missing = finding.kind is FindingKind.MISSING
+    true = {*case.effects, *built.right} if missing else built.reshaped
+    return Answer(
+        names, finding.kind, any(n in true for n in names), finding.margin,
+        finding.proof is not None, finding.confidence,
+    )  # fmt: skip
+
+
+def _tested(found: AxisDiagnosis, test: Dataset, built: Machine) -> float:
+    """Error of what was found on a log that decided nothing, over what noise leaves there."""
+    axis = found.final.axis
+    test = realigned(test, found.dataset.channel_delay)
+    if depends_on_time_origin(axis, test):
+        test = with_time_origins(axis, test)
+    return rms(error_on(axis, test.fit)) / own_error(built.true.axes[AXIS], test)
 
 
 def _right_coordinates(built: Machine, base: Fit, dataset: Dataset) -> tuple[str, ...]:
@@ -140,12 +174,18 @@ def _planted_force(planted: tuple[Fitted, ...], base: Fit, dataset: Dataset) -> 
     return unabsorbed(force, base.basis)
 
 
-def _covered(built: Machine, found: AxisDiagnosis) -> tuple[tuple[str, bool], ...]:
-    """Whether the 90 % intervals of a fit hold the machine's true values."""
-    fit = found.base
-    truth = read(built.true.axes[AXIS], fit.scaling.where)
-    out = []
-    for estimate, true in zip(estimates(fit), truth, strict=False):
-        if estimate.low is not None and estimate.high is not None:
-            out.append((estimate.label, bool(estimate.low <= true <= estimate.high)))
-    return tuple(out)
+def _held(built: Machine, fit: Fit) -> tuple[Held, ...]:
+    """Where the truth lies of the parameters whose law the machine has too."""
+    true = built.true.axes[AXIS]
+    where = [
+        c
+        for c in fit.scaling.where
+        if not c.effect or (c.effect in true.names and c.effect not in built.reshaped)
+    ]
+    truth = dict(zip([c.label for c in where], read(true, where), strict=True))
+    half = dict(zip([c.label for c in fit.scaling.where], half_widths(fit), strict=True))
+    return tuple(
+        Held(e.label, float(abs(truth[e.label] - e.value) / half[e.label]), e.low is not None)
+        for e in estimates(fit)
+        if e.label in truth and np.isfinite(half[e.label])
+    )

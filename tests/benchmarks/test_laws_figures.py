@@ -9,12 +9,19 @@ import numpy as np
 import pytest
 
 from benchmarks.figures import Figure, Target, write_results
+from identify.selection.findings import FindingKind
+from identify.selftest.case import Case
 from identify.selftest.picture import _shares, draw
-from identify.selftest.trial import Case, TrialResult
+from identify.selftest.trial import Answer, TrialResult
 from twin.errors import InputError
 
+
+def named(effect: str) -> tuple[Answer, ...]:
+    return (Answer((effect,), FindingKind.MISSING, True, confidence=0.9),)
+
+
 EVERY = [
-    TrialResult(Case(("a",), 5.0, 1), "MISSING_EFFECT", (("a",),)),
+    TrialResult(Case(("a",), 5.0, 1), "MISSING_EFFECT", named("a")),
     TrialResult(Case(("a",), 5.0, 2), "UNEXPLAINED"),
     TrialResult(Case((), 0.0, 1), "NOTHING_MISSING"),
 ]
@@ -39,21 +46,23 @@ def test_the_share_of_an_answer_stands_in_its_row_and_column(tmp_path, monkeypat
 
     drawn = []
     monkeypatch.setattr(Drawing, "savefig", lambda self, out, format: drawn.append((self, format)))
-    other = TrialResult(Case(("b",), 5.0, 3), "MISSING_EFFECT", (("c",),))
+    other = TrialResult(Case(("b",), 5.0, 3), "MISSING_EFFECT", named("c"))
     draw([*EVERY, *EVERY[:2], other, EVERY[0]], tmp_path / "m.pdf")
     ((figure, kind),) = drawn
     (axes,) = figure.axes
     rows = [t.get_text() for t in axes.get_yticklabels()]
     columns = [t.get_text() for t in axes.get_xticklabels()]
     assert (rows, kind) == (["a", "b", "nothing"], "pdf")
-    assert columns == ["a", "b", "c", "ambiguous with it", "unexplained", "nothing"]
+    assert columns == [
+        "a", "b", "c", "ambiguous with it", "wrong shape", "unexplained", "nothing",
+    ]  # fmt: skip
     found = {(rows[y], columns[x]): t.get_text() for t in axes.texts for x, y in [t.get_position()]}
     assert found == {
         ("a", "a"): "60", ("a", "unexplained"): "40", ("b", "c"): "100",
         ("nothing", "nothing"): "100",
     }  # fmt: skip
     shares = axes.get_images()[0].get_array()
-    assert (shares[0, 0], shares[0, 4], shares[1, 2], shares[2, 5]) == (0.6, 0.4, 1.0, 1.0)
+    assert (shares[0, 0], shares[0, 5], shares[1, 2], shares[2, 6]) == (0.6, 0.4, 1.0, 1.0)
 
 
 @pytest.mark.parametrize(

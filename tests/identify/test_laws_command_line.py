@@ -25,6 +25,7 @@ from identify.cli.shared import checked
 from identify.output import as_json, machine_json, machine_text
 from identify.output import selftest as selftest_output
 from identify.output import text as as_text
+from identify.selftest.case import Case
 from identify.selftest.tally import Rate
 from twin.log.check import CheckReport, Fault, Finding, Severity
 from twin.model.units import LINEAR
@@ -249,26 +250,40 @@ def test_demo(monkeypatch, cli, named, code):
 def test_selftest(monkeypatch, cli):
     cases = stub(monkeypatch, identify.selftest.Design, "cases", ["a case"])
     run = stub(monkeypatch, identify.selftest, "run_all", ["an outcome"])
-    draw = stub(monkeypatch, identify.selftest, "draw")
+    draw, reliable = (
+        stub(monkeypatch, identify.selftest, name) for name in ("draw", "draw_reliability")
+    )
     rate = Rate("mass", 1, 2)
     monkeypatch.setattr(selftest_output, "rates", lambda results: [rate])
-    monkeypatch.setattr(selftest_output, "coverage", lambda results: {"mass": rate})
-    monkeypatch.setattr(selftest_output, "selftest_json", lambda results: {"n": len(results)})
-    code, text, _ = cli("selftest", "--seed", "4", "--only", "wear", "--only", "gms", "-o", "p.svg")
-    assert (code, text.splitlines()) == (
-        0,
-        ["mass: 1 of 2 (50 %)", "  interval of mass: 1 of 2 (50 %)"],
+    monkeypatch.setattr(selftest_output, "coverage_by_parameter", lambda results: {"mass": rate})
+    monkeypatch.setattr(selftest_output, "by_stratum", lambda results: {"bumps": [rate]})
+    for name in ("reliability", "failures"):
+        monkeypatch.setattr(selftest_output, name, lambda results: [])
+    monkeypatch.setattr(
+        selftest_output, "selftest_json", lambda results, seed: {"n": len(results), "seed": seed}
     )
+    code, text, _ = cli(
+        "selftest", "--seed", "4", "--only", "wear", "--only", "gms", "-o", "p.svg",
+        "--reliability", "r.svg",
+    )  # fmt: skip
+    half = "mass: 1 of 2 (50 %; 1 to 99 % by chance)"
+    assert (code, text.splitlines()) == (
+        0, ["seed 4, 1 machines", half, f"  interval of {half}", f"  bumps, {half}"],
+    )  # fmt: skip
     assert cases.calls.pop()[0] == (4, ["wear", "gms"])
     assert run.calls.pop()[0] == (["a case"],)
     assert draw.only[0] == (["an outcome"], Path("p.svg"))
+    assert reliable.only[0] == (["an outcome"], Path("r.svg"))
     code, text, _ = cli("selftest", "--json")
-    assert (code, json.loads(text)) == (0, {"n": 1})
+    assert (code, json.loads(text)) == (0, {"n": 1, "seed": 1})
     assert cases.only[0] == (1, None)
     picked = []
     for name in ("QUICK", "FULL"):
-        design = SimpleNamespace(cases=lambda seed, names, n=name: picked.append(n))
+        design = SimpleNamespace(cases=lambda seed, names, n=name: picked.append((n, seed)))
         monkeypatch.setattr(identify.selftest, name, design)
     cli("selftest")
     cli("selftest", "--full")
-    assert picked == ["QUICK", "FULL"]
+    assert picked == [("QUICK", 1), ("FULL", identify.selftest.release_seed())]
+    run.calls.clear()
+    cli("selftest", "--case", "wear@5/bumps/17")
+    assert run.only[0] == ([Case(("wear",), 5.0, 17, "bumps")],)

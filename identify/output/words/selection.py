@@ -53,10 +53,12 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
         f"{what} {100.0 * finding.explains:.0f} % of the squared error above the noise floor: "
         f"{without} the {error} is {before}, {with_it} {after}"
     )
+    sure = f"confidence {100.0 * finding.confidence:.0f} %"
     if finding.proof is None:
-        return text
+        return f"{text}; {sure}"
     gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.best_decoy))
-    return f"{text}; in one linear step it takes {gain:.0f} % of it, its best decoy {decoy:.0f} %"
+    step = f"in one linear step it takes {gain:.0f} % of it, its best decoy {decoy:.0f} %"
+    return f"{text}; {step}; {sure}"
 
 
 def remainder_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str | None:

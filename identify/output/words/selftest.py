@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from identify.selection.findings import FindingKind
+from identify.selftest.calibration import Tenth
 from identify.selftest.tally import Rate
 from identify.selftest.trial import TrialResult
 
@@ -17,22 +19,37 @@ def target_in_words(rate: Rate) -> str:
 
 
 def rate_in_words(rate: Rate) -> str:
-    """E.g. "named, force 5 times the noise floor: 30 of 31 (97 %), target: at least 95 %"."""
+    """E.g. "named at 5: 30 of 31 (97 %; 83 to 100 % with 95 % certainty), target: ..."."""
     target = f", target: {target_in_words(rate)}" if rate.asked else ""
-    share = f" ({100 * rate.value:.0f} %)" if rate.trials else ""
-    return f"{rate.what}: {rate.count} of {rate.trials}{share}{target}"
+    if not rate.trials:
+        return f"{rate.what}: 0 of 0{target}"
+    low, high = (100.0 * end for end in rate.interval)
+    share = f"{100 * rate.value:.0f} %; {low:.0f} to {high:.0f} % by chance"
+    return f"{rate.what}: {rate.count} of {rate.trials} ({share}){target}"
+
+
+def tenth_in_words(tenth: Tenth) -> str:
+    """E.g. "stated 94 % on average in 90 to 100 %: right 30 of 31 (...)"."""
+    return f"stated {100 * tenth.stated:.0f} % on average, right {rate_in_words(tenth.right)}"
 
 
 def trial_in_words(result: TrialResult) -> str:
-    """One line: what was planted, and what the diagnosis answered."""
+    """One line: the machine by its name, and what the diagnosis answered."""
     case = result.case
-    planted = " and ".join(case.effects) or "nothing"
     if not result.shown:
         return (
-            f"{planted} cannot reach {case.strength:g} times the noise floor within its bounds on "
+            f"{case}: cannot reach {case.strength:g} times the noise floor within its bounds on "
             "this stage's motion"
         )
-    level = f" at {case.strength:g} times the noise floor" if case.effects else ""
-    known = "" if case.known else ", left out of the catalogue"
-    answer = " and ".join(" or ".join(answer) for answer in result.answers)
-    return f"{planted}{level}{known}: {answer or result.verdict.lower().replace('_', ' ')}"
+    shape = {FindingKind.MISSING: "", FindingKind.WRONG_SHAPE: " of another shape"}
+    answers = [
+        f"{' or '.join(a.names)}{shape[a.kind]} ({100 * a.confidence:.0f} %)"
+        for a in result.answers
+    ]
+    return f"{case}: {' and '.join(answers) or result.verdict.lower().replace('_', ' ')}"
+
+
+def failure_in_words(result: TrialResult) -> str:
+    """One line: the command that makes the machine again, and what was answered."""
+    what = "wrong" if result.wrong else "missed"
+    return f"{what}: twin selftest --case {trial_in_words(result)}"

@@ -181,12 +181,13 @@ def test_a_diagnosis():
                 "effect": "cogging", "kind": "missing", "explains": 0.871,
                 "indistinguishable_from": ["quadratic_drag"], "test_error_before": 7.17,
                 "test_error_after": 2.19, "unit": "N", "parameters": {"p": 0.0261},
-                "gain": 0.813, "best_decoy": 0.137,
+                "gain": 0.813, "best_decoy": 0.137, "confidence": made.FOUND[0].confidence,
             },
             {
                 "effect": "lugre", "kind": "missing", "explains": 0.119,
                 "indistinguishable_from": [], "test_error_before": 3.23, "test_error_after": 2.19,
                 "unit": "N", "parameters": {"Fc": 0.31}, "gain": None, "best_decoy": None,
+                "confidence": made.FOUND[1].confidence,
             },
         ],
         "remainder": {

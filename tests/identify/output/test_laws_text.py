@@ -132,12 +132,13 @@ def test_a_diagnosis():
     planned = [f"  {line}" for line in plan_text(result.next_experiments["x"]).splitlines()]
     assert lines[3 : 3 + len(planned)] == planned
     rest = [" ".join(line.split()) for line in lines[3 + len(planned) :]]
+    sure = [f"confidence {100.0 * f.confidence:.0f} %" for f in made.FOUND]
     assert rest[:3] == [
         "cogging explains 87 % of the squared error above the noise floor: without it the test "
         "error is 7.17 N, with it 2.19 N; in one linear step it takes 81 % of it, its best decoy "
-        "14 %",
+        f"14 %; {sure[0]}",
         "lugre explains 12 % of the squared error above the noise floor: without it the test error "
-        "is 3.23 N, with it 2.19 N",
+        f"is 3.23 N, with it 2.19 N; {sure[1]}",
         "what remains beside the named effects is 3.19 N, 1.6 times the noise floor",
     ]
     rest = rest[3:]

@@ -26,7 +26,7 @@ def drawn(seed):
     rng = np.random.default_rng([seed, *(zlib.crc32(name.encode()) for name in PLANTED)])
     stage = replace(load_model("proton_xy", CATALOGUE), sample_rate=2500.0)
     with patch("identify.selftest.cases.DURATION", 8.0):
-        built = machine(stage, [CATALOGUE[e] for e in PLANTED], 5.0, rng)
+        built = machine(stage, [CATALOGUE[e] for e in PLANTED], 5.0, "plain", rng)
     dataset = datasets(built.model, built.logs, built.holdout)[AXIS]
     return fit_axis(built.model.axes[AXIS], dataset.fit), dataset
 

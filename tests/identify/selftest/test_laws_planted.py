@@ -14,13 +14,15 @@ from built_fits import CATALOGUE, HARDWARE, PLAIN, axis_of, built_fit, fitted
 from identify import demo
 from identify.selftest import cases
 from identify.selftest.cases import NotShown, machine, plain_friction
-from twin.effect import Kind
+from identify.selftest.variations import Drawn
+from twin.effect import Excitation, Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, Fitted, MachineModel
-from twin.simulator import FineSimulator, ReducedSimulator
+from twin.simulator import FineSimulator
 
 LUGRE = fitted("lugre", Fc=0.27, Fs=0.35, sigma2=0.021)
 STAGE = MachineModel("s", {"x": AxisModel(5.3, HARDWARE, (LUGRE,)), "y": PLAIN})
+EXCITATION = Excitation(-0.15, 0.15, 0.2, 0.3, 12.0, 1e-3)
 
 
 def test_the_plain_friction_is_the_simplest_at_the_level_of_the_stages_own():
@@ -32,46 +34,49 @@ def test_the_plain_friction_is_the_simplest_at_the_level_of_the_stages_own():
         plain_friction(STAGE, CATALOGUE["coulomb_viscous"])
 
 
-def test_a_machine_is_logged_three_times_and_the_last_is_held_out(monkeypatch):
+def test_a_machine_is_logged_for_training_selection_and_test(monkeypatch):
     ran, order = [], []
 
     def simulate(true, run, seed, duration, simulator):
         ran.append((true, run, seed, duration, simulator))
         return f"log of seed {seed}"
 
-    def planted(true, effect, *rest):
+    def planted(drawn, effect, *rest):
         order.append(effect.name)
         new = Fitted.at_start(effect)
-        axis = replace(true.axes["x"].with_effect(new), mass_fixed=True)
-        return true.with_axis("x", axis), new
-
-    def friction(true, model, effect, *rest):
-        assert model.axes["x"].names == ("coulomb_viscous",)
-        return planted(true, effect)
+        model = replace(drawn.model.axes["x"], mass_fixed=True)
+        drawn = replace(drawn, model=drawn.model.with_axis("x", model))
+        return drawn.on("x", lambda a: a.with_effect(new)), new
 
     monkeypatch.setattr(cases, "simulate", simulate)
     monkeypatch.setattr(cases, "_with_planted", planted)
-    monkeypatch.setattr(cases, "_with_friction", friction)
+    monkeypatch.setattr(cases, "_with_friction", planted)
     effects = [CATALOGUE["wear"], CATALOGUE["gms"], CATALOGUE["cogging"]]
-    found = machine(STAGE, effects, 5.0, np.random.default_rng(3))
+    found = machine(STAGE, effects, 5.0, "plain", np.random.default_rng(3))
     assert order == ["gms", "wear", "cogging"]  # a friction first
     assert [f.effect.name for f in found.planted] == order
     assert list(found.model.axes) == ["x"]
-    assert found.model.axes["x"].names == ("coulomb_viscous",)
-    assert found.model.axes["x"].mass_fixed
     assert found.true.axes["x"].names == ("gms", "wear", "cogging")
+    assert found.model.axes["x"].mass == found.true.axes["x"].mass  # held, so it was weighed
     assert found.true.axes["y"] != STAGE.axes["y"]  # drawn
     assert [(r[1], r[3], r[4]) for r in ran] == [
-        (run, 12.0, FineSimulator) for run in ("tracking", "moves", "tracking")
+        (run, 12.0, FineSimulator) for run in ("tracking", "moves", "tracking", "moves")
     ]
     assert all(r[0] is found.true for r in ran)
     seeds = [r[2] for r in ran]
-    assert len(set(seeds)) == 3
+    assert len(set(seeds)) == 4
     assert list(found.logs) == ["log 1", "log 2"]
     assert found.holdout == {"log 3": f"log of seed {seeds[2]}"}
-    empty = machine(STAGE, [], 5.0, np.random.default_rng(3))
+    assert found.test == {"log 4": f"log of seed {seeds[3]}"}
+    empty = machine(STAGE, [], 5.0, "plain", np.random.default_rng(3))
     assert (empty.planted, empty.model.axes["x"]) == ((), STAGE.axes["x"])
-    assert [r[2] for r in ran[3:]] == seeds
+    assert 0.0 < abs(empty.true.axes["x"].mass / STAGE.axes["x"].mass - 1.0) < 0.1
+    assert [r[2] for r in ran[4:]] == seeds
+
+
+def trial_of(axis, floor=0.02):
+    dataset = SimpleNamespace(fit="logs", excitation=EXCITATION)
+    return cases._Trial(dataset, built_fit(1.0, 0.5, axis), floor)
 
 
 @pytest.mark.parametrize(
@@ -81,74 +86,63 @@ def test_a_machine_is_logged_three_times_and_the_last_is_held_out(monkeypatch):
 def test_an_effect_must_show_and_the_mass_is_held_where_it_would_hide(
     monkeypatch, hidden, visible, held, shown
 ):
-    trial, forces = SimpleNamespace(fit="logs", excitation="seen"), []
+    """The strength is that of what the machine's own laws leave, not of the product's floor."""
+    weighed = []
+    monkeypatch.setattr(cases._Trial, "of", lambda drawn, seed: trial_of(drawn.model.axes["x"]))
+    monkeypatch.setattr(
+        cases, "_scaled", lambda effect, values, *_: Fitted.at_start(effect, values)
+    )
+    monkeypatch.setattr(cases, "hidden_part", lambda *_: hidden)
+    monkeypatch.setattr(cases, "visible_force", lambda *_: visible * 5.0 * 0.02)
 
-    def simulate(true, run, seed, duration, simulator):
-        assert (run, seed, duration, simulator) == ("tracking", 7, 12.0, ReducedSimulator)
+    def fit(axis, logs):
+        weighed.append(axis.mass)
+        return built_fit(1.0, 0.5, axis)
 
-    def drawn(effect, axis, logs, excitation, force, rng, beside=None):
-        assert (logs, excitation) == ("logs", "seen")
-        forces.append((force, beside and beside.axis.mass_fixed))
-        return Fitted.at_start(effect)
-
-    monkeypatch.setattr(cases, "simulate", simulate)
-
-    def studied(stage, logs, held):
-        assert (list(stage.axes), list(logs), held) == (["x"], ["trial"], {})
-        return {"x": trial}
-
-    def seen(fitted, base, dataset):
-        assert (fitted.effect.name, dataset, base.floor) == ("wear", trial, 0.02)
-        return visible * 5.0 * 0.02
-
-    monkeypatch.setattr(cases, "datasets", studied)
-    monkeypatch.setattr(cases, "fit_axis", lambda axis, logs: built_fit(1.0, 0.02, axis))
-    monkeypatch.setattr(cases, "draw_effect", drawn)
-    monkeypatch.setattr(cases, "hidden_part", lambda fitted, base, dataset: hidden)
-    monkeypatch.setattr(cases, "visible_force", seen)
+    monkeypatch.setattr(cases, "fit_axis", fit)
+    true = STAGE.with_axis("x", replace(STAGE.axes["x"], mass=5.7))
 
     def plant():
         rng = np.random.default_rng(1)
-        return cases._with_planted(STAGE, CATALOGUE["wear"], 5.0, 7, rng)
+        return cases._with_planted(Drawn(STAGE, true), CATALOGUE["wear"], 5.0, 7, rng)
 
     if not shown:
         with pytest.raises(NotShown):
             plant()
         return
-    true, planted = plant()
+    drawn, planted = plant()
     assert planted.effect.name == "wear"
-    assert true.axes["x"].names == ("lugre", "wear")
-    assert true.axes["x"].mass_fixed is held
-    assert forces == [(0.02, None), (pytest.approx(0.1), held)]
+    assert drawn.true.axes["x"].names == ("lugre", "wear")
+    assert drawn.model.axes["x"].mass_fixed is held
+    assert weighed == ([5.7] if held else [])
 
 
 @pytest.mark.parametrize(("level", "shown"), [(1.0, True), (0.1, False)])
 def test_a_friction_is_scaled_until_the_model_falls_short_by_the_strength(
     monkeypatch, level, shown
 ):
-    """The error of the model is in proportion to the dry level, or stays short of what is asked."""
-    floor = 0.01
-    monkeypatch.setattr(cases, "simulate", lambda true, *a, **k: true)
-    monkeypatch.setattr(
-        cases, "datasets", lambda model, logs, held: {"x": SimpleNamespace(fit=logs["trial"])}
-    )
-    monkeypatch.setattr(cases, "floor_of", lambda axis, logs: floor)
+    """Its error grows with the dry level; what the right friction leaves too does not count."""
+    floor, other = 0.01, 0.03  # N; other: of the bumps, say
 
-    def fit(axis, true):
-        excess = (level * true.axes["x"]["gms"].values["Fc"]) if shown else 0.05 * floor
-        return built_fit(np.hypot(excess, floor), floor)
+    def trial(drawn, seed):
+        excess = level * drawn.true.axes["x"].effects[-1].values["Fc"] if shown else 0.05 * floor
+        base = built_fit(float(np.hypot(excess, other)), floor, drawn.model.axes["x"])
+        return cases._Trial(SimpleNamespace(fit="logs", excitation=EXCITATION), base, floor)
 
-    monkeypatch.setattr(cases, "fit_axis", fit)
-    model = STAGE.with_axis("x", PLAIN)
+    monkeypatch.setattr(cases._Trial, "of", trial)
+    monkeypatch.setattr(cases, "fit_axis", lambda axis, logs: built_fit(other, floor, axis))
     rng = np.random.default_rng(2)
+    drawn = Drawn(STAGE, STAGE, reshaped=frozenset({"lugre"}))
     if not shown:
         with pytest.raises(NotShown):
-            cases._with_friction(STAGE, model, CATALOGUE["gms"], 5.0, 1, rng)
+            cases._with_friction(drawn, CATALOGUE["gms"], 5.0, 1, rng)
         return
-    true, found = cases._with_friction(STAGE, model, CATALOGUE["gms"], 5.0, 1, rng)
-    assert found.effect.name == "gms"
-    assert true.axes["x"]["gms"] is found
-    assert level * found.values["Fc"] / floor == pytest.approx(5.0, rel=1e-3)
+    found, planted = cases._with_friction(drawn, CATALOGUE["gms"], 5.0, 1, rng)
+    assert planted.effect.name == "gms"
+    assert found.true.axes["x"]["gms"] is planted
+    assert found.model.axes["x"].names == ("coulomb_viscous",)
+    assert not found.reshaped
+    assert level * planted.values["Fc"] / floor == pytest.approx(5.0, rel=1e-3)
 
 
 # --- the demonstration ----------------------------------------------------------------------

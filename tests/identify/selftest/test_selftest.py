@@ -1,4 +1,6 @@
-"""The self-test in small: what is planted is named, and the tally counts what it should."""
+"""The self-test in small: what is planted is named, and a machine can be made again."""
+
+from __future__ import annotations
 
 import json
 from dataclasses import replace
@@ -7,19 +9,11 @@ import pytest
 
 from identify.cli import main
 from identify.output.plain import plain
-from identify.output.selftest import selftest_json
-from identify.selftest import (
-    Case,
-    Design,
-    TrialResult,
-    confusion,
-    coverage,
-    draw,
-    rates,
-    run_all,
-)
+from identify.output.selftest import selftest_json, selftest_text
+from identify.selection.findings import FindingKind
+from identify.selftest import Case, TrialResult, draw, draw_reliability, run_all
 from identify.selftest.design import plantable
-from identify.selftest.trial import FLOOR, STAGE, run
+from identify.selftest.trial import STAGE, Answer, Held, run
 from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model
 
@@ -27,33 +21,18 @@ SLOW = pytest.mark.slow
 
 
 @SLOW  # tests/test_hidden_effects.py hides one
-@pytest.mark.parametrize(
-    "case",
-    [
-        Case(("cogging",), 5.0, 1),
-        Case(("thermal_drift",), 2.0, 2),
-        Case(("asymmetric_friction", "axis_coupling"), 5.0, 3),
-        # Delays that tie but for the last digits; a play whose basin is narrow; end stops that a
-        # cogging stands in for until the rest is known; rounding that is a tone at constant speed.
-        Case(("actuator_lag", "asymmetric_friction"), 5.0, 34),
-        Case(("axis_coupling", "backlash"), 5.0, 10),
-        Case(("asymmetric_friction", "end_stop"), 5.0, 44),
-        Case(("encoder_quantization", "end_stop"), 5.0, 42),
-    ],
-    ids=lambda c: "+".join(c.effects),
-)
-def test_what_is_planted_is_named(case):
-    found = run(case)
-    assert found.right
-    assert found.left < 1.3 < found.ratio
+@pytest.mark.parametrize("effect", ["cogging", "thermal_drift", "asymmetric_friction"])
+def test_what_is_planted_is_named_on_most_machines(effect):
+    """At 95 % right, fewer than four of five are one case in 50."""
+    assert sum(run(Case((effect,), 5.0, seed)).right for seed in range(1, 6)) >= 4
 
 
 @SLOW
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
 def test_nothing_planted_nothing_named(seed):
     found = run(Case((), 0.0, seed))
-    assert found.quiet
-    assert found.covered
+    assert not found.answers
+    assert any(h.given for h in found.held)
 
 
 @pytest.fixture
@@ -71,94 +50,55 @@ def small(monkeypatch):
 
 def test_trials_in_small_name_what_is_planted_and_nothing_else(small):
     """One machine of each kind that the self-test counts; many of each are in the long set."""
-    empty = run(Case((), 0.0, 1))
-    assert empty.quiet
-    assert empty.covered
-    # Ten times the floor: far above what a log of 5 s needs, so any seed will do.
-    hidden = run(Case(("cogging",), 10.0, 1))
+    # Twenty times the floor: far above what a log of 5 s needs, so any seed will do.
+    hidden = run(Case(("quadratic_drag",), 20.0, 1))
     assert hidden.right
-    assert hidden.left < FLOOR < 5.0 < hidden.ratio
-    unknown = run(Case(("cogging",), 10.0, 1, known=False))
-    assert unknown.verdict == "UNEXPLAINED"
-    assert unknown.depends_on == "position"
-    assert unknown.honest
-
-
-@SLOW
-@pytest.mark.parametrize(
-    ("effect", "seed", "coordinate"),
-    [("cogging", 1002, "position"), ("quadratic_drag", 1, "velocity")],
-)
-def test_an_effect_taken_out_of_the_catalogue_is_unexplained(effect, seed, coordinate):
-    found = run(Case((effect,), 5.0, seed, known=False))
-    assert found.verdict == "UNEXPLAINED"
-    assert found.depends_on == coordinate
-    assert found.honest
+    assert hidden.left < 1.3 < 5.0 < hidden.ratio
+    assert hidden.tested > 0.8  # noise is left on any log
+    assert hidden.held
+    unknown = run(Case(("quadratic_drag",), 20.0, 1, known=False))
+    assert not unknown.named
 
 
 def test_a_design_plants_every_physical_effect_the_stage_lacks():
     catalogue = load_catalogue()
-    names = plantable(catalogue)
     own = load_model(STAGE, catalogue).axes["x"].names
     described = [n for n, e in catalogue.items() if e.is_nonparametric]
-    assert sorted([*names, *own, *described]) == list(catalogue)
-    cases = Design(strengths=(2.0, 5.0), each=2, empty=3, pairs=4, left_out=1).cases(1)
-    assert len(cases) == 3 + 2 * 2 * len(names) + 4 + len(names)
-    assert len(set(cases)) == len(cases)
+    assert sorted([*plantable(catalogue), *own, *described]) == list(catalogue)
 
 
-# --- the tally, on invented outcomes --------------------------------------------------------
+# --- what is shown, of invented outcomes ------------------------------------------------------
 
-NAMED = TrialResult(Case(("a",), 5.0, 1), "MISSING_EFFECT", (("a",),), ratio=5.0, left=1.0)
-TIED = replace(NAMED, verdict="AMBIGUOUS", answers=(("b", "a"),))
-WRONG = replace(NAMED, answers=(("b",),))
-MISSED = replace(NAMED, verdict="UNEXPLAINED", answers=())
-ALARM = TrialResult(Case((), 0.0, 1), "MISSING_EFFECT", (("b",),), covered=(("mass", False),))
-QUIET = TrialResult(Case((), 0.0, 2), "NOTHING_MISSING", covered=(("mass", True),))
-LOST = TrialResult(
-    Case(("a",), 5.0, 1, known=False), "UNEXPLAINED", left=5.0, depends_on="time",
-    coordinates=("position",),
-)  # fmt: skip
+SURE = Answer(("a",), FindingKind.MISSING, True, 1.0, True, 0.95)
+NAMED = TrialResult(Case(("a",), 5.0, 1), "MISSING_EFFECT", (SURE,), ratio=5.0, left=1.0)
+WRONG = replace(NAMED, answers=(replace(SURE, names=("b",), right=False, confidence=0.55),))
+QUIET = TrialResult(Case((), 0.0, 2), "NOTHING_MISSING", held=(Held("mass", 0.3, True),))
+EVERY = [NAMED, WRONG, QUIET]
 
 
-def counts(outcomes):
-    return {r.what.split(",")[0]: (r.count, r.trials) for r in rates(outcomes)}
+def test_the_text_tells_the_seed_the_strata_confidence_and_what_failed():
+    text = selftest_text(EVERY, 17)
+    lines = [line.strip() for line in text.splitlines()]
+    assert lines[0] == "seed 17, 3 machines"
+    assert "plain, named at 5: 1 of 2 (50 %; 1 to 99 % by chance)" in lines
+    assert any(line.startswith("confidence: stated 95 % on average, right 90 to") for line in lines)
+    assert lines[-1] == "wrong: twin selftest --case a@5/plain/1: b (55 %)"
 
 
-def test_right_ambiguous_wrong_and_missed_are_told_apart():
-    assert [o.right for o in (NAMED, TIED, WRONG, MISSED)] == [True, True, False, False]
-    found = counts([NAMED, TIED, WRONG, MISSED])
-    assert found["named or in a declared ambiguity"] == (2, 4)
-    assert found["wrong names given with confidence"] == (1, 4)
+def test_the_json_holds_every_trial():
+    found = json.loads(json.dumps(plain(selftest_json(EVERY, 17))))
+    assert found["seed"] == 17
+    assert [t["case"] for t in found["trials"]] == [str(o.case) for o in EVERY]
+    assert found["trials"][1]["answers"][0]["names"] == ["b"]
+    assert [(t["stated"], t["count"], t["trials"]) for t in found["reliability"]] == [
+        (0.55, 0, 1), (0.95, 1, 1),
+    ]  # fmt: skip
 
 
-def test_false_alarms_and_coverage_are_counted():
-    assert counts([ALARM, QUIET])["false alarms"] == (1, 2)
-    assert coverage([ALARM, QUIET])["mass"].value == 0.5
-
-
-def test_an_unexplained_effect_needs_its_own_coordinate_or_the_floor():
-    assert not LOST.honest
-    assert replace(LOST, depends_on="position").honest
-    assert not replace(LOST, verdict="MISSING_EFFECT", answers=(("b",),), left=1.5).honest
-    assert replace(LOST, verdict="MISSING_EFFECT", answers=(("b",),), left=1.1).honest
-
-
-def test_one_of_two_named_is_not_enough():
-    both = replace(NAMED, case=Case(("a", "b"), 5.0, 1))
-    assert not both.right
-    assert replace(both, answers=(("b",), ("c", "a"))).right
-    assert not replace(both, answers=(("a", "b"), ("c",))).right
-    assert not replace(both, answers=(("a",), ("b",), ("c",))).right
-
-
-def test_the_picture_shows_every_answer(tmp_path):
-    table = confusion([NAMED, TIED, WRONG, MISSED, ALARM, QUIET])
-    assert table["a"] == {"a": 0.25, "ambiguous with it": 0.25, "b": 0.25, "unexplained": 0.25}
-    assert table["nothing"] == {"b": 0.5, "nothing": 0.5}
-    draw([NAMED, TIED, WRONG, MISSED, ALARM, QUIET], tmp_path / "matrix.svg")
-    text = (tmp_path / "matrix.svg").read_text(encoding="utf-8")
-    assert "<svg" in text
+@pytest.mark.parametrize("drawing", [draw, draw_reliability])
+def test_the_pictures_are_drawn(tmp_path, drawing):
+    drawing(EVERY, tmp_path / "picture.svg")
+    assert "<svg" in (tmp_path / "picture.svg").read_text(encoding="utf-8")
 
 
 def test_a_failing_machine_is_named():
@@ -166,21 +106,20 @@ def test_a_failing_machine_is_named():
         run_all([Case(("no such effect",), 5.0, 1)], workers=1)
 
 
-def test_bad_input_is_one_line(tmp_path, capsys, monkeypatch):
-    for given, said in (
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
         (["--only", "coging"], "did you mean 'cogging'?"),
-        (["-o", str(tmp_path / "no" / "m.png")], "folder does not exist"),
-    ):
-        monkeypatch.setattr("sys.argv", ["twin", "selftest", *given])
-        with pytest.raises(SystemExit) as stopped:
-            main()
-        assert stopped.value.code == 2
-        error = capsys.readouterr().err
-        assert said in error
-        assert error.count("\n") == 1
-
-
-def test_the_json_holds_every_trial():
-
-    text = json.dumps(plain(selftest_json([NAMED, QUIET])))
-    assert len(json.loads(text)["trials"]) == 2
+        (["-o", "no/m.png"], "folder does not exist"),
+        (["--reliability", "no/m.png"], "folder does not exist"),
+        (["--case", "cogging"], "give EFFECT@STRENGTH/VARIATION/SEED"),
+    ],
+)
+def test_bad_input_is_one_line(given, said, capsys, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["twin", "selftest", *given])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert stopped.value.code == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1

@@ -1,0 +1,19 @@
+"""Drag in proportion to the cube of the speed: F = -c v^3."""
+
+from twin.effect import OUT, Effect, Kind, Parameter, V
+
+
+def law(p, s, io):
+    io[OUT] = -p[0] * io[V] * io[V] * io[V]
+
+
+EFFECT = Effect(
+    kind=Kind.FORCE,
+    summary="drag in proportion to the cube of the speed",
+    equation="F = -c v^3",
+    source="this project's choice",
+    parameters=(Parameter("c", "N s^3/m^3", 0.0, 0.0, 1e6, "drag", strength=True),),
+    law=law,
+    fingerprint="none",
+    excited_by="any motion",
+)

@@ -1,0 +1,114 @@
+"""How a machine departs from the laws of its model, and how its logs from good ones.
+
+One variation changes one thing, so that a self-test shows where a diagnosis fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identify.dataset.drive import is_noise
+from identify.selftest.drawing import other_exponents
+from identify.selftest.laws import BUMPS, CABLES, NOISE
+from twin.effect import Effect, Kind
+from twin.effects import load_catalogue
+from twin.model.machine import AxisModel, Fitted, MachineModel
+
+FOLD = (0.7, 1.4)  # of the start of the travel over which the stiffness of a cable changes
+MASS_OFF = 0.1  # of the model's
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A model and the machine that it is a model of, so far.
+
+    reshaped: effects of the model whose law is not the machine's. right: further effects that it
+    would be right to name.
+    """
+
+    model: MachineModel
+    true: MachineModel
+    reshaped: frozenset[str] = frozenset()
+    right: frozenset[str] = frozenset()
+
+    def on(self, axis: str, change: Callable[[AxisModel], AxisModel]) -> Drawn:
+        """The same with one axis of the machine changed."""
+        return replace(self, true=self.true.with_axis(axis, change(self.true.axes[axis])))
+
+
+Variation = Callable[[Drawn, str, np.random.Generator], Drawn]
+
+
+def plain(drawn: Drawn, axis: str, rng: np.random.Generator) -> Drawn:
+    """The laws of the model; other values."""
+    return drawn
+
+
+def bumps(drawn: Drawn, axis: str, rng: np.random.Generator) -> Drawn:
+    """Bumps of another form."""
+    return _in_place(drawn, axis, BUMPS[rng.integers(len(BUMPS))], {})
+
+
+def cable(drawn: Drawn, axis: str, rng: np.random.Generator) -> Drawn:
+    """A cable that is no cubic."""
+    form = CABLES[rng.integers(len(CABLES))]
+    fold = form.parameter("fold").start * float(rng.uniform(*FOLD))
+    return _in_place(drawn, axis, form, {"fold": fold})
+
+
+def exponent(drawn: Drawn, axis: str, rng: np.random.Generator) -> Drawn:
+    """A friction with another Stribeck exponent than the model holds."""
+    old = next(f for f in drawn.true.axes[axis].effects if f.effect.kind is Kind.FRICTION)
+    out = drawn.on(axis, lambda a: a.with_effect(other_exponents(old, rng)))
+    return replace(out, reshaped=out.reshaped | {old.effect.name})
+
+
+def coloured(drawn: Drawn, axis: str, rng: np.random.Generator) -> Drawn:
+    """Force noise of 2 to 10 mN with a memory of 3 to 50 ms."""
+    values = {"size": rng.uniform(2e-3, 10e-3), "memory": 3e-3 * (50 / 3) ** rng.uniform()}
+    noise = Fitted.at_start(NOISE, {k: float(v) for k, v in values.items()})
+    return drawn.on(axis, lambda a: a.with_effect(noise))
+
+
+def encoder(drawn: Drawn, axis: str, rng: np.random.Generator) -> Drawn:
+    """An encoder of 3 to 300 nm with noise of 1 to 30 nm, both known to the model."""
+    step, noise = float(3e-9 * 100.0 ** rng.uniform()), float(1e-9 * 30.0 ** rng.uniform())
+
+    def of(machine: MachineModel) -> MachineModel:
+        a = machine.axes[axis]
+        hardware = replace(a.hardware, encoder_resolution=step, encoder_noise=noise)
+        return machine.with_axis(axis, replace(a, hardware=hardware))
+
+    rounding = {e.name for e in load_catalogue().values() if is_noise(e)}
+    return replace(drawn, model=of(drawn.model), true=of(drawn.true), right=drawn.right | rounding)
+
+
+def rate(drawn: Drawn, axis: str, rng: np.random.Generator) -> Drawn:
+    """Logs and control at 1 to 8 kHz."""
+    chosen = float(rng.choice([1e3, 2e3, 2.5e3, 4e3, 5e3, 8e3]))
+    model, true = (replace(m, sample_rate=chosen) for m in (drawn.model, drawn.true))
+    return replace(drawn, model=model, true=true)
+
+
+def everything(drawn: Drawn, axis: str, rng: np.random.Generator) -> Drawn:
+    """All of them at once."""
+    for one in (rate, encoder, bumps, cable, exponent, coloured):
+        drawn = one(drawn, axis, rng)
+    return drawn
+
+
+VARIATIONS: Mapping[str, Variation] = {
+    f.__name__: f for f in (plain, bumps, cable, exponent, coloured, encoder, rate, everything)
+}
+
+
+def _in_place(drawn: Drawn, axis: str, form: Effect, own: Mapping[str, float]) -> Drawn:
+    """The machine with a form in place of the effect that assumes the same kind of curve."""
+    old = next(f for f in drawn.true.axes[axis].effects if f.effect.curve == form.curve)
+    known = {**old.values, **own}
+    new = Fitted.at_start(form, {p.name: known[p.name] for p in form.parameters if p.name in known})
+    out = drawn.on(axis, lambda a: a.without(old.effect.name).with_effect(new))
+    return replace(out, reshaped=out.reshaped | {old.effect.name})
