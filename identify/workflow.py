@@ -10,7 +10,7 @@ import numpy as np
 from identify.dataset.dataset import Dataset, by_log, datasets
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.channel_delay import aligned, fit_aligned
-from identify.estimation.fit import Fit, holdout_error
+from identify.estimation.fit import Fit, holdout_error, unfitted
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.experiment_design.plan import Plan, next_experiment, plan
@@ -22,6 +22,7 @@ from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
+from identify.selection.unpredictable import with_own_noise
 from identify.thesis.study import Reproduction
 from identify.thesis.study import reproduce as study
 from identify.validation.agreement import Agreement, agreement
@@ -62,7 +63,8 @@ def fit(
     fits: dict[str, Fit] = {}
     for i, (axis, dataset) in enumerate(list(found.items())):
         require_residual(model.axes[axis], dataset)
-        found[axis], fits[axis] = fit_aligned(model.axes[axis], dataset)
+        dataset, fitted = fit_aligned(model.axes[axis], dataset)
+        found[axis], fits[axis] = with_own_noise(fitted, dataset)
         require_residual(fits[axis].axis, found[axis])
         progress("fitting", i + 1, len(found))
     held = {a: holdout_error(f, found[a]) for a, f in fits.items()}
@@ -105,7 +107,10 @@ def compare(
     found = datasets(model, logs, {}, test_function)
     for axis, dataset in found.items():
         require_residual(model.axes[axis], dataset)
-    found = {axis: aligned(model.axes[axis], dataset) for axis, dataset in found.items()}
+    for axis, given in model.axes.items():
+        if axis in found:
+            dataset = aligned(given, found[axis])
+            found[axis] = with_own_noise(unfitted(given, dataset.fit), dataset)[0]
     return _compared(model, found, progress)
 
 

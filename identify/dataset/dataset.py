@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 
 import numpy as np
@@ -73,6 +73,19 @@ class Dataset:
         """Which test functions of the fit logs are in their heads."""
         pairs = zip(self.heads, self.fit, strict=True)
         return np.concatenate([np.arange(len(w)) < len(h) for h, w in pairs])
+
+    @property
+    def force_noise(self) -> float:
+        """N RMS by test functions, of force noise that no sensor makes."""
+        return max(log.force_noise for log in self.fit)
+
+    def with_force_noise(self, size: float) -> Dataset:
+        """The same with force noise that no sensor makes, N RMS by test functions, in all logs."""
+        fit, holdout = (
+            tuple(replace(log, force_noise=size) for log in logs)
+            for logs in (self.fit, self.holdout)
+        )
+        return replace(self, fit=fit, holdout=holdout)
 
     @property
     def units(self) -> AxisUnits:

@@ -58,7 +58,9 @@ class Noise:
 
 def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     """RMS noise floor in N of the force residual of these logs."""
-    return noise_floor(axis, [(log.motion, log.test_function) for log in logs])
+    own = [log.force_noise for log in logs]
+    sensors = noise_floor(axis, [(log.motion, log.test_function) for log in logs])
+    return float(np.hypot(sensors, np.sqrt(np.mean(np.square(own)))))
 
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:

@@ -25,7 +25,8 @@ class PreparedLog:
     """One log's motion of an axis with its weak form.
 
     test_function, fine: over the motion's blocks, and the same over the log's samples. command (n,)
-    N and acceleration (n,) m/s^2 are means by test functions.
+    N and acceleration (n,) m/s^2 are means by test functions. force_noise: N RMS by test functions,
+    which sensors do not make and nothing predicts; part of the noise floor.
     """
 
     motion: Motion
@@ -33,6 +34,7 @@ class PreparedLog:
     fine: TestFunction
     command: Array
     acceleration: Array
+    force_noise: float = 0.0
 
     def __repr__(self) -> str:
         return (

@@ -19,6 +19,9 @@ class DecisionRule:
     Factors, JASA 90 (1995). no_evidence: "not worth more than a bare mention", same source.
     least_t: gain on the held-out logs over its standard error across blocks.
 
+    fewest_cycles: over the travel, of a force that is said to repeat along the track; fewer are any
+    smooth force of position.
+
     beyond_doubt: evidence required of an effect where the error is already at the noise floor.
     partial_bic: evidence required of an effect after which the residual still depends on something.
     nearly_all: explained part that is sufficient by itself. least_part: explained part required
@@ -41,6 +44,9 @@ class DecisionRule:
     of the share of time from which another coordinate is preferred. left_over: part of a dependence
     that may remain after an effect that explains it.
 
+    foretold: part of the squared test error that a curve over a coordinate, or the past, must take
+    for what is left of a force to be more than noise.
+
     line_chance: false-alarm probability below which a spectral line counts. line_share: part of the
     squared residual from which it is the period of a dependence.
 
@@ -52,6 +58,7 @@ class DecisionRule:
     least_bic: float = 10.0
     no_evidence: float = 2.0
     least_t: float = 3.0
+    fewest_cycles: float = 2.5
 
     beyond_doubt: float = 100.0
     partial_bic: float = 50.0
@@ -77,6 +84,8 @@ class DecisionRule:
     least_share: float = 0.1
     rather: float = 0.8
     left_over: float = 0.5
+
+    foretold: float = 0.05
 
     line_chance: float = 1e-3
     line_share: float = 0.2

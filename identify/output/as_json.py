@@ -39,6 +39,7 @@ def fit_json(result: FitResult) -> dict[str, Any]:
                 "force_shift": result.datasets[axis].channel_delay,
                 "force_shift_unit": "s",
                 "left_out": list(result.left_out[axis]),
+                "force_noise": result.datasets[axis].force_noise,
                 "beginnings_left_out": dict(result.datasets[axis].begun),
                 "beginnings_left_out_unit": "s",
                 "parameters": {e.label: _estimate(e) for e in result.estimates[axis]},

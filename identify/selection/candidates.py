@@ -58,11 +58,29 @@ class Candidate:
 
     @property
     def supported(self) -> bool:
-        """Whether both the evidence and the held-out logs support the effect."""
+        """Whether both the evidence and the held-out logs support the effect, and it repeats."""
         return (
-            self.delta_bic > RULE.least_bic and self.gain.t > RULE.least_t
+            self.delta_bic > RULE.least_bic and self.gain.t > RULE.least_t and self.repeats
             and (self.is_noise or self.gain.after < self.gain.before)
         )  # fmt: skip
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the axis travels far enough for what repeats along the track to be seen to.
+
+        One cycle over all of the travel is any smooth force of position.
+        """
+        if self.effect.name not in self.fit.axis.names:
+            return True
+        values = self.fit.axis[self.effect.name].values
+        periods = [values[p.name] for p in self.effect.parameters if p.period]
+        if not periods:
+            return True
+        low, high = zip(
+            *((m.position.min(), m.position.max()) for m in (log.motion for log in self.fit.logs)),
+            strict=True,
+        )
+        return bool(max(high) - min(low) > RULE.fewest_cycles * max(periods))
 
     @property
     def is_noise(self) -> bool:

@@ -90,6 +90,10 @@ class Trial:
         held = _Part.of(base, dataset.holdout) if dataset.holdout else None
         return cls(_Part.of(base, dataset.fit), held)
 
+    def of_power(self) -> Trial:
+        """The same of the residual's square beside a constant, which of steady noise is all."""
+        return Trial(self.fit.of_power(), self.held and self.held.of_power())
+
     def proof(
         self, columns: Columns, *, sticking: bool, ridge: float = RIDGE, decoys: int = DECOYS
     ) -> Proof:
@@ -129,6 +133,10 @@ class _Part:
         force = residual(base.axis, logs)
         own = jacobian(base.axis, logs, base.scaling.where)
         return cls(logs, force, own, np.ones(len(force), dtype=bool))
+
+    def of_power(self) -> _Part:
+        """The same with the residual's square (n,) N^2 beside a constant."""
+        return replace(self, force=self.force**2, base=np.ones((len(self.force), 1)))
 
     def with_columns(self, columns: Columns, sticking: bool) -> _Part:
         """The same with columns to try; sticking: without test functions with standstill."""

@@ -9,7 +9,7 @@ from functools import partial
 from identify.dataset.dataset import Dataset
 from identify.estimation.channel_delay import moved_by
 from identify.estimation.decision import RULE
-from identify.estimation.fit import Fit, fit_axis
+from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.time_origin import synchronised
 from identify.estimation.variable_projection import fit_thoroughly
 from identify.selection.candidates import Candidate, score
@@ -18,6 +18,7 @@ from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, Ve
 from identify.selection.pair_search import held_at_floor, search_pairs
 from identify.selection.ranking import Progress, less, rank, tie, took_friction
 from identify.selection.residual_dependence import explains, find_dependence
+from identify.selection.unpredictable import is_unpredictable, with_own_noise
 from twin.effect import Kind
 from twin.effects import Catalogue
 
@@ -35,6 +36,9 @@ def diagnose_axis(
     workers: threads; one a core where None. shifts: how often the diagnosis may still start again
     because an added effect changes the channel delay.
     """
+    if any(log.force_noise for log in dataset.fit):  # an effect may explain it yet
+        dataset = dataset.with_force_noise(0.0)
+        base = finished(base.axis, base.begun, dataset.fit, base.outcome)
     ranked = partial(rank, catalogue=catalogue, progress=progress, workers=workers)
     base, ranking = ranked(base, dataset)
     steps: list[Step] = []
@@ -53,7 +57,19 @@ def diagnose_axis(
         dataset, final = synchronised(final, dataset)
         final, found = ranked(final, dataset)
         states[-1] = replace(states[-1], fit=final)
+    dataset, states = _with_own_noise(dataset, states)
     return _decided(dataset, ranking, states)
+
+
+def _with_own_noise(
+    dataset: Dataset, states: list[SelectionState]
+) -> tuple[Dataset, list[SelectionState]]:
+    """Dataset and states with what is left at the end as noise, where nothing predicts it."""
+    noisy, _ = with_own_noise(states[-1].fit, dataset)
+    if noisy is dataset:
+        return dataset, states
+    fits = [finished(s.fit.axis, s.fit.begun, noisy.fit, s.fit.outcome) for s in states]
+    return noisy, [replace(s, fit=f) for s, f in zip(states, fits, strict=True)]
 
 
 def _next(
@@ -68,7 +84,7 @@ def _next(
         near = tuple(c for c in ranking[1:] if c.supported and _near(best, c))
         tied = tuple(c.effect.name for c in near if tie(dataset, best, c))
         return [Step(best, tied or _friction_instead(base, best, ranking), rivals=near)]
-    if base.at_floor or held_at_floor(base, dataset):
+    if base.at_floor or held_at_floor(base, dataset) or is_unpredictable(base, dataset):
         return []
     pairs = search_pairs(base, dataset, ranking, ranked)
     if not pairs:

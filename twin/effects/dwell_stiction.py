@@ -30,7 +30,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("growth", "1", 0.0, 0.0, 200.0, "growth after a long rest", strength=True),
         Parameter(
-            "time", "s", 1.0, 1e-3, 1e5, "rest after which half of it is there",
+            "time", "s", 1.0, 0.02, 1e5, "rest after which half of it is there",
             scan=lambda e: (0.1, 1.0, 10.0),
         ),
         Parameter(

@@ -54,8 +54,15 @@ def no_interval_in_words(reason: NoInterval) -> str:
 def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
     """What was done to the logs before they were fitted, that a reader should know."""
     shifted, words = channel_delay_in_words(dataset), dataset.units.words
+    own = dataset.force_noise
+    noise = (
+        f"axis {dataset.axis}: the noise floor holds {own:.4g} {dataset.units.force} of "
+        f"{words('force')} that nothing measured foretells, beside what sensors make: noise of the "
+        "drive or of what surrounds it"
+    )
     return (
         *((shifted,) if shifted else ()),
+        *((noise,) if own else ()),
         *(
             f"{log}: the first {end:.2g} s of axis {dataset.axis} are left out, as its "
             f"{words('force')} there fits nothing that follows: the axis did not yet move freely. "

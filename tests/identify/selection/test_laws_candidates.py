@@ -70,7 +70,9 @@ def test_absent_are_all_effects_but_those_there_and_descriptions():
     found = {e.name for e in absent_effects(bare, CATALOGUE)}
     assert found == set(CATALOGUE) - modifiers - described
     sliding = replace(PLAIN, effects=(fitted("cogging"),))
-    assert {e.name for e in absent_effects(sliding, CATALOGUE)} == found - {"cogging"} | {"cogging_2"}
+    assert {e.name for e in absent_effects(sliding, CATALOGUE)} == found - {"cogging"} | {
+        "cogging_2"
+    }
     assert modifiers <= {e.name for e in absent_effects(PLAIN, CATALOGUE)}
 
 
