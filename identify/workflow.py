@@ -10,7 +10,7 @@ import numpy as np
 from identify.dataset.dataset import Dataset, by_log, datasets
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.channel_delay import aligned, fit_aligned
-from identify.estimation.fit import Fit, holdout_error, unfitted
+from identify.estimation.fit import Fit, holdout_error
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.experiment_design.plan import Plan, next_experiment, plan
@@ -22,7 +22,7 @@ from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
-from identify.selection.unpredictable import with_own_noise
+from identify.selection.unpredictable import noise_known, with_own_noise
 from identify.thesis.study import Reproduction
 from identify.thesis.study import reproduce as study
 from identify.validation.agreement import Agreement, agreement
@@ -107,10 +107,8 @@ def compare(
     found = datasets(model, logs, {}, test_function)
     for axis, dataset in found.items():
         require_residual(model.axes[axis], dataset)
-    for axis, given in model.axes.items():
-        if axis in found:
-            dataset = aligned(given, found[axis])
-            found[axis] = with_own_noise(unfitted(given, dataset.fit), dataset)[0]
+    given = model.axes
+    found = {axis: noise_known(given[axis], aligned(given[axis], d)) for axis, d in found.items()}
     return _compared(model, found, progress)
 
 

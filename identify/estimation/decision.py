@@ -58,7 +58,7 @@ class DecisionRule:
     least_bic: float = 10.0
     no_evidence: float = 2.0
     least_t: float = 3.0
-    fewest_cycles: float = 2.5
+    fewest_cycles: float = 1.9
 
     beyond_doubt: float = 100.0
     partial_bic: float = 50.0

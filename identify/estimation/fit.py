@@ -290,11 +290,6 @@ def finished(
     )
 
 
-def unfitted(axis: AxisModel, logs: Sequence[PreparedLog]) -> Fit:
-    """The axis as it is given, as the fit that it would be."""
-    return finished(axis, axis, logs, Outcome.CONVERGED)
-
-
 def holdout_error(fit: Fit, dataset: Dataset) -> float | None:
     """RMS force error on the held-out logs in N, or None where there are none."""
     return rms(error_on(fit.axis, dataset.holdout)) if dataset.holdout else None

@@ -40,13 +40,18 @@ RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion doe
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidate:
-    """A model with one effect more: its refit, evidence and held-out gain."""
+    """A model with one effect more: its refit, evidence and held-out gain.
+
+    repeats: whether the axis travels far enough for what repeats along the track to be seen to; one
+    cycle over all of the travel is any smooth force of position.
+    """
 
     effect: Effect
     axis: str
     fit: Fit
     evidence: Evidence
     gain: Gain
+    repeats: bool = True
 
     def __repr__(self) -> str:
         return f"<Candidate {self.effect.name} on {self.axis}: evidence {self.delta_bic:.4g}>"
@@ -63,24 +68,6 @@ class Candidate:
             self.delta_bic > RULE.least_bic and self.gain.t > RULE.least_t and self.repeats
             and (self.is_noise or self.gain.after < self.gain.before)
         )  # fmt: skip
-
-    @property
-    def repeats(self) -> bool:
-        """Whether the axis travels far enough for what repeats along the track to be seen to.
-
-        One cycle over all of the travel is any smooth force of position.
-        """
-        if self.effect.name not in self.fit.axis.names:
-            return True
-        values = self.fit.axis[self.effect.name].values
-        periods = [values[p.name] for p in self.effect.parameters if p.period]
-        if not periods:
-            return True
-        low, high = zip(
-            *((m.position.min(), m.position.max()) for m in (log.motion for log in self.fit.logs)),
-            strict=True,
-        )
-        return bool(max(high) - min(low) > RULE.fewest_cycles * max(periods))
 
     @property
     def is_noise(self) -> bool:
@@ -239,7 +226,18 @@ def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
         fit=fit,
         evidence=proof,
         gain=held_out_gain(pair[0], pair[1], base.floor),
+        repeats=_repeats(fit, effect),
     )
+
+
+def _repeats(fit: Fit, effect: Effect) -> bool:
+    """Whether the logs travel over enough periods of what the effect repeats along the track."""
+    found = [f for f in fit.axis.effects if f.effect.name == effect.name]
+    periods = [f.values[p.name] for f in found for p in effect.parameters if p.period]
+    if not periods:
+        return True
+    travel = np.ptp(np.concatenate([log.motion.position for log in fit.logs]))
+    return bool(travel > RULE.fewest_cycles * max(periods))
 
 
 def _score_noise(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:

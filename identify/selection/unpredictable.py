@@ -10,15 +10,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.estimation.decision import RULE
-from identify.estimation.fit import Fit, finished
+from identify.estimation.fit import Fit, Outcome, finished, holdout_error
 from identify.selection.decoys import Trial
 from identify.selection.residual_dependence import coordinates_of, find_dependence, gathered
+from twin.model.machine import AxisModel
 from twin.signals import Array
 
 HATS = 16  # over a coordinate
@@ -26,6 +28,7 @@ LAGS = (1, 2, 4, 8, 16, 32, 64)  # test functions, by which what moved before ma
 MOVED = ("velocity", "acceleration", "direction")
 RIDGE = 0.03  # of a column's length, which keeps hats that are seldom visited small
 DECOYS = 20
+ALIKE = 1.5  # times the error of the fit logs that noise may have on the held-out ones
 
 Columns = Callable[[Sequence[PreparedLog]], list[Array]]
 
@@ -39,19 +42,39 @@ def with_own_noise(fit: Fit, dataset: Dataset) -> tuple[Dataset, Fit]:
     return dataset, finished(fit.axis, fit.begun, dataset.fit, fit.outcome)
 
 
+def noise_known(axis: AxisModel, dataset: Dataset) -> Dataset:
+    """The dataset with what an axis, as it is given, leaves as part of the noise, if it is."""
+    return with_own_noise(finished(axis, axis, dataset.fit, Outcome.CONVERGED), dataset)[0]
+
+
 def is_unpredictable(fit: Fit, dataset: Dataset) -> bool:
-    """Whether neither the motion nor its past foretells the residual, and no line stands out."""
+    """Whether neither the motion nor its past foretells the residual, and no line stands out.
+
+    Neither on the held-out logs nor on blocks left out of the fit logs; noise is as large on both.
+    """
+    held = holdout_error(fit, dataset)
+    if held is not None and held > ALIKE * fit.error:
+        return False
     if find_dependence(fit, dataset).period is not None:
         return False
-    force, sticking = Trial.of(fit, dataset), sticks(fit.axis)
-    for trial, columns in itertools.product((force, force.of_power()), _predictors(dataset)):
-        proof = trial.proof(columns, sticking=sticking, ridge=RIDGE, decoys=0)
-        if proof.gain < (RULE.least_share if trial is force else RULE.foretold):
-            continue
-        beside = trial.proof(columns, sticking=sticking, ridge=RIDGE, decoys=DECOYS)
-        if beside.gain > beside.best_decoy:
-            return False
-    return True
+    trial, sticking = Trial.of(fit, dataset), sticks(fit.axis)
+    own = replace(trial, held=None)
+    trials = [(t, RULE.least_share) for t in (trial, own)]
+    trials += [(t.of_power(), RULE.foretold) for t in (trial, own)]
+    predictors = list(_predictors(dataset))
+    return not any(
+        _foretells(t, columns, least, sticking)
+        for (t, least), columns in itertools.product(trials, predictors)
+    )
+
+
+def _foretells(trial: Trial, columns: Columns, least: float, sticking: bool) -> bool:
+    """Whether columns take at least a part of the squared test error, and more than decoys do."""
+    proof = trial.proof(columns, sticking=sticking, ridge=RIDGE, decoys=0)
+    if proof.gain < least:
+        return False
+    proof = trial.proof(columns, sticking=sticking, ridge=RIDGE, decoys=DECOYS)
+    return proof.gain > proof.best_decoy
 
 
 def _predictors(dataset: Dataset) -> Iterator[Columns]:

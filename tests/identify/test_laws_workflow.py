@@ -115,6 +115,7 @@ def handed(monkeypatch):
 
     monkeypatch.setattr(workflow, "datasets", read)
     monkeypatch.setattr(workflow, "fit_aligned", aligned)
+    monkeypatch.setattr(workflow, "with_own_noise", lambda fit, dataset: (dataset, fit))
     monkeypatch.setattr(workflow, "estimates", lambda fit: ("estimates", fit))
     monkeypatch.setattr(workflow, "intervals_to_keep", lambda fit, found: (fit.error, found))
     monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
@@ -152,6 +153,7 @@ def test_a_comparison_is_of_the_axes_that_move(monkeypatch):
         "logs", {}, 0.07) else None)  # fmt: skip
     monkeypatch.setattr(workflow, "require_residual", lambda axis, dataset: None)
     monkeypatch.setattr(workflow, "aligned", lambda axis, dataset: (axis.mass, dataset))
+    monkeypatch.setattr(workflow, "noise_known", lambda axis, dataset: (*dataset, axis.mass + 1))
     asked = []
 
     def errors(model, found, progress):
@@ -165,7 +167,7 @@ def test_a_comparison_is_of_the_axes_that_move(monkeypatch):
     found = workflow.compare(
         made.MODEL, "logs", test_function=0.07, progress=lambda *done: bars.append(done)
     )
-    prepared = (7.9, "dataset y")
+    prepared = (7.9, "dataset y", 8.9)
     assert found.axes == {"y": (made.MODEL, prepared, "errors of y", "floors of y")}
     assert (asked, bars) == ([(made.MODEL, {"y": prepared})], [("comparing", 3, 4)])
     assert found.model is made.MODEL

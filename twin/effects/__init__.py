@@ -12,7 +12,7 @@ import itertools
 import pkgutil
 import re
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -26,7 +26,7 @@ LONGEST_TRIAL = 30.0  # s for loading, trying and compiling a user's file
 class Catalogue(Mapping[str, Effect]):
     """Effects by name, in alphabetical order."""
 
-    def __init__(self, effects: Sequence[Effect]) -> None:
+    def __init__(self, effects: Iterable[Effect]) -> None:
         self._effects = {e.name: e for e in sorted(effects, key=lambda e: e.name)}
 
     def __getitem__(self, name: str) -> Effect:

@@ -66,7 +66,8 @@ def test_a_fit():
         parameters, refit = told.pop("parameters"), told.pop("refit")
         assert told == {
             "outcome": outcome_in_words(fit.ended), "converged": True, "at_bound": [],
-            "left_out": [], "beginnings_left_out": {}, "beginnings_left_out_unit": "s",
+            "left_out": [], "force_noise": 0.0,
+            "beginnings_left_out": {}, "beginnings_left_out_unit": "s",
             "force_error": pytest.approx(fit.error), "noise_floor": fit.floor, "unit": "N",
             "holdout_force_error": result.holdout_error[axis],
             "force_shift": result.datasets[axis].channel_delay, "force_shift_unit": "s",

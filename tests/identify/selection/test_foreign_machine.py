@@ -12,19 +12,20 @@ from foreign_machine import AHEAD, BEHIND, FORCE, drawn, gaussian
 
 from identify.selection.diagnosis import Verdict
 from identify.selection.forward_selection import diagnose_axis
+from twin.effects import Catalogue
 from twin.model.machine import Fitted
 
 SEED = 5
 RATE = 4e3  # Hz
-RIVALS = {
-    name: CATALOGUE[name]
+RIVALS = Catalogue(
+    CATALOGUE[name]
     for name in (
         "actuator_delay", "asymmetric_friction", "base_vibration", "cable_hysteresis", "cogging",
         "load_dependent_friction", "periodic_disturbance", "quadratic_drag", "thermal_drift",
         "wear",
     )
-}  # fmt: skip
-FEW = {name: CATALOGUE[name] for name in ("asymmetric_friction", "cogging", "quadratic_drag")}
+)  # fmt: skip
+FEW = Catalogue([CATALOGUE[n] for n in ("asymmetric_friction", "cogging", "quadratic_drag")])
 QUICK = (4.0, FEW)  # s of each log, and the effects tried
 FULL = (10.0, CATALOGUE)
 
@@ -105,6 +106,6 @@ def test_a_hysteresis_that_leaves_no_dry_friction_may_be_one():
     axis = STAGE.axes["x"]
     friction = Fitted.at_start(CATALOGUE["coulomb_viscous"])
     model = STAGE.with_axis("x", replace(axis, effects=(friction,)))
-    tried = RIVALS | {name: CATALOGUE[name] for name in ("gms", "stribeck")}
+    tried = Catalogue([*RIVALS.values(), CATALOGUE["gms"], CATALOGUE["stribeck"]])
     answer = diagnosed(model, machine, 1, 8.0, tried)
     assert "gms" in answer.answers[0]

@@ -50,12 +50,20 @@ def test_no_pair_is_sought_at_the_floor(monkeypatch, base, held):
     assert _next(base, DATASET, [], None) == []
 
 
+def test_no_pair_is_sought_where_nothing_foretells_what_is_left(monkeypatch):
+    monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: False)
+    monkeypatch.setattr(module, "is_unpredictable", lambda fit, dataset: dataset is DATASET)
+    monkeypatch.setattr(module, "search_pairs", lambda *_: pytest.fail("sought"))
+    assert _next(HIGH, DATASET, [built(t=1.0)], None) == []
+
+
 def test_a_pair_is_added_with_the_others_that_tie_with_it(monkeypatch):
     def pair(first, second, bic):
         return Pair(built(first), built(second), built(second, bic=bic))
 
     pairs = [pair("wear", "cogging", 90.0), pair("wear", "dahl", 80.0), pair("gms", "lugre", 70.0)]
     monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: False)
+    monkeypatch.setattr(module, "is_unpredictable", lambda fit, dataset: False)
     monkeypatch.setattr(module, "search_pairs", lambda *_: pairs)
     monkeypatch.setattr(
         module, "tie", lambda s, a, b: a is pairs[0].together and b is pairs[1].together
@@ -95,6 +103,7 @@ def looped(monkeypatch, errors, *, moved=(), shifts=2):
     monkeypatch.setattr(module, "moved_by", lambda fit, dataset: next(moves, None))
     monkeypatch.setattr(module, "fit_axis", lambda axis, logs: built_fit(6.0, axis=axis))
     monkeypatch.setattr(module, "synchronised", lambda fit, dataset: (dataset, fit))
+    monkeypatch.setattr(module, "with_own_noise", lambda fit, dataset: (dataset, fit))
     diagnose_axis(HIGH, DATASET, Catalogue([]), shifts=shifts)
     return seen, calls
 
@@ -119,7 +128,7 @@ def test_nothing_more_is_sought_where_error_and_floor_agree(monkeypatch, error, 
 
 
 def test_all_begins_anew_after_a_shift_as_often_as_allowed(monkeypatch):
-    other = dataset_stub(fit=("moved",))
+    other = dataset_stub(fit=())
     seen, _ = looped(monkeypatch, [7.0, 6.0, 5.0], moved=[other, other, other])
     assert seen["dataset"] is other
     assert [s.fit.error for s in seen["stages"]] == pytest.approx([6.0, 5.0])
