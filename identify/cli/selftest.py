@@ -10,7 +10,6 @@ import typer
 
 from identify.cli.shared import Json, app, require_folder, say
 
-
 Full = Annotated[
     bool, typer.Option("--full", help="Many machines, drawn with the seed of this version.")
 ]
