@@ -10,27 +10,34 @@ import typer
 
 from identify.cli.shared import Json, app, require_folder, say
 
+Full = Annotated[
+    bool, typer.Option("--full", help="Many machines, drawn with the seed of this version.")
+]
+Seed = Annotated[int | None, typer.Option(help="Draws the machines.")]
+Only = Annotated[
+    list[str] | None, typer.Option("--only", help="Plant this effect only; may be repeated.")
+]
+Again = Annotated[
+    list[str] | None,
+    typer.Option("--case", help="One machine again, by the name printed; may be repeated."),
+]
+Matrix = Annotated[
+    Path | None, typer.Option("--out", "-o", help="Picture of the confusion matrix.")
+]
+Reliability = Annotated[
+    Path | None,
+    typer.Option("--reliability", help="Picture of confidence against how often right."),
+]
+
 
 @app.command()
 def selftest(
-    full: Annotated[
-        bool, typer.Option("--full", help="Many machines, drawn with the seed of this version.")
-    ] = False,
-    seed: Annotated[int | None, typer.Option(help="Draws the machines.")] = None,
-    only: Annotated[
-        list[str] | None, typer.Option("--only", help="Plant this effect only; may be repeated.")
-    ] = None,
-    case: Annotated[
-        list[str] | None,
-        typer.Option("--case", help="One machine again, by the name printed; may be repeated."),
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Picture of the confusion matrix.")
-    ] = None,
-    reliability: Annotated[
-        Path | None,
-        typer.Option("--reliability", help="Picture of confidence against how often right."),
-    ] = None,
+    full: Full = False,
+    seed: Seed = None,
+    only: Only = None,
+    case: Again = None,
+    out: Matrix = None,
+    reliability: Reliability = None,
     as_json_: Json = False,
 ) -> None:
     """Plant effects in machines drawn at random, and count how often they are named."""

@@ -266,7 +266,7 @@ def test_selftest(monkeypatch, cli):
         "selftest", "--seed", "4", "--only", "wear", "--only", "gms", "-o", "p.svg",
         "--reliability", "r.svg",
     )  # fmt: skip
-    half = "mass: 1 of 2 (50 %; 1 to 99 % by chance)"
+    half = "mass: 1 of 2 (50 %, 95 % interval 1 to 99 %)"
     assert (code, text.splitlines()) == (
         0, ["seed 4, 1 machines", half, f"  interval of {half}", f"  bumps, {half}"],
     )  # fmt: skip

@@ -19,12 +19,12 @@ def target_in_words(rate: Rate) -> str:
 
 
 def rate_in_words(rate: Rate) -> str:
-    """E.g. "named at 5: 30 of 31 (97 %; 83 to 100 % with 95 % certainty), target: ..."."""
+    """E.g. "named at 5: 30 of 31 (97 %, 95 % interval 83 to 100 %), target: ..."."""
     target = f", target: {target_in_words(rate)}" if rate.asked else ""
     if not rate.trials:
         return f"{rate.what}: 0 of 0{target}"
     low, high = (100.0 * end for end in rate.interval)
-    share = f"{100 * rate.value:.0f} %; {low:.0f} to {high:.0f} % by chance"
+    share = f"{100 * rate.value:.0f} %, 95 % interval {low:.0f} to {high:.0f} %"
     return f"{rate.what}: {rate.count} of {rate.trials} ({share}){target}"
 
 

@@ -33,7 +33,7 @@ def drawn(seed):
 
 @pytest.fixture(scope="module")
 def case():
-    return drawn(4)
+    return drawn(1)  # a machine on which neither has evidence alone
 
 
 @pytest.mark.slow

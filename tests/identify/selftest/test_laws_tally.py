@@ -194,7 +194,9 @@ def test_a_rate_has_the_interval_of_its_binomial():
 
 def test_rates_in_words():
     rate = Rate("what", 3, 4, (0.2, 0.9))
-    assert rate_in_words(rate) == ("what: 3 of 4 (75 %; 19 to 99 % by chance), target: 20 to 90 %")
+    assert rate_in_words(rate) == (
+        "what: 3 of 4 (75 %, 95 % interval 19 to 99 %), target: 20 to 90 %"
+    )
     assert rate_in_words(Rate("what", 0, 0)) == "what: 0 of 0"
     assert math.isnan(Rate("what", 0, 0).value)
     assert rate.value == 0.75

@@ -80,7 +80,7 @@ def test_the_text_tells_the_seed_the_strata_confidence_and_what_failed():
     text = selftest_text(EVERY, 17)
     lines = [line.strip() for line in text.splitlines()]
     assert lines[0] == "seed 17, 3 machines"
-    assert "plain, named at 5: 1 of 2 (50 %; 1 to 99 % by chance)" in lines
+    assert "plain, named at 5: 1 of 2 (50 %, 95 % interval 1 to 99 %)" in lines
     assert any(line.startswith("confidence: stated 95 % on average, right 90 to") for line in lines)
     assert lines[-1] == "wrong: twin selftest --case a@5/plain/1: b (55 %)"
 
