@@ -17,7 +17,7 @@ import identify
 from benchmarks.figures import Figure, Target
 from identify.dataset.dataset import datasets
 from identify.estimation.presliding import Presliding
-from identify.thesis.simulation import DYNAMIC, SimulationStudy
+from identify.thesis.simulation import DYNAMIC, SimulationResult
 from twin.effect import Kind
 from twin.effects import load_catalogue
 from twin.experiments.kinds import OpenLoopSine
@@ -35,18 +35,18 @@ TOLERANCES = {"xatol": 1e-4, "fatol": 1e-14, "maxfev": 400}
 
 
 def measure() -> list[Figure]:
-    """The whole study, then the speed of its dynamic identification."""
-    return [*_study(), *_dynamic()]
+    """All chapters, then the speed of its dynamic identification."""
+    return [*_chapters(), *_dynamic()]
 
 
-def _study() -> list[Figure]:
+def _chapters() -> list[Figure]:
     done = identify.reproduce()
     figures = [Figure("all chapters", sum(done.seconds.values()), "s", Target(high=600.0))]
-    study = done.chapters["simulation"]
-    assert isinstance(study, SimulationStudy)
+    chapter = done.chapters["simulation"]
+    assert isinstance(chapter, SimulationResult)
     figures += [
         Figure(f"mean of {name} off the planted value", abs(p.error), "1", Target(high=1e-3))
-        for name, p in study.parameters.items()
+        for name, p in chapter.parameters.items()
     ]
     cable = done.chapters["cable"]
     off = abs(cable.pitch.mean - cable.pitch.true)

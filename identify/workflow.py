@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Dataset, by_log, datasets
-from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.fit import Fit, holdout_error
-from identify.estimation.force_balance import residual
+from identify.estimation.force_balance import require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.measure import cable_force, velocity_map
@@ -22,8 +20,6 @@ from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
-from identify.thesis.study import Reproduction
-from identify.thesis.study import reproduce as study
 from identify.validation.agreement import Agreement, agreement
 from identify.validation.free_run import free_run, rms_error
 from identify.validation.misfit_maps import compare_axis, position_errors
@@ -31,8 +27,11 @@ from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.log import Log
-from twin.model.machine import AxisModel, HistoryStep, MachineModel
+from twin.model.machine import HistoryStep, MachineModel
 from twin.simulator import MujocoSimulator
+
+if TYPE_CHECKING:
+    from identify.thesis.chapters import Reproduction
 
 Logs = Mapping[str, Log]
 Progress = Callable[[str, int, int], None]
@@ -72,26 +71,6 @@ def fit(
         model = model.with_axis(axis, result.axis)
         model = model.with_intervals(axis, intervals_to_keep(result, intervals[axis]))
     return FitResult(model, found, fits, intervals, held, given, known)
-
-
-def require_residual(axis: AxisModel, dataset: Dataset) -> None:
-    """Raise InputError where no test function is usable, or the residual is not a number."""
-    kept = moving(dataset.fit, sticks(axis))
-    names = ", ".join(log.motion.name for log in dataset.fit)
-    if not kept.any():
-        raise InputError(
-            f"axis {dataset.axis} comes to rest within every test function of "
-            f"{dataset.test_function_length:g} s of {names}, and at rest its friction is unknown; "
-            "give a log in which it moves for longer at a time, or a shorter --test-function (s)"
-        )
-    with np.errstate(all="ignore"):
-        bad = np.count_nonzero(~np.isfinite(residual(axis, dataset.fit)[kept]))
-    if bad:
-        raise InputError(
-            f"axis {dataset.axis}: the force of the model is not a finite number in {bad} of "
-            f"{np.count_nonzero(kept)} test functions of {names}; check the values of its effects, "
-            "or leave them out to begin with their start values"
-        )
 
 
 def compare(
@@ -286,7 +265,9 @@ def reproduce(
 
     small: fewer speeds, trials and passes.
     """
-    return study(load_catalogue(), chapters, small=small, seed=seed, progress=progress)
+    from identify.thesis import chapters as thesis
+
+    return thesis.reproduce(load_catalogue(), chapters, small=small, seed=seed, progress=progress)
 
 
 __all__ = [

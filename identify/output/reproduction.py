@@ -14,13 +14,13 @@ from identify.output.words.reproduction import (
     track_in_words,
     twin_in_words,
 )
-from identify.thesis.cable import CableStudy
+from identify.thesis.cable import CableResult
 from identify.thesis.chapter import Recovered
-from identify.thesis.residuals import ResidualStudy
-from identify.thesis.simulation import SimulationStudy
-from identify.thesis.study import Reproduction
-from identify.thesis.track import Along, TrackStudy
-from identify.thesis.twin import TwinStudy
+from identify.thesis.chapters import Reproduction
+from identify.thesis.residuals import ResidualResult
+from identify.thesis.simulation import SimulationResult
+from identify.thesis.track import Along, TrackResult
+from identify.thesis.twin import TwinResult
 
 
 def reproduction_json(result: Reproduction) -> dict[str, Any]:
@@ -49,34 +49,34 @@ def _recovered(r: Recovered) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _simulation(study: SimulationStudy) -> dict[str, Any]:
+def _simulation(result: SimulationResult) -> dict[str, Any]:
     return {
-        "snr_db": study.snr,
-        "trials": study.trials,
-        "parameters": {k: _recovered(r) for k, r in study.parameters.items()},
+        "snr_db": result.snr,
+        "trials": result.trials,
+        "parameters": {k: _recovered(r) for k, r in result.parameters.items()},
         "by_snr_db": {
             f"{snr:g}": {k: _recovered(r) for k, r in found.items()}
-            for snr, found in study.by_snr.items()
+            for snr, found in result.by_snr.items()
         },
         "sensitivity": {
-            "factors": study.sensitivity.factors.tolist(),
-            "force_error": {k: f.tolist() for k, f in study.sensitivity.force.items()},
+            "factors": result.sensitivity.factors.tolist(),
+            "force_error": {k: f.tolist() for k, f in result.sensitivity.force.items()},
             "unit": "N",
         },
         "map": {
-            "velocity": study.map.velocity.tolist(), "velocity_unit": "m/s",
-            "friction": study.map.friction.tolist(), "friction_unit": "N",
+            "velocity": result.map.velocity.tolist(), "velocity_unit": "m/s",
+            "friction": result.map.friction.tolist(), "friction_unit": "N",
         },
     }  # fmt: skip
 
 
-def _cable(study: CableStudy) -> dict[str, Any]:
-    found = study.found
+def _cable(result: CableResult) -> dict[str, Any]:
+    found = result.found
     return {
-        "repeats": study.repeats,
-        "pitch": study.pitch
+        "repeats": result.repeats,
+        "pitch": result.pitch
         and {
-            **_recovered(study.pitch),
+            **_recovered(result.pitch),
             "standard_error": found.pitch and found.pitch.standard_error,
         },
         "spikes": [
@@ -85,28 +85,28 @@ def _cable(study: CableStudy) -> dict[str, Any]:
         ],
         "position": found.position.tolist(),
         "position_unit": "m",
-        "true": study.planted.tolist(),
+        "true": result.planted.tolist(),
         "found": found.force.tolist(),
         "band_90": found.band.tolist(),
         "with_spikes": found.with_all.tolist(),
         "unit": "N",
-        "rms_error": study.rms_error,
-        "largest_error": study.largest_error,
-        "rms_error_with_spikes": study.rms_error_with_all,
-        "within_band": study.within_band,
+        "rms_error": result.rms_error,
+        "largest_error": result.largest_error,
+        "rms_error_with_spikes": result.rms_error_with_all,
+        "within_band": result.within_band,
         "printed": None,
     }
 
 
-def _track(study: TrackStudy) -> dict[str, Any]:
+def _track(result: TrackResult) -> dict[str, Any]:
     return {
-        "position": study.places.tolist(),
+        "position": result.places.tolist(),
         "position_unit": "m",
         **{
             way: {
                 DIRECTIONS[d]: {k: _along(a) for k, a in found.items()} for d, found in by.items()
             }
-            for way, by in (("map", study.maps), ("fit", study.fits))
+            for way, by in (("map", result.maps), ("fit", result.fits))
         },
     }
 
@@ -121,34 +121,34 @@ def _along(a: Along) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _residuals(study: ResidualStudy) -> dict[str, Any]:
-    tests = {"before": study.before, "after": study.after}
+def _residuals(result: ResidualResult) -> dict[str, Any]:
+    tests = {"before": result.before, "after": result.after}
     return {
-        "fitted": study.first,
-        "planted": study.planted,
-        "verdict": study.verdict.name.lower(),
-        "named": list(study.named),
+        "fitted": result.first,
+        "planted": result.planted,
+        "verdict": result.verdict.name.lower(),
+        "named": list(result.named),
         "ranking": [
             {"effect": c.name, "delta_bic": c.delta_bic, "error_over_noise_floor": c.over_floor}
-            for c in study.ranking
+            for c in result.ranking
         ],
-        "test_error_before": study.error_before,
-        "test_error_after": study.error_after,
-        "noise_floor": study.floor,
+        "test_error_before": result.error_before,
+        "test_error_after": result.error_after,
+        "noise_floor": result.floor,
         "unit": "N",
         "white": {name: t.passes for name, t in tests.items()},
         "outside_90_bounds": {
             name: {c.signal: c.outside for c in t.correlations} for name, t in tests.items()
         },
-        "parameters": {k: _recovered(r) for k, r in study.values.items()},
+        "parameters": {k: _recovered(r) for k, r in result.values.items()},
     }
 
 
-def _twin(study: TwinStudy) -> dict[str, Any]:
+def _twin(result: TwinResult) -> dict[str, Any]:
     return {
-        "alike": agree_json(study.alike),
-        "changed": {**agree_json(study.changed), "added_mass": study.added, "unit": "kg"},
-        "closed_loop_error": {k: {"found": v, "unit": "1"} for k, v in study.errors.items()},
+        "alike": agree_json(result.alike),
+        "changed": {**agree_json(result.changed), "added_mass": result.added, "unit": "kg"},
+        "closed_loop_error": {k: {"found": v, "unit": "1"} for k, v in result.errors.items()},
     }
 
 
@@ -160,9 +160,9 @@ JSON: Mapping[str, Callable[[Any], dict[str, Any]]] = {
     "twin": _twin,
 }
 TEXT: Mapping[str, Callable[[Any], list[str]]] = {
-    "simulation": lambda study: [
-        *simulation_in_words(study),
-        *(recovered_in_words(name, r) for name, r in study.parameters.items()),
+    "simulation": lambda result: [
+        *simulation_in_words(result),
+        *(recovered_in_words(name, r) for name, r in result.parameters.items()),
     ],
     "cable": cable_in_words,
     "track": track_in_words,

@@ -1,15 +1,35 @@
-"""What the chapters share: a planted value beside what was found for it and what is printed."""
+"""What the chapters share: how one is run, and a planted value beside what was found for it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.effects import Catalogue
+from twin.model.machine import MachineModel
+
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]  # what, done, of how many
+Size = TypeVar("Size")
+Result = TypeVar("Result", covariant=True)
+
+
+@dataclass(frozen=True)
+class Chapter(Generic[Size, Result]):
+    """A chapter and what it needs: names of model files, its whole size and a quick one.
+
+    run: from those models, the catalogue of effects, a size, a generator for all that is drawn, and
+    progress.
+    """
+
+    models: tuple[str, ...]
+    full: Size
+    small: Size
+    run: Callable[[Sequence[MachineModel], Catalogue, Size, np.random.Generator, Progress], Result]
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,8 +24,9 @@ from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.intervals import CONFIDENCE, half_widths
 from identify.estimation.stribeck_curve import fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
-from identify.thesis.chapter import Progress
+from identify.thesis.chapter import Chapter, Progress
 from twin.effect import Kind
+from twin.effects import Catalogue
 from twin.experiments.kinds import Staircase
 from twin.experiments.named import simulate
 from twin.log import Log
@@ -83,7 +84,7 @@ class Along:
 
 
 @dataclass(frozen=True, eq=False)
-class TrackStudy:
+class TrackResult:
     """The chapter's results. places (k,) m.
 
     maps, fits: by the thesis's way and by ours, direction (+1 or -1) -> parameters by name.
@@ -97,10 +98,15 @@ class TrackStudy:
 Found = tuple[Array, Array]  # parameters (4,), half widths (4,) of their 90 % intervals
 
 
-def track_study(
-    model: MachineModel, size: Size, rng: np.random.Generator, progress: Progress
-) -> TrackStudy:
+def run(
+    models: Sequence[MachineModel],
+    catalogue: Catalogue,
+    size: Size,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> TrackResult:
     """Measure the friction of the first axis of a machine at each place, in both ways."""
+    (model,) = models
     name, axis = next(iter(model.axes.items()))
     apart = 9 // size.places
     places = np.array([FIRST + APART * apart * i for i in range(size.places)])
@@ -118,7 +124,7 @@ def track_study(
             maps[way].append(_through(found.towards(way)))
             fits[way].append(_of_law(local, float(place), way * speeds))
             planted[way].append(_curve(axis, float(place), way * speeds))
-    return TrackStudy(
+    return TrackResult(
         places,
         {way: _along(axis, maps[way], planted[way]) for way in DIRECTIONS},
         {way: _along(axis, fits[way], planted[way]) for way in DIRECTIONS},
@@ -222,3 +228,6 @@ def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
     )  # fmt: skip
     law = axis_table({"": parts_of(axis, Kind.FRICTION, Kind.MODIFIER)})
     return float(-np.sign(velocity) * total_force(law, motion)[-1])
+
+
+CHAPTER = Chapter(("thesis_track",), FULL, SMALL, run)
