@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from identify.cli.shared import Json, app, bars_on_stderr, say
-from twin.errors import InputError
 
 REPORT, RESULTS = "thesis.html", "thesis.json"
 
@@ -33,14 +32,9 @@ def reproduce(
     from identify.output.plain import plain
     from identify.output.report.thesis import write_reproduction
     from identify.output.reproduction import reproduction_json, reproduction_text
-    from twin.model.file import write_atomically
+    from twin.files import make_folder, write_atomically
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{out}: cannot be made ({error.strerror}); give another folder"
-        ) from error
+    make_folder(out)
     with bars_on_stderr() as bars:
         result = workflow.reproduce(chapter or (), small=small, seed=seed, progress=bars)
     found = reproduction_json(result)

@@ -11,7 +11,7 @@ from identify.output.report.drawing import drawing_style
 from identify.output.report.html import page
 from identify.output.report.thesis import cable, residuals, simulation, track, twin
 from identify.thesis.chapters import Reproduction
-from twin.model.file import write_atomically
+from twin.files import write_atomically
 
 SECTIONS: Mapping[str, Callable[[Any], Section]] = {
     "simulation": simulation.section,

@@ -17,7 +17,7 @@ from identify.output.report.blocks import (
     Tone,
 )
 from identify.output.report.drawing import BLUE, FLOOR, GREY, INK, ORANGE, new_figure
-from identify.output.report.units import quantity
+from identify.output.report.units import quantity, with_minus
 from identify.output.words.numbers import capitalised
 from identify.output.words.reproduction import cable_in_words
 from identify.thesis.cable import CableResult
@@ -52,9 +52,7 @@ def _answer(result: CableResult) -> Answer:
         off = 1e3 * (result.pitch.mean - result.pitch.true)
         value = f"{1e3 * result.pitch.mean:.3f} mm"
         tiles.append(
-            Tile(
-                "pitch of the spikes", value, f"{off:+.4f} mm off the planted one".replace("-", "−")
-            )
+            Tile("pitch of the spikes", value, with_minus(f"{off:+.4f} mm off the planted one"))
         )
     first, *others = [capitalised(said) for said in cable_in_words(result)]
     headline = f"The cable's force is recovered to {quantity(result.rms_error, 'N')} RMS"
@@ -112,10 +110,7 @@ def _spikes(result: CableResult) -> Table:
         Row(
             (
                 str(i),
-                *(
-                    f"{1e3 * x:.2f}".replace("-", "−")
-                    for x in (s.centre, s.width, s.ahead, s.behind)
-                ),
+                *(with_minus(f"{1e3 * x:.2f}") for x in (s.centre, s.width, s.ahead, s.behind)),
             )
         )
         for i, s in enumerate(result.found.spikes, 1)

@@ -13,7 +13,7 @@ from identify.output.report.blocks import (
     Tile,
     Tone,
 )
-from identify.output.report.units import number, pretty, quantity, spaced
+from identify.output.report.units import number, percent, pretty, quantity, spaced
 from identify.output.report.whiteness import residual_test_blocks
 from identify.output.words.numbers import capitalised
 from identify.output.words.reproduction import residuals_in_words
@@ -80,7 +80,7 @@ def _values(result: ResidualResult) -> Table:
     rows = [
         Row(
             (name, f"{r.true:g}", f"{r.mean:.5g}", pretty(r.unit),
-             f"{100.0 * r.error:+.2f} %".replace("-", "−"))
+             percent(r.error, 2))
         )
         for name, r in result.values.items()
     ]  # fmt: skip

@@ -20,7 +20,7 @@ from identify.output.report.blocks import (
     Tone,
 )
 from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure, plain_tick
-from identify.output.report.units import NOTHING, number, pretty
+from identify.output.report.units import NOTHING, number, percent, pretty
 from identify.output.words.numbers import capitalised
 from identify.output.words.reproduction import simulation_headline, simulation_in_words, worst
 from identify.thesis.chapter import Recovered
@@ -95,18 +95,13 @@ def _table(result: SimulationResult) -> Table:
 
 
 def _cells(name: str, r: Recovered) -> tuple[str, ...]:
-    off = NOTHING if r.printed is None else _percent(r.printed / r.true - 1.0)
+    off = NOTHING if r.printed is None else percent(r.printed / r.true - 1.0, 4)
     printed = NOTHING if r.printed is None else f"{r.printed:.4f}"
     unit = pretty(r.unit).replace("/", "\u2060/\u2060")  # no line break within it
     return (
         f"{name} ({unit})", f"{r.true:g}", printed, f"{r.mean:.6g}", number(r.sd),
-        _percent(r.error), off,
+        percent(r.error, 4), off,
     )  # fmt: skip
-
-
-def _percent(share: float) -> str:
-    rounded = round(100.0 * share, 4) + 0.0  # adding zero turns a rounded minus zero into zero
-    return f"{rounded:+.4f} %".replace("-", "−")
 
 
 def _map_figure(result: SimulationResult) -> Figure:
