@@ -11,9 +11,10 @@ from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.fit import Fit, holdout_error
 from identify.estimation.force_balance import require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
+from identify.estimation.simulated_motion import fit_simulated_motion, simulated_error
 from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.measure import cable_force, velocity_map
-from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+from identify.output.results import Addition, Comparison, Diagnosis, FitResult, SimulationFit
 from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate, score, try_effect, usable
 from identify.selection.confounded import moved_parameters
@@ -73,13 +74,26 @@ def fit(
     return FitResult(model, found, fits, intervals, held, given, known)
 
 
+def fit_simulation(found: FitResult, *, progress: Progress = silent) -> SimulationFit:
+    """Fit the motion that the model makes of the command alone, from a fit of the force residual.
+
+    Over whole logs, without a restart (identify.estimation.simulated_motion). Raises InputError
+    where that motion is not finite, or depends on another axis.
+    """
+    model, axes, held = found.model, {}, {}
+    for i, (axis, dataset) in enumerate(found.datasets.items()):
+        progress("fitting simulated motion", i, len(found.datasets))
+        done = axes[axis] = fit_simulated_motion(found.fits[axis].axis, dataset.fit)
+        both = (simulated_error(a, dataset.holdout) for a in (done.begun, done.axis))
+        held[axis] = (next(both), next(both)) if dataset.holdout else None
+        model = model.with_axis(axis, done.axis)
+    return SimulationFit(model, found, axes, held)
+
+
 def compare(
-    model: MachineModel,
-    logs: Logs,
-    *,
-    test_function: float | None = None,
+    model: MachineModel, logs: Logs, *, test_function: float | None = None,
     progress: Progress = silent,
-) -> Comparison:
+) -> Comparison:  # fmt: skip
     """The errors of a model with its present values, and where it fails. Raises InputError."""
     found = datasets(model, logs, {}, test_function)
     for axis, dataset in found.items():
@@ -110,13 +124,9 @@ def diagnose(
     """
     known = usable(catalogue, model)
     result = fit(
-        physics_alone(model),
-        logs,
-        holdout,
-        catalogue=catalogue,
-        test_function=test_function,
+        physics_alone(model), logs, holdout, catalogue=catalogue, test_function=test_function,
         progress=progress,
-    )
+    )  # fmt: skip
     axes = {
         axis: diagnose_axis(
             fitted,
@@ -128,14 +138,9 @@ def diagnose(
     }
     plans, not_planned = _next_experiments(axes, result.model, test_function)
     return Diagnosis(
-        result.model,
-        axes,
-        _compared(result.model, result.datasets, progress),
-        plans,
-        result.refits,
-        tuple(name for name in catalogue if name not in known),
-        not_planned,
-    )
+        result.model, axes, _compared(result.model, result.datasets, progress), plans,
+        result.refits, tuple(name for name in catalogue if name not in known), not_planned,
+    )  # fmt: skip
 
 
 def _next_experiments(
@@ -276,6 +281,7 @@ __all__ = [
     "Comparison",
     "Diagnosis",
     "FitResult",
+    "SimulationFit",
     "add",
     "add_named",
     "agree",
@@ -283,6 +289,7 @@ __all__ = [
     "compare",
     "diagnose",
     "fit",
+    "fit_simulation",
     "plan",
     "reproduce",
     "score",
