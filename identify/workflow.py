@@ -11,7 +11,8 @@ from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.fit import Fit, holdout_error
 from identify.estimation.force_balance import require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
-from identify.estimation.simulated_motion import fit_simulated_motion, simulated_error
+from identify.estimation.replay import simulated_error
+from identify.estimation.simulated_motion import fit_simulated_motion
 from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.measure import cable_force, velocity_map
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult, SimulationFit

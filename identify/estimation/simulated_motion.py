@@ -10,7 +10,7 @@ free altogether, it would take over what the model lacks.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,17 +18,20 @@ from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import effective_samples
-from identify.estimation.fit import NEGLIGIBLE, Outcome, rms
+from identify.estimation.fit import Outcome, rms
 from identify.estimation.levenberg_marquardt import Solution, minimise
-from identify.estimation.open_loop import START_FIT, as_logged, open_loop, states_along
+from identify.estimation.replay import (
+    LEAST_READING,
+    Beginning,
+    Replay,
+    measured_beginning,
+    motion_error,
+    simulated_error,
+)
 from identify.estimation.scaling import Scaling
-from twin.core.native import Table
-from twin.effect import Kind
 from twin.errors import InputError
-from twin.model.machine import AxisModel, MachineModel
+from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters
-from twin.signals import local_cubic
-from twin.simulator import ReducedSimulator
 
 Array = NDArray[np.float64]
 
@@ -37,23 +40,15 @@ AROUND = 0.1  # standard deviation of those, in parts of each value
 FIRST_EVALUATIONS = 10  # of the search from each, after which the best goes on with all
 MOST_EVALUATIONS = 100
 MOST_COMPARED = 20_000  # samples of a log
-WEIGHINGS = 2  # of the beginnings against the error, which falls on the way
+MOST_WEIGHINGS = 6  # of the beginnings against the error, which falls on the way
+FALLS = 0.9  # of the error, above which the weights are right
 PROBE = 1e-2  # of the error, by which a difference step should change the position
 TURNS = 4  # tries to find such a step
 FIRST_STEP = 1e-4  # of a value
-LEAST_READING = 1e-9  # m, below which no reading is trusted
+TOLERANCE = 1e-6  # relative fall of the squared error, below which the search ends
+AT_BOUND = 2.0  # from a bound a logarithm this near is not taken as a start
 SEED = 0  # of the places around
 OF_OTHER_AXIS = ("X_OTHER", "V_OTHER", "A_OTHER")
-
-
-@dataclass(frozen=True, eq=False)
-class Beginning:
-    """Where a log begins at sample ``first``: position m, velocity m/s, effect states (n,)."""
-
-    first: int
-    position: float
-    velocity: float
-    states: Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,7 +95,7 @@ def fit_simulated_motion(axis: AxisModel, logs: Sequence[PreparedLog]) -> Motion
     problem = _Problem(axis, logs)
     rng = np.random.default_rng(SEED)
     starts = [problem.start, *(problem.around(rng) for _ in range(STARTS - 1))]
-    tried = [problem.solve(start, FIRST_EVALUATIONS) for start in starts]
+    tried = [problem.solve(problem.begun_well(start), FIRST_EVALUATIONS) for start in starts]
     costs = [problem.cost(s.x) for s in tried]
     if not np.isfinite(costs).any():
         raise InputError(
@@ -108,9 +103,7 @@ def fit_simulated_motion(axis: AxisModel, logs: Sequence[PreparedLog]) -> Motion
             "not finite; fit the force residual first (--objective force)"
         )
     found = tried[int(np.nanargmin(costs))]
-    for _ in range(WEIGHINGS):
-        problem.weigh(found.x)
-        found = problem.solve(found.x, MOST_EVALUATIONS)
+    found = problem.settled(found.x)
     return MotionFit(
         axis=problem.axis_at(found.x),
         begun=axis,
@@ -119,75 +112,6 @@ def fit_simulated_motion(axis: AxisModel, logs: Sequence[PreparedLog]) -> Motion
         outcome=Outcome.CONVERGED if found.converged else Outcome.NOT_CONVERGED,
         starts=[problem.error(s.x) for s in tried],
     )
-
-
-def simulated_error(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
-    """RMS of simulated less measured position over whole logs, m, each begun as measured."""
-    return rms(np.concatenate([motion_error(axis, log) for log in logs]))
-
-
-def motion_error(axis: AxisModel, log: PreparedLog, beginning: Beginning | None = None) -> Array:
-    """Simulated less measured position (n,) m of one log; begun as measured where None."""
-    return _Run(axis, log).error(axis, beginning or measured_beginning(axis, log)[0])
-
-
-def measured_beginning(axis: AxisModel, log: PreparedLog) -> tuple[Beginning, Array]:
-    """Where a log begins by its first readings, and how sure that is (2 + n_states,).
-
-    As standard deviations: of position m and velocity m/s by the noise of the readings, and of each
-    state of the friction by its usual size along the measured motion; 0 for a state that is known.
-    """
-    run = _Run(axis, log)
-    table, position, period = run.model.table(), run.position, log.motion.sample_period
-    side = run.first
-    reading = max(log.motion.position_noise, log.motion.resolution / 12**0.5, LEAST_READING)
-    around = position[: 2 * side + 1]
-    x, v, _ = local_cubic(around, period)
-    unit = [local_cubic(row, period)[:2] for row in np.eye(2 * side + 1)]
-    surely = reading * np.linalg.norm(np.array(unit, dtype=float), axis=0)
-    places = np.linspace(side, len(position) - 1, 50).astype(np.int64)
-    along = states_along(table, position[:, None], run.command[:, None], period, places, 0.0, False)
-    usual = np.sqrt(np.mean(along**2, axis=0)) * _of_friction(axis, table)
-    return Beginning(side, float(x), float(v), along[0]), np.concatenate([surely, usual])
-
-
-def _of_friction(axis: AxisModel, table: Table) -> NDArray[np.bool_]:
-    """Which states are those of the friction."""
-    out = np.zeros(table.n_states, dtype=bool)
-    for (_, name), entry in zip(table.labels, table.entries, strict=True):
-        effect = axis[name].effect
-        if effect.kind is Kind.FRICTION:
-            out[int(entry[3]) : int(entry[3]) + len(effect.states)] = True
-    return out
-
-
-class _Run:
-    """One log to be simulated again and again on one axis."""
-
-    def __init__(self, axis: AxisModel, log: PreparedLog) -> None:
-        motion = log.motion
-        machine = MachineModel("", {motion.axis: axis}, 1.0 / motion.sample_period)
-        self.model = as_logged(machine, {motion.axis: log})
-        self.position, _, self.command = motion.at_samples(0.0)
-        self.period, self.origin = motion.sample_period, motion.time_origin
-        self.first = max(round(START_FIT / self.period), 2)
-
-    def error(self, axis: AxisModel, begin: Beginning) -> Array:
-        """(n,) m, from the beginning on."""
-        ((name, own),) = self.model.axes.items()
-        model = self.model.with_axis(name, replace(axis, hardware=own.hardware))
-        table = model.table()
-        simulation = ReducedSimulator(model, table)
-        # The stepped position leads the true one by half a sample (see twin.core.loop).
-        lead = 0.5 * self.period * begin.velocity
-        states = begin.states.copy()
-        simulation.place(
-            np.array([begin.position + lead]), np.array([begin.velocity]), states, begin.first,
-            self.origin,
-        )  # fmt: skip
-        command = self.command[begin.first :, None]
-        simulated = open_loop(model, table, simulation, begin.first, command)[:, 0]
-        return simulated - self.position[begin.first :]
 
 
 class _Problem:
@@ -201,7 +125,7 @@ class _Problem:
         _require_alone(axis, logs)
         self.axis, self.logs = axis, logs
         self.scaling = Scaling(free_parameters(axis))
-        self.runs = [_Run(axis, log) for log in logs]
+        self.runs = [Replay(axis, log) for log in logs]
         self.measured, self.surely = zip(
             *(measured_beginning(axis, log) for log in logs), strict=True
         )
@@ -209,22 +133,45 @@ class _Problem:
         low, high = self.scaling.bounds()
         begun = np.zeros(sum(len(o) for o in self.open))
         self.bounds = np.r_[low, begun - np.inf], np.r_[high, begun + np.inf]
-        self.start = np.r_[np.clip(self.scaling.inside(axis), low, high), begun]
+        self.start = self.off_bounds(np.r_[np.clip(self.scaling.inside(axis), low, high), begun])
         self.parameters = len(low)
         sizes = np.where(self.scaling.is_logarithm(), 1.0, np.abs(self.start[: len(low)]))
         self.sizes = np.where(sizes > 0.0, sizes, _usual_sizes(self.scaling.where))
         self.steps = np.r_[FIRST_STEP * self.sizes, begun + 1.0]
         self.weight = 0.0
-        self.weigh(self.start)
+        self.weigh(self.start, white=True)
 
-    def weigh(self, internal: Array) -> None:
-        """How much a standard deviation of a beginning counts beside the error, m.
+    def off_bounds(self, internal: Array) -> Array:
+        """The same with logarithms at a bound back at the start that is declared.
 
-        The error is coloured, so that it holds as much as its effective number of samples.
+        At its bound a positive parameter has no influence left, so that no step would leave it.
+        """
+        out = internal.copy()
+        edge = np.minimum(internal - self.bounds[0], self.bounds[1] - internal)
+        for i in np.flatnonzero(self.scaling.is_logarithm()):
+            if edge[i] < AT_BOUND:
+                out[i] = np.log(self.scaling.where[i].parameter.start)
+        return out
+
+    def begun_well(self, internal: Array) -> Array:
+        """The same with the beginnings fitted alone, lest parameters make up for them."""
+        low, high = (bound.copy() for bound in self.bounds)
+        own = slice(self.parameters)
+        low[own] = high[own] = internal[own]
+        return minimise(
+            self.rows, self.slopes, internal, (low, high),
+            tolerance=TOLERANCE, most_evaluations=FIRST_EVALUATIONS,
+        ).x  # fmt: skip
+
+    def weigh(self, internal: Array, white: bool) -> None:
+        """How much a standard deviation of a beginning counts beside the error of a sample, m.
+
+        As much as that error; where it is coloured it holds fewer samples, and counts for less.
         """
         error = np.concatenate(self._errors(internal))
         if np.isfinite(error).all():
-            self.weight = rms(error) * np.sqrt(len(error) / effective_samples(error))
+            samples = len(error) if white else effective_samples(error)
+            self.weight = rms(error) * np.sqrt(len(error) / samples)
 
     def around(self, rng: np.random.Generator) -> Array:
         """A place around the start."""
@@ -291,11 +238,25 @@ class _Problem:
             out[:, i] = np.nan_to_num(change / step)
         return out
 
+    def settled(self, internal: Array) -> Solution:
+        """The search gone on with, the beginnings weighed against the error that it falls to.
+
+        First as if that error were white, which lets them move; at the end by its colour, lest they
+        make up for a model that is wrong.
+        """
+        for _ in range(MOST_WEIGHINGS):
+            before = self.error(internal)
+            self.weigh(internal, white=True)
+            internal = self.solve(self.off_bounds(internal), MOST_EVALUATIONS).x
+            if not self.error(internal) < FALLS * before:
+                break
+        self.weigh(internal, white=False)
+        return self.solve(internal, MOST_EVALUATIONS)
+
     def solve(self, start: Array, evaluations: int) -> Solution:
-        tolerance = NEGLIGIBLE / effective_samples(np.nan_to_num(self.rows(start)))
         return minimise(
             self.rows, self.slopes, start, self.bounds,
-            tolerance=tolerance, most_evaluations=evaluations,
+            tolerance=TOLERANCE, most_evaluations=evaluations,
         )  # fmt: skip
 
 
