@@ -14,9 +14,11 @@ from identify.output.words.reproduction import (
     track_in_words,
     twin_in_words,
 )
+from identify.output.words.thesis_dynamic import dynamic_in_words
 from identify.thesis.cable import CableResult
 from identify.thesis.chapter import Recovered
 from identify.thesis.chapters import Reproduction
+from identify.thesis.dynamic import DynamicResult
 from identify.thesis.residuals import ResidualResult
 from identify.thesis.simulation import SimulationResult
 from identify.thesis.track import Along, TrackResult
@@ -121,6 +123,29 @@ def _along(a: Along) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _dynamic(result: DynamicResult) -> dict[str, Any]:
+    records = {"closed_loop": result.closed, "open_loop": result.opened}
+    return {
+        "position": result.places.tolist(),
+        "position_unit": "m",
+        "records": {
+            name: {
+                "friction_change": r.friction, "force_noise": r.noise, "unit": "N",
+                "relative_half_width_90": dict(r.half_widths), "found_over_true": dict(r.found),
+            }
+            for name, r in records.items()
+        },
+        "simplex": {k: _recovered(r) for k, r in result.simplex.items()},
+        "parameters": {k: _recovered(r) for k, r in result.fitted.items()},
+        "seconds_at_a_place": dict(zip(("simplex", "fit"), result.seconds, strict=True)),
+        "position_error": {
+            part: dict(zip(("from_rest", "beginning_estimated"), e.T.tolist(), strict=True))
+            for part, e in (("first_period", result.first_period), ("after", result.afterwards))
+        },
+        "unit": "m",
+    }  # fmt: skip
+
+
 def _residuals(result: ResidualResult) -> dict[str, Any]:
     tests = {"before": result.before, "after": result.after}
     return {
@@ -156,6 +181,7 @@ JSON: Mapping[str, Callable[[Any], dict[str, Any]]] = {
     "simulation": _simulation,
     "cable": _cable,
     "track": _track,
+    "dynamic": _dynamic,
     "residuals": _residuals,
     "twin": _twin,
 }
@@ -166,6 +192,7 @@ TEXT: Mapping[str, Callable[[Any], list[str]]] = {
     ],
     "cable": cable_in_words,
     "track": track_in_words,
+    "dynamic": dynamic_in_words,
     "residuals": residuals_in_words,
     "twin": twin_in_words,
 }

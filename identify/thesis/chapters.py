@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from identify.thesis import cable, residuals, simulation, track, twin
+from identify.thesis import cable, dynamic, residuals, simulation, track, twin
 from identify.thesis.chapter import Chapter, Progress
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -21,6 +21,7 @@ CHAPTERS: Mapping[str, Chapter[Any, Any]] = {
     "simulation": simulation.CHAPTER,
     "cable": cable.CHAPTER,
     "track": track.CHAPTER,
+    "dynamic": dynamic.CHAPTER,
     "residuals": residuals.CHAPTER,
     "twin": twin.CHAPTER,
 }

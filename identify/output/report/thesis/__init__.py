@@ -9,7 +9,7 @@ from typing import Any
 from identify.output.report.blocks import Section
 from identify.output.report.drawing import drawing_style
 from identify.output.report.html import page
-from identify.output.report.thesis import cable, residuals, simulation, track, twin
+from identify.output.report.thesis import cable, dynamic, residuals, simulation, track, twin
 from identify.thesis.chapters import Reproduction
 from twin.files import write_atomically
 
@@ -17,6 +17,7 @@ SECTIONS: Mapping[str, Callable[[Any], Section]] = {
     "simulation": simulation.section,
     "cable": cable.section,
     "track": track.section,
+    "dynamic": dynamic.section,
     "residuals": residuals.section,
     "twin": twin.section,
 }
