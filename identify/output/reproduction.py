@@ -15,10 +15,12 @@ from identify.output.words.reproduction import (
     twin_in_words,
 )
 from identify.output.words.thesis_dynamic import dynamic_in_words
+from identify.output.words.thesis_models import models_in_words
 from identify.thesis.cable import CableResult
 from identify.thesis.chapter import Recovered
 from identify.thesis.chapters import Reproduction
 from identify.thesis.dynamic import DynamicResult
+from identify.thesis.models import ModelsResult
 from identify.thesis.residuals import ResidualResult
 from identify.thesis.simulation import SimulationResult
 from identify.thesis.track import Along, TrackResult
@@ -48,6 +50,29 @@ def _recovered(r: Recovered) -> dict[str, Any]:
     return {
         "true": r.true, "mean": r.mean, "sd": r.sd, "printed": r.printed, "unit": r.unit,
         "error": r.error, "rms_error": r.rms_error,
+    }  # fmt: skip
+
+
+def _models(result: ModelsResult) -> dict[str, Any]:
+    return {
+        "laws": list(result.laws),
+        "behaviours": list(result.behaviours),
+        "error_over_noise_floor": {
+            machine: {
+                law: dict(zip(result.behaviours, ratios.tolist(), strict=True))
+                for law, ratios in zip(result.laws, rows, strict=True)
+            }
+            for machine, rows in zip(result.laws, result.ratios, strict=True)
+        },
+        "by_law": {
+            law: {
+                "right_starts": float(result.right[i]), "starts": result.starts,
+                "fit_time": float(result.seconds[i]), "step_time": float(result.step[i]),
+                "time_unit": "s", "loop_open_by": result.loops[law].gap,
+                "nested_loops_open_by": result.nested[law].gap, "unit": "N", "printed": None,
+            }
+            for i, law in enumerate(result.laws)
+        },
     }  # fmt: skip
 
 
@@ -178,6 +203,7 @@ def _twin(result: TwinResult) -> dict[str, Any]:
 
 
 JSON: Mapping[str, Callable[[Any], dict[str, Any]]] = {
+    "models": _models,
     "simulation": _simulation,
     "cable": _cable,
     "track": _track,
@@ -186,6 +212,7 @@ JSON: Mapping[str, Callable[[Any], dict[str, Any]]] = {
     "twin": _twin,
 }
 TEXT: Mapping[str, Callable[[Any], list[str]]] = {
+    "models": models_in_words,
     "simulation": lambda result: [
         *simulation_in_words(result),
         *(recovered_in_words(name, r) for name, r in result.parameters.items()),

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from identify.thesis import cable, dynamic, residuals, simulation, track, twin
+from identify.thesis import cable, dynamic, models, residuals, simulation, track, twin
 from identify.thesis.chapter import Chapter, Progress
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.model.file import load_model
 
 CHAPTERS: Mapping[str, Chapter[Any, Any]] = {
+    "models": models.CHAPTER,
     "simulation": simulation.CHAPTER,
     "cable": cable.CHAPTER,
     "track": track.CHAPTER,

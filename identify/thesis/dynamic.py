@@ -19,9 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import datasets
-from identify.dataset.drive import parts_of
-from identify.dataset.motion import Motion
-from identify.dataset.prepared_log import PreparedLog, total_force
+from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import Outcome, finished, fit_axis, rms
 from identify.estimation.intervals import half_widths
 from identify.estimation.presliding import Presliding
@@ -29,6 +27,7 @@ from identify.estimation.replay import Beginning, Replay, measured_beginning
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
 from identify.thesis.cable import of_position
 from identify.thesis.chapter import Chapter, Progress, Recovered
+from identify.thesis.prescribed import force_along
 from identify.thesis.track import APART, FIRST
 from twin.core.control import Controller
 from twin.effect import Kind
@@ -37,7 +36,7 @@ from twin.experiments.kinds import Reversals
 from twin.experiments.named import follow, simulate
 from twin.experiments.trajectory import open_loop_sine
 from twin.log import AxisLog, Log
-from twin.model.machine import AxisModel, MachineModel, axis_table
+from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import ParameterReference, free_parameters, read, write
 from twin.simulator import FineSimulator
 
@@ -205,12 +204,7 @@ def _cable(axis: AxisModel, place: float) -> float:
     """Force of the smooth forces of position there, N, which passes measure (chapter "cable")."""
     forces = [f for f in axis.effects if of_position(f.effect)]
     kept = replace(axis, effects=tuple(forces))
-    signals = np.array([[place], [0.0], [0.0]])
-    motion = Motion(
-        name="", axis="", signals=signals, others=np.zeros_like(signals), period=1.0, start=0.0,
-        sample_period=1.0, position_noise=0.0, raw=signals[1:],
-    )  # fmt: skip
-    return float(total_force(axis_table({"": parts_of(kept, Kind.FORCE)}), motion)[0])
+    return float(force_along(kept, np.array([place]), np.zeros(1), 1.0, Kind.FORCE)[0])
 
 
 def _by_simplex(axis: AxisModel, log: PreparedLog, rng: np.random.Generator) -> Array:

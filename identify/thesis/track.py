@@ -17,20 +17,19 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from identify.dataset.dataset import datasets
-from identify.dataset.drive import parts_of
-from identify.dataset.motion import Motion, motion_of
-from identify.dataset.prepared_log import total_force
+from identify.dataset.motion import motion_of
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.intervals import CONFIDENCE, half_widths
 from identify.estimation.stribeck_curve import fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
 from identify.thesis.chapter import Chapter, Progress
+from identify.thesis.prescribed import force_along
 from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.experiments.kinds import Staircase
 from twin.experiments.named import simulate
 from twin.log import Log
-from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
+from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import read, write
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
@@ -221,13 +220,9 @@ def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
     place: m; velocity: m/s, not zero.
     """
     period = STEADY_TRAVEL / STEPS / abs(velocity)
-    signals = np.repeat([[place], [velocity], [0.0]], STEPS, axis=1)
-    motion = Motion(
-        name="", axis="", signals=signals, others=np.zeros_like(signals), period=period, start=0.0,
-        sample_period=period, position_noise=0.0, raw=signals[1:],
-    )  # fmt: skip
-    law = axis_table({"": parts_of(axis, Kind.FRICTION, Kind.MODIFIER)})
-    return float(-np.sign(velocity) * total_force(law, motion)[-1])
+    places, velocities = np.repeat([[place], [velocity]], STEPS, axis=1)
+    force = force_along(axis, places, velocities, period, Kind.FRICTION, Kind.MODIFIER)
+    return float(-np.sign(velocity) * force[-1])
 
 
 CHAPTER = Chapter(("thesis_track",), FULL, SMALL, run)

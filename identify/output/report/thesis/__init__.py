@@ -9,11 +9,12 @@ from typing import Any
 from identify.output.report.blocks import Section
 from identify.output.report.drawing import drawing_style
 from identify.output.report.html import page
-from identify.output.report.thesis import cable, dynamic, residuals, simulation, track, twin
+from identify.output.report.thesis import cable, dynamic, models, residuals, simulation, track, twin
 from identify.thesis.chapters import Reproduction
 from twin.files import write_atomically
 
 SECTIONS: Mapping[str, Callable[[Any], Section]] = {
+    "models": models.section,
     "simulation": simulation.section,
     "cable": cable.section,
     "track": track.section,
