@@ -96,7 +96,7 @@ class ModelsResult:
     @property
     def overall(self) -> Array:
         """RMS of the ratios over the behaviours (k, k), by machine and fitted law."""
-        return np.sqrt(np.nanmean(self.ratios**2, axis=2))
+        return overall(self.ratios)
 
     @property
     def usual(self) -> Array:
@@ -109,6 +109,11 @@ class ModelsResult:
     def own(self) -> Array:
         """Overall ratio (k,) of each law on its own machine."""
         return np.diag(self.overall)
+
+
+def overall(ratios: Array) -> Array:
+    """RMS of ratios (..., b) over the behaviours in which the machine moves."""
+    return np.asarray(np.sqrt(np.nanmean(ratios**2, axis=-1)))
 
 
 def run(
@@ -274,7 +279,7 @@ def _share_right(
                 least = values[p.at_least] if p.at_least else p.lower
                 values[p.name] = float(np.clip(drawn, least, p.upper))
         start = replace(begun, effects=(replace(fitted, values=values),))
-        ended.append(np.nanmax(_by_log(fit_axis(start, dataset.fit), names)) <= RIGHT)
+        ended.append(overall(np.array(_by_log(fit_axis(start, dataset.fit), names))) <= RIGHT)
     return float(np.mean(ended))
 
 

@@ -38,7 +38,7 @@ def models_in_words(result: ModelsResult) -> list[str]:
         f"an inner loop stays open with {', '.join(forget) or 'none'}, so these forget; it closes "
         "with the others",
         f"of random starts up to three times off {100.0 * result.right.mean():.0f} % end within "
-        f"{RIGHT:g} times the noise floor on every log"
+        f"{RIGHT:g} times the noise floor"
         + (f"; not all do with {', '.join(fails)}" if fails else ""),
         f"a fit takes {result.seconds.min():.2g} to {result.seconds.max():.2g} s of CPU time, a "
         f"step of a law {1e9 * result.step.min():.0f} to {1e9 * result.step.max():.0f} ns",
