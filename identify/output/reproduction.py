@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from identify.estimation.cable_force import CableForce
 from identify.output.agreement import agree_json
 from identify.output.words.reproduction import (
     cable_in_words,
+    cable_of_logs_in_words,
     recovered_in_words,
     residuals_in_words,
     simulation_in_words,
@@ -15,12 +17,16 @@ from identify.output.words.reproduction import (
     twin_in_words,
 )
 from identify.output.words.thesis_dynamic import dynamic_in_words
+from identify.output.words.thesis_future import future_in_words
 from identify.output.words.thesis_models import models_in_words
-from identify.thesis.cable import CableResult
+from identify.thesis.aging import Drift
+from identify.thesis.cable import CableOfLogs, CableResult
 from identify.thesis.chapter import Recovered
 from identify.thesis.chapters import Reproduction
 from identify.thesis.dynamic import DynamicResult
+from identify.thesis.future import FutureResult
 from identify.thesis.models import ModelsResult
+from identify.thesis.printed import ROLLER_PITCH
 from identify.thesis.residuals import ResidualResult
 from identify.thesis.simulation import SimulationResult
 from identify.thesis.track import Along, TrackResult
@@ -30,7 +36,7 @@ from identify.thesis.twin import TwinResult
 def reproduction_json(result: Reproduction) -> dict[str, Any]:
     """The documented object: every chapter that was run, and the seconds that it took."""
     return {
-        "chapters": {name: JSON[name](found) for name, found in result.chapters.items()},
+        "chapters": {name: JSON[type(found)](found) for name, found in result.chapters.items()},
         "small": result.small,
         "seconds": sum(result.seconds.values()),
         "seconds_by_chapter": dict(result.seconds),
@@ -42,7 +48,7 @@ def reproduction_text(result: Reproduction) -> str:
     lines = []
     for name, found in result.chapters.items():
         lines.append(f"{name} ({result.seconds[name]:.0f} s)")
-        lines += [f"  {line}" for line in TEXT[name](found)]
+        lines += [f"  {line}" for line in TEXT[type(found)](found)]
     return "\n".join(lines)
 
 
@@ -106,22 +112,43 @@ def _cable(result: CableResult) -> dict[str, Any]:
             **_recovered(result.pitch),
             "standard_error": found.pitch and found.pitch.standard_error,
         },
+        **_of_passes(found),
+        "true": result.planted.tolist(),
+        "rms_error": result.rms_error,
+        "largest_error": result.largest_error,
+        "rms_error_with_spikes": result.rms_error_with_all,
+        "within_band": result.within_band,
+        "printed": None,
+    }
+
+
+def _cable_of_logs(result: CableOfLogs) -> dict[str, Any]:
+    found = result.found
+    pitch = found.pitch
+    return {
+        "repeats": len(found.passes.alike),
+        "pitch": pitch and {
+            "mean": pitch.value, "standard_error": pitch.standard_error, "unit": "m",
+            "printed": ROLLER_PITCH,
+        },
+        **_of_passes(found),
+        "true": None,
+        "printed": None,
+    }  # fmt: skip
+
+
+def _of_passes(found: CableForce) -> dict[str, Any]:
+    return {
         "spikes": [
             {"centre": s.centre, "width": s.width, "ahead": s.ahead, "behind": s.behind}
             for s in found.spikes
         ],
         "position": found.position.tolist(),
         "position_unit": "m",
-        "true": result.planted.tolist(),
         "found": found.force.tolist(),
         "band_90": found.band.tolist(),
         "with_spikes": found.with_all.tolist(),
         "unit": "N",
-        "rms_error": result.rms_error,
-        "largest_error": result.largest_error,
-        "rms_error_with_spikes": result.rms_error_with_all,
-        "within_band": result.within_band,
-        "printed": None,
     }
 
 
@@ -194,6 +221,43 @@ def _residuals(result: ResidualResult) -> dict[str, Any]:
     }
 
 
+def _future(result: FutureResult) -> dict[str, Any]:
+    slow, aging = result.slow, result.aging
+    return {
+        "elements": {
+            "planted": result.planted, "found": result.chosen.count,
+            "tried": [
+                {"elements": e.count, "delta_bic": e.delta_bic, "error_over_noise_floor":
+                 e.over_floor} for e in result.elements
+            ],
+        },
+        "residuals": [
+            {"model": b.name, "parameters_added": b.parameters, "holdout_error": b.held_out,
+             "test_error": b.test} for b in result.beside
+        ],
+        "noise_floor": result.floor,
+        "near_zero_speed": {
+            "velocity": slow.speed.tolist(), "velocity_unit": "m/s", "true": slow.planted.tolist(),
+            "map": slow.mapped.tolist(), "found": slow.fitted.tolist(), "printed": None,
+        },
+        "unit": "N",
+        "long_run": {
+            **{n: _drift(d) for n, d in (("aging", aging.level), ("without", aging.steady))},
+            "parameters": {k: _recovered(r) for k, r in aging.planted.items()},
+        },
+    }  # fmt: skip
+
+
+def _drift(drift: Drift) -> dict[str, Any]:
+    slope, error = drift.slope
+    return {
+        "distance": drift.distance.tolist(), "distance_unit": "m", "true": drift.truth.tolist(),
+        "found": drift.found.tolist(), "half_width_90": drift.half.tolist(), "unit": drift.unit,
+        "slope": slope, "slope_standard_error": error, "slope_unit": f"{drift.unit}/m",
+        "detected": drift.detected, "printed": None,
+    }  # fmt: skip
+
+
 def _twin(result: TwinResult) -> dict[str, Any]:
     return {
         "alike": agree_json(result.alike),
@@ -202,24 +266,28 @@ def _twin(result: TwinResult) -> dict[str, Any]:
     }
 
 
-JSON: Mapping[str, Callable[[Any], dict[str, Any]]] = {
-    "models": _models,
-    "simulation": _simulation,
-    "cable": _cable,
-    "track": _track,
-    "dynamic": _dynamic,
-    "residuals": _residuals,
-    "twin": _twin,
+JSON: Mapping[type, Callable[[Any], dict[str, Any]]] = {
+    ModelsResult: _models,
+    SimulationResult: _simulation,
+    CableResult: _cable,
+    CableOfLogs: _cable_of_logs,
+    TrackResult: _track,
+    DynamicResult: _dynamic,
+    ResidualResult: _residuals,
+    FutureResult: _future,
+    TwinResult: _twin,
 }
-TEXT: Mapping[str, Callable[[Any], list[str]]] = {
-    "models": models_in_words,
-    "simulation": lambda result: [
+TEXT: Mapping[type, Callable[[Any], list[str]]] = {
+    ModelsResult: models_in_words,
+    SimulationResult: lambda result: [
         *simulation_in_words(result),
         *(recovered_in_words(name, r) for name, r in result.parameters.items()),
     ],
-    "cable": cable_in_words,
-    "track": track_in_words,
-    "dynamic": dynamic_in_words,
-    "residuals": residuals_in_words,
-    "twin": twin_in_words,
+    CableResult: cable_in_words,
+    CableOfLogs: cable_of_logs_in_words,
+    TrackResult: track_in_words,
+    DynamicResult: dynamic_in_words,
+    ResidualResult: residuals_in_words,
+    FutureResult: future_in_words,
+    TwinResult: twin_in_words,
 }

@@ -7,7 +7,7 @@ against what was planted; ``cable_force`` itself runs on any log of passes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import datasets
 from identify.estimation.cable_force import CableForce, cable_force
 from identify.estimation.fit import rms
+from identify.measure import cable_force as of_passes
 from identify.thesis.chapter import Chapter, Progress, Recovered
 from identify.thesis.printed import ROLLER_PITCH
 from twin.effect import Effect, Kind
@@ -85,6 +86,18 @@ class CableResult:
         return float(np.mean(np.abs(self.error) <= self.found.band))
 
 
+@dataclass(frozen=True, eq=False)
+class CableOfLogs:
+    """What passes of a real machine tell, of which nothing is known to be planted."""
+
+    found: CableForce
+
+
+def of_logs(model: MachineModel, logs: Mapping[str, Log]) -> CableOfLogs:
+    """The chapter on logs of passes; raises InputError where they hold none."""
+    return CableOfLogs(of_passes(model, logs, test_function=TEST_FUNCTION))
+
+
 def run(
     models: Sequence[MachineModel],
     catalogue: Catalogue,
@@ -133,4 +146,4 @@ def _pitch(axis: AxisModel, found: CableForce) -> Recovered | None:
     return Recovered(planted[0], np.array([found.pitch.value]), axis.units.position, ROLLER_PITCH)
 
 
-CHAPTER = Chapter(("proton_xy",), FULL, SMALL, run)
+CHAPTER = Chapter(("proton_xy",), FULL, SMALL, run, of_logs)

@@ -10,8 +10,9 @@ from identify.output.words.agreement import (
     causes_in_words,
     difference_in_words,
 )
-from identify.thesis.cable import CableResult
+from identify.thesis.cable import CableOfLogs, CableResult
 from identify.thesis.chapter import Recovered
+from identify.thesis.printed import ROLLER_PITCH
 from identify.thesis.residuals import ResidualResult
 from identify.thesis.simulation import STATIC, SimulationResult
 from identify.thesis.track import Along, TrackResult
@@ -86,6 +87,24 @@ def cable_in_words(result: CableResult) -> list[str]:
         f"{len(result.found.spikes)} spikes, pitch {1e3 * result.pitch.mean:.4f} +- "
         f"{1e3 * result.found.pitch.standard_error:.2g} mm "
         f"(planted {1e3 * result.pitch.true:g} mm)",
+    ]
+
+
+def cable_of_logs_in_words(result: CableOfLogs) -> list[str]:
+    """The cable's force, its band, and the pitch of the spikes, of a real machine."""
+    found = result.found
+    said = [
+        f"cable force from {len(found.passes.alike)} passes each way over "
+        f"{1e3 * np.ptp(found.position):.0f} mm: {found.force.min():.4g} to "
+        f"{found.force.max():.4g} N, 90 % band +- {np.median(found.band):.2g} N (median)"
+    ]
+    if found.pitch is None:
+        return [*said, "fewer than three spikes were found, so there is no pitch"]
+    return [
+        *said,
+        f"{len(found.spikes)} spikes, pitch {1e3 * found.pitch.value:.4f} +- "
+        f"{1e3 * found.pitch.standard_error:.2g} mm (the thesis's stage: "
+        f"{1e3 * ROLLER_PITCH:g} mm)",
     ]
 
 

@@ -7,7 +7,8 @@ import pytest
 
 import identify
 from identify.output.reproduction import reproduction_json, reproduction_text
-from identify.thesis.models import LOOP, behaviours, friction_of
+from identify.thesis.behaviours import LOOP, behaviours
+from identify.thesis.residuals import friction_of
 from twin.effects import load_catalogue
 from twin.model.file import load_model
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from identify.estimation.cable_force import CableForce
 from identify.output.report.blocks import (
     Answer,
     Block,
@@ -19,8 +20,8 @@ from identify.output.report.blocks import (
 from identify.output.report.drawing import BLUE, FLOOR, GREY, INK, ORANGE, new_figure
 from identify.output.report.units import quantity, with_minus
 from identify.output.words.numbers import capitalised
-from identify.output.words.reproduction import cable_in_words
-from identify.thesis.cable import CableResult
+from identify.output.words.reproduction import cable_in_words, cable_of_logs_in_words
+from identify.thesis.cable import CableOfLogs, CableResult
 
 
 def section(result: CableResult) -> Section:
@@ -28,7 +29,7 @@ def section(result: CableResult) -> Section:
     blocks: list[Block] = [
         _answer(result),
         Picture(
-            _passes(result),
+            _passes(result.found),
             "The mean force over the passes of each direction. Shaded: where a spike was found; it "
             "is kept out of the cable's force.",
         ),
@@ -37,9 +38,40 @@ def section(result: CableResult) -> Section:
             "The cable's force found and planted, and below the error with its 90 % band; orange: "
             "the error if the spikes are left in, as in the thesis.",
         ),
-        _spikes(result),
+        _spikes(result.found),
     ]
     return Section("cable", "Cable slab", blocks)
+
+
+def section_of_logs(result: CableOfLogs) -> Section:
+    """The chapter on logs of a real machine."""
+    found = result.found
+    first, *others = [capitalised(said) for said in cable_of_logs_in_words(result)]
+    blocks: list[Block] = [
+        Answer("The cable's force from passes", first, [], others, Tone.STRONG),
+        Picture(
+            _passes(found),
+            "The mean force over the passes of each direction. Shaded: where a spike was found; it "
+            "is kept out of the cable's force.",
+        ),
+        Picture(_with_band(found), "The cable's force with its 90 % band."),
+        _spikes(found),
+    ]
+    return Section("cable", "Cable slab", blocks)
+
+
+def _with_band(found: CableForce) -> Figure:
+    figure = new_figure(3.0)
+    axes = figure.subplots()
+    place = 1e3 * found.position
+    axes.fill_between(
+        place, found.force - found.band, found.force + found.band, color=FLOOR, label="90 % band"
+    )
+    axes.plot(place, found.force, color=INK, label="found")
+    axes.set_xlabel("Position (mm)")
+    axes.set_ylabel("Cable force (N)")
+    axes.legend()
+    return figure
 
 
 def _answer(result: CableResult) -> Answer:
@@ -59,16 +91,16 @@ def _answer(result: CableResult) -> Answer:
     return Answer(headline, first, tiles, others, Tone.STRONG)
 
 
-def _passes(result: CableResult) -> Figure:
+def _passes(cable: CableForce) -> Figure:
     figure = new_figure(3.6)
     upper, lower = figure.subplots(2, 1, sharex=True)
-    found = result.found.passes
+    found = cable.passes
     place = 1e3 * found.position
     upper.plot(place, found.forwards.mean(axis=0), color=BLUE, label="forwards")
     lower.plot(place, found.backwards.mean(axis=0), color=ORANGE, label="backwards")
     for axes in (upper, lower):
         low, high = axes.get_ylim()
-        axes.fill_between(place, low, high, where=~result.found.kept, color=FLOOR, alpha=0.6)
+        axes.fill_between(place, low, high, where=~cable.kept, color=FLOOR, alpha=0.6)
         axes.set_ylim(low, high)
         axes.set_ylabel("Force (N)")
         axes.legend(loc="upper left")
@@ -98,7 +130,7 @@ def _recovered(result: CableResult) -> Figure:
     return figure
 
 
-def _spikes(result: CableResult) -> Table:
+def _spikes(cable: CableForce) -> Table:
     columns = (
         Column("Spike"),
         Column("Centre (mm)", numeric=True),
@@ -113,7 +145,7 @@ def _spikes(result: CableResult) -> Table:
                 *(with_minus(f"{1e3 * x:.2f}") for x in (s.centre, s.width, s.ahead, s.behind)),
             )
         )
-        for i, s in enumerate(result.found.spikes, 1)
+        for i, s in enumerate(cable.spikes, 1)
     ]
     return Table(columns, rows, "Tops as seen through test functions of 20 ms, which are 2 mm long "
                  "at this speed and lower them.")  # fmt: skip
