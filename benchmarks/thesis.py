@@ -50,6 +50,22 @@ def _chapters() -> list[Figure]:
     ]
     cable = done.chapters["cable"]
     off = abs(cable.pitch.mean - cable.pitch.true)
+    dynamic = done.chapters["dynamic"]
+    figures += [
+        Figure(f"{name} of the open-loop sine off, largest of the places",
+               float(np.abs(p.values / p.true - 1.0).max()), "1", Target(high=2e-3))
+        for name, p in dynamic.fitted.items()
+    ]  # fmt: skip
+    rest, own = dynamic.first_period.max(axis=0)
+    future = done.chapters["future"]
+    figures += [
+        Figure("misfit of the first period, from rest", 1e3 * rest, "mm"),
+        Figure("the same from the estimated beginning", 1e6 * own, "um"),
+        Figure("frictions fitted to their own data, largest error over noise floor",
+               float(done.chapters["models"].own.max()), "1", Target(high=1.2)),
+        Figure("elements chosen less planted", future.chosen.count - future.planted, "1",
+               Target(low=0.0, high=0.0)),
+    ]  # fmt: skip
     return [
         *figures,
         Figure("pitch of the spikes off", 1e3 * off, "mm", Target(high=0.1)),
