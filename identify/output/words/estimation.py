@@ -42,8 +42,10 @@ def motion_fit_in_words(axis: str, fit: MotionFit, held: tuple[float, float] | N
     if held is not None:
         said += f"; held out {held[0]:.4g} {unit}, {held[1]:.4g} {unit} now"
     starts = ", ".join(f"{error:.3g}" for error in fit.starts)
+    worse = held is not None and held[1] > held[0]
     return [
         said,
+        *([HELD_OUT_GREW] if worse else []),
         MOTION_OUTCOMES[fit.outcome],
         f"position errors of the searches from {len(fit.starts)} starts when the best was chosen: "
         f"{starts} {unit}",
@@ -52,6 +54,10 @@ def motion_fit_in_words(axis: str, fit: MotionFit, held: tuple[float, float] | N
     ]
 
 
+HELD_OUT_GREW = (
+    "The held-out error grew, so the force fit is the better one: the noise of the measured "
+    "command or what the model lacks adds up to a drift, and the parameters have followed it."
+)
 MOTION_OUTCOMES = {
     Outcome.CONVERGED: "The fit converged: no parameter change lowers the position error further.",
     Outcome.NOT_CONVERGED: OUTCOMES[Outcome.NOT_CONVERGED],

@@ -13,13 +13,15 @@ from cli_runs import twin
 import identify
 from identify.dataset.dataset import datasets
 from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.fit import Outcome
 from identify.estimation.replay import (
     Beginning,
     measured_beginning,
     motion_error,
     simulated_error,
 )
-from identify.estimation.simulated_motion import fit_simulated_motion
+from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
+from identify.output.words.estimation import motion_fit_in_words
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.kinds import OpenLoopSine
@@ -111,6 +113,17 @@ def test_an_effect_of_the_other_axis_is_refused(slide, log) -> None:
         fit_simulated_motion(axis, prepared(slide, log))
 
 
+def test_a_held_out_error_that_grows_is_said(slide, log) -> None:
+    axis, logs = slide.axes["x"], prepared(slide, log)
+    begun = [measured_beginning(axis, one)[0] for one in logs]
+    found = MotionFit(axis, axis, logs, begun, Outcome.CONVERGED, [1e-6])
+    grew, fell = (
+        " ".join(motion_fit_in_words("x", found, held)) for held in ((1e-6, 2e-6), (2e-6, 1e-6))
+    )
+    assert "The held-out error grew" in grew
+    assert "The held-out error grew" not in fell
+
+
 def test_the_command_says_the_objective_and_both_errors(slide, log, tmp_path: Path) -> None:
     write_log(log, tmp_path / "log.mcap")
     save_model(slide, tmp_path / "slide.toml")
@@ -126,6 +139,7 @@ def test_the_command_says_the_objective_and_both_errors(slide, log, tmp_path: Pa
     assert list(axis["beginnings"]) == ["log.mcap"]
 
 
+@pytest.mark.slow
 def test_emps_as_diagnosed_simulates_the_pulses_better_than_published(shared_data) -> None:
     """Whole records without a restart; 6.63 mm: mujoco.sysid with four parameters."""
     mapping = load_mapping(EXAMPLES / "import_emps.toml")
