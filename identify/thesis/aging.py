@@ -17,7 +17,7 @@ from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.intervals import half_widths
 from identify.thesis.chapter import Progress, Recovered
 from identify.thesis.residuals import friction_of
-from twin.effect import Kind
+from twin.effect import DRY, DT, IO_SIZE, Kind
 from twin.experiments.named import simulate
 from twin.log import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 SURE = 3.0  # standard errors of a slope, from which there is a drift
 PART = 10.0  # s, of each log
+THINNED = 100  # samples, over which a state hardly changes
+AT_ONCE = 1e-12  # s, of a step in which no state moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +59,8 @@ class Drift:
 class Aging:
     """level: the dry friction of the machine that ages; steady: of the same machine without.
 
-    planted: parameters of the effects that made the drift, found on the whole run.
+    planted: parameters of the effects that made the drift, found on the whole run; ratio: error of
+    that fit over the noise floor.
     """
 
     level: Drift
@@ -137,9 +140,9 @@ def _drift(machine: MachineModel, name: str, young: AxisModel, log: Log) -> Drif
 
 def _true_level(axis: AxisModel, log: Log, name: str, part: slice, level: str) -> float:
     """Mean over a part of the run of the level that the machine's friction had."""
-    own, factor = axis.effects, np.ones(part.stop - part.start)
+    factor = np.ones(part.stop - part.start)
     states = {k: v[part] for k, v in log.truth[name].items()}
-    for f in own:
+    for f in axis.effects:
         if _ages(f):
             factor = factor * _factor(f, states)
     return float(np.mean(friction_of(axis).values[level] * factor))
@@ -147,17 +150,12 @@ def _true_level(axis: AxisModel, log: Log, name: str, part: slice, level: str) -
 
 def _factor(fitted: Fitted, truth: dict[str, Array]) -> Array:
     """What the law makes of a unit of dry friction at the states that were logged."""
-    from twin.effect import DRY, DT, IO_SIZE
-
     effect = fitted.effect
     logged = np.stack([truth[f"{effect.name}_{state}"] for state in effect.states], axis=1)
     values, out = np.array(fitted.vector()), np.ones(len(logged))
     for k in range(0, len(logged), THINNED):
         io = np.zeros(IO_SIZE)
-        io[DRY], io[DT] = 1.0, 1e-12
+        io[DRY], io[DT] = 1.0, AT_ONCE
         effect.law(values, logged[k].copy(), io)
         out[k : k + THINNED] = io[DRY]
     return out
-
-
-THINNED = 100  # samples, over which a state hardly changes
