@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import datasets
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.fit import Outcome, finished, fit_axis, rms
-from identify.estimation.intervals import half_widths
+from identify.estimation.fit import rms
 from identify.estimation.presliding import Presliding
 from identify.estimation.replay import Beginning, Replay, measured_beginning
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
 from identify.thesis.cable import of_position
 from identify.thesis.chapter import Chapter, Progress, Recovered
+from identify.thesis.informed import Informed, informed
 from identify.thesis.prescribed import force_along
 from identify.thesis.track import APART, FIRST
 from twin.core.control import Controller
@@ -63,20 +63,6 @@ FULL = Size(9, 30.0)
 SMALL = Size(1, 6.0)
 
 
-@dataclass(frozen=True)
-class Informed:
-    """What one record says of the dynamic part.
-
-    friction, noise: RMS change of the friction, and RMS noise of the measured force a sample, N.
-    half_widths: of the 90 % intervals at the planted values, over those; found: over them as well.
-    """
-
-    friction: float
-    noise: float
-    half_widths: Mapping[str, float]
-    found: Mapping[str, float]
-
-
 @dataclass(frozen=True, eq=False)
 class Trace:
     """Motion at one place, (n,) s and m: measured, and simulated from rest and from where it began.
@@ -111,6 +97,20 @@ class DynamicResult:
     trace: Trace
 
 
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """What one place gives: parameters by both ways, seconds of each, errors, the motions.
+
+    errors (2, 2) m RMS: in the first period and afterwards, from rest and as estimated.
+    """
+
+    simplex: Array
+    fitted: Array
+    seconds: tuple[float, float]
+    errors: Array
+    trace: Trace
+
+
 def run(
     models: Sequence[MachineModel],
     catalogue: Catalogue,
@@ -125,36 +125,44 @@ def run(
     places = np.array([FIRST + APART * (9 // size.places) * i for i in range(size.places)])
     known = _dynamic_part_free(axis)
     where = free_parameters(known)
-    simplex, fitted, seconds, first, after = [], [], [], [], []
+    found = []
     for i, place in enumerate(places):
         progress("open-loop sines", i, len(places))
         log = _late(_sine(quiet, name, float(place), size, rng), name)
-        prepared = _prepared(quiet, name, log)
-        begun = perf_counter()
-        simplex.append(_by_simplex(known, prepared[0], rng))
-        between = perf_counter()
-        found = _fitted(known, prepared, rng)
-        seconds.append((between - begun, perf_counter() - between))
-        fitted.append(read(found.axis, where))
-        rest, own = _errors(found.axis, prepared[0], found.beginnings[0])
-        cut = round(PERIOD * model.sample_rate)
-        first.append((rms(rest[:cut]), rms(own[:cut])))
-        after.append((rms(rest[cut:]), rms(own[cut:])))
-        if i == 0:
-            trace = _trace(prepared[0], found.beginnings[0].first, rest, own)
-            whole = _sine(model, name, float(place), size, rng)
-            opened = _informed(known, name, whole, _prepared(model, name, whole))
-    true = read(known, where)
+        found.append(_at_place(known, _prepared(quiet, name, log), rng))
+    whole = _sine(model, name, float(places[0]), size, rng)
+    true, seconds = read(known, where), np.median([f.seconds for f in found], axis=0)
     return DynamicResult(
         places=places,
         closed=_closed(model, name, known, float(places[0]), rng),
-        opened=opened,
-        simplex=_recovered(where, true, np.array(simplex)),
-        fitted=_recovered(where, true, np.array(fitted)),
-        seconds=(float(np.median(seconds, axis=0)[0]), float(np.median(seconds, axis=0)[1])),
-        first_period=np.array(first),
-        afterwards=np.array(after),
-        trace=trace,
+        opened=informed(known, name, whole, _prepared(model, name, whole)),
+        simplex=_recovered(where, true, np.array([f.simplex for f in found])),
+        fitted=_recovered(where, true, np.array([f.fitted for f in found])),
+        seconds=(float(seconds[0]), float(seconds[1])),
+        first_period=np.array([f.errors[0] for f in found]),
+        afterwards=np.array([f.errors[1] for f in found]),
+        trace=found[0].trace,
+    )
+
+
+def _at_place(
+    known: AxisModel, prepared: Sequence[PreparedLog], rng: np.random.Generator
+) -> _Place:
+    """The dynamic part by both ways, and the motion that the fitted values make."""
+    log, begun = prepared[0], perf_counter()
+    simplex = _by_simplex(known, log, rng)
+    between = perf_counter()
+    found = _fitted(known, prepared, rng)
+    seconds = (between - begun, perf_counter() - between)
+    rest, own = _errors(found.axis, log, found.beginnings[0])
+    cut = round(PERIOD / log.motion.sample_period)
+    errors = [[rms(e[part]) for e in (rest, own)] for part in (slice(cut), slice(cut, None))]
+    return _Place(
+        simplex=simplex,
+        fitted=read(found.axis, free_parameters(known)),
+        seconds=seconds,
+        errors=np.array(errors),
+        trace=_trace(log, found.beginnings[0].first, rest, own),
     )
 
 
@@ -262,28 +270,11 @@ def _closed(
     reversals = Reversals(name, repeats=REVERSALS, amplitude=REVERSAL, dwell=0.02, at=(place,))
     seed = int(rng.integers(2**31))
     log = simulate(model, reversals, seed=seed, simulator=FineSimulator)
-    return _informed(known, name, log, _prepared(model, name, log))
+    return informed(known, name, log, _prepared(model, name, log))
 
 
 def _prepared(model: MachineModel, name: str, log: Log) -> tuple[PreparedLog, ...]:
     return datasets(model, {"log": log}, {}, TEST_FUNCTION)[name].fit
-
-
-def _informed(axis: AxisModel, name: str, log: Log, prepared: Sequence[PreparedLog]) -> Informed:
-    """Uncertainty at the planted values, and what a fit of the force residual from them finds."""
-    friction = next(f.effect.name for f in axis.effects if f.effect.kind is Kind.FRICTION)
-    where = free_parameters(axis)
-    true = read(axis, where)
-    half = half_widths(finished(axis, axis, prepared, Outcome.CONVERGED))
-    found = read(fit_axis(axis, prepared).axis, where)
-    force = log.truth[name][friction]
-    noise = axis.hardware.current_noise * axis.hardware.force_constant
-    names = [c.parameter.name for c in where]
-    return Informed(
-        friction=float(np.std(force)), noise=noise,
-        half_widths=dict(zip(names, (half / true).tolist(), strict=True)),
-        found=dict(zip(names, (found / true).tolist(), strict=True)),
-    )  # fmt: skip
 
 
 CHAPTER = Chapter(("thesis_track",), FULL, SMALL, run)

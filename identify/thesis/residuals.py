@@ -22,6 +22,7 @@ from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
 from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.experiments.named import simulate
+from twin.log import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import FineSimulator
 
@@ -87,9 +88,7 @@ def run(
     logs = {}
     for i, seed in enumerate(seeds):
         progress("logs of the machine", i, len(seeds))
-        logs[f"log {i + 1}"] = simulate(
-            machine, "tracking", seed=seed, duration=size.duration, simulator=FineSimulator
-        )
+        logs[f"log {i + 1}"] = _recorded(machine, seed, size)
     apart = {"log 4": logs.pop("log 4")}
     held = {"log 3": logs.pop("log 3")}
     dataset, base = fit_aligned(model.axes[name], datasets(model, logs, held)[name])
@@ -113,6 +112,10 @@ def run(
         floor=found.final.floor,
         values=_values(planted, found.final.axis),
     )
+
+
+def _recorded(machine: MachineModel, seed: int, size: Size) -> Log:
+    return simulate(machine, "tracking", seed=seed, duration=size.duration, simulator=FineSimulator)
 
 
 def friction_of(axis: AxisModel) -> Fitted:

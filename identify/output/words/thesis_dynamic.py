@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from identify.thesis.dynamic import DynamicResult, Informed
+from identify.thesis.dynamic import DynamicResult
+from identify.thesis.informed import Informed
 
 
 def dynamic_in_words(result: DynamicResult) -> list[str]:
