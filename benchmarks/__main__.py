@@ -13,6 +13,7 @@ from time import perf_counter
 from benchmarks import (
     diagnosis,
     effect_cost,
+    emps,
     fuzz,
     import_time,
     mcap_logs,
@@ -29,7 +30,7 @@ from benchmarks.mutation import noticed
 
 ALL = (
     simulation, second_start, peer_fits, diagnosis, passes, stages, mcap_logs, effect_cost,
-    import_time, thesis, selftest, fuzz, noticed,
+    import_time, emps, thesis, selftest, fuzz, noticed,
 )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
+from twin.files import make_folder
 from twin.log import Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import Fitted, MachineModel
@@ -58,10 +59,7 @@ def demo(
     Writes machine_*.mcap, better.toml and report.html into the folder. Raises InputError where the
     folder cannot be made.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made: {error.strerror}; give another") from error
+    make_folder(folder)
     rng = np.random.default_rng(seed)
     machine, hidden = hidden_machine(model, catalogue, rng)
     say("1. a machine with an effect that the model lacks runs three experiments, logged as MCAP")

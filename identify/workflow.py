@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Dataset, by_log, datasets
-from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.fit import Fit, holdout_error
-from identify.estimation.force_balance import residual
+from identify.estimation.force_balance import require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
+from identify.estimation.replay import simulated_error
+from identify.estimation.simulated_motion import fit_simulated_motion
 from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.measure import cable_force, velocity_map
-from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+from identify.output.results import Addition, Comparison, Diagnosis, FitResult, SimulationFit
 from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate, score, try_effect, usable
 from identify.selection.confounded import moved_parameters
@@ -23,8 +23,6 @@ from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
 from identify.selection.unpredictable import noise_known, with_own_noise
-from identify.thesis.study import Reproduction
-from identify.thesis.study import reproduce as study
 from identify.validation.agreement import Agreement, agreement
 from identify.validation.free_run import free_run, rms_error
 from identify.validation.misfit_maps import compare_axis, position_errors
@@ -32,8 +30,11 @@ from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.log import Log
-from twin.model.machine import AxisModel, HistoryStep, MachineModel
+from twin.model.machine import HistoryStep, MachineModel
 from twin.simulator import MujocoSimulator
+
+if TYPE_CHECKING:
+    from identify.thesis.chapters import Reproduction
 
 Logs = Mapping[str, Log]
 Progress = Callable[[str, int, int], None]
@@ -76,33 +77,26 @@ def fit(
     return FitResult(model, found, fits, intervals, held, given, known)
 
 
-def require_residual(axis: AxisModel, dataset: Dataset) -> None:
-    """Raise InputError where no test function is usable, or the residual is not a number."""
-    kept = moving(dataset.fit, sticks(axis))
-    names = ", ".join(log.motion.name for log in dataset.fit)
-    if not kept.any():
-        raise InputError(
-            f"axis {dataset.axis} comes to rest within every test function of "
-            f"{dataset.test_function_length:g} s of {names}, and at rest its friction is unknown; "
-            "give a log in which it moves for longer at a time, or a shorter --test-function (s)"
-        )
-    with np.errstate(all="ignore"):
-        bad = np.count_nonzero(~np.isfinite(residual(axis, dataset.fit)[kept]))
-    if bad:
-        raise InputError(
-            f"axis {dataset.axis}: the force of the model is not a finite number in {bad} of "
-            f"{np.count_nonzero(kept)} test functions of {names}; check the values of its effects, "
-            "or leave them out to begin with their start values"
-        )
+def fit_simulation(found: FitResult, *, progress: Progress = silent) -> SimulationFit:
+    """Fit the motion that the model makes of the command alone, from a fit of the force residual.
+
+    Over whole logs, without a restart (identify.estimation.simulated_motion). Raises InputError
+    where that motion is not finite, or depends on another axis.
+    """
+    model, axes, held = found.model, {}, {}
+    for i, (axis, dataset) in enumerate(found.datasets.items()):
+        progress("fitting simulated motion", i, len(found.datasets))
+        done = axes[axis] = fit_simulated_motion(found.fits[axis].axis, dataset.fit)
+        both = (simulated_error(a, dataset.holdout) for a in (done.begun, done.axis))
+        held[axis] = (next(both), next(both)) if dataset.holdout else None
+        model = model.with_axis(axis, done.axis)
+    return SimulationFit(model, found, axes, held)
 
 
 def compare(
-    model: MachineModel,
-    logs: Logs,
-    *,
-    test_function: float | None = None,
+    model: MachineModel, logs: Logs, *, test_function: float | None = None,
     progress: Progress = silent,
-) -> Comparison:
+) -> Comparison:  # fmt: skip
     """The errors of a model with its present values, and where it fails. Raises InputError."""
     found = datasets(model, logs, {}, test_function)
     for axis, dataset in found.items():
@@ -134,13 +128,9 @@ def diagnose(
     """
     known = usable(catalogue, model)
     result = fit(
-        physics_alone(model),
-        logs,
-        holdout,
-        catalogue=catalogue,
-        test_function=test_function,
+        physics_alone(model), logs, holdout, catalogue=catalogue, test_function=test_function,
         progress=progress,
-    )
+    )  # fmt: skip
     axes = {
         axis: diagnose_axis(
             fitted,
@@ -152,14 +142,9 @@ def diagnose(
     }
     plans, not_planned = _next_experiments(axes, result.model, test_function)
     return Diagnosis(
-        result.model,
-        axes,
-        _compared(result.model, result.datasets, progress),
-        plans,
-        result.refits,
-        tuple(name for name in catalogue if name not in known),
-        not_planned,
-    )
+        result.model, axes, _compared(result.model, result.datasets, progress), plans,
+        result.refits, tuple(name for name in catalogue if name not in known), not_planned,
+    )  # fmt: skip
 
 
 def _next_experiments(
@@ -290,7 +275,9 @@ def reproduce(
 
     small: fewer speeds, trials and passes.
     """
-    return study(load_catalogue(), chapters, small=small, seed=seed, progress=progress)
+    from identify.thesis import chapters as thesis
+
+    return thesis.reproduce(load_catalogue(), chapters, small=small, seed=seed, progress=progress)
 
 
 __all__ = [
@@ -299,6 +286,7 @@ __all__ = [
     "Comparison",
     "Diagnosis",
     "FitResult",
+    "SimulationFit",
     "add",
     "add_named",
     "agree",
@@ -306,6 +294,7 @@ __all__ = [
     "compare",
     "diagnose",
     "fit",
+    "fit_simulation",
     "plan",
     "reproduce",
     "score",

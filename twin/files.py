@@ -29,6 +29,15 @@ def require_writable(path: Path) -> None:
             stream.write(TRIAL)
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it; raises InputError where that is not possible."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{path}: cannot be made: {reason}; give another folder") from error
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """A stream whose bytes become ``path`` at the end, or nothing where anything fails.

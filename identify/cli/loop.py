@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -27,12 +28,26 @@ from identify.cli.shared import (
 )
 
 
+class Objective(StrEnum):
+    """What a fit brings near the measurement."""
+
+    FORCE = "force"
+    SIMULATION = "simulation"
+
+
 @app.command()
 def fit(
     model: Model,
     logs: Logs,
     holdout: Holdout = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Fitted model to write.")] = None,
+    objective: Annotated[
+        Objective,
+        typer.Option(
+            help="What is brought near the measurement: the force along the measured "
+            "motion, or the motion simulated from the command alone."
+        ),
+    ] = Objective.FORCE,
     test_function: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
@@ -41,6 +56,7 @@ def fit(
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
+    from identify.output.simulation_fit import simulation_fit_json
     from twin.model.file import save_model
 
     if out:
@@ -50,9 +66,14 @@ def fit(
         partial(workflow.fit, catalogue=catalogue, test_function=test_function),
         machine_model(model, catalogue), logs, holdout,
     )  # fmt: skip
+    fitted, text, found = result.model, as_text.fit_text(result), as_json.fit_json(result)
+    if objective is Objective.SIMULATION:
+        with bars_on_stderr() as bars:
+            refined = workflow.fit_simulation(result, progress=bars)
+        fitted, text, found = refined.model, str(refined), simulation_fit_json(refined)
     if out:
-        save_model(result.model, out)
-    say(as_text.fit_text(result), as_json.fit_json(result), as_json_, findings)
+        save_model(fitted, out)
+    say(text, found, as_json_, findings)
 
 
 @app.command()

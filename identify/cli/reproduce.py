@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from identify.cli.shared import Json, app, bars_on_stderr, say
+from identify.cli.shared import (
+    Json,
+    app,
+    bars_on_stderr,
+    catalogue_with,
+    machine_model,
+    read_measured,
+    say,
+)
 from twin.errors import InputError
 
 REPORT, RESULTS = "thesis.html", "thesis.json"
@@ -23,6 +31,15 @@ def reproduce(
     small: Annotated[
         bool, typer.Option("--small", help="Fewer speeds, trials and passes.")
     ] = False,
+    log: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--log", help="Log of a real machine to run chapters on, with --model; may be repeated."
+        ),
+    ] = None,
+    model: Annotated[
+        str | None, typer.Option("--model", help="Machine model (.toml) that goes with --log.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Draws the noise.")] = 1,
     as_json_: Json = False,
 ) -> None:
@@ -33,16 +50,18 @@ def reproduce(
     from identify.output.plain import plain
     from identify.output.report.thesis import write_reproduction
     from identify.output.reproduction import reproduction_json, reproduction_text
-    from twin.model.file import write_atomically
+    from identify.thesis.chapters import reproduce_on_logs
+    from twin.files import make_folder, write_atomically
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{out}: cannot be made ({error.strerror}); give another folder"
-        ) from error
-    with bars_on_stderr() as bars:
-        result = workflow.reproduce(chapter or (), small=small, seed=seed, progress=bars)
+    if (log is None) != (model is None):
+        raise InputError("--log and --model go together; give both, or neither to use the twin")
+    make_folder(out)
+    if log is not None and model is not None:
+        machine = machine_model(model, catalogue_with(None))
+        result = reproduce_on_logs(chapter or (), machine, read_measured(log))
+    else:
+        with bars_on_stderr() as bars:
+            result = workflow.reproduce(chapter or (), small=small, seed=seed, progress=bars)
     found = reproduction_json(result)
     write_reproduction(out / REPORT, result)
     write_atomically(out / RESULTS, json.dumps(plain(found)).encode())

@@ -27,6 +27,7 @@ from twin.model.units import AxisUnits
 def fit_json(result: FitResult) -> dict[str, Any]:
     """Per axis: parameters with unit and 90 % interval, the outcome, fit and held-out errors."""
     return {
+        "objective": "force",
         "axes": {
             axis: {
                 "outcome": fit.axis.units.words(outcome_in_words(fit.ended)),

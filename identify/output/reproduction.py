@@ -5,28 +5,38 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from identify.estimation.cable_force import CableForce
 from identify.output.agreement import agree_json
 from identify.output.words.reproduction import (
     cable_in_words,
+    cable_of_logs_in_words,
     recovered_in_words,
     residuals_in_words,
     simulation_in_words,
     track_in_words,
     twin_in_words,
 )
-from identify.thesis.cable import CableStudy
+from identify.output.words.thesis_dynamic import dynamic_in_words
+from identify.output.words.thesis_future import future_in_words
+from identify.output.words.thesis_models import models_in_words
+from identify.thesis.aging import Drift
+from identify.thesis.cable import CableOfLogs, CableResult
 from identify.thesis.chapter import Recovered
-from identify.thesis.residuals import ResidualStudy
-from identify.thesis.simulation import SimulationStudy
-from identify.thesis.study import Reproduction
-from identify.thesis.track import Along, TrackStudy
-from identify.thesis.twin import TwinStudy
+from identify.thesis.chapters import Reproduction
+from identify.thesis.dynamic import DynamicResult
+from identify.thesis.future import FutureResult
+from identify.thesis.models import ModelsResult
+from identify.thesis.printed import ROLLER_PITCH
+from identify.thesis.residuals import ResidualResult
+from identify.thesis.simulation import SimulationResult
+from identify.thesis.track import Along, TrackResult
+from identify.thesis.twin import TwinResult
 
 
 def reproduction_json(result: Reproduction) -> dict[str, Any]:
     """The documented object: every chapter that was run, and the seconds that it took."""
     return {
-        "chapters": {name: JSON[name](found) for name, found in result.chapters.items()},
+        "chapters": {name: JSON[type(found)](found) for name, found in result.chapters.items()},
         "small": result.small,
         "seconds": sum(result.seconds.values()),
         "seconds_by_chapter": dict(result.seconds),
@@ -38,7 +48,7 @@ def reproduction_text(result: Reproduction) -> str:
     lines = []
     for name, found in result.chapters.items():
         lines.append(f"{name} ({result.seconds[name]:.0f} s)")
-        lines += [f"  {line}" for line in TEXT[name](found)]
+        lines += [f"  {line}" for line in TEXT[type(found)](found)]
     return "\n".join(lines)
 
 
@@ -49,64 +59,108 @@ def _recovered(r: Recovered) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _simulation(study: SimulationStudy) -> dict[str, Any]:
+def _models(result: ModelsResult) -> dict[str, Any]:
     return {
-        "snr_db": study.snr,
-        "trials": study.trials,
-        "parameters": {k: _recovered(r) for k, r in study.parameters.items()},
-        "by_snr_db": {
-            f"{snr:g}": {k: _recovered(r) for k, r in found.items()}
-            for snr, found in study.by_snr.items()
+        "laws": list(result.laws),
+        "behaviours": list(result.behaviours),
+        "error_over_noise_floor": {
+            machine: {
+                law: dict(zip(result.behaviours, ratios.tolist(), strict=True))
+                for law, ratios in zip(result.laws, rows, strict=True)
+            }
+            for machine, rows in zip(result.laws, result.ratios, strict=True)
         },
-        "sensitivity": {
-            "factors": study.sensitivity.factors.tolist(),
-            "force_error": {k: f.tolist() for k, f in study.sensitivity.force.items()},
-            "unit": "N",
-        },
-        "map": {
-            "velocity": study.map.velocity.tolist(), "velocity_unit": "m/s",
-            "friction": study.map.friction.tolist(), "friction_unit": "N",
+        "by_law": {
+            law: {
+                "right_starts": float(result.right[i]), "starts": result.starts,
+                "fit_time": float(result.seconds[i]), "step_time": float(result.step[i]),
+                "time_unit": "s", "loop_open_by": result.loops[law].gap,
+                "nested_loops_open_by": result.nested[law].gap, "unit": "N", "printed": None,
+            }
+            for i, law in enumerate(result.laws)
         },
     }  # fmt: skip
 
 
-def _cable(study: CableStudy) -> dict[str, Any]:
-    found = study.found
+def _simulation(result: SimulationResult) -> dict[str, Any]:
     return {
-        "repeats": study.repeats,
-        "pitch": study.pitch
+        "snr_db": result.snr,
+        "trials": result.trials,
+        "parameters": {k: _recovered(r) for k, r in result.parameters.items()},
+        "by_snr_db": {
+            f"{snr:g}": {k: _recovered(r) for k, r in found.items()}
+            for snr, found in result.by_snr.items()
+        },
+        "sensitivity": {
+            "factors": result.sensitivity.factors.tolist(),
+            "force_error": {k: f.tolist() for k, f in result.sensitivity.force.items()},
+            "unit": "N",
+        },
+        "map": {
+            "velocity": result.map.velocity.tolist(), "velocity_unit": "m/s",
+            "friction": result.map.friction.tolist(), "friction_unit": "N",
+        },
+    }  # fmt: skip
+
+
+def _cable(result: CableResult) -> dict[str, Any]:
+    found = result.found
+    return {
+        "repeats": result.repeats,
+        "pitch": result.pitch
         and {
-            **_recovered(study.pitch),
+            **_recovered(result.pitch),
             "standard_error": found.pitch and found.pitch.standard_error,
         },
+        **_of_passes(found),
+        "true": result.planted.tolist(),
+        "rms_error": result.rms_error,
+        "largest_error": result.largest_error,
+        "rms_error_with_spikes": result.rms_error_with_all,
+        "within_band": result.within_band,
+        "printed": None,
+    }
+
+
+def _cable_of_logs(result: CableOfLogs) -> dict[str, Any]:
+    found = result.found
+    pitch = found.pitch
+    return {
+        "repeats": len(found.passes.alike),
+        "pitch": pitch and {
+            "mean": pitch.value, "standard_error": pitch.standard_error, "unit": "m",
+            "printed": ROLLER_PITCH,
+        },
+        **_of_passes(found),
+        "true": None,
+        "printed": None,
+    }  # fmt: skip
+
+
+def _of_passes(found: CableForce) -> dict[str, Any]:
+    return {
         "spikes": [
             {"centre": s.centre, "width": s.width, "ahead": s.ahead, "behind": s.behind}
             for s in found.spikes
         ],
         "position": found.position.tolist(),
         "position_unit": "m",
-        "true": study.planted.tolist(),
         "found": found.force.tolist(),
         "band_90": found.band.tolist(),
         "with_spikes": found.with_all.tolist(),
         "unit": "N",
-        "rms_error": study.rms_error,
-        "largest_error": study.largest_error,
-        "rms_error_with_spikes": study.rms_error_with_all,
-        "within_band": study.within_band,
-        "printed": None,
     }
 
 
-def _track(study: TrackStudy) -> dict[str, Any]:
+def _track(result: TrackResult) -> dict[str, Any]:
     return {
-        "position": study.places.tolist(),
+        "position": result.places.tolist(),
         "position_unit": "m",
         **{
             way: {
                 DIRECTIONS[d]: {k: _along(a) for k, a in found.items()} for d, found in by.items()
             }
-            for way, by in (("map", study.maps), ("fit", study.fits))
+            for way, by in (("map", result.maps), ("fit", result.fits))
         },
     }
 
@@ -121,51 +175,119 @@ def _along(a: Along) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _residuals(study: ResidualStudy) -> dict[str, Any]:
-    tests = {"before": study.before, "after": study.after}
+def _dynamic(result: DynamicResult) -> dict[str, Any]:
+    records = {"closed_loop": result.closed, "open_loop": result.opened}
     return {
-        "fitted": study.first,
-        "planted": study.planted,
-        "verdict": study.verdict.name.lower(),
-        "named": list(study.named),
+        "position": result.places.tolist(),
+        "position_unit": "m",
+        "records": {
+            name: {
+                "friction_change": r.friction, "force_noise": r.noise, "unit": "N",
+                "relative_half_width_90": dict(r.half_widths), "found_over_true": dict(r.found),
+            }
+            for name, r in records.items()
+        },
+        "simplex": {k: _recovered(r) for k, r in result.simplex.items()},
+        "parameters": {k: _recovered(r) for k, r in result.fitted.items()},
+        "seconds_at_a_place": dict(zip(("simplex", "fit"), result.seconds, strict=True)),
+        "position_error": {
+            part: dict(zip(("from_rest", "beginning_estimated"), e.T.tolist(), strict=True))
+            for part, e in (("first_period", result.first_period), ("after", result.afterwards))
+        },
+        "unit": "m",
+    }  # fmt: skip
+
+
+def _residuals(result: ResidualResult) -> dict[str, Any]:
+    tests = {"before": result.before, "after": result.after}
+    return {
+        "fitted": result.first,
+        "planted": result.planted,
+        "verdict": result.verdict.name.lower(),
+        "named": list(result.named),
         "ranking": [
             {"effect": c.name, "delta_bic": c.delta_bic, "error_over_noise_floor": c.over_floor}
-            for c in study.ranking
+            for c in result.ranking
         ],
-        "test_error_before": study.error_before,
-        "test_error_after": study.error_after,
-        "noise_floor": study.floor,
+        "test_error_before": result.error_before,
+        "test_error_after": result.error_after,
+        "noise_floor": result.floor,
         "unit": "N",
         "white": {name: t.passes for name, t in tests.items()},
         "outside_90_bounds": {
             name: {c.signal: c.outside for c in t.correlations} for name, t in tests.items()
         },
-        "parameters": {k: _recovered(r) for k, r in study.values.items()},
+        "parameters": {k: _recovered(r) for k, r in result.values.items()},
     }
 
 
-def _twin(study: TwinStudy) -> dict[str, Any]:
+def _future(result: FutureResult) -> dict[str, Any]:
+    slow, aging = result.slow, result.aging
     return {
-        "alike": agree_json(study.alike),
-        "changed": {**agree_json(study.changed), "added_mass": study.added, "unit": "kg"},
-        "closed_loop_error": {k: {"found": v, "unit": "1"} for k, v in study.errors.items()},
+        "elements": {
+            "planted": result.planted, "found": result.chosen.count,
+            "tried": [
+                {"elements": e.count, "delta_bic": e.delta_bic, "error_over_noise_floor":
+                 e.over_floor} for e in result.elements
+            ],
+        },
+        "residuals": [
+            {"model": b.name, "parameters_added": b.parameters, "holdout_error": b.held_out,
+             "test_error": b.test} for b in result.beside
+        ],
+        "noise_floor": result.floor,
+        "near_zero_speed": {
+            "velocity": slow.speed.tolist(), "velocity_unit": "m/s", "true": slow.planted.tolist(),
+            "map": slow.mapped.tolist(), "found": slow.fitted.tolist(), "printed": None,
+        },
+        "unit": "N",
+        "long_run": {
+            **{n: _drift(d) for n, d in (("aging", aging.level), ("without", aging.steady))},
+            "parameters": {k: _recovered(r) for k, r in aging.planted.items()},
+        },
+    }  # fmt: skip
+
+
+def _drift(drift: Drift) -> dict[str, Any]:
+    slope, error = drift.slope
+    return {
+        "distance": drift.distance.tolist(), "distance_unit": "m", "true": drift.truth.tolist(),
+        "found": drift.found.tolist(), "half_width_90": drift.half.tolist(), "unit": drift.unit,
+        "slope": slope, "slope_standard_error": error, "slope_unit": f"{drift.unit}/m",
+        "detected": drift.detected, "printed": None,
+    }  # fmt: skip
+
+
+def _twin(result: TwinResult) -> dict[str, Any]:
+    return {
+        "alike": agree_json(result.alike),
+        "changed": {**agree_json(result.changed), "added_mass": result.added, "unit": "kg"},
+        "closed_loop_error": {k: {"found": v, "unit": "1"} for k, v in result.errors.items()},
     }
 
 
-JSON: Mapping[str, Callable[[Any], dict[str, Any]]] = {
-    "simulation": _simulation,
-    "cable": _cable,
-    "track": _track,
-    "residuals": _residuals,
-    "twin": _twin,
+JSON: Mapping[type, Callable[[Any], dict[str, Any]]] = {
+    ModelsResult: _models,
+    SimulationResult: _simulation,
+    CableResult: _cable,
+    CableOfLogs: _cable_of_logs,
+    TrackResult: _track,
+    DynamicResult: _dynamic,
+    ResidualResult: _residuals,
+    FutureResult: _future,
+    TwinResult: _twin,
 }
-TEXT: Mapping[str, Callable[[Any], list[str]]] = {
-    "simulation": lambda study: [
-        *simulation_in_words(study),
-        *(recovered_in_words(name, r) for name, r in study.parameters.items()),
+TEXT: Mapping[type, Callable[[Any], list[str]]] = {
+    ModelsResult: models_in_words,
+    SimulationResult: lambda result: [
+        *simulation_in_words(result),
+        *(recovered_in_words(name, r) for name, r in result.parameters.items()),
     ],
-    "cable": cable_in_words,
-    "track": track_in_words,
-    "residuals": residuals_in_words,
-    "twin": twin_in_words,
+    CableResult: cable_in_words,
+    CableOfLogs: cable_of_logs_in_words,
+    TrackResult: track_in_words,
+    DynamicResult: dynamic_in_words,
+    ResidualResult: residuals_in_words,
+    FutureResult: future_in_words,
+    TwinResult: twin_in_words,
 }

@@ -9,7 +9,9 @@ from functools import cached_property
 from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit
 from identify.estimation.intervals import Estimate
+from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
+from identify.output.simulation_fit import simulation_fit_text
 from identify.output.text import add_text, compare_text, diagnose_text, fit_text
 from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate
@@ -58,6 +60,26 @@ class FitResult:
 
     def __repr__(self) -> str:
         return f"<FitResult of {self.model.name}; print it to read it>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulationFit:
+    """A machine fitted to the motion of whole logs, by axis, from a fit of the force residual.
+
+    holdout_error: by axis, RMS position error over the held-out logs before and after, begun as
+    measured; None where there are none.
+    """
+
+    model: MachineModel
+    force: FitResult
+    axes: Mapping[str, MotionFit]
+    holdout_error: Mapping[str, tuple[float, float] | None]
+
+    def __str__(self) -> str:
+        return simulation_fit_text(self)
+
+    def __repr__(self) -> str:
+        return f"<SimulationFit of {self.model.name}; print it to read it>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

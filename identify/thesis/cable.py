@@ -7,6 +7,7 @@ against what was planted; ``cable_force`` itself runs on any log of passes.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +15,12 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import datasets
 from identify.estimation.cable_force import CableForce, cable_force
-from identify.thesis.chapter import Progress, Recovered
+from identify.estimation.fit import rms
+from identify.measure import cable_force as of_passes
+from identify.thesis.chapter import Chapter, Progress, Recovered
 from identify.thesis.printed import ROLLER_PITCH
 from twin.effect import Effect, Kind
+from twin.effects import Catalogue
 from twin.experiments.kinds import Passes
 from twin.experiments.named import simulate
 from twin.log import Log
@@ -43,7 +47,7 @@ SMALL = Size(3, ReducedSimulator)
 
 
 @dataclass(frozen=True, eq=False)
-class CableStudy:
+class CableResult:
     """The chapter's results.
 
     planted (k,) N, at the positions of what was found. pitch: None where fewer than three spikes
@@ -64,7 +68,7 @@ class CableStudy:
     @property
     def rms_error(self) -> float:
         """RMS of the error, N."""
-        return _rms(self.error)
+        return rms(self.error)
 
     @property
     def largest_error(self) -> float:
@@ -74,7 +78,7 @@ class CableStudy:
     @property
     def rms_error_with_all(self) -> float:
         """RMS of the error with the spikes left in, as in the thesis, N."""
-        return _rms(self.found.with_all - self.planted)
+        return rms(self.found.with_all - self.planted)
 
     @property
     def within_band(self) -> float:
@@ -82,14 +86,27 @@ class CableStudy:
         return float(np.mean(np.abs(self.error) <= self.found.band))
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+@dataclass(frozen=True, eq=False)
+class CableOfLogs:
+    """What passes of a real machine tell, of which nothing is known to be planted."""
+
+    found: CableForce
 
 
-def cable_study(
-    model: MachineModel, size: Size, rng: np.random.Generator, progress: Progress
-) -> CableStudy:
+def of_logs(model: MachineModel, logs: Mapping[str, Log]) -> CableOfLogs:
+    """The chapter on logs of passes; raises InputError where they hold none."""
+    return CableOfLogs(of_passes(model, logs, test_function=TEST_FUNCTION))
+
+
+def run(
+    models: Sequence[MachineModel],
+    catalogue: Catalogue,
+    size: Size,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> CableResult:
     """Run the passes on the first axis of a machine with a cable and rollers."""
+    (model,) = models
     name, axis = next(iter(model.axes.items()))
     passing = Passes(name, span=SPAN, speed=SPEED, repeats=size.repeats)
     log = simulate(
@@ -99,7 +116,7 @@ def cable_study(
     prepared = datasets(model, {"passes": log}, {}, TEST_FUNCTION)[name].fit
     found = cable_force(axis, prepared)
     h = axis.hardware
-    return CableStudy(
+    return CableResult(
         found, _planted(axis, log, name, found.position), _pitch(axis, found), size.repeats,
         h.current_noise * h.force_constant,
     )  # fmt: skip
@@ -127,3 +144,6 @@ def _pitch(axis: AxisModel, found: CableForce) -> Recovered | None:
     if found.pitch is None or not planted:
         return None
     return Recovered(planted[0], np.array([found.pitch.value]), axis.units.position, ROLLER_PITCH)
+
+
+CHAPTER = Chapter(("proton_xy",), FULL, SMALL, run, of_logs)

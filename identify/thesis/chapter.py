@@ -1,15 +1,38 @@
-"""What the chapters share: a planted value beside what was found for it and what is printed."""
+"""What the chapters share: how one is run, and a planted value beside what was found for it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.effects import Catalogue
+from twin.log import Log
+from twin.model.machine import MachineModel
+
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]  # what, done, of how many
+Size = TypeVar("Size")
+Result = TypeVar("Result", covariant=True)
+
+
+@dataclass(frozen=True)
+class Chapter(Generic[Size, Result]):
+    """A chapter and what it needs: names of model files, its whole size and a quick one.
+
+    run: from those models, the catalogue of effects, a size, a generator for all that is drawn, and
+    progress. on_logs: the same from logs of a real machine with its model, where that makes sense;
+    then nothing is planted.
+    """
+
+    models: tuple[str, ...]
+    full: Size
+    small: Size
+    run: Callable[[Sequence[MachineModel], Catalogue, Size, np.random.Generator, Progress], Result]
+    on_logs: Callable[[MachineModel, Mapping[str, Log]], Any] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,11 +17,12 @@ from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.channel_delay import fit_aligned, realigned
 from identify.estimation.fit import Fit, error_on, rms
 from identify.selection.forward_selection import Verdict, diagnose_axis
-from identify.thesis.chapter import Progress, Recovered
+from identify.thesis.chapter import Chapter, Progress, Recovered
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
 from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.experiments.named import simulate
+from twin.log import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import FineSimulator
 
@@ -48,7 +49,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class ResidualStudy:
+class ResidualResult:
     """The chapter's results.
 
     first: the friction that was fitted; planted: the machine's. named: effects that the diagnosis
@@ -71,15 +72,15 @@ class ResidualStudy:
     values: dict[str, Recovered]
 
 
-def residual_study(
-    machine: MachineModel,
-    stage: MachineModel,
+def run(
+    models: Sequence[MachineModel],
     catalogue: Catalogue,
     size: Size,
     rng: np.random.Generator,
     progress: Progress,
-) -> ResidualStudy:
-    """Fit the stage's friction to the first axis of another machine, and diagnose it."""
+) -> ResidualResult:
+    """Fit the second model's friction to the first axis of the first, and diagnose it."""
+    machine, stage = models
     name, axis = next(iter(machine.axes.items()))
     planted, first = (friction_of(a) for a in (axis, next(iter(stage.axes.values()))))
     model = machine.with_axis(name, axis.with_effect(first))
@@ -87,9 +88,7 @@ def residual_study(
     logs = {}
     for i, seed in enumerate(seeds):
         progress("logs of the machine", i, len(seeds))
-        logs[f"log {i + 1}"] = simulate(
-            machine, "tracking", seed=seed, duration=size.duration, simulator=FineSimulator
-        )
+        logs[f"log {i + 1}"] = _recorded(machine, seed, size)
     apart = {"log 4": logs.pop("log 4")}
     held = {"log 3": logs.pop("log 3")}
     dataset, base = fit_aligned(model.axes[name], datasets(model, logs, held)[name])
@@ -99,7 +98,7 @@ def residual_study(
         base, dataset, known, lambda done, total: progress("trying effects", done, total)
     )
     tests = [realigned(whole, d.channel_delay).fit for d in (dataset, found.dataset)]
-    return ResidualStudy(
+    return ResidualResult(
         first=first.effect.name,
         planted=planted.effect.name,
         verdict=found.verdict,
@@ -113,6 +112,10 @@ def residual_study(
         floor=found.final.floor,
         values=_values(planted, found.final.axis),
     )
+
+
+def _recorded(machine: MachineModel, seed: int, size: Size) -> Log:
+    return simulate(machine, "tracking", seed=seed, duration=size.duration, simulator=FineSimulator)
 
 
 def friction_of(axis: AxisModel) -> Fitted:
@@ -142,3 +145,6 @@ def _values(planted: Fitted, found: AxisModel) -> dict[str, Recovered]:
         for p in planted.effect.parameters
         if p.name not in planted.fixed and not p.fixed
     }
+
+
+CHAPTER = Chapter(("thesis_memory", "proton_xy"), FULL, SMALL, run)

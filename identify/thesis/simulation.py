@@ -19,13 +19,15 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.fit import rms
 from identify.estimation.force_balance import residual
 from identify.estimation.presliding import Presliding
 from identify.estimation.stribeck_curve import StribeckCurve, fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
-from identify.thesis.chapter import Progress, Recovered
+from identify.thesis.chapter import Chapter, Progress, Recovered
 from identify.thesis.printed import SIMULATION
 from twin.effect import Kind
+from twin.effects import Catalogue
 from twin.experiments.kinds import Reversals, Staircase
 from twin.experiments.named import simulate
 from twin.log import AxisLog, Log
@@ -83,7 +85,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True, eq=False)
-class SimulationStudy:
+class SimulationResult:
     """The chapter's results. map: without noise. by_snr: ratio in dB -> parameters by name."""
 
     map: VelocityMap
@@ -103,10 +105,15 @@ class SimulationStudy:
         return self.by_snr[self.snr]
 
 
-def simulation_study(
-    model: MachineModel, size: Size, rng: np.random.Generator, progress: Progress
-) -> SimulationStudy:
+def run(
+    models: Sequence[MachineModel],
+    catalogue: Catalogue,
+    size: Size,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> SimulationResult:
     """Run the study on the first axis of a machine whose friction has these parameters."""
+    (model,) = models
     name, axis = next(iter(model.axes.items()))
     friction = next(f for f in axis.effects if f.effect.kind is Kind.FRICTION)
     found = _map(model, name, size, progress)
@@ -126,7 +133,7 @@ def simulation_study(
         by_snr[snr] = _recovered(friction, np.array(rows))
     true = StribeckCurve(*(friction.values[p] for p in STATIC))
     logs = _prepared(model, name, clean.noisy(0.0, rng))
-    return SimulationStudy(
+    return SimulationResult(
         found, true, by_snr, _sensitivity(axis, friction, found, true, logs), size.trials
     )
 
@@ -217,13 +224,12 @@ def _sensitivity(
     speed, force = np.abs(found.velocity), {}
     for p in STATIC:
         curves = [replace(true, **{p: f * getattr(true, p)}) for f in FACTORS]
-        force[p] = np.array([_rms(curve(speed) - true(speed)) for curve in curves])
+        force[p] = np.array([rms(curve(speed) - true(speed)) for curve in curves])
     for p in DYNAMIC:
         where = [ParameterReference(friction.effect.name, friction.effect.parameter(p))]
         moved = [write(axis, where, [f * friction.values[p]]) for f in FACTORS]
-        force[p] = np.array([_rms(residual(a, logs)) for a in moved])
+        force[p] = np.array([rms(residual(a, logs)) for a in moved])
     return Sensitivity(FACTORS, force)
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+CHAPTER = Chapter(("thesis_simulation",), FULL, SMALL, run)

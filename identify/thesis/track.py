@@ -17,19 +17,19 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from identify.dataset.dataset import datasets
-from identify.dataset.drive import parts_of
-from identify.dataset.motion import Motion, motion_of
-from identify.dataset.prepared_log import total_force
+from identify.dataset.motion import motion_of
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.intervals import CONFIDENCE, half_widths
 from identify.estimation.stribeck_curve import fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
-from identify.thesis.chapter import Progress
+from identify.thesis.chapter import Chapter, Progress
+from identify.thesis.prescribed import force_along
 from twin.effect import Kind
+from twin.effects import Catalogue
 from twin.experiments.kinds import Staircase
 from twin.experiments.named import simulate
 from twin.log import Log
-from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
+from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import read, write
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
@@ -83,7 +83,7 @@ class Along:
 
 
 @dataclass(frozen=True, eq=False)
-class TrackStudy:
+class TrackResult:
     """The chapter's results. places (k,) m.
 
     maps, fits: by the thesis's way and by ours, direction (+1 or -1) -> parameters by name.
@@ -97,10 +97,15 @@ class TrackStudy:
 Found = tuple[Array, Array]  # parameters (4,), half widths (4,) of their 90 % intervals
 
 
-def track_study(
-    model: MachineModel, size: Size, rng: np.random.Generator, progress: Progress
-) -> TrackStudy:
+def run(
+    models: Sequence[MachineModel],
+    catalogue: Catalogue,
+    size: Size,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> TrackResult:
     """Measure the friction of the first axis of a machine at each place, in both ways."""
+    (model,) = models
     name, axis = next(iter(model.axes.items()))
     apart = 9 // size.places
     places = np.array([FIRST + APART * apart * i for i in range(size.places)])
@@ -118,7 +123,7 @@ def track_study(
             maps[way].append(_through(found.towards(way)))
             fits[way].append(_of_law(local, float(place), way * speeds))
             planted[way].append(_curve(axis, float(place), way * speeds))
-    return TrackStudy(
+    return TrackResult(
         places,
         {way: _along(axis, maps[way], planted[way]) for way in DIRECTIONS},
         {way: _along(axis, fits[way], planted[way]) for way in DIRECTIONS},
@@ -215,10 +220,9 @@ def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
     place: m; velocity: m/s, not zero.
     """
     period = STEADY_TRAVEL / STEPS / abs(velocity)
-    signals = np.repeat([[place], [velocity], [0.0]], STEPS, axis=1)
-    motion = Motion(
-        name="", axis="", signals=signals, others=np.zeros_like(signals), period=period, start=0.0,
-        sample_period=period, position_noise=0.0, raw=signals[1:],
-    )  # fmt: skip
-    law = axis_table({"": parts_of(axis, Kind.FRICTION, Kind.MODIFIER)})
-    return float(-np.sign(velocity) * total_force(law, motion)[-1])
+    places, velocities = np.repeat([[place], [velocity]], STEPS, axis=1)
+    force = force_along(axis, places, velocities, period, Kind.FRICTION, Kind.MODIFIER)
+    return float(-np.sign(velocity) * force[-1])
+
+
+CHAPTER = Chapter(("thesis_track",), FULL, SMALL, run)

@@ -7,7 +7,7 @@ times finer than its twin; ``twin_of`` and ``closed_loop_errors`` take the log o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.intervals import estimates, intervals_to_keep
-from identify.thesis.chapter import Progress
+from identify.thesis.chapter import Chapter, Progress
 from identify.validation.agreement import Agreement, agreement
 from twin.core.control import Controller
 from twin.effect import Kind
@@ -49,7 +49,7 @@ SMALL = Size(6.0, ReducedSimulator)
 
 
 @dataclass(frozen=True, eq=False)
-class TwinStudy:
+class TwinResult:
     """The chapter's results.
 
     alike: machine and twin. changed: the machine before and after its mass was changed by ``added``
@@ -62,14 +62,15 @@ class TwinStudy:
     errors: Mapping[str, float]
 
 
-def twin_study(
-    model: MachineModel,
+def run(
+    models: Sequence[MachineModel],
     catalogue: Catalogue,
     size: Size,
     rng: np.random.Generator,
     progress: Progress,
-) -> TwinStudy:
+) -> TwinResult:
     """Run the chapter on the first axis of a machine, whose dry friction is drawn anew."""
+    (model,) = models
     name = next(iter(model.axes))
     model = MachineModel(model.name, {name: model.axes[name]}, model.sample_rate)
     machine = _drawn(model, name, rng)
@@ -88,7 +89,7 @@ def twin_study(
         fits.append(identified(model, log))
     progress("machine and twin", 2, 3)
     follower = twin_of(fits[0], logs[0], simulator=size.simulator)
-    return TwinStudy(
+    return TwinResult(
         alike=agreement(fits[0], identified(model, follower), catalogue),
         changed=agreement(fits[0], fits[1], catalogue),
         added=heavier,
@@ -161,3 +162,6 @@ def _signals(log: Log, axis: str) -> dict[str, Array]:
         "acceleration": rate(velocity, log.period),
         "force": log.axes[axis].force,
     }
+
+
+CHAPTER = Chapter(("proton_xy",), FULL, SMALL, run)

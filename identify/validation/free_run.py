@@ -8,23 +8,20 @@ wrong force of the model.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identify.dataset.noise_floor import noise_of
 from identify.dataset.prepared_log import PreparedLog
-from twin.core.control import Controller, gain_table
-from twin.core.loop import N_SIGNALS, POSITION_COLUMN
-from twin.core.native import LAST_ACCELERATION, LAST_VELOCITY, Table, walk
+from identify.estimation.open_loop import START_FIT, as_logged, open_loop, states_along
+from twin.core.native import LAST_ACCELERATION, LAST_VELOCITY
 from twin.model.machine import MachineModel
-from twin.signals import Array, between, local_cubic, local_parabola
+from twin.signals import Array, local_cubic
 from twin.simulator import MujocoSimulator, ReducedSimulator, Stepper
 
 HORIZON = 0.5  # s between restarts
 SEED = 0  # of the added noise
-START_FIT = 5e-3  # s on each side of a restart from which its position and velocity are taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +43,7 @@ def free_run(
     noise: generator of measurement noise of the log's level, added to its readings and commands;
     no noise is added where None.
     """
-    model = _as_logged(model, logs)
+    model = as_logged(model, logs)
     position, command = _signals(model, logs, noise)
     n, period = len(position), model.period
     count = max(round(HORIZON / period), 2)
@@ -55,7 +52,7 @@ def free_run(
     table = model.table()
     origin = _time_origin(logs)
     accelerated = any(f.effect.reads("A_OTHER") for a in model.axes.values() for f in a.effects)
-    states = _states_at(table, position, command, period, starts, origin, accelerated)
+    states = states_along(table, position, command, period, starts, origin, accelerated)
     around = position[np.arange(-side, side + 1)[:, None] + starts]
     begun = zip(starts, states, *local_cubic(around, period), strict=True)
     out = np.full((n, len(model.axes)), np.nan)
@@ -66,7 +63,7 @@ def free_run(
         # The stepped position leads the true one by half a sample (see twin.core.loop).
         simulation.place(x + 0.5 * period * v, v, state, int(start), origin)
         span = slice(start, min(start + count, n))
-        simulated = _open_loop(model, table, simulation, int(start), command[span])
+        simulated = open_loop(model, table, simulation, int(start), command[span])
         out[span] = simulated - position[span]
     return FreeRun({a: out[:, i] for i, a in enumerate(model.axes) if a in logs}, HORIZON)
 
@@ -110,90 +107,3 @@ def rms_error(run: FreeRun, axis: str) -> float:
     """RMS of the free-running position error of one axis, in m; infinite where the run diverges."""
     with np.errstate(over="ignore"):
         return float(np.sqrt(np.nanmean(run.error[axis] ** 2)))
-
-
-def _as_logged(model: MachineModel, logs: Mapping[str, PreparedLog]) -> MachineModel:
-    """The axes at the log's rate, without sensor errors and force limit, which the log contains.
-
-    On a machine of two axes, one that is not among the logs stands still, because effects of the
-    other may depend on its position; on a machine of more it is left out.
-    """
-    axes = {
-        name: replace(
-            axis if name in logs else replace(axis, effects=()),
-            hardware=replace(axis.hardware, encoder_resolution=0.0, force_limit=np.inf),
-        )
-        for name, axis in model.axes.items()
-        if name in logs or len(model.axes) == 2
-    }
-    period = next(iter(logs.values())).motion.sample_period
-    return replace(model, axes=axes, sample_rate=1.0 / period)
-
-
-def _states_at(
-    table: Table,
-    position: Array,
-    command: Array,
-    period: float,
-    starts: NDArray[np.int64],
-    origin: float,
-    accelerated: bool = True,
-) -> Array:
-    """Effect states (n_starts, n_states) after following the measured motion up to each start.
-
-    accelerated: whether a law reads the acceleration of the other axis.
-    """
-    middle = 0.5 * (position[1:] + position[:-1]).T
-    velocity = between(position.T, period)
-    pair = len(table.axes) == 2  # no law of a larger machine reads the other axis
-    acceleration = np.zeros_like(velocity)
-    if pair and accelerated:
-        acceleration = _smooth_acceleration(velocity, period)
-    states = np.zeros(table.n_states)
-    out = np.empty((len(starts), table.n_states))
-    rows = np.empty((len(table.entries), middle.shape[1]))
-    begin = 0
-    for i, start in enumerate(starts):
-        span = slice(begin, int(start))
-        for a, (first, last, at, _, _) in enumerate(table.axes):
-            motion = np.stack([middle[a, span], velocity[a, span], command[span, a]])
-            others = np.zeros_like(motion)
-            if pair:
-                b = 1 - a
-                others = np.stack([middle[b, span], velocity[b, span], acceleration[b, span]])
-            walk(
-                table.entries, first, last, table.parameters, states, at, motion, others, period,
-                begin, np.ascontiguousarray(rows[:, span]), table.masses[a], origin,
-            )  # fmt: skip
-        out[i] = states
-        begin = int(start)
-    return out
-
-
-def _smooth_acceleration(velocity: Array, period: float) -> Array:
-    """Acceleration (n_axes, n) m/s^2 of a velocity, over the time of a start's fit."""
-    samples = min(2 * max(round(START_FIT / period), 2) + 1, (velocity.shape[1] - 1) // 2 * 2 + 1)
-    return local_parabola(velocity, samples, derivative=1, period=period)
-
-
-def _open_loop(
-    model: MachineModel, table: Table, simulation: Stepper, first: int, command: Array
-) -> Array:
-    n, n_axes = command.shape
-    setpoints = np.zeros((n, n_axes, 4))
-    setpoints[:, :, 3] = command
-    off = {a: Controller() for a in model.axes}
-    shared = (
-        model.period,
-        (table.entries, table.axes, table.parameters),
-        np.zeros(table.n_states),
-        gain_table(off, model.axes, model.period),
-        np.zeros((n_axes, 3)),
-        np.zeros(0, dtype=np.int64),
-    )
-    signals = np.empty((n, n_axes, N_SIGNALS))
-    simulation.run(
-        first, shared, setpoints, np.zeros((n, n_axes)),
-        (signals, np.zeros((n, len(table.entries))), np.empty((n, 0))),
-    )  # fmt: skip
-    return signals[:, :, POSITION_COLUMN]

@@ -67,7 +67,7 @@ class Scale:
         decimals = max(1 - math.floor(math.log10(half)), 0)
         # Adding zero turns a rounded minus zero into zero.
         rounded = (round(v / self.size, decimals) + 0.0 for v in values)
-        return [f"{v:.{decimals}f}".replace("-", "−") for v in rounded]
+        return [with_minus(f"{v:.{decimals}f}") for v in rounded]
 
 
 def quantity(value: float | None, unit: str) -> str:
@@ -94,7 +94,18 @@ def number(value: float) -> str:
     else:
         digits, power = f"{value:.{DIGITS - 1}e}".split("e")
         text = f"{digits}×10{str(int(power)).translate(RAISED)}"
+    return with_minus(text)
+
+
+def with_minus(text: str) -> str:
+    """A printed number with a true minus sign."""
     return text.replace("-", "−")
+
+
+def percent(share: float, decimals: int) -> str:
+    """A share in per cent with its sign, e.g. "+0.25 %"."""
+    rounded = round(100.0 * share, decimals) + 0.0  # adding zero turns minus zero into zero
+    return with_minus(f"{rounded:+.{decimals}f} %")
 
 
 def title_case(name: str) -> str:

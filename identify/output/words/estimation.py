@@ -12,6 +12,7 @@ from identify.estimation.intervals import (
     NotExcited,
     OpenSided,
 )
+from identify.estimation.simulated_motion import MotionFit
 from twin.model.units import units_of
 
 OUTCOMES = {
@@ -29,6 +30,38 @@ OUTCOMES = {
 def outcome_in_words(outcome: Outcome) -> str:
     """How a fit ended."""
     return OUTCOMES[outcome]
+
+
+def motion_fit_in_words(axis: str, fit: MotionFit, held: tuple[float, float] | None) -> list[str]:
+    """The position error before and after, how the search ended, and what it does not say."""
+    unit = fit.axis.units.position
+    said = (
+        f"axis {axis}: fitted to simulated motion without a restart: position error "
+        f"{fit.error_begun:.4g} {unit} with the force fit, {fit.error:.4g} {unit} now"
+    )
+    if held is not None:
+        said += f"; held out {held[0]:.4g} {unit}, {held[1]:.4g} {unit} now"
+    starts = ", ".join(f"{error:.3g}" for error in fit.starts)
+    worse = held is not None and held[1] > held[0]
+    return [
+        said,
+        *([HELD_OUT_GREW] if worse else []),
+        MOTION_OUTCOMES[fit.outcome],
+        f"position errors of the searches from {len(fit.starts)} starts when the best was chosen: "
+        f"{starts} {unit}",
+        "no intervals: the error of a motion that nothing restarts is one long drift, whose "
+        "scatter says little; `twin fit` without --objective gives them",
+    ]
+
+
+HELD_OUT_GREW = (
+    "The held-out error grew, so the force fit is the better one: the noise of the measured "
+    "command or what the model lacks adds up to a drift, and the parameters have followed it."
+)
+MOTION_OUTCOMES = {
+    Outcome.CONVERGED: "The fit converged: no parameter change lowers the position error further.",
+    Outcome.NOT_CONVERGED: OUTCOMES[Outcome.NOT_CONVERGED],
+}
 
 
 def no_interval_in_words(reason: NoInterval) -> str:

@@ -22,6 +22,7 @@ from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import rms
 from identify.estimation.force_balance import residual
+from identify.estimation.open_loop import START_FIT, as_logged, states_along
 from identify.experiment_design.planting import (
     SHAPE_SPREAD,
     SPREAD,
@@ -33,15 +34,7 @@ from identify.experiment_design.planting import (
     strength_for,
     visible_force,
 )
-from identify.validation.free_run import (
-    HORIZON,
-    START_FIT,
-    FreeRun,
-    _as_logged,
-    _states_at,
-    free_run,
-    rms_error,
-)
+from identify.validation.free_run import HORIZON, FreeRun, free_run, rms_error
 from twin.core.native import walk
 from twin.effect import Parameter
 from twin.model.machine import AxisModel, Hardware, MachineModel, axis_table
@@ -239,7 +232,7 @@ def test_an_axis_that_stands_still_is_seen_where_it_stands(simulator):
 def test_the_log_has_the_sensors_and_limits_in_it_already():
     hardware = Hardware(force_limit=2.0, encoder_resolution=1e-4, force_constant=7.0)
     model = MachineModel("s", {"x": AxisModel(1.7, hardware)}, 999.0)
-    found = _as_logged(model, prepared(T, T))
+    found = as_logged(model, prepared(T, T))
     assert found.sample_rate == RATE
     got = found.axes["x"].hardware
     assert (got.force_limit, got.encoder_resolution, got.force_constant) == (np.inf, 0.0, 7.0)
@@ -252,7 +245,7 @@ def test_states_at_a_restart_are_those_of_the_motion_before_it():
     axis = AxisModel(1.0, effects=(effect("actuator_lag", {"tau": 0.03}),))
     table = MachineModel("s", {"x": axis, "y": axis}).table()
     starts = np.array([800, 1100, 1700])
-    states = _states_at(table, x, command, 1.0 / RATE, starts, 0.0)
+    states = states_along(table, x, command, 1.0 / RATE, starts, 0.0)
     own = states[:, table.entries[:, 3].astype(int)].T
     since = starts / RATE - 0.5
     wanted = np.where(since > 0.0, 3.0 * (1.0 - np.exp(-since / 0.03)), 0.0)
@@ -265,11 +258,11 @@ def test_a_coupled_axis_follows_the_others_motion_before_a_restart():
     x = np.stack([0.1 * np.sin(9.0 * T), 0.03 + 0.0 * T], axis=1)
     axis = AxisModel(1.0, effects=(effect("cable_hysteresis", {"f0": 0.4}),))
     table = MachineModel("s", {"x": axis, "y": axis}).table()
-    states = _states_at(table, x, 0.0 * x, 1.0 / RATE, np.array([900, 1900]), 0.0)
+    states = states_along(table, x, 0.0 * x, 1.0 / RATE, np.array([900, 1900]), 0.0)
     first, second = (slice(int(e[3]), int(e[3]) + 4) for e in table.entries)
     assert np.abs(states[:, first]).max() > 1e-4
     assert not states[:, second].any()
-    swapped = _states_at(table, x[:, ::-1], 0.0 * x, 1.0 / RATE, np.array([900, 1900]), 0.0)
+    swapped = states_along(table, x[:, ::-1], 0.0 * x, 1.0 / RATE, np.array([900, 1900]), 0.0)
     np.testing.assert_array_equal(swapped[:, second], states[:, first])
 
 
@@ -282,7 +275,7 @@ def test_friction_before_a_restart_knows_the_place_and_the_other_axis():
     axis = AxisModel(1.0, effects=(brush, place, load))
     table = MachineModel("s", {"x": axis, "y": axis}).table()
     starts = np.array([900, 2100, 3000])
-    states = _states_at(table, x, 0.0 * x, 1.0 / RATE, starts, 0.0)
+    states = states_along(table, x, 0.0 * x, 1.0 / RATE, starts, 0.0)
     for a in (0, 1):
         own = next(e for e, n in zip(table.entries, table.labels, strict=True)
                    if n == ("xy"[a], "dahl"))  # fmt: skip

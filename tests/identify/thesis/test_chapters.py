@@ -30,13 +30,13 @@ def chapters(written: Path) -> dict:
 
 
 def test_every_mean_of_the_simulation_study_is_within_a_thousandth(chapters) -> None:
-    study = chapters["simulation"]
-    assert study["snr_db"] == 80.0
-    for name, p in study["parameters"].items():
+    chapter = chapters["simulation"]
+    assert chapter["snr_db"] == 80.0
+    for name, p in chapter["parameters"].items():
         assert p["mean"] == pytest.approx(p["true"], rel=1e-3), name
         assert p["printed"] == pytest.approx(p["true"], rel=6e-3)
-    noisy = study["by_snr_db"]["40"]
-    assert noisy["sigma2"]["sd"] > 30.0 * study["parameters"]["sigma2"]["sd"]
+    noisy = chapter["by_snr_db"]["40"]
+    assert noisy["sigma2"]["sd"] > 30.0 * chapter["parameters"]["sigma2"]["sd"]
 
 
 def test_the_cable_and_the_pitch_are_recovered(chapters) -> None:
@@ -52,24 +52,24 @@ def test_the_missing_memory_is_named_and_the_error_falls_to_the_noise_floor(
     tmp_path: Path,
 ) -> None:
     done = twin("reproduce", "--chapter", "residuals", "--small", "--json", folder=tmp_path)
-    study = json.loads(done.stdout)["chapters"]["residuals"]
-    assert study["planted"] != study["fitted"]
-    assert study["named"] == [study["planted"]]
-    assert study["test_error_before"] > 5.0 * study["noise_floor"]
-    assert study["test_error_after"] < 1.2 * study["noise_floor"]
-    assert study["white"] == {"before": False, "after": True}
-    assert study["parameters"]["spread"]["mean"] == pytest.approx(10.0, rel=0.01)
+    chapter = json.loads(done.stdout)["chapters"]["residuals"]
+    assert chapter["planted"] != chapter["fitted"]
+    assert chapter["named"] == [chapter["planted"]]
+    assert chapter["test_error_before"] > 5.0 * chapter["noise_floor"]
+    assert chapter["test_error_after"] < 1.2 * chapter["noise_floor"]
+    assert chapter["white"] == {"before": False, "after": True}
+    assert chapter["parameters"]["spread"]["mean"] == pytest.approx(10.0, rel=0.01)
 
 
 def test_machine_and_twin_agree_and_a_changed_mass_is_named(chapters) -> None:
-    study = chapters["twin"]
-    assert study["alike"]["agree"]
-    changed = study["changed"]["axes"]["x"]
+    chapter = chapters["twin"]
+    assert chapter["alike"]["agree"]
+    changed = chapter["changed"]["axes"]["x"]
     assert changed["differing"] == ["mass"]
     mass = changed["parameters"]["mass"]
-    assert mass["difference"] == pytest.approx(study["changed"]["added_mass"], rel=0.02)
+    assert mass["difference"] == pytest.approx(chapter["changed"]["added_mass"], rel=0.02)
     assert "payload_mass" in [c["effect"] for c in changed["causes"]]
-    assert study["closed_loop_error"]["position"]["found"] < 1e-6
+    assert chapter["closed_loop_error"]["position"]["found"] < 1e-6
 
 
 def test_the_report_holds_every_chapter_and_needs_nothing_else(written: Path, chapters) -> None:
@@ -92,11 +92,11 @@ def test_an_unknown_chapter_suggests_the_nearest() -> None:
 
 
 def test_levels_are_recovered_along_the_track_where_the_map_reads_them_too_low() -> None:
-    study = identify.reproduce(["track"], small=True).chapters["track"]
+    chapter = identify.reproduce(["track"], small=True).chapters["track"]
     for direction in (1.0, -1.0):
-        assert study.fits[direction]["Fs"].largest_error < 1e-3
-        assert study.maps[direction]["Fs"].largest_error > 3e-3
-        assert study.fits[direction]["Fc"].largest_error < 3e-3
-    ahead, back = (study.fits[way]["Fs"].found for way in (1.0, -1.0))
+        assert chapter.fits[direction]["Fs"].largest_error < 1e-3
+        assert chapter.maps[direction]["Fs"].largest_error > 3e-3
+        assert chapter.fits[direction]["Fc"].largest_error < 3e-3
+    ahead, back = (chapter.fits[way]["Fs"].found for way in (1.0, -1.0))
     assert all(ahead > back)  # as planted: friction is lower backwards
     assert ahead[0] > ahead[1]  # and falls along the track

@@ -9,16 +9,29 @@ from typing import Any
 from identify.output.report.blocks import Section
 from identify.output.report.drawing import drawing_style
 from identify.output.report.html import page
-from identify.output.report.thesis import cable, residuals, simulation, track, twin
-from identify.thesis.study import Reproduction
-from twin.model.file import write_atomically
+from identify.output.report.thesis import (
+    cable,
+    dynamic,
+    future,
+    models,
+    residuals,
+    simulation,
+    track,
+    twin,
+)
+from identify.thesis.chapters import Reproduction
+from twin.files import write_atomically
 
-SECTIONS: Mapping[str, Callable[[Any], Section]] = {
-    "simulation": simulation.section,
-    "cable": cable.section,
-    "track": track.section,
-    "residuals": residuals.section,
-    "twin": twin.section,
+SECTIONS: Mapping[type, Callable[[Any], Section]] = {
+    models.ModelsResult: models.section,
+    simulation.SimulationResult: simulation.section,
+    cable.CableResult: cable.section,
+    cable.CableOfLogs: cable.section_of_logs,
+    track.TrackResult: track.section,
+    dynamic.DynamicResult: dynamic.section,
+    residuals.ResidualResult: residuals.section,
+    future.FutureResult: future.section,
+    twin.TwinResult: twin.section,
 }
 TITLE = "Friction identification on the gantry stage, reproduced on its twin"
 
@@ -32,6 +45,6 @@ def write_reproduction(path: Path, result: Reproduction) -> None:
     if result.small:
         facts.append(("Size", "small: fewer speeds, trials and passes"))
     with drawing_style():
-        shown = [SECTIONS[name](found) for name, found in result.chapters.items()]
+        shown = [SECTIONS[type(found)](found) for found in result.chapters.values()]
         text = page(TITLE, facts, shown)
     write_atomically(path, text.encode("utf-8"))

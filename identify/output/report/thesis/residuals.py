@@ -13,47 +13,47 @@ from identify.output.report.blocks import (
     Tile,
     Tone,
 )
-from identify.output.report.units import number, pretty, quantity, spaced
+from identify.output.report.units import number, percent, pretty, quantity, spaced
 from identify.output.report.whiteness import residual_test_blocks
 from identify.output.words.numbers import capitalised
 from identify.output.words.reproduction import residuals_in_words
-from identify.thesis.residuals import ResidualStudy
+from identify.thesis.residuals import ResidualResult
 from twin.model.units import LINEAR
 
 SHOWN = 8  # candidates in the table
 
 
-def section(study: ResidualStudy) -> Section:
+def section(result: ResidualResult) -> Section:
     """The chapter."""
     blocks: list[Block] = [
-        _answer(study),
-        _ranking(study),
-        Heading(f"With {spaced(study.first)}"),
-        *residual_test_blocks(study.before, LINEAR),
+        _answer(result),
+        _ranking(result),
+        Heading(f"With {spaced(result.first)}"),
+        *residual_test_blocks(result.before, LINEAR),
     ]
-    if study.named:
+    if result.named:
         blocks += [
-            Heading(f"With {', '.join(map(spaced, study.named))}"),
-            *residual_test_blocks(study.after, LINEAR),
+            Heading(f"With {', '.join(map(spaced, result.named))}"),
+            *residual_test_blocks(result.after, LINEAR),
         ]
-    if study.values:
-        blocks.append(_values(study))
+    if result.values:
+        blocks.append(_values(result))
     return Section("residuals", "Residual analysis", blocks)
 
 
-def _answer(study: ResidualStudy) -> Answer:
-    right = study.named == (study.planted,)
+def _answer(result: ResidualResult) -> Answer:
+    right = result.named == (result.planted,)
     headline = "The missing memory is named" if right else "The missing memory is not named alone"
     tiles = [
-        Tile(f"with {study.first}", quantity(study.error_before, "N"), "RMS on the test log"),
-        Tile("with what is named", quantity(study.error_after, "N"), "RMS on the test log"),
-        Tile("noise floor", quantity(study.floor, "N"), "RMS"),
+        Tile(f"with {result.first}", quantity(result.error_before, "N"), "RMS on the test log"),
+        Tile("with what is named", quantity(result.error_after, "N"), "RMS on the test log"),
+        Tile("noise floor", quantity(result.floor, "N"), "RMS"),
     ]
-    first, *others = [capitalised(said) for said in residuals_in_words(study)]
+    first, *others = [capitalised(said) for said in residuals_in_words(result)]
     return Answer(headline, first, tiles, others, Tone.STRONG)
 
 
-def _ranking(study: ResidualStudy) -> Table:
+def _ranking(result: ResidualResult) -> Table:
     columns = (
         Column("Effect added, or friction exchanged"),
         Column("Error over noise floor", numeric=True),
@@ -62,14 +62,14 @@ def _ranking(study: ResidualStudy) -> Table:
     rows = [
         Row(
             (spaced(c.name), number(c.over_floor), number(c.delta_bic)),
-            Tone.STRONG if c.name in study.named else Tone.PLAIN,
+            Tone.STRONG if c.name in result.named else Tone.PLAIN,
         )
-        for c in study.ranking[:SHOWN]
+        for c in result.ranking[:SHOWN]
     ]
-    return Table(columns, rows, f"The first {len(rows)} of {len(study.ranking)} that were tried.")
+    return Table(columns, rows, f"The first {len(rows)} of {len(result.ranking)} that were tried.")
 
 
-def _values(study: ResidualStudy) -> Table:
+def _values(result: ResidualResult) -> Table:
     columns = (
         Column("Parameter"),
         Column("Planted", numeric=True),
@@ -80,8 +80,8 @@ def _values(study: ResidualStudy) -> Table:
     rows = [
         Row(
             (name, f"{r.true:g}", f"{r.mean:.5g}", pretty(r.unit),
-             f"{100.0 * r.error:+.2f} %".replace("-", "−"))
+             percent(r.error, 2))
         )
-        for name, r in study.values.items()
+        for name, r in result.values.items()
     ]  # fmt: skip
     return Table(columns, rows, "The thesis prints no such values: it fitted LuGre alone.")

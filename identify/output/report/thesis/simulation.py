@@ -20,52 +20,52 @@ from identify.output.report.blocks import (
     Tone,
 )
 from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure, plain_tick
-from identify.output.report.units import NOTHING, number, pretty
+from identify.output.report.units import NOTHING, number, percent, pretty
 from identify.output.words.numbers import capitalised
 from identify.output.words.reproduction import simulation_headline, simulation_in_words, worst
 from identify.thesis.chapter import Recovered
-from identify.thesis.simulation import DYNAMIC, STATIC, SimulationStudy
+from identify.thesis.simulation import DYNAMIC, STATIC, SimulationResult
 
 COLORS = (BLUE, ORANGE, "#3a8f5c", "#8a5fb0", "#b08a2e", "#c2476b")  # one a parameter
 BINS = 14
 
 
-def section(study: SimulationStudy) -> Section:
+def section(result: SimulationResult) -> Section:
     """The chapter."""
-    blocks: list[Block] = [_answer(study), _table(study)]
+    blocks: list[Block] = [_answer(result), _table(result)]
     blocks += [
         Picture(
-            _map_figure(study),
+            _map_figure(result),
             "Friction at constant speed, simulated in closed loop and averaged on the last half of "
             "each plateau, and the planted curve.",
         ),
         Picture(
-            _distributions(study),
-            f"Parameters found in {study.trials} trials at {study.snr:g} dB. Line: planted; "
+            _distributions(result),
+            f"Parameters found in {result.trials} trials at {result.snr:g} dB. Line: planted; "
             "dashed: the mean that the thesis prints, where it is on the picture.",
         ),
         Picture(
-            _growth(study),
+            _growth(result),
             "RMS error of one trial, in per cent of the planted value, as the noise grows. Slopes "
             "of one decade in 20 dB are noise alone; a flat part is bias: the noisier the "
             "position, the longer the blocks over which the motion is averaged.",
         ),
         Picture(
-            _sensitivities(study),
+            _sensitivities(result),
             "RMS force error when one parameter is off by a factor: static parameters on the map, "
             "dynamic ones on the reversals.",
         ),
-        Listing([capitalised(said) for said in simulation_in_words(study)]),
+        Listing([capitalised(said) for said in simulation_in_words(result)]),
     ]
     return Section("simulation", "Simulation study", blocks)
 
 
-def _answer(study: SimulationStudy) -> Answer:
-    name, r = worst(study)
-    printed = study.parameters["sigma2"]
+def _answer(result: SimulationResult) -> Answer:
+    name, r = worst(result)
+    printed = result.parameters["sigma2"]
     tiles = [
         Tile("largest error of a mean", f"{100 * abs(r.error):.2g} %", f"{name}, here"),
-        Tile("trials", str(study.trials), f"at {study.snr:g} dB"),
+        Tile("trials", str(result.trials), f"at {result.snr:g} dB"),
     ]
     if printed.printed is not None:
         off = 100 * (printed.printed / printed.true - 1.0)
@@ -74,10 +74,10 @@ def _answer(study: SimulationStudy) -> Answer:
         "A velocity map of both directions gives the static parameters, reversals of 50 µm the "
         "dynamic ones."
     )
-    return Answer(simulation_headline(study), sentence, tiles, [], Tone.STRONG)
+    return Answer(simulation_headline(result), sentence, tiles, [], Tone.STRONG)
 
 
-def _table(study: SimulationStudy) -> Table:
+def _table(result: SimulationResult) -> Table:
     columns = (
         Column("Parameter"),
         Column("Planted", numeric=True),
@@ -87,7 +87,7 @@ def _table(study: SimulationStudy) -> Table:
         Column("Error of the mean", numeric=True),
         Column("Error of the thesis's mean", numeric=True),
     )
-    rows = [Row(_cells(name, r)) for name, r in study.parameters.items()]
+    rows = [Row(_cells(name, r)) for name, r in result.parameters.items()]
     caption = (
         "The thesis prints four decimals; the error of its mean is that of the printed number."
     )
@@ -95,29 +95,24 @@ def _table(study: SimulationStudy) -> Table:
 
 
 def _cells(name: str, r: Recovered) -> tuple[str, ...]:
-    off = NOTHING if r.printed is None else _percent(r.printed / r.true - 1.0)
+    off = NOTHING if r.printed is None else percent(r.printed / r.true - 1.0, 4)
     printed = NOTHING if r.printed is None else f"{r.printed:.4f}"
     unit = pretty(r.unit).replace("/", "\u2060/\u2060")  # no line break within it
     return (
         f"{name} ({unit})", f"{r.true:g}", printed, f"{r.mean:.6g}", number(r.sd),
-        _percent(r.error), off,
+        percent(r.error, 4), off,
     )  # fmt: skip
 
 
-def _percent(share: float) -> str:
-    rounded = round(100.0 * share, 4) + 0.0  # adding zero turns a rounded minus zero into zero
-    return f"{rounded:+.4f} %".replace("-", "−")
-
-
-def _map_figure(study: SimulationStudy) -> Figure:
+def _map_figure(result: SimulationResult) -> Figure:
     figure = new_figure(3.4)
     axes = figure.subplots()
     for way, color, mark in ((1.0, BLUE, "o"), (-1.0, ORANGE, "x")):
-        part = study.map.towards(way)
+        part = result.map.towards(way)
         name = "forwards" if way > 0 else "backwards"
         axes.plot(np.abs(part.velocity), part.friction, mark, color=color, label=name, markersize=4)
-    speed = np.geomspace(np.abs(study.map.velocity).min(), np.abs(study.map.velocity).max(), 300)
-    axes.plot(speed, study.true(speed), color=INK, linewidth=0.9, label="planted")
+    speed = np.geomspace(np.abs(result.map.velocity).min(), np.abs(result.map.velocity).max(), 300)
+    axes.plot(speed, result.true(speed), color=INK, linewidth=0.9, label="planted")
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(FuncFormatter(plain_tick))
     axes.set_xlabel("Speed (m/s)")
@@ -126,10 +121,10 @@ def _map_figure(study: SimulationStudy) -> Figure:
     return figure
 
 
-def _distributions(study: SimulationStudy) -> Figure:
+def _distributions(result: SimulationResult) -> Figure:
     figure = new_figure(4.4)
     for axes, (name, r) in zip(
-        figure.subplots(2, 3).ravel(), study.parameters.items(), strict=True
+        figure.subplots(2, 3).ravel(), result.parameters.items(), strict=True
     ):
         _histogram(axes, name, r)
     return figure
@@ -149,12 +144,12 @@ def _histogram(axes: Axes, name: str, r: Recovered) -> None:
     axes.set_ylabel("Trials")
 
 
-def _growth(study: SimulationStudy) -> Figure:
+def _growth(result: SimulationResult) -> Figure:
     figure = new_figure(3.4)
     axes = figure.subplots()
-    ratios = list(study.by_snr)
+    ratios = list(result.by_snr)
     for name, color in zip((*STATIC, *DYNAMIC), COLORS, strict=True):
-        errors = [100.0 * study.by_snr[snr][name].rms_error for snr in ratios]
+        errors = [100.0 * result.by_snr[snr][name].rms_error for snr in ratios]
         axes.plot(ratios, errors, "o-", color=color, label=name, markersize=4)
     axes.axhline(0.1, color=GREY, linestyle=":")
     axes.set_yscale("log")
@@ -166,14 +161,14 @@ def _growth(study: SimulationStudy) -> Figure:
     return figure
 
 
-def _sensitivities(study: SimulationStudy) -> Figure:
+def _sensitivities(result: SimulationResult) -> Figure:
     figure = new_figure(3.2)
-    factors = study.sensitivity.factors
+    factors = result.sensitivity.factors
     parts = (STATIC, "static, on the map"), (DYNAMIC, "dynamic, on the reversals")
     colors = dict(zip((*STATIC, *DYNAMIC), COLORS, strict=True))
     for axes, (names, title) in zip(figure.subplots(1, 2), parts, strict=True):
         for name in names:
-            force = 1e3 * study.sensitivity.force[name]
+            force = 1e3 * result.sensitivity.force[name]
             axes.plot(factors, force, color=colors[name], label=name)
         axes.set_title(title)
         axes.set_xlabel("Value over the planted one (1)")

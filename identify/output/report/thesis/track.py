@@ -13,19 +13,19 @@ from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
 from identify.output.report.units import pretty
 from identify.output.words.numbers import capitalised
 from identify.output.words.reproduction import LEVELS, track_in_words
-from identify.thesis.track import NAMES, Along, TrackStudy
+from identify.thesis.track import NAMES, Along, TrackResult
 
 SIDES = {1.0: "forwards", -1.0: "backwards"}
 APART = 1.5  # mm, between the marks of the two ways, which would hide each other
 
 
-def section(study: TrackStudy) -> Section:
+def section(result: TrackResult) -> Section:
     """The chapter."""
     blocks: list[Block] = [
-        _answer(study),
+        _answer(result),
         *(
             Picture(
-                _figure(study, direction),
+                _figure(result, direction),
                 f"Moving {side}. Line: planted; crosses: the curve through the map of the last "
                 "half of each move, as in the thesis; dots: the whole law fitted to the same logs. "
                 "Bars: 90 % intervals.",
@@ -36,18 +36,18 @@ def section(study: TrackStudy) -> Section:
     return Section("track", "Velocity maps along the track", blocks)
 
 
-def _answer(study: TrackStudy) -> Answer:
+def _answer(result: TrackResult) -> Answer:
     tiles = [
         Tile(f"{name}, {way}", f"{100.0 * _worst(by, name):.2g} %", "largest error of a level")
-        for way, by in (("thesis's map", study.maps), ("fit", study.fits))
+        for way, by in (("thesis's map", result.maps), ("fit", result.fits))
         for name in LEVELS
     ]
-    said = [capitalised(text) for text in track_in_words(study)]
+    said = [capitalised(text) for text in track_in_words(result)]
     sentence = (
         "After 5 mm the bristles have not settled, so the map reads friction too low; a fit of the "
         "whole law does not mind."
     )
-    found = max(_worst(study.fits, name) for name in LEVELS)
+    found = max(_worst(result.fits, name) for name in LEVELS)
     headline = f"The profile along the track is recovered within {100.0 * found:.2g} %"
     return Answer(headline, sentence, tiles, said, Tone.STRONG)
 
@@ -56,11 +56,11 @@ def _worst(by_direction: Mapping[float, Mapping[str, Along]], name: str) -> floa
     return max(found[name].largest_error for found in by_direction.values())
 
 
-def _figure(study: TrackStudy, direction: float) -> Figure:
+def _figure(result: TrackResult, direction: float) -> Figure:
     figure = new_figure(4.4)
-    place = 1e3 * study.places
+    place = 1e3 * result.places
     for axes, name in zip(figure.subplots(2, 2, sharex=True).ravel(), NAMES, strict=True):
-        mapped, fitted = study.maps[direction][name], study.fits[direction][name]
+        mapped, fitted = result.maps[direction][name], result.fits[direction][name]
         axes.plot(place, mapped.planted, color=GREY, linewidth=3.0, alpha=0.6)
         _marks(axes, place - APART / 2.0, mapped, "x", ORANGE)
         _marks(axes, place + APART / 2.0, fitted, "o", BLUE)

@@ -22,36 +22,36 @@ from identify.output.report.drawing import BLUE, FLOOR, INK, ORANGE, new_figure
 from identify.output.report.units import number, pretty
 from identify.output.words.numbers import capitalised
 from identify.output.words.reproduction import twin_in_words
-from identify.thesis.twin import TwinStudy
+from identify.thesis.twin import TwinResult
 from identify.validation.agreement import Agreement, Difference
 
 REACH = 8.0  # joint standard errors that the picture shows
 
 
-def section(study: TwinStudy) -> Section:
+def section(result: TwinResult) -> Section:
     """The chapter."""
     blocks: list[Block] = [
-        _answer(study),
+        _answer(result),
         Picture(
-            _figure(study),
+            _figure(result),
             "Difference of the parameters of two fits, in joint standard errors. Grey: what the "
             "uncertainties of all comparisons together allow; a parameter beyond the picture is "
             "drawn at its edge.",
         ),
-        _table(study),
-        Listing([capitalised(said) for said in twin_in_words(study)]),
+        _table(result),
+        Listing([capitalised(said) for said in twin_in_words(result)]),
     ]
     return Section("twin", "Twin against machine", blocks)
 
 
-def _answer(study: TwinStudy) -> Answer:
-    headline = "Machine and twin agree" if study.alike.agrees else "Machine and twin differ"
-    named = [d.label for axis in study.changed.axes.values() for d in axis.differing]
+def _answer(result: TwinResult) -> Answer:
+    headline = "Machine and twin agree" if result.alike.agrees else "Machine and twin differ"
+    named = [d.label for axis in result.changed.axes.values() for d in axis.differing]
     tiles = [
         Tile(f"closed loop, {signal}", f"{number(100.0 * error)} %", "twin less machine, RMS")
-        for signal, error in study.errors.items()
+        for signal, error in result.errors.items()
     ]
-    remark = f"Of a machine with {study.added:.3g} kg more these differ: {', '.join(named)}."
+    remark = f"Of a machine with {result.added:.3g} kg more these differ: {', '.join(named)}."
     sentence = (
         "The machine is identified, its twin follows the same reference in MuJoCo and is "
         "identified in turn."
@@ -63,11 +63,11 @@ def _differences(found: Agreement) -> list[Difference]:
     return [d for axis in found.axes.values() for d in axis.differences]
 
 
-def _figure(study: TwinStudy) -> Figure:
+def _figure(result: TwinResult) -> Figure:
     figure = new_figure(4.2)
     left, right = figure.subplots(1, 2)
-    _draw(left, _differences(study.alike), "machine and twin", BLUE)
-    _draw(right, _differences(study.changed), "machine before and after the change", ORANGE)
+    _draw(left, _differences(result.alike), "machine and twin", BLUE)
+    _draw(right, _differences(result.changed), "machine before and after the change", ORANGE)
     return figure
 
 
@@ -84,7 +84,7 @@ def _draw(axes: Axes, found: list[Difference], title: str, color: str) -> None:
     axes.set_xlabel("Difference (joint standard errors)")
 
 
-def _table(study: TwinStudy) -> Table:
+def _table(result: TwinResult) -> Table:
     columns = (
         Column("Parameter"),
         Column("Machine", numeric=True),
@@ -94,6 +94,6 @@ def _table(study: TwinStudy) -> Table:
     )
     rows = [
         Row((d.label, f"{d.a:.6g}", f"{d.b:.6g}", number(d.standard_error), pretty(d.unit)))
-        for d in _differences(study.alike)
+        for d in _differences(result.alike)
     ]
     return Table(columns, rows)

@@ -1,0 +1,29 @@
+"""Forces of laws along a motion that is prescribed, without a machine or a log."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.drive import parts_of
+from identify.dataset.motion import Motion
+from identify.dataset.prepared_log import total_force
+from twin.effect import Kind
+from twin.model.machine import AxisModel, axis_table
+
+Array = NDArray[np.float64]
+
+
+def force_along(
+    axis: AxisModel, position: Array, velocity: Array, period: float, *kinds: Kind
+) -> Array:
+    """Force (n,) N of the axis' effects of these kinds, under no command.
+
+    position m and velocity m/s (n,) at the middle of samples that are ``period`` s long.
+    """
+    signals = np.stack([position, velocity, np.zeros_like(velocity)])
+    motion = Motion(
+        name="", axis="", signals=signals, others=np.zeros_like(signals), period=period, start=0.0,
+        sample_period=period, position_noise=0.0, raw=signals[1:],
+    )  # fmt: skip
+    return total_force(axis_table({"": parts_of(axis, *kinds)}), motion)

@@ -1,0 +1,158 @@
+"""Fit of simulated motion: planted values, beginnings, several starts, and the public EMPS task."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_runs import twin
+
+import identify
+from identify.dataset.dataset import datasets
+from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.fit import Outcome
+from identify.estimation.replay import (
+    Beginning,
+    measured_beginning,
+    motion_error,
+    simulated_error,
+)
+from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
+from identify.output.words.estimation import motion_fit_in_words
+from twin.effects import load_catalogue
+from twin.errors import InputError
+from twin.experiments.kinds import OpenLoopSine
+from twin.experiments.named import simulate
+from twin.log import AxisLog, Log, write_log
+from twin.log.importers import import_log, load_mapping
+from twin.model.file import load_model, save_model
+from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.model.parameters import free_parameters, read, write
+from twin.simulator import ReducedSimulator
+
+CATALOGUE = load_catalogue()
+EXAMPLES = Path(__file__).parents[3] / "examples"
+RATE = 1000.0
+NOISE = 1e-7  # m
+
+
+@pytest.fixture(scope="module")
+def slide() -> MachineModel:
+    """A mass under dry and viscous friction, driven by a force alone."""
+    friction = Fitted.at_start(
+        CATALOGUE["dahl"], {"Fc": 2.0, "sigma2": 20.0, "sigma0": 2e4, "n": 1.0}
+    )
+    axis = AxisModel(mass=5.0, effects=(friction,))
+    hardware = replace(axis.hardware, encoder_noise=NOISE, travel=(-1.0, 1.0))
+    axis = replace(axis, hardware=hardware)
+    return MachineModel("slide", {"x": axis}, RATE)
+
+
+@pytest.fixture(scope="module")
+def log(slide) -> Log:
+    motion = OpenLoopSine("x", 6.0, amplitude=6.0, period=1.5)
+    return simulate(slide, motion, seed=3, simulator=ReducedSimulator)
+
+
+def prepared(model: MachineModel, log: Log) -> tuple[PreparedLog, ...]:
+    return datasets(model, {"log": log}, {}, 0.1)["x"].fit
+
+
+def test_planted_values_are_found_from_a_start_a_tenth_off(slide, log) -> None:
+    axis, where = slide.axes["x"], free_parameters(slide.axes["x"])
+    found = fit_simulated_motion(write(axis, where, 1.1 * read(axis, where)), prepared(slide, log))
+    np.testing.assert_allclose(read(found.axis, where), read(axis, where), rtol=2e-3)
+    assert found.error == pytest.approx(NOISE, rel=0.1)  # what is left is the readings' noise
+    assert found.error < 1e-3 * found.error_begun
+    assert len(found.starts) == 4
+
+
+def test_a_log_that_begins_in_motion_is_begun_as_it_was(slide, log) -> None:
+    """Cut where the axis moves and its bristles are bent: all of that is estimated."""
+    columns = {name: column[700:] for name, column in log.axes["x"].columns.items()}
+    late = Log(RATE, {"x": AxisLog(columns)})
+    part = prepared(slide, late)
+    axis = slide.axes["x"]
+    found = fit_simulated_motion(axis, part)
+    (begun,) = found.beginnings
+    speed = log.truth["x"]["velocity"][700 + begun.first]
+    assert begun.velocity == pytest.approx(speed, rel=1e-3)
+    assert found.error == pytest.approx(NOISE, rel=0.1)
+    assert found.error < simulated_error(axis, part)
+
+
+def test_unknown_bristles_are_as_sure_as_their_usual_deflection(slide, log) -> None:
+    begun, surely = measured_beginning(slide.axes["x"], prepared(slide, log)[0])
+    position, velocity, *states = surely
+    assert 0.1 * NOISE < position < NOISE
+    assert velocity < 1e-3
+    assert max(states) == pytest.approx(2.0, rel=0.3)  # N: this friction's state is its force
+    assert begun.first == 5
+
+
+def test_the_error_is_the_simulated_motion_less_the_measured_one(slide, log) -> None:
+    """Without friction a held force gives a parabola, sample by sample."""
+    free = AxisModel(mass=5.0)
+    part = prepared(slide, log)[0]
+    begun = Beginning(5, 0.01, 0.2, np.zeros(3))
+    error = motion_error(free, part, begun)
+    force = part.motion.raw[1][5:]
+    velocity = 0.2 + np.concatenate([[0.0], np.cumsum(force[:-1] / 5.0 / RATE)])
+    mean = 0.5 * (velocity[1:] + velocity[:-1])
+    position = 0.01 + np.concatenate([[0.0], np.cumsum(mean / RATE)])
+    measured = part.motion.at_samples(0.0)[0][5:]
+    np.testing.assert_allclose(error, position - measured, atol=1e-9)
+
+
+def test_an_effect_of_the_other_axis_is_refused(slide, log) -> None:
+    axis = slide.axes["x"].with_effect(Fitted.at_start(CATALOGUE["axis_coupling"]))
+    with pytest.raises(InputError, match="'axis_coupling' depends on the other axis"):
+        fit_simulated_motion(axis, prepared(slide, log))
+
+
+def test_a_held_out_error_that_grows_is_said(slide, log) -> None:
+    axis, logs = slide.axes["x"], prepared(slide, log)
+    begun = [measured_beginning(axis, one)[0] for one in logs]
+    found = MotionFit(axis, axis, logs, begun, Outcome.CONVERGED, [1e-6])
+    grew, fell = (
+        " ".join(motion_fit_in_words("x", found, held)) for held in ((1e-6, 2e-6), (2e-6, 1e-6))
+    )
+    assert "The held-out error grew" in grew
+    assert "The held-out error grew" not in fell
+
+
+def test_the_command_says_the_objective_and_both_errors(slide, log, tmp_path: Path) -> None:
+    write_log(log, tmp_path / "log.mcap")
+    save_model(slide, tmp_path / "slide.toml")
+    given = ("fit", "slide.toml", "log.mcap", "--objective", "simulation", "--json")
+    done = twin(*given, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["objective"] == "simulation"
+    axis = found["axes"]["x"]
+    assert axis["position_error"] <= axis["position_error_of_force_fit"]
+    assert axis["unit"] == "m"
+    assert axis["parameters"]["mass"]["unit"] == "kg"
+    assert list(axis["beginnings"]) == ["log.mcap"]
+
+
+@pytest.mark.slow
+def test_emps_as_diagnosed_simulates_the_pulses_better_than_published(shared_data) -> None:
+    """Whole records without a restart; 6.63 mm: mujoco.sysid with four parameters."""
+    mapping = load_mapping(EXAMPLES / "import_emps.toml")
+    run, pulses = (
+        import_log(shared_data / "emps" / f"{name}.mat", mapping)
+        for name in ("DATA_EMPS", "DATA_EMPS_PULSES")
+    )
+    model = load_model(EXAMPLES / "emps.toml", CATALOGUE)
+    axis = model.axes["x"].with_effect(Fitted.at_start(CATALOGUE["asymmetric_friction"]))
+    model = model.with_axis("x", axis)
+    force = identify.fit(model, {"run": run}, {"pulses": pulses}, test_function=0.2)
+    found = identify.fit_simulation(force)
+    before, after = found.holdout_error["x"]
+    assert after < 6.63e-3 < before
+    assert found.axes["x"].error < found.axes["x"].error_begun
+    assert "x" not in found.model.intervals
