@@ -16,7 +16,6 @@ from identify.cli.shared import (
     bars_on_stderr,
     catalogue_with,
     machine_model,
-    read_logs,
     require_folder,
     say,
 )
@@ -45,22 +44,22 @@ def simulate(
     from functools import partial
 
     from twin.experiments.file import SUFFIX, load_experiment
-    from twin.experiments.named import outside_travel
-    from twin.experiments.named import simulate as run
-    from twin.log import write_log
+    from twin.experiments.named import Reach, simulate_parts
+    from twin.log import record_log
 
     require_folder(out)
     stage = machine_model(model, catalogue_with(effects))
     chosen = load_experiment(experiment) if experiment.endswith(SUFFIX) else experiment
+    reach = Reach(stage)
     with bars_on_stderr() as bars:
-        log = run(
+        parts = simulate_parts(
             stage, chosen, seed=seed, duration=duration, axis=axis,
             progress=partial(bars, "simulating"),
         )  # fmt: skip
-        write_log(log, out, progress=partial(bars, "writing"))
-    result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
-    text = f"{out}: {len(log)} samples at {log.sample_rate:g} Hz"
-    say(text, result, as_json_, outside_travel(stage, log))
+        samples = record_log(map(reach.take, parts), out)
+    rate = stage.sample_rate
+    result = {"log": str(out), "samples": samples, "sample_rate": rate, "unit": "Hz"}
+    say(f"{out}: {samples} samples at {rate:g} Hz", result, as_json_, reach.warnings())
 
 
 @app.command("import")
@@ -86,9 +85,9 @@ def import_(
 def check(logs: Logs, as_json_: Json = False) -> None:
     """Say whether logs are fit for identification, and what is wrong with them."""
     from identify.output import machine_json, machine_text
-    from twin.log.check import check_log
+    from twin.log.long import check_file
 
-    reports = {name: check_log(log) for name, log in read_logs(logs).items()}
+    reports = {str(path): check_file(path) for path in logs}
     say(machine_text.check_text(reports), machine_json.check_json(reports), as_json_)
     if not all(report.ok for report in reports.values()):
         raise typer.Exit(1)

@@ -152,7 +152,7 @@ class _Stretches:
                 except InputError as error:
                     if not explained:  # no damage was seen where the gap is
                         self._lost.append(f"{part.place}: {error}")
-            runs.append(Run(self._salvage.topics, None, {}))
+            runs.append(Run(self._salvage.topics))
             try:
                 runs[-1].extend(part.blocks)
             except InputError as error:
