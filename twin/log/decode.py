@@ -185,7 +185,7 @@ class Decoder:
     def _register_leading(self, data: bytes) -> int:
         offset = 0
         while offset < len(data):
-            opcode, content, end = _record(data, offset)
+            opcode, content, end = record_at(data, offset)
             if opcode == Opcode.MESSAGE:
                 break
             self._register(opcode, content)
@@ -202,10 +202,10 @@ class Decoder:
         """Layout of the messages up to the one whose channel comes a second time."""
         messages: dict[int, MessageLayout] = {}
         while offset < len(data):
-            opcode, content, offset = _record(data, offset)
+            opcode, content, offset = record_at(data, offset)
             if opcode != Opcode.MESSAGE:
                 return None
-            channel, _, _, _, payload = _message(content)
+            channel, _, _, _, payload = message_parts(content)
             if channel in messages:
                 break
             topic = self._topics.topic(channel, payload)
@@ -218,11 +218,11 @@ class Decoder:
     def _message_blocks(self, data: bytes, offset: int) -> Iterator[Block]:
         samples: dict[int, list[tuple[int, int, Sequence[float]]]] = {}
         while offset < len(data):
-            opcode, content, offset = _record(data, offset)
+            opcode, content, offset = record_at(data, offset)
             if opcode != Opcode.MESSAGE:
                 self._register(opcode, content)
             else:
-                channel, sequence, time, _, payload = _message(content)
+                channel, sequence, time, _, payload = message_parts(content)
                 topic = self._topics.topic(channel, payload)
                 if topic is not None:
                     with at(topic.name):
@@ -236,7 +236,7 @@ class Decoder:
             yield Block(channel, np.array(numbers, "u4"), np.array(times, "u8"), columns)
 
 
-def _record(data: bytes, offset: int) -> tuple[int, bytes, int]:
+def record_at(data: bytes, offset: int) -> tuple[int, bytes, int]:
     """Opcode, content and end of the record at ``offset``."""
     start = offset + RECORD_HEAD.size
     if start > len(data):
@@ -249,7 +249,8 @@ def _record(data: bytes, offset: int) -> tuple[int, bytes, int]:
     return opcode, data[start : start + length], start + length
 
 
-def _message(content: bytes) -> tuple[int, int, int, int, bytes]:
+def message_parts(content: bytes) -> tuple[int, int, int, int, bytes]:
+    """Channel, sequence, log time, publish time (ns) and payload of a message record."""
     if len(content) < _MESSAGE_HEAD.size:
         raise Damaged("a message record is too short")
     return *_MESSAGE_HEAD.unpack_from(content), content[_MESSAGE_HEAD.size :]

@@ -11,7 +11,7 @@ import numpy as np
 
 from twin.errors import InputError, at
 from twin.log.container import reading
-from twin.log.importers import csv_text, hdf5, json_table, mat, parquet, tdms
+from twin.log.importers import csv_text, hdf5, json_table, mat, mcap_topics, parquet, tdms
 from twin.log.importers.mapping import ImportMap
 from twin.log.importers.resample import clock_of
 from twin.log.importers.sample_rate import rate_of
@@ -36,6 +36,7 @@ FORMATS: Mapping[str, Format] = {
     "parquet": Format((".parquet", ".pq"), parquet.read),
     "json": Format((".json",), json_table.read),
     "tdms": Format((".tdms",), tdms.read),
+    "mcap": Format((".mcap",), mcap_topics.read),
 }
 
 
@@ -95,7 +96,9 @@ def _on_one_clock(
 
 
 def _start(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> dict[str, str]:
-    """When the recording began by the wall clock, where its times are those since 1970."""
+    """When the recording began by the wall clock, where the format or its times say so."""
+    if table.start_ns is not None:
+        return {"start_time_unix_ns": str(table.start_ns)}
     if mapping.time is None:
         return {}
     raw = np.asarray(table.columns[mapping.time.column])

@@ -21,10 +21,14 @@ _MOST_NAMES = 40  # columns listed in a message
 
 @dataclass(frozen=True)
 class Table:
-    """Columns as the file holds them; sample_rate (Hz) where the format itself states one."""
+    """Columns as the file holds them; what the format itself states of sample rate and start.
+
+    sample_rate: Hz. start_ns: when the recording began, ns since 1970.
+    """
 
     columns: Mapping[str, NDArray]
     sample_rate: float | None = None
+    start_ns: int | None = None
 
 
 def require_columns(wanted: Iterable[str], there: Collection[str]) -> None:
