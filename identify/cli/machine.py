@@ -64,7 +64,10 @@ def simulate(
 
 @app.command("import")
 def import_(
-    source: Annotated[Path, typer.Argument(help="CSV, MAT, JSON, Parquet, HDF5 or TDMS file.")],
+    sources: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE...", help="CSV, MAT, JSON, Parquet, HDF5, TDMS or MCAP."),
+    ],
     mapping: Annotated[Path, typer.Option("--map", help="Columns, units, scale, sign, rate.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")],
     as_json_: Json = False,
@@ -74,10 +77,10 @@ def import_(
     from twin.log.importers import import_log, load_mapping
 
     require_folder(out)
-    log = import_log(source, load_mapping(mapping))
+    log = import_log(sources, load_mapping(mapping))
     write_log(log, out)
     result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
-    resampled = [log.metadata["resampled"]] if "resampled" in log.metadata else []
+    resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
     say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, resampled)
 
 

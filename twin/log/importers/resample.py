@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
+from twin.log.importers.mapping import ImportMap
 from twin.log.log import Array
 
 LONGEST_GAP = 20.0  # usual steps, over which a line is no measurement
@@ -32,6 +34,16 @@ class Clock:
         between = np.interp(self.times[1:-1:2], self.times[::2], kept[::2])
         # Of a smooth signal lines twice as long are four times as far off.
         return float(np.sqrt(np.mean((between - kept[1:-1:2]) ** 2))) / 4.0
+
+    def costs(self, mapping: ImportMap, columns: Mapping[str, Array]) -> str:
+        """What the clock costs each signal of a map, one sentence."""
+        each = [
+            f"{axis}.{field} {c.unit.size * abs(c.scale) * self.cost(columns[c.column]):.2g} "
+            f"{entry.units[field]}"
+            for axis, entry in mapping.axes.items()
+            for field, c in entry.columns.items()
+        ]
+        return f"{self}; error rms about {', '.join(each)}"
 
     def __str__(self) -> str:
         steps = np.diff(self.times) * 1e3
