@@ -68,20 +68,50 @@ def import_(
         list[Path],
         typer.Argument(metavar="FILE...", help="CSV, MAT, JSON, Parquet, HDF5, TDMS or MCAP."),
     ],
-    mapping: Annotated[Path, typer.Option("--map", help="Columns, units, scale, sign, rate.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")],
+    mapping: Annotated[
+        Path | None, typer.Option("--map", help="Columns, units, scale, sign, rate.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="MCAP log to write; or the map.")
+    ] = None,
+    guess: Annotated[
+        bool, typer.Option("--guess", help="Propose a map for FILE, with reasons.")
+    ] = False,
     as_json_: Json = False,
 ) -> None:
     """Turn a machine's recording into an MCAP log."""
     from twin.log import write_log
     from twin.log.importers import import_log, load_mapping
 
-    require_folder(out)
+    if out is not None:
+        require_folder(out)
+    if guess:
+        _guess(sources, out, as_json_)
+        return
+    if mapping is None or out is None:
+        raise InputError("give --map MAP and -o LOG; --guess proposes a map")
     log = import_log(sources, load_mapping(mapping))
     write_log(log, out)
     result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
     resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
     say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, resampled)
+
+
+def _guess(sources: list[Path], out: Path | None, as_json_: bool) -> None:
+    """Print or write a proposed map; exit code 1 where something is missing in it."""
+    from twin.files import write_atomically
+    from twin.log.importers.guess import guess_map
+
+    if len(sources) != 1:
+        raise InputError(f"--guess was given {len(sources)} files; give one at a time")
+    found = guess_map(sources[0])
+    result = {"map": found.text, "missing": list(found.missing)}
+    if out is not None:
+        write_atomically(out, found.text.encode())
+    say(found.text if out is None else f"{out}: a map to be read and corrected", result, as_json_,
+        found.missing)  # fmt: skip
+    if found.missing:
+        raise typer.Exit(1)
 
 
 @app.command()

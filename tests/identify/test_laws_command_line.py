@@ -182,7 +182,7 @@ def test_import_and_recover(monkeypatch, cli):
     assert (code, json.loads(text)) == (
         0, {"log": "r.mcap", "samples": 9, "sample_rate": 125.0, "unit": "Hz"},
     )  # fmt: skip
-    assert (load.only[0], read.only[0]) == ((Path("m.toml"),), (Path("d.csv"), "the map"))
+    assert (load.only[0], read.only[0]) == ((Path("m.toml"),), ([Path("d.csv")], "the map"))
     assert write.calls.pop()[0] == (log, Path("r.mcap"))
     part = SimpleNamespace(metadata={"recovered": "2 samples"})
     log = SimpleNamespace(metadata={"recovered": "41 samples"})

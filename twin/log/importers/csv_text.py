@@ -19,7 +19,7 @@ import numpy as np
 from twin.errors import InputError
 from twin.log.importers.mapping import CsvLayout, ImportMap
 from twin.log.importers.scope_text import END, find_header
-from twin.log.importers.table import Table, parsing, require_columns
+from twin.log.importers.table import Table, chosen, parsing
 from twin.log.log import Array
 
 _HEAD_BYTES = 1 << 16
@@ -79,8 +79,7 @@ def read(path: Path, mapping: ImportMap) -> Table:
     """Columns of a text table; raises InputError."""
     with parsing("a text table"):
         layout = _find_layout(path, mapping.csv)
-        wanted = mapping.column_names()
-        require_columns(wanted, layout.names)
+        wanted = chosen(mapping.column_names(), layout.names)
         where = [layout.names.index(name) for name in wanted]
         try:
             values = _numbers(path, layout, where)
@@ -88,12 +87,6 @@ def read(path: Path, mapping: ImportMap) -> Table:
             raise _first_fault(path, layout, where) or InputError(str(error)) from error
     columns = dict(zip(wanted, values, strict=True))
     return Table(columns, layout.sample_rate, layout.start_ns)
-
-
-def column_names(path: Path, stated: CsvLayout = CsvLayout()) -> tuple[str, ...]:  # noqa: B008
-    """All columns of a text table; raises InputError."""
-    with parsing("a text table"):
-        return _find_layout(path, stated).names
 
 
 def _numbers(path: Path, layout: _Layout, where: Sequence[int]) -> Array:

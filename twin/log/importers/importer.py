@@ -99,12 +99,17 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
     return _log(mapping, found.columns, mapping.resample, facts)
 
 
+def table_of(path: Path, mapping: ImportMap) -> Table:
+    """The columns that a map names, all where it has no axes; raises InputError."""
+    return FORMATS[_format_name(path, mapping)].read(path, mapping)
+
+
 def _read(path: Path, mapping: ImportMap) -> tuple[Table, Mapping[str, Array], dict[str, str]]:
     """The table, its columns as numbers, and format and sha256 of the file."""
     name = _format_name(path, mapping)
     with open(path, "rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
-    table = FORMATS[name].read(path, mapping)
+    table = table_of(path, mapping)
     columns = {n: numbers(n, raw) for n, raw in table.columns.items()}
     _common_length(columns)
     return table, columns, {"original_format": name, "original_sha256": digest}

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from twin.apart import apart
 from twin.log.importers import hdf5
 from twin.log.importers.mapping import ImportMap
-from twin.log.importers.table import Table, parsing, require_columns, split_columns
+from twin.log.importers.table import Table, chosen, parsing, split_columns
 
 LONGEST = 600.0  # s
 
@@ -33,8 +33,7 @@ def _read(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
     with parsing("MAT"):
         content = scipy.io.loadmat(path, simplify_cells=True)
     columns = _columns("", {k: v for k, v in content.items() if not k.startswith("__")})
-    require_columns(names, columns)
-    return {name: columns[name] for name in names}
+    return {name: columns[name] for name in chosen(names, columns)}
 
 
 def _columns(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:

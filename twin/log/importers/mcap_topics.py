@@ -22,7 +22,7 @@ from twin.errors import InputError
 from twin.log.container import Inflation, open_mcap, parse, payloads
 from twin.log.decode import message_parts, record_at
 from twin.log.importers.mapping import ImportMap
-from twin.log.importers.table import Table, extra, parsing, require_columns
+from twin.log.importers.table import Table, chosen, extra, parsing, require_columns
 
 LOG_TIME = "log_time"
 _STAMPS = (("sec", "nanosec"), ("seconds", "nanos"))  # ROS 2, protobuf
@@ -35,7 +35,7 @@ def read(path: Path, mapping: ImportMap) -> Table:
     wanted = mapping.column_names()
     with parsing("MCAP"):
         columns = _read(path, wanted)
-    return Table({name: columns[name] for name in wanted})
+    return Table({name: columns[name] for name in chosen(wanted, columns)})
 
 
 def _read(path: Path, wanted: Sequence[str]) -> dict[str, NDArray]:
@@ -47,7 +47,7 @@ def _read(path: Path, wanted: Sequence[str]) -> dict[str, NDArray]:
         values = _flat(f"{topic}.", decoded) if decoded is not None else {}
         values[f"{topic}.{LOG_TIME}"] = np.datetime64(time, "ns")
         seen.update(dict.fromkeys(values))
-        for name in wanted:
+        for name in wanted or values:
             if name in values:
                 value = values[name]
                 if isinstance(value, np.datetime64):
@@ -84,7 +84,9 @@ class _Topics:
                         continue
                     number, _, time, _, data = message_parts(content)
                     topic = self._channels[number].topic
-                    if number in shown and not any(w.startswith(f"{topic}.") for w in wanted):
+                    if number in shown and not any(
+                        w.startswith(f"{topic}.") for w in wanted or (f"{topic}.",)
+                    ):
                         continue
                     shown.add(number)
                     decode = self._decoder(number)

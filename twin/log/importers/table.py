@@ -49,6 +49,13 @@ def require_columns(wanted: Iterable[str], there: Collection[str]) -> None:
         )
 
 
+def chosen(wanted: Iterable[str], there: Collection[str]) -> tuple[str, ...]:
+    """The wanted columns, all where none is named; raises InputError where one is missing."""
+    names = tuple(wanted)
+    require_columns(names, there)
+    return names or tuple(there)
+
+
 def split_columns(name: str, values: NDArray) -> dict[str, NDArray]:
     """A vector as it is; a matrix as ``name[1]``, ``name[2]``, ... along its shorter side.
 
