@@ -16,6 +16,7 @@ from identify.cli.shared import (
     bars_on_stderr,
     catalogue_with,
     machine_model,
+    read_checked,
     require_folder,
     say,
 )
@@ -112,6 +113,25 @@ def _guess(sources: list[Path], out: Path | None, as_json_: bool) -> None:
         found.missing)  # fmt: skip
     if found.missing:
         raise typer.Exit(1)
+
+
+@app.command()
+def new(
+    logs: Logs,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Machine model (.toml) to write.")],
+    as_json_: Json = False,
+) -> None:
+    """Propose a first model from logs: mass, friction and what they show of the hardware."""
+    from identify.measure import first_model
+    from twin.effects import load_catalogue
+    from twin.model.file import save_model
+
+    require_folder(out)
+    recorded, findings = read_checked(logs)
+    model = first_model(recorded, out.stem, load_catalogue())
+    save_model(model, out)
+    text = f"{out}: axes {', '.join(model.axes)}; now `twin fit {out} {logs[0]} -o fitted.toml`"
+    say(text, {"model": str(out), "axes": list(model.axes)}, as_json_, findings)
 
 
 @app.command()

@@ -12,9 +12,10 @@ from mcap.records import Attachment, Metadata
 
 from twin.errors import InputError, at
 from twin.log.container import Damaged, Record
+from twin.log.instants import seconds
 from twin.log.layout import Block
 from twin.log.log import AxisLog, Log
-from twin.log.series import JITTER, Series, seconds
+from twin.log.series import JITTER, Series
 from twin.log.topics import AXIS_PREFIX, Topic, Topics, positive_number
 
 METADATA_NAME = "twin"

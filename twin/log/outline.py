@@ -12,6 +12,7 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 
 from twin.errors import InputError, at
 from twin.log.assemble import SCHEMA_VERSION
+from twin.log.instants import seconds
 from twin.log.layout import MessageLayout, RowLayout
 from twin.log.log import Array, AxisLog, Log
 from twin.log.schema import (
@@ -21,7 +22,6 @@ from twin.log.schema import (
     file_descriptor_set,
     protobuf_segments,
 )
-from twin.log.series import seconds
 from twin.log.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_units
 
 SERIES = "twin.Series"  # the message of a topic that no log of a machine has

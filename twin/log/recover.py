@@ -12,9 +12,9 @@ from twin.errors import InputError
 from twin.log.assemble import Extras, Run
 from twin.log.container import has_checksum, open_mcap, reading
 from twin.log.decode import read_strictly
+from twin.log.instants import seconds
 from twin.log.log import Log
 from twin.log.salvage import Part, Salvage
-from twin.log.series import seconds
 
 METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
+from twin.log.instants import seconds
 from twin.log.layout import Block, sample_times
 from twin.log.log import Array
 from twin.log.topics import Topic
@@ -163,8 +164,3 @@ class Series:
                 f"(sample {self.count + i}); leave out a signal that was not recorded, "
                 "or keep the longest part without it with: twin recover"
             )
-
-
-def seconds(nanoseconds: float) -> str:
-    """A time for a message."""
-    return f"{nanoseconds * 1e-9:.9f}".rstrip("0").rstrip(".") + " s"

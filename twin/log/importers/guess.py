@@ -94,20 +94,19 @@ def guess_map(path: Path) -> Guess:
 
 
 def _distinct(raw: Mapping[str, np.ndarray]) -> dict[str, Array]:
-    """The columns of numbers, each once: of two that are the same, the one without an index."""
+    """The columns of numbers, each once: an entry of an array that has a name goes by that."""
     out: dict[str, Array] = {}
-    seen: dict[bytes, str] = {}
-    for name, values in sorted(raw.items(), key=lambda item: item[0].endswith("]")):
+    named = {(n.rpartition(".")[0], np.asarray(c).tobytes()) for n, c in raw.items()}
+    for name, values in raw.items():
         try:
             column = numbers(name, values)
         except InputError:
             continue
-        if len(column) < 3 or not np.isfinite(column).all():
-            continue
-        if seen.setdefault(column.tobytes(), name) == name:
+        again = name.endswith("]") and (name.rpartition("[")[0], values.tobytes()) in named
+        if len(column) > 2 and np.isfinite(column).all() and not again:
             out[name] = column
     longest = max((len(c) for c in out.values()), default=0)
-    return {n: out[n] for n in raw if n in out and len(out[n]) == longest}
+    return {name: column for name, column in out.items() if len(column) == longest}
 
 
 def _words(name: str) -> list[str]:

@@ -17,9 +17,8 @@ from twin.log.importers.resample import clock_of
 from twin.log.importers.sample_rate import rate_of
 from twin.log.importers.several import read_together
 from twin.log.importers.table import Table, numbers
+from twin.log.instants import is_calendar
 from twin.log.log import Array, AxisLog, Log
-
-_EARLIEST, _LATEST = 5e8, 5e9  # s since 1970, between which a time is that of a calendar
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,7 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
             rate, count = _sample_rate(table, own, columns), _common_length(columns)
             return columns, np.arange(count) / rate, facts["original_sha256"]
         times = own.time.to_si(columns[own.time.column])
-        if start is not None and not _is_calendar(times):  # dates: seconds since the first
+        if start is not None and not is_calendar(times[0]):  # dates: seconds since the first
             times = times - times[0] + int(start) * 1e-9
         return columns, times, facts["original_sha256"]
 
@@ -93,7 +92,7 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
         "original_format": ",".join(formats), "original_sha256": ",".join(found.digests),
         **found.notes,
     }  # fmt: skip
-    if _is_calendar(np.array([found.start])):
+    if is_calendar(found.start):
         facts["start_time_unix_ns"] = str(round(found.start * 1e9))
     assert mapping.resample is not None
     return _log(mapping, found.columns, mapping.resample, facts)
@@ -137,11 +136,6 @@ def _on_one_clock(
     return even, {"resampled": clock.costs(mapping, columns)}
 
 
-def _is_calendar(times: Array) -> bool:
-    """Whether times (n,) in s are those since 1970."""
-    return bool(len(times)) and bool(_EARLIEST < times[0] < _LATEST)
-
-
 def _start(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> dict[str, str]:
     """When the recording began by the wall clock, where the format or its times say so."""
     if table.start_ns is not None:
@@ -152,7 +146,7 @@ def _start(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> di
     if raw.dtype.kind == "M" and len(raw):
         return {"start_time_unix_ns": str(int(raw[0].astype("datetime64[ns]").astype(np.int64)))}
     first = mapping.time.to_si(columns[mapping.time.column][:1])
-    if _is_calendar(first):
+    if len(first) and is_calendar(first[0]):
         return {"start_time_unix_ns": str(round(float(first[0]) * 1e9))}
     return {}
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from twin.log.log import Array
+from twin.signals import between, rate
 
 _SPAN = 0.01  # s over which a rate is taken
 _RATE = 0.9  # correlation of a column with the rate of another from which it is called that
@@ -42,7 +43,7 @@ def moved_by(
     middle = _mean(position, step)
     rows = np.column_stack(
         [
-            np.gradient(velocity, width * step), velocity, np.sign(velocity), middle,
+            rate(velocity, width * step), velocity, np.sign(velocity), middle,
             np.ones_like(middle),
         ]
     )  # fmt: skip
@@ -62,8 +63,7 @@ def _width(step: float) -> int:
 
 def _rate(column: Array, step: float) -> Array:
     """(k,) rate over each span of 0.01 s, a second."""
-    kept = column[:: _width(step)]
-    return np.asarray(np.diff(kept) / (_width(step) * step))
+    return between(column[:: _width(step)], _width(step) * step)
 
 
 def _mean(column: Array, step: float) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from twin.errors import InputError
 from twin.log.importers.mapping import ImportMap
+from twin.log.instants import instant
 from twin.log.log import Array
 
 LONGEST_GAP = 20.0  # usual steps, over which a line is no measurement
@@ -73,8 +74,8 @@ def clock_of(time: Array, rate: float) -> Clock:
     gap = int(np.argmax(steps))
     if steps[gap] > LONGEST_GAP * usual:
         raise InputError(
-            f"there is nothing between {kept[gap]:.6g} and {kept[gap + 1]:.6g} s; import the parts "
-            "before and behind it as logs of their own"
+            f"there is nothing between {instant(kept[gap])} and {instant(kept[gap + 1])}; import "
+            "the parts before and behind it as logs of their own"
         )
     grid = kept[0] + np.arange(int((kept[-1] - kept[0]) * rate * (1.0 + 1e-12)) + 1) / rate
     return Clock(rows, kept, grid, len(time) - len(kept))

@@ -12,6 +12,7 @@ from twin.errors import InputError
 from twin.log.container import reading
 from twin.log.importers.mapping import ImportMap
 from twin.log.importers.resample import Clock, clock_of
+from twin.log.instants import instant
 from twin.log.log import Array
 
 Read = Callable[[Path, ImportMap], tuple[Mapping[str, Array], Array, str]]
@@ -62,7 +63,7 @@ def _common(paths: Sequence[Path], clocks: Sequence[Clock], rate: float) -> Arra
     end = min(clock.times[-1] for clock in clocks)
     if not (end - begin) * rate >= 2.0:
         spans = "; ".join(
-            f"{path} {clock.times[0]:.6f} to {clock.times[-1]:.6f} s"
+            f"{path} {instant(clock.times[0])} to {instant(clock.times[-1])}"
             for path, clock in zip(paths, clocks, strict=True)
         )
         raise InputError(f"the files have no time in common ({spans}); correct their offset (s)")
