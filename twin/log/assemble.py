@@ -19,6 +19,7 @@ from twin.log.series import JITTER, Series
 from twin.log.topics import AXIS_PREFIX, Topic, Topics, positive_number
 
 METADATA_NAME = "twin"
+CHECKSUM = "checksum"  # entry of the metadata, as their record has none
 SCHEMA_VERSION = "1"
 
 
@@ -40,6 +41,15 @@ class Wanted:
 EVERYTHING = Wanted()
 
 
+def checksum(metadata: Mapping[str, str]) -> str:
+    """CRC-32, eight digits, of all keys and values of metadata, sorted, each behind its length."""
+    crc = 0
+    for text in (t for entry in sorted(metadata.items()) for t in entry):
+        data = text.encode()
+        crc = zlib.crc32(data, zlib.crc32(len(data).to_bytes(8, "little"), crc))
+    return f"{crc:08x}"
+
+
 class Extras:
     """Metadata and attachments."""
 
@@ -49,6 +59,7 @@ class Extras:
         attachments: dict[str, bytes] | None = None,
     ) -> None:
         self.metadata = metadata or {}
+        self.proved = False  # whether a checksum of its own proves the metadata
         self.attachments = attachments or {}
 
     def add(self, record: Record) -> None:
@@ -56,8 +67,12 @@ class Extras:
         if record.opcode == Opcode.METADATA:
             metadata = record.parsed(Metadata)
             if metadata.name == METADATA_NAME:
-                self._check_version(metadata.metadata)
-                self.metadata = metadata.metadata
+                entries = dict(metadata.metadata)
+                stated = entries.pop(CHECKSUM, None)
+                if stated is not None and stated != checksum(entries):
+                    raise Damaged(f"metadata at byte {record.offset}: wrong checksum")
+                self._check_version(entries)
+                self.metadata, self.proved = entries, stated is not None
         elif record.opcode == Opcode.ATTACHMENT:
             attachment = record.parsed(Attachment)
             crc = int.from_bytes(record.content[-4:], "little")

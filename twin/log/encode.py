@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.files import recording, replacing
-from twin.log.assemble import METADATA_NAME
+from twin.log.assemble import CHECKSUM, METADATA_NAME, checksum
 from twin.log.layout import sample_times
 from twin.log.log import Array, Log
 from twin.log.outline import Outline, Samples, outline, outline_of_topics, samples_of
@@ -94,7 +94,8 @@ def _written(
     Every chunk begins with all schemas and channels: any one of them can be read alone.
     """
     writer = McapWriter(stream)
-    writer.add_metadata(METADATA_NAME, plan.metadata)
+    proof = {CHECKSUM: checksum(plan.metadata)}
+    writer.add_metadata(METADATA_NAME, {**plan.metadata, **proof})
     for name, data in attachments.items():
         writer.add_attachment(name, data)
     head = encoded([*plan.schemas, *plan.channels])

@@ -11,7 +11,7 @@ from mcap.records import Channel, Schema
 from mcap.well_known import MessageEncoding, SchemaEncoding
 
 from twin.errors import InputError, at
-from twin.log.assemble import SCHEMA_VERSION
+from twin.log.assemble import CHECKSUM, SCHEMA_VERSION
 from twin.log.instants import seconds
 from twin.log.layout import MessageLayout, RowLayout
 from twin.log.log import Array, AxisLog, Log
@@ -147,8 +147,9 @@ def _common(axis: str, log: Log) -> dict[str, str]:
 
 
 def _metadata(log: Log) -> dict[str, str]:
+    given = {key: value for key, value in log.metadata.items() if key != CHECKSUM}
     return {
-        **log.metadata,
+        **given,
         "schema_version": SCHEMA_VERSION,
         "sample_rate_hz": repr(float(log.sample_rate)),
         "axes": ",".join(log.axes),

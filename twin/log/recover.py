@@ -96,7 +96,8 @@ class _Stretches:
         log, kept = self._log(runs[longest], counts[longest])
         others = list(self._others(runs, counts, longest))
         lost = self._lost if self._keep_unproved else [*self._lost, *self._salvage.unproved]
-        unproved: list[str] = [METADATA] if self._salvage.extras.metadata else []
+        extras = self._salvage.extras
+        unproved: list[str] = [METADATA] if extras.metadata and not extras.proved else []
         unproved += self._salvage.unproved if self._keep_unproved else []
         recovery = Recovery(
             kept, tuple(dict.fromkeys(lost)), tuple(dict.fromkeys(unproved)), tuple(others)

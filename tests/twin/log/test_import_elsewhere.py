@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -140,7 +141,8 @@ def test_json_in_mcap_and_a_damaged_one(tmp_path):
         writer.start()
         channel = writer.register_channel("/drive", "json", 0)
         for k in range(COUNT):
-            text = f'{{"a": {{"q": {float(Q[k])!r}}}, "f": [{float(F[k])!r}, 0], "on": true, "id": "z"}}'
+            message = {"a": {"q": float(Q[k])}, "f": [float(F[k]), 0], "on": True, "id": "z"}
+            text = json.dumps(message)
             writer.add_message(channel, k * 10**6, text.encode(), k * 10**6)
         writer.finish()
     text = """
