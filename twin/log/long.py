@@ -12,11 +12,11 @@ from twin.log.decode import read_parts, samples_by_axis
 from twin.log.log import Log, joined
 from twin.log.thin import thinned
 
-# Samples, all axes together. A check takes 90 bytes a sample; a fit or comparison 75, and 115 more
-# a millisecond of motion; the program itself 0.3 GB. Half an hour of two axes then fits into 1 GiB.
+# Samples, all axes together. A check takes 90 bytes a sample beside 0.1 GB for the program.
 LARGEST_PART = 5_000_000
-MOST_SAMPLES = 3_600_000
-SHORTEST_STEP = 1e-3  # s; motion is identified in blocks of that length, so no step is longer
+# A fit takes some 75 bytes a sample and more for each millisecond of motion, which no rate changes.
+MOST_SAMPLES = 7_500_000
+LONGEST_STEP = 5e-4  # s: two in a block of motion; with one the residual is half as large again
 
 
 def check_file(path: Path) -> CheckReport:
@@ -71,7 +71,7 @@ def _thinned(parts: Iterable[Log], every: int) -> Iterator[Log]:
     held: Log | None = None
     for part in parts:
         whole = part if held is None else joined([held, part])
-        step = max(1, min(every, int(SHORTEST_STEP * whole.sample_rate * (1.0 + 1e-9))))
+        step = max(1, min(every, int(LONGEST_STEP * whole.sample_rate * (1.0 + 1e-9))))
         count = len(whole) // step * step
         held = whole.part(count, len(whole)).copied() if count < len(whole) else None
         yield thinned(whole.part(0, count), step)
