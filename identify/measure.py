@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from identify.dataset.dataset import Dataset, datasets
+import numpy as np
+
+from identify.dataset.dataset import Dataset, datasets, inertia
+from identify.dataset.excitation import excitation
+from identify.dataset.motion import Motion, motion_of
+from identify.dataset.test_function import TestFunction
 from identify.estimation.cable_force import CableForce
 from identify.estimation.cable_force import cable_force as of_cable
 from identify.estimation.velocity_map import VelocityMap
 from identify.estimation.velocity_map import velocity_map as of_velocity
+from twin.effect import Effect, Kind
+from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.log import Log
-from twin.model.machine import MachineModel
+from twin.log.check import moves
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 
 TEST_FUNCTION = 0.02  # s, short enough for spikes of a few millimetres at 0.1 m/s
+MARGIN = 0.05  # of the way that was covered, beyond its ends
 
 
 def velocity_map(
@@ -42,6 +51,68 @@ def cable_force(
     """
     name, dataset = _only(datasets(model, logs, {}, test_function), axis)
     return of_cable(model.axes[name], dataset.fit)
+
+
+def first_model(logs: Mapping[str, Log], name: str, catalogue: Catalogue) -> MachineModel:
+    """A model to begin with: of each axis that moves its rough mass and the simplest friction.
+
+    Hardware is what the logs show: travel, speed, acceleration and force that were reached, the
+    step and the noise of the encoder. Raises InputError where no axis moves, and where the logs
+    differ in sample rate.
+    """
+    rates = sorted({log.sample_rate for log in logs.values()})
+    if len(rates) != 1:
+        raise InputError(
+            f"the logs are sampled at {', '.join(f'{r:g}' for r in rates)} Hz; give one rate"
+        )
+    names = dict.fromkeys(axis for log in logs.values() for axis in log.axes)
+    axes = {}
+    for axis in names:
+        going = {n: log for n, log in logs.items() if axis in log.axes and moves(log, axis)}
+        if going:
+            motions = [motion_of(log, axis, n) for n, log in going.items()]
+            constant = next(iter(going.values())).axes[axis].force_constant
+            axes[axis] = _first_axis(motions, constant, _simplest_friction(catalogue))
+    if not axes:
+        raise InputError(f"no axis moves in {', '.join(logs)}; give a log in which one does")
+    return MachineModel(name, axes, rates[0])
+
+
+def _first_axis(
+    motions: Sequence[Motion], force_constant: float | None, friction: Effect
+) -> AxisModel:
+    mass, covered, units = inertia(motions), excitation(motions, None), motions[0].units
+    window = [TestFunction.of_length(TEST_FUNCTION, m.period) for m in motions]
+    reached = max(
+        float(np.abs(w.acceleration(m.velocity)).max())
+        for w, m in zip(window, motions, strict=True)
+    )
+    margin = MARGIN * covered.travel
+    low, high = covered.position_low - margin, covered.position_high + margin
+    hardware = Hardware(
+        travel=(_shown(low), _shown(high)),
+        force_constant=1.0 if force_constant is None else force_constant,
+        force_limit=_shown(2.0 * covered.force_max),
+        encoder_resolution=_shown(covered.resolution),
+        encoder_noise=_shown(max(m.position_noise for m in motions)),
+        velocity=_shown(covered.speed_max),
+        acceleration=_shown(reached),
+        jerk=_shown(reached / TEST_FUNCTION),
+    )
+    start = Fitted.at_start(friction, friction.starts(covered), units)
+    return AxisModel(_shown(mass), hardware, (start,), rotary=units.rotary)
+
+
+def _shown(value: float) -> float:
+    return float(f"{value:.3g}")
+
+
+def _simplest_friction(catalogue: Catalogue) -> Effect:
+    """The friction of the catalogue with the fewest parameters and states."""
+    frictions = [
+        e for e in catalogue.values() if e.kind is Kind.FRICTION and not e.is_nonparametric
+    ]
+    return min(frictions, key=lambda e: (len(e.parameters), len(e.states)))
 
 
 def _only(found: Mapping[str, Dataset], axis: str | None) -> tuple[str, Dataset]:

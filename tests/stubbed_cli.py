@@ -48,18 +48,22 @@ def stubbed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, fold
                 lambda name, catalogue: MachineModel(f"{name} {catalogue['all']}", {}),
             ),
             ("catalogue_with", lambda files: {"all": [str(f) for f in files or ()], "wear": "W"}),
-            ("read_logs", logs_of),
-            ("read_measured", logs_of),
+            ("read_measured", lambda paths, beside=None: logs_of(paths)),
             (
                 "read_checked",
-                lambda paths: (logs_of(paths), [f"warned of {p}" for p in paths or ()]),
+                lambda paths, beside=None: (
+                    logs_of(paths),
+                    [f"warned of {p}" for p in paths or ()],
+                ),
             ),
             ("bars_on_stderr", lambda: nullcontext(Stub())),
         ):
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, answer)
     monkeypatch.setattr("identify.cli.shared.read_checked", loop.read_checked)
-    monkeypatch.setattr("identify.cli.shared.read_measured", logs_of)
+    monkeypatch.setattr(
+        "identify.cli.shared.read_measured", lambda paths, beside=None: logs_of(paths)
+    )
     monkeypatch.setattr("identify.cli.shared.bars_on_stderr", lambda: nullcontext(Stub()))
 
     def run(*arguments: object) -> tuple[int, str, str]:

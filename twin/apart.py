@@ -24,16 +24,19 @@ class NoAnswer(InputError):
     """The work hung, crashed or ended its process."""
 
 
-def apart(work: Callable[..., T], *arguments: Any, seconds: float) -> T:
+def apart(work: Callable[..., T], *arguments: Any, seconds: float, memory: int | None = None) -> T:
     """What ``work`` returns, from another process.
 
-    work: a function of a module, as the other process looks it up by name. Raises InputError where
-    it does, and NoAnswer where it does not come to an end, crashes, or ends the process.
+    work: a function of a module, as the other process looks it up by name. memory: bytes that it
+    may take beside what the program has, where the system can tell. Raises InputError where it
+    does, and NoAnswer where it does not come to an end, crashes, or ends the process.
     """
     # A fork starts at once, with all that is imported; elsewhere it is not safe.
     context: Any = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
     answers, questions = context.Pipe(duplex=False)
-    process = context.Process(target=_attempt, args=(work, arguments, questions), daemon=True)
+    process = context.Process(
+        target=_attempt, args=(work, arguments, questions, memory), daemon=True
+    )
     process.start()
     questions.close()
     try:
@@ -54,18 +57,34 @@ def apart(work: Callable[..., T], *arguments: Any, seconds: float) -> T:
     return result
 
 
-def _attempt(work: Callable[..., Any], arguments: tuple, questions: Connection) -> None:
+def _attempt(
+    work: Callable[..., Any], arguments: tuple, questions: Connection, memory: int | None
+) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_DFL)
     faulthandler.disable()
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in (1, 2):  # what is printed here is printed again, or nobody's concern
         os.dup2(nowhere, stream)
+    if memory is not None:
+        _limit(memory)
     try:
         answer = ("", work(*arguments))
     except InputError as error:
         answer = (str(error), None)
+    except MemoryError:
+        answer = ("takes more memory than a file of its size may; export it again", None)
     questions.send(answer)
+
+
+def _limit(memory: int) -> None:
+    """Let this process take so many bytes more than it has, on Linux."""
+    if sys.platform == "linux":
+        import resource
+
+        with open("/proc/self/statm") as stream:
+            held = int(stream.read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (held + memory, resource.RLIM_INFINITY))
 
 
 def _ended(code: int | None) -> str:

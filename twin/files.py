@@ -13,6 +13,7 @@ from typing import BinaryIO
 from twin.errors import InputError
 
 PART = ".twin-part"
+UNFINISHED = ".unfinished"  # a recording, of which a killed run leaves what it has written
 TRIAL = bytes(1 << 16)  # written and removed again, to find a full disk before the work
 
 # A program that is told to end at once has no other way to know what it would leave behind.
@@ -53,12 +54,27 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         target = _target(path)
         with _part(path, target) as (stream, part):
             yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-            if target.exists():
-                os.chmod(part, stat.S_IMODE(target.stat().st_mode))
-            os.replace(part, target)
-        _keep_folder(target.parent)
+            _put_in_place(stream, part, target)
+
+
+@contextmanager
+def recording(path: Path) -> Iterator[BinaryIO]:
+    """``replacing`` for what grows while a long run lasts: the file ``path.unfinished``.
+
+    It is removed where the run fails or is interrupted. A killed run leaves it to be recovered,
+    until the next run that records to the same path. Raises InputError where one does just now.
+    """
+    with _explained(path):
+        if _is_direct(path):
+            with open(path, "wb") as stream:
+                yield stream
+            return
+        target = _target(path)
+        _require_file(path, target)
+        part = target.with_name(f"{target.name}{UNFINISHED}")
+        with _opened(part) as stream:
+            yield stream
+            _put_in_place(stream, part, target)
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -77,21 +93,48 @@ def remove_unfinished() -> None:
 @contextmanager
 def _part(path: Path, target: Path) -> Iterator[tuple[BinaryIO, Path]]:
     """A file beside the target that is removed on leaving, if it is still there."""
+    _require_file(path, target)
+    _remove_left_over(target.parent)
+    part = target.with_name(f".{target.name}.{os.getpid()}{PART}")
+    with _opened(part) as stream:
+        yield stream, part
+
+
+def _require_file(path: Path, target: Path) -> None:
+    """Raise InputError for a path that is no file in a folder that is there."""
     if target.is_dir():
         raise InputError(f"{path}: is a folder; give the name of a file in it")
     if not target.parent.is_dir():
         raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
-    _remove_left_over(target.parent)
-    part = target.with_name(f".{target.name}.{os.getpid()}{PART}")
-    _unfinished.add(part)
-    try:
-        with open(part, "wb") as stream:
+
+
+@contextmanager
+def _opened(part: Path) -> Iterator[BinaryIO]:
+    """An empty file that nobody else writes, removed on leaving if it is still there."""
+    with open(part, "ab") as stream:
+        try:
             _lock(stream)
-            yield stream, part
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-        _unfinished.discard(part)
+        except BlockingIOError as error:
+            raise InputError(f"{part}: another run is writing it; give another name") from error
+        _unfinished.add(part)
+        try:
+            if stream.tell():  # a killed run has left it
+                stream.truncate(0)
+            yield stream
+        finally:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+            _unfinished.discard(part)
+
+
+def _put_in_place(stream: BinaryIO, part: Path, target: Path) -> None:
+    """Make a part that is complete the target."""
+    stream.flush()
+    os.fsync(stream.fileno())
+    if target.exists():
+        os.chmod(part, stat.S_IMODE(target.stat().st_mode))
+    os.replace(part, target)
+    _keep_folder(target.parent)
 
 
 @contextmanager

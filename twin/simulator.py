@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -14,11 +14,11 @@ from twin.core.control import Controller, gain_table
 from twin.core.loop import N_SIGNALS, run_mujoco, run_reduced
 from twin.core.native import Table
 from twin.errors import CannotRun, InputError
-from twin.experiments.trajectory.setpoint import Setpoint
+from twin.experiments.trajectory.setpoint import AnySetpoint, Setpoint
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import attach, offsets, passive_callback, step_address
 
-CHUNK = 20_000  # samples between two reports of progress
+CHUNK = 20_000  # samples that are run, reported and recorded at once
 WATCHED_STATES = 8  # an effect with more states than this is not logged state by state
 
 Array = NDArray[np.float64]
@@ -38,6 +38,9 @@ class Run:
     states: Array
     table: Table
     state_names: tuple[tuple[str, str], ...]
+
+    def __len__(self) -> int:
+        return len(self.signals)
 
 
 class Stepper(Protocol):
@@ -166,7 +169,7 @@ class FineSimulator(ReducedSimulator):
 
 def run(
     model: MachineModel,
-    setpoint: Setpoint,
+    setpoint: AnySetpoint,
     rng: np.random.Generator,
     *,
     simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
@@ -175,17 +178,31 @@ def run(
 ) -> Run:
     """Run a setpoint on the twin, from rest at its first position.
 
-    rng draws the encoder noise. controllers: by axis; the model's own bandwidths where None.
+    rng draws the encoder noise. controllers: by axis; the model's own bandwidths where None. Raises
+    CannotRun where the simulation breaks down.
     """
-    table = model.table()
-    setpoints = np.stack(
-        [setpoint.position, setpoint.velocity, setpoint.acceleration, setpoint.force], axis=2
+    parts = run_parts(
+        model, setpoint, rng, simulator=simulator, controllers=controllers, progress=progress
     )
-    n, n_axes = setpoint.position.shape
-    if n_axes != len(model.axes):
-        raise InputError(f"the setpoint has {n_axes} axes, the model {len(model.axes)}")
+    return _joined(parts, len(setpoint))
+
+
+def run_parts(
+    model: MachineModel,
+    setpoint: AnySetpoint,
+    rng: np.random.Generator,
+    *,
+    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    controllers: Mapping[str, Controller] | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Run]:
+    """``run`` in parts, one after the other, so that a long one need not be held in memory."""
+    table = model.table()
+    n, n_axes = len(setpoint), len(model.axes)
+    start = setpoint.part(0, 1).position
+    if start.shape[1] != n_axes:
+        raise InputError(f"the setpoint has {start.shape[1]} axes, the model {n_axes}")
     scale = np.array([a.hardware.encoder_noise for a in model.axes.values()])
-    noise = rng.standard_normal((n, n_axes)) * scale
     controllers = controllers or {a: Controller.for_axis(m) for a, m in model.axes.items()}
     watched, names = _watched(model, table)
     shared = (
@@ -196,20 +213,59 @@ def run(
         np.zeros((n_axes, 3)),
         watched,
     )
-    out = (
-        np.empty((n, n_axes, N_SIGNALS)),
-        np.zeros((n, len(table.entries))),
-        np.empty((n, len(watched))),
-    )
     simulation: Stepper = simulator(model, table)
-    simulation.place(setpoint.position[0], np.zeros(n_axes), np.zeros(table.n_states), 0)
+    simulation.place(start[0], np.zeros(n_axes), np.zeros(table.n_states), 0)
+    before = Run(
+        np.zeros((0, n_axes, N_SIGNALS)), np.zeros((0, len(table.entries))),
+        np.zeros((0, len(watched))), table, names,
+    )  # fmt: skip
     for first in range(0, n, CHUNK):
-        part = slice(first, first + CHUNK)
-        simulation.run(first, shared, setpoints[part], noise[part], tuple(o[part] for o in out))
+        wanted = setpoint.part(first, min(first + CHUNK, n))
+        noise = rng.standard_normal((len(wanted), n_axes)) * scale
+        part = _empty(before, len(wanted))
+        simulation.run(first, shared, _stacked(wanted), noise, _arrays(part))
+        require_sound(
+            np.concatenate([before.signals[-1:], part.signals]),
+            np.concatenate([before.forces[-1:], part.forces]),
+            model, table, first - len(before.signals[-1:]),
+        )  # fmt: skip
+        yield part
+        before = part
         if progress:
-            progress(min(first + CHUNK, n), n)
-    require_sound(out[0], out[1], model, table)
-    return Run(*out, table=table, state_names=names)
+            progress(first + len(wanted), n)
+
+
+def _stacked(setpoint: Setpoint) -> Array:
+    columns = (setpoint.position, setpoint.velocity, setpoint.acceleration, setpoint.force)
+    return np.stack(columns, axis=2)
+
+
+def _arrays(part: Run) -> tuple[Array, Array, Array]:
+    return part.signals, part.forces, part.states
+
+
+def _empty(like: Run, samples: int) -> Run:
+    """A run of so many samples, of the same axes and effects, its forces zero."""
+    return replace(
+        like,
+        signals=np.empty((samples, *like.signals.shape[1:])),
+        forces=np.zeros((samples, like.forces.shape[1])),
+        states=np.empty((samples, like.states.shape[1])),
+    )
+
+
+def _joined(parts: Iterable[Run], samples: int) -> Run:
+    """Parts that have so many samples together, as one run."""
+    whole: Run | None = None
+    done = 0
+    for part in parts:
+        if whole is None:
+            whole = _empty(part, samples)
+        for column, new in zip(_arrays(whole), _arrays(part), strict=True):
+            column[done : done + len(part)] = new
+        done += len(part)
+    assert whole is not None
+    return whole
 
 
 def _watched(

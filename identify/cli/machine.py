@@ -16,7 +16,7 @@ from identify.cli.shared import (
     bars_on_stderr,
     catalogue_with,
     machine_model,
-    read_logs,
+    read_checked,
     require_folder,
     say,
 )
@@ -45,50 +45,102 @@ def simulate(
     from functools import partial
 
     from twin.experiments.file import SUFFIX, load_experiment
-    from twin.experiments.named import outside_travel
-    from twin.experiments.named import simulate as run
-    from twin.log import write_log
+    from twin.experiments.named import Reach, simulate_parts
+    from twin.log import record_log
 
     require_folder(out)
     stage = machine_model(model, catalogue_with(effects))
     chosen = load_experiment(experiment) if experiment.endswith(SUFFIX) else experiment
+    reach = Reach(stage)
     with bars_on_stderr() as bars:
-        log = run(
+        parts = simulate_parts(
             stage, chosen, seed=seed, duration=duration, axis=axis,
             progress=partial(bars, "simulating"),
         )  # fmt: skip
-        write_log(log, out, progress=partial(bars, "writing"))
-    result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
-    text = f"{out}: {len(log)} samples at {log.sample_rate:g} Hz"
-    say(text, result, as_json_, outside_travel(stage, log))
+        samples = record_log(map(reach.take, parts), out)
+    rate = stage.sample_rate
+    result = {"log": str(out), "samples": samples, "sample_rate": rate, "unit": "Hz"}
+    say(f"{out}: {samples} samples at {rate:g} Hz", result, as_json_, reach.warnings())
 
 
 @app.command("import")
 def import_(
-    source: Annotated[Path, typer.Argument(help="CSV, MAT, JSON, Parquet, HDF5 or TDMS file.")],
-    mapping: Annotated[Path, typer.Option("--map", help="Columns, units, scale, sign, rate.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")],
+    sources: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE...", help="CSV, MAT, JSON, Parquet, HDF5, TDMS or MCAP."),
+    ],
+    mapping: Annotated[
+        Path | None, typer.Option("--map", help="Columns, units, scale, sign, rate.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="MCAP log to write; or the map.")
+    ] = None,
+    guess: Annotated[
+        bool, typer.Option("--guess", help="Propose a map for FILE, with reasons.")
+    ] = False,
     as_json_: Json = False,
 ) -> None:
     """Turn a machine's recording into an MCAP log."""
     from twin.log import write_log
     from twin.log.importers import import_log, load_mapping
 
-    require_folder(out)
-    log = import_log(source, load_mapping(mapping))
+    if out is not None:
+        require_folder(out)
+    if guess:
+        _guess(sources, out, as_json_)
+        return
+    if mapping is None or out is None:
+        raise InputError("give --map MAP and -o LOG; --guess proposes a map")
+    log = import_log(sources, load_mapping(mapping))
     write_log(log, out)
     result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
-    resampled = [log.metadata["resampled"]] if "resampled" in log.metadata else []
+    resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
     say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, resampled)
+
+
+def _guess(sources: list[Path], out: Path | None, as_json_: bool) -> None:
+    """Print or write a proposed map; exit code 1 where something is missing in it."""
+    from twin.files import write_atomically
+    from twin.log.importers.guess import guess_map
+
+    if len(sources) != 1:
+        raise InputError(f"--guess was given {len(sources)} files; give one at a time")
+    found = guess_map(sources[0])
+    result = {"map": found.text, "missing": list(found.missing)}
+    if out is not None:
+        write_atomically(out, found.text.encode())
+    say(found.text if out is None else f"{out}: a map to be read and corrected", result, as_json_,
+        found.missing)  # fmt: skip
+    if found.missing:
+        raise typer.Exit(1)
+
+
+@app.command()
+def new(
+    logs: Logs,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Machine model (.toml) to write.")],
+    as_json_: Json = False,
+) -> None:
+    """Propose a first model from logs: mass, friction and what they show of the hardware."""
+    from identify.measure import first_model
+    from twin.effects import load_catalogue
+    from twin.model.file import save_model
+
+    require_folder(out)
+    recorded, findings = read_checked(logs)
+    model = first_model(recorded, out.stem, load_catalogue())
+    save_model(model, out)
+    text = f"{out}: axes {', '.join(model.axes)}; now `twin fit {out} {logs[0]} -o fitted.toml`"
+    say(text, {"model": str(out), "axes": list(model.axes)}, as_json_, findings)
 
 
 @app.command()
 def check(logs: Logs, as_json_: Json = False) -> None:
     """Say whether logs are fit for identification, and what is wrong with them."""
     from identify.output import machine_json, machine_text
-    from twin.log.check import check_log
+    from twin.log.long import check_file
 
-    reports = {name: check_log(log) for name, log in read_logs(logs).items()}
+    reports = {str(path): check_file(path) for path in logs}
     say(machine_text.check_text(reports), machine_json.check_json(reports), as_json_)
     if not all(report.ok for report in reports.values()):
         raise typer.Exit(1)

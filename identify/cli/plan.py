@@ -64,11 +64,12 @@ def plan(
     catalogue = catalogue_with(effects)
     machine = machine_model(model, catalogue)
     rivals = [_rival(name, catalogue) for name in between or ()]
-    recorded, findings = read_checked(logs)
+    recorded, findings = read_checked(logs, beside=holdout)
     with bars_on_stderr() as bars:
         result = workflow.plan(
-            machine, recorded, read_measured(holdout), between=rivals, catalogue=catalogue,
-            axis=axis, duration=duration, test_function=test_function, progress=bars,
+            machine, recorded, read_measured(holdout, beside=logs), between=rivals,
+            catalogue=catalogue, axis=axis, duration=duration, test_function=test_function,
+            progress=bars,
         )  # fmt: skip
     text, file = as_text.plan_text(result), None
     if result.decides:

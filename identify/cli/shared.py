@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -16,6 +15,7 @@ if TYPE_CHECKING:
     from identify.workflow import Progress
     from twin.effects import Catalogue
     from twin.log import Log
+    from twin.log.check import CheckReport
     from twin.model.machine import MachineModel
 
 Result = TypeVar("Result")
@@ -119,55 +119,57 @@ def with_holdout(
     job: Callable[..., Result], model: MachineModel, logs: list[Path], holdout: list[Path] | None
 ) -> tuple[Result, list[str]]:
     """The result of a job on a model, logs and held-out logs; and the findings on the logs."""
-    recorded, findings = read_checked(logs)
-    held = read_measured(holdout)
+    recorded, findings = read_checked(logs, beside=holdout)
+    held = read_measured(holdout, beside=logs)
     with bars_on_stderr() as bars:
         return job(model, recorded, held, progress=bars), findings
 
 
-def read_logs(paths: list[Path] | None) -> dict[str, Log]:
-    """The logs by name, less the truth that a simulation knows."""
-    return {str(path): log for path, log in _read(paths)}
+def read_measured(
+    paths: Sequence[Path] | None, beside: Sequence[Path] | None = None
+) -> dict[str, Log]:
+    """The logs by name, less what identification does not read: most of their memory.
+
+    beside: other logs that are held in memory as well. Where all are too long, they are read at a
+    lower rate.
+    """
+    from twin.log.long import read_measured as read
+    from twin.log.long import step_of
+
+    every = step_of([*(paths or ()), *(beside or ())]) if paths else 1
+    return {str(path): said(path, read(path, MEASURED, every), every) for path in paths or ()}
 
 
-def read_measured(paths: list[Path] | None) -> dict[str, Log]:
-    """The logs by name, less what identification does not read: most of their memory."""
-    return {str(path): _measured(log) for path, log in _read(paths)}
-
-
-def read_checked(paths: list[Path] | None) -> tuple[dict[str, Log], list[str]]:
+def read_checked(
+    paths: Sequence[Path] | None, beside: Sequence[Path] | None = None
+) -> tuple[dict[str, Log], list[str]]:
     """The same, and the findings of the log check on the whole logs, one sentence each."""
+    from twin.log.long import read_checked as read
+    from twin.log.long import step_of
+
+    every = step_of([*(paths or ()), *(beside or ())]) if paths else 1
     recorded, findings = {}, []
-    for path, log in _read(paths):
-        findings += checked({str(path): log})
-        recorded[str(path)] = _measured(log)
+    for path in paths or ():
+        log, report = read(path, MEASURED, every)
+        recorded[str(path)] = said(path, log, every)
+        findings += sentences(str(path), report)
     return recorded, findings
 
 
-def _read(paths: list[Path] | None) -> Iterator[tuple[Path, Log]]:
-    from twin.log import read_log
-
-    for path in paths or ():
-        yield path, read_log(path, truth=False)
-
-
-def _measured(log: Log) -> Log:
-    axes = {
-        name: replace(axis, columns={k: v for k, v in axis.columns.items() if k in MEASURED})
-        for name, axis in log.axes.items()
-    }
-    return replace(log, axes=axes, truth={}, attachments={})
+def said(path: Path, log: Log, every: int) -> Log:
+    """The log; that it was read at a lower rate is said on standard error."""
+    if every > 1:
+        print(
+            f"twin: {path}: is read at {log.sample_rate:g} Hz, because all logs together are too "
+            "long to be held in memory; cut them to be fitted at their own rate",
+            file=sys.stderr,
+        )
+    return log
 
 
-def checked(logs: Mapping[str, Log]) -> list[str]:
+def sentences(name: str, report: CheckReport) -> list[str]:
     """The findings of the log check, one sentence each."""
-    from twin.log.check import check_log
-
-    return [
-        f"{name}: {finding.severity.value}: {finding}"
-        for name, log in logs.items()
-        for finding in check_log(log).findings
-    ]
+    return [f"{name}: {finding.severity.value}: {finding}" for finding in report.findings]
 
 
 def require_folder(path: Path) -> None:

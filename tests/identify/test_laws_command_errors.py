@@ -14,16 +14,16 @@ from identify import workflow
 from identify.cli import machine, main
 from identify.cli.shared import (
     catalogue_with,
-    checked,
     machine_model,
     read_checked,
-    read_logs,
     read_measured,
     require_folder,
     say,
+    sentences,
 )
 from twin.errors import InputError
-from twin.log import AxisLog, Log
+from twin.log import AxisLog, Log, write_log
+from twin.log.check import check_log
 
 
 @pytest.fixture
@@ -89,17 +89,15 @@ def test_what_is_said_goes_to_its_own_stream(capsys, tmp_path):
 
 
 def test_files_are_read_by_the_names_they_were_given(monkeypatch):
-    monkeypatch.setattr("twin.log.read_log", lambda path, truth: f"log {path}")
     monkeypatch.setattr("twin.effects.load_catalogue", lambda files: files)
     monkeypatch.setattr("twin.model.file.load_model", lambda *given: given)
     paths = [Path("b.mcap"), Path("a.mcap")]
-    assert list(read_logs(paths).items()) == [(str(p), f"log {p}") for p in paths]
-    assert read_logs(None) == {}
+    assert (read_measured(None), read_checked(None)) == ({}, ({}, []))
     assert (catalogue_with(paths), catalogue_with(None)) == (paths, ())
     assert machine_model("name", "catalogue") == ("name", "catalogue")
 
 
-def test_identification_holds_no_more_of_a_log_than_it_reads(monkeypatch):
+def test_identification_holds_no_more_of_a_log_than_it_reads(tmp_path):
     """Six columns and the truth of a simulation are four times what is fitted."""
     t = 1e-3 * np.arange(3000)
     own = {
@@ -111,13 +109,16 @@ def test_identification_holds_no_more_of_a_log_than_it_reads(monkeypatch):
         1000.0, {"x": AxisLog({**own, "velocity": late}, force_constant=1.0)}, {"a": "b"},
         truth={"x": {"position": own["position"]}}, attachments={"model.toml": b""},
     )  # fmt: skip
-    monkeypatch.setattr("twin.log.read_log", lambda path, truth: whole)
-    found, findings = read_checked([Path("a.mcap")])
-    assert findings == checked({"a.mcap": whole})
+    path = tmp_path / "a.mcap"
+    write_log(whole, path)
+    found, findings = read_checked([path])
+    assert findings == sentences(str(path), check_log(whole))
     assert any("velocity" in f for f in findings)
-    for logs in (found, read_measured([Path("a.mcap")])):
+    for logs in (found, read_measured([path])):
         (log,) = logs.values()
-        assert log.axes["x"].columns == own
+        columns = log.axes["x"].columns
+        assert {f: c.tolist() for f, c in columns.items()} == {
+            f: c.tolist() for f, c in own.items()
+        }
         assert (log.truth, log.attachments) == ({}, {})
-        assert (log.metadata, log.axes["x"].force_constant) == ({"a": "b"}, 1.0)
-    assert read_checked(None) == ({}, [])
+        assert (log.metadata["a"], log.axes["x"].force_constant) == ("b", 1.0)

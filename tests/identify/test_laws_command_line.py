@@ -19,9 +19,10 @@ import twin.experiments.named
 import twin.log
 import twin.log.check
 import twin.log.importers
+import twin.log.long
 import twin.model.file
 from identify import workflow
-from identify.cli.shared import checked
+from identify.cli.shared import sentences
 from identify.output import as_json, machine_json, machine_text
 from identify.output import selftest as selftest_output
 from identify.output import text as as_text
@@ -144,27 +145,27 @@ def test_plan(monkeypatch, cli, decides, code):
 
 
 def test_simulate(monkeypatch, cli):
-    class Recording(list):
-        sample_rate = 250.0
+    class Reach:
+        take = staticmethod(lambda part: f"{part} seen")
+        warnings = staticmethod(lambda: ("axis x went",))
 
-    call = stub(monkeypatch, twin.experiments.named, "simulate", Recording([0] * 7))
-    write = stub(monkeypatch, twin.log, "write_log")
-    monkeypatch.setattr(
-        twin.experiments.named, "outside_travel", lambda stage, log: ("axis x went",)
-    )
+    call = stub(monkeypatch, twin.experiments.named, "simulate_parts", ["one", "two"])
+    record = stub(monkeypatch, twin.log, "record_log", 7)
+    monkeypatch.setattr(twin.experiments.named, "Reach", lambda stage: Reach)
     monkeypatch.setattr(twin.experiments.file, "load_experiment", lambda path: f"file {path}")
     command = ("simulate", "moves", "--model", "m.toml", "-o", "r.mcap", "--seed", "5",
                "--duration", "3.5", "--axis", "y", *COMMON[2:])  # fmt: skip
     code, text, warned = cli(*command)
     assert (code, text.strip(), warned.strip()) == (
-        0, "r.mcap: 7 samples at 250 Hz", "twin: axis x went",
+        0, "r.mcap: 7 samples at 10000 Hz", "twin: axis x went",
     )  # fmt: skip
     given, named = call.only
     assert (given[0].name, given[1]) == (NAME, "moves")
     assert named == {"seed": 5, "duration": 3.5, "axis": "y"}
-    assert write.only == ((call.answer, Path("r.mcap")), {})
+    parts, path = record.only[0]
+    assert (list(parts), path) == (["one seen", "two seen"], Path("r.mcap"))
     code, text, _ = cli("simulate", "e.toml", "--json")
-    assert json.loads(text) == {"log": "log.mcap", "samples": 7, "sample_rate": 250.0, "unit": "Hz"}
+    assert json.loads(text) == {"log": "log.mcap", "samples": 7, "sample_rate": 1e4, "unit": "Hz"}
     assert call.calls[-1][0][1] == "file e.toml"
     assert call.calls[-1][1] == {"seed": 0, "duration": None, "axis": None}
 
@@ -182,7 +183,7 @@ def test_import_and_recover(monkeypatch, cli):
     assert (code, json.loads(text)) == (
         0, {"log": "r.mcap", "samples": 9, "sample_rate": 125.0, "unit": "Hz"},
     )  # fmt: skip
-    assert (load.only[0], read.only[0]) == ((Path("m.toml"),), (Path("d.csv"), "the map"))
+    assert (load.only[0], read.only[0]) == ((Path("m.toml"),), ([Path("d.csv")], "the map"))
     assert write.calls.pop()[0] == (log, Path("r.mcap"))
     part = SimpleNamespace(metadata={"recovered": "2 samples"})
     log = SimpleNamespace(metadata={"recovered": "41 samples"})
@@ -200,12 +201,12 @@ def test_import_and_recover(monkeypatch, cli):
 @pytest.mark.parametrize(("severity", "code"), [(Severity.ERROR, 1), (Severity.WARNING, 0)])
 def test_check(monkeypatch, cli, severity, code):
     finding = Finding(severity, Fault.LAG, "y", "what", "where", "remedy")
-    reports = {"log a.mcap": CheckReport((finding,)), "log b.mcap": CheckReport(())}
-    monkeypatch.setattr(twin.log.check, "check_log", reports.__getitem__)
+    reports = {Path("a.mcap"): CheckReport((finding,)), Path("b.mcap"): CheckReport(())}
+    monkeypatch.setattr(twin.log.long, "check_file", reports.__getitem__)
     found, text, _ = cli("check", "a.mcap", "b.mcap", "--json")
     assert (found, json.loads(text)["ok"]) == (code, code == 0)
     assert list(json.loads(text)["logs"]) == ["a.mcap", "b.mcap"]
-    assert checked({"n": "log a.mcap", "m": "log b.mcap"}) == [
+    assert sentences("n", reports[Path("a.mcap")]) == [
         f"n: {severity.value}: axis y, where: what; remedy"
     ]
 

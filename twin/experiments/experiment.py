@@ -17,7 +17,7 @@ from twin.errors import CannotRun, InputError
 from twin.experiments import trajectory
 from twin.experiments.trajectory import Limits
 from twin.experiments.trajectory.limits import require_count
-from twin.experiments.trajectory.setpoint import Setpoint
+from twin.experiments.trajectory.setpoint import AnySetpoint, Setpoint
 from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits, rotary_unit
 
@@ -52,7 +52,7 @@ class Experiment(ABC):
                 require_count(f.name, getattr(self, f.name))
 
     @abstractmethod
-    def setpoint(self, model: MachineModel, rng: np.random.Generator) -> Setpoint:
+    def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
         """The setpoint for this machine; CannotRun where it exceeds the machine's limits."""
 
 
@@ -109,7 +109,7 @@ class OneAxis(Experiment):
         metadata={"unit": "m", "meaning": "span of the other axis meanwhile", "zero": True},
     )  # fmt: skip
 
-    def setpoint(self, model: MachineModel, rng: np.random.Generator) -> Setpoint:
+    def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
         """See Experiment."""
         model.axis(self.axis)
         if self.effort > 1.0:
@@ -126,7 +126,7 @@ class OneAxis(Experiment):
     @abstractmethod
     def on(
         self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
-    ) -> Setpoint:
+    ) -> AnySetpoint:
         """The setpoint with the other axis at rest. axis: index; place: m, one per axis."""
 
 
@@ -136,7 +136,7 @@ def gentle(limit: Limits, effort: float) -> Limits:
 
 
 def _with_other(
-    alone: Setpoint, model: MachineModel, axis: str, place: tuple[float, ...], span: float
+    alone: AnySetpoint, model: MachineModel, axis: str, place: tuple[float, ...], span: float
 ) -> Setpoint:
     """The setpoint with the other axis going back and forth over the span (m) about its place."""
     names = list(model.axes)
@@ -161,8 +161,8 @@ def _with_other(
         column[: count * samples, index] = np.tile(added[:, index], count)
         parts.append(column)
     position, velocity, acceleration = parts
-    return replace(alone, position=position, velocity=velocity, acceleration=acceleration)
+    return Setpoint(position, velocity, acceleration, alone.force, alone.sample_rate)
 
 
-def _columns(setpoint: Setpoint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _columns(setpoint: AnySetpoint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return setpoint.position, setpoint.velocity, setpoint.acceleration

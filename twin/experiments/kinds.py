@@ -16,7 +16,7 @@ from twin.errors import CannotRun, InputError
 from twin.experiments import trajectory
 from twin.experiments.experiment import Experiment, OneAxis, counted, gentle, given, machine_limits
 from twin.experiments.trajectory import Limits
-from twin.experiments.trajectory.setpoint import Setpoint
+from twin.experiments.trajectory.setpoint import AnySetpoint
 from twin.model.machine import AxisModel, MachineModel
 
 RANDOM_ENDS = (0.02, 0.98)  # parts of the travel between which random places lie
@@ -31,7 +31,7 @@ class Tracking(Experiment):
     duration: float = given("s", "exact length")
     slowest: float = given("m/s", "lowest speed", 5e-4)
 
-    def setpoint(self, model: MachineModel, rng: np.random.Generator) -> Setpoint:
+    def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
         """See Experiment."""
         return trajectory.random_tracking(
             machine_limits(model), self.duration, rng, slowest=self.slowest,
@@ -48,7 +48,7 @@ class Moves(Experiment):
     count: int = counted("places")
     dwell: float = given("s", "rest at each place", 0.1, zero=True)
 
-    def setpoint(self, model: MachineModel, rng: np.random.Generator) -> Setpoint:
+    def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
         """See Experiment."""
         limits = machine_limits(model)
         low, high = np.array([limit.travel for limit in limits]).T
@@ -71,7 +71,7 @@ class Passes(OneAxis):
 
     def on(
         self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
-    ) -> Setpoint:
+    ) -> AnySetpoint:
         """See OneAxis."""
         return trajectory.constant_speed_passes(
             limits, axis, span=self.span, speed=self.speed, repeats=self.repeats, at=place,
@@ -92,7 +92,7 @@ class Staircase(OneAxis):
 
     def on(
         self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
-    ) -> Setpoint:
+    ) -> AnySetpoint:
         """See OneAxis."""
         return trajectory.velocity_staircase(
             limits, axis, self.speeds, span=self.span, longest_plateau=self.longest_plateau,
@@ -112,7 +112,7 @@ class Reversals(OneAxis):
 
     def on(
         self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
-    ) -> Setpoint:
+    ) -> AnySetpoint:
         """See OneAxis."""
         return trajectory.micro_reversals(
             limits, axis, amplitude=self.amplitude, repeats=self.repeats, at=place,
@@ -133,7 +133,7 @@ class OpenLoopSine(OneAxis):
 
     def on(
         self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
-    ) -> Setpoint:
+    ) -> AnySetpoint:
         """See OneAxis."""
         return trajectory.open_loop_sine(
             axis, amplitude=self.amplitude, period=self.period, duration=self.duration, at=place,
@@ -157,7 +157,7 @@ class Steps(OneAxis):
 
     def on(
         self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
-    ) -> Setpoint:
+    ) -> AnySetpoint:
         """See OneAxis."""
         if max(self.efforts) > 1.0:
             raise InputError(
@@ -189,7 +189,7 @@ class Rests(OneAxis):
 
     def on(
         self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
-    ) -> Setpoint:
+    ) -> AnySetpoint:
         """See OneAxis."""
         rounds = [
             trajectory.constant_speed_passes(
@@ -221,7 +221,7 @@ class Sweep(OneAxis):
 
     def on(
         self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
-    ) -> Setpoint:
+    ) -> AnySetpoint:
         """See OneAxis."""
         driven = list(model.axes.values())[axis]
         allowed, unit = self.most_force(driven), driven.units.force
@@ -241,7 +241,7 @@ class Sweep(OneAxis):
         )  # fmt: skip
         force = passes.force.copy()
         force[:, axis] = self.amplitude * np.sin(self._phase(passes.duration, len(force)))
-        return replace(passes, force=force)
+        return replace(passes.part(0, len(passes)), force=force)
 
     def most_force(self, axis: AxisModel) -> float:
         """Largest amplitude in N that stays within what the moves leave of the axis' limits."""

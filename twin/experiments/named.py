@@ -7,16 +7,16 @@ sine; tracking is the rich motion on which models are fitted and tested.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.core.control import Controller
-from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
 from twin.errors import InputError
 from twin.experiments.experiment import Experiment, driven_units, machine_limits
 from twin.experiments.file import format_experiment
+from twin.experiments.follow import follow_parts
 from twin.experiments.kinds import (
     Moves,
     OpenLoopSine,
@@ -27,13 +27,10 @@ from twin.experiments.kinds import (
     kind_of,
 )
 from twin.experiments.trajectory import Limits
-from twin.experiments.trajectory.setpoint import Setpoint
-from twin.log import AxisLog, Log
-from twin.log.log import LINEAR_UNITS, ROTARY_UNITS
-from twin.log.writer import software_version
-from twin.model.file import format_model
-from twin.model.machine import MachineModel
-from twin.simulator import MujocoSimulator, Progress, ReducedSimulator, Run, run
+from twin.log import Log
+from twin.log.log import joined
+from twin.model.machine import AxisModel, MachineModel
+from twin.simulator import MujocoSimulator, Progress, ReducedSimulator
 
 MAP_SPEEDS = (0.0005, 0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.02, 0.04, 0.08)  # m/s
 MAP_SPAN = 0.02  # m
@@ -125,6 +122,25 @@ def simulate(
     that moves where the experiment moves one, the first where None. The same seed gives the same
     log. Raises InputError for an unknown experiment or axis, and for a setpoint outside the travel.
     """
+    return joined(
+        simulate_parts(
+            model, experiment, seed=seed, duration=duration, axis=axis, simulator=simulator,
+            progress=progress,
+        )
+    )  # fmt: skip
+
+
+def simulate_parts(
+    model: MachineModel,
+    experiment: str | Experiment,
+    *,
+    seed: int = 0,
+    duration: float | None = None,
+    axis: str | None = None,
+    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    progress: Progress | None = None,
+) -> Iterator[Log]:
+    """``simulate`` in parts of two seconds or so, to be recorded while the twin runs."""
     motion_rng, noise_rng, current_rng = np.random.default_rng(seed).spawn(3)
     if isinstance(experiment, str):
         name = experiment
@@ -142,100 +158,56 @@ def simulate(
         }
     setpoint = chosen.setpoint(model, motion_rng)
     controllers = None if chosen.closed_loop else {a: Controller() for a in model.axes}
-    log = follow(
+    for part in follow_parts(
         model, setpoint, (noise_rng, current_rng), name=name, seed=seed, simulator=simulator,
         controllers=controllers, progress=progress,
-    )  # fmt: skip
-    return replace(log, attachments={**log.attachments, **attached})
+    ):  # fmt: skip
+        yield replace(part, attachments={**part.attachments, **attached})
 
 
-def follow(
-    model: MachineModel,
-    setpoint: Setpoint,
-    noise: tuple[np.random.Generator, np.random.Generator],
-    *,
-    name: str,
-    seed: int,
-    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
-    controllers: Mapping[str, Controller] | None = None,
-    progress: Progress | None = None,
-) -> Log:
-    """The log of the twin that follows a setpoint. noise: draws that of encoders and currents.
+class Reach:
+    """How far each axis of a model went; ``take`` the parts of a log of the twin one by one."""
 
-    name, seed: for the log's metadata. controllers: by axis; the model's own where None.
-    """
-    result = run(
-        model, setpoint, noise[0], simulator=simulator, controllers=controllers, progress=progress
+    def __init__(self, model: MachineModel) -> None:
+        self._model = model
+        self._farthest: dict[str, float] = {}
+
+    def take(self, log: Log) -> Log:
+        """Look at the next part, which is returned."""
+        for name, axis in self._model.axes.items():
+            if axis.hardware.travel is None:
+                continue
+            low, high = axis.hardware.travel
+            position = np.append(log.truth[name]["position"], self._farthest.get(name, low))
+            out = np.maximum(low - position, position - high)
+            self._farthest[name] = float(position[np.argmax(out)])
+        return log
+
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence for each axis that left its travel."""
+        return tuple(
+            sentence
+            for name, farthest in self._farthest.items()
+            if (sentence := _outside(name, self._model.axes[name], farthest))
+        )
+
+
+def _outside(name: str, axis: AxisModel, farthest: float) -> str | None:
+    units = axis.units
+    assert axis.hardware.travel is not None
+    low, high = axis.hardware.travel
+    if low <= farthest <= high:
+        return None
+    return (
+        f"axis {name} went to {farthest:.6g} {units.position}, outside its travel of "
+        f"{low:g} to {high:g} {units.position}: the drive does not hold it; move more "
+        f"gently, or check force_limit ({axis.hardware.force_limit:g} {units.force}), "
+        "bandwidth and the effects"
     )
-    return _log(model, name, seed, setpoint, result, noise[1])
 
 
 def outside_travel(model: MachineModel, log: Log) -> tuple[str, ...]:
     """A sentence for each axis of the model that left its travel in a log of the twin."""
-    warnings = []
-    for name, axis in model.axes.items():
-        if axis.hardware.travel is None:
-            continue
-        units, (low, high) = axis.units, axis.hardware.travel
-        position = log.truth[name]["position"]
-        farthest = position[np.argmax(np.maximum(low - position, position - high))]
-        if not low <= farthest <= high:
-            warnings.append(
-                f"axis {name} went to {farthest:.4g} {units.position}, outside its travel of "
-                f"{low:g} to {high:g} {units.position}: the drive does not hold it; move more "
-                f"gently, or check force_limit ({axis.hardware.force_limit:g} {units.force}), "
-                "bandwidth and the effects"
-            )
-    return tuple(warnings)
-
-
-def _log(
-    model: MachineModel,
-    experiment: str,
-    seed: int,
-    setpoint: Setpoint,
-    result: Run,
-    rng: np.random.Generator,
-) -> Log:
-    axes, truth = {}, {}
-    for i, (name, axis) in enumerate(model.axes.items()):
-        signals = result.signals[:, i]
-        constant = axis.hardware.force_constant
-        noise = axis.hardware.current_noise * rng.standard_normal(len(signals))
-        current = signals[:, COMMAND_COLUMN] / constant + noise
-        axes[name] = AxisLog(
-            columns={
-                "setpoint_position": setpoint.position[:, i].copy(),
-                "setpoint_velocity": setpoint.velocity[:, i].copy(),
-                "setpoint_acceleration": setpoint.acceleration[:, i].copy(),
-                "position": signals[:, READING_COLUMN].copy(),
-                "current": current,
-                "force": constant * current,
-            },
-            units=ROTARY_UNITS if axis.rotary else LINEAR_UNITS,
-            force_constant=constant,
-        )
-        truth[name] = {
-            "position": signals[:, POSITION_COLUMN].copy(),
-            "velocity": signals[:, VELOCITY_COLUMN].copy(),
-            **_of_axis(name, result.table.labels, result.forces),
-            **_of_axis(name, result.state_names, result.states),
-        }
-    text = format_model(model)
-    metadata = {
-        "source": "simulation",
-        "experiment": experiment,
-        "seed": str(seed),
-        "software": f"proton-twin {software_version()}",
-        "mujoco": software_version("mujoco"),
-    }
-    attachments = {"model.toml": text.encode()}
-    if model.mjcf:
-        attachments["model.xml"] = model.mjcf.encode()
-    return Log(model.sample_rate, axes, metadata, truth, attachments)
-
-
-def _of_axis(
-    axis: str, names: tuple[tuple[str, str], ...], columns: np.ndarray
-) -> dict[str, np.ndarray]:
-    return {n: columns[:, i].copy() for i, (a, n) in enumerate(names) if a == axis}
+    reach = Reach(model)
+    reach.take(log)
+    return reach.warnings()

@@ -12,7 +12,7 @@ import numpy as np
 
 from twin.core.control import Controller
 from twin.errors import InputError
-from twin.experiments.named import follow
+from twin.experiments.follow import follow
 from twin.experiments.trajectory.setpoint import Setpoint
 from twin.log import AxisLog, Log
 from twin.model.machine import MachineModel

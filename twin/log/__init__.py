@@ -1,7 +1,7 @@
 """Logs: columns with units, the MCAP codec, importers and checks."""
 
 from twin.log.decode import read_log
-from twin.log.encode import write_log, write_topics
+from twin.log.encode import record_log, write_log, write_topics
 from twin.log.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, AxisLog, Log
 from twin.log.recover import Recovery, recover_log
 
@@ -13,6 +13,7 @@ __all__ = [
     "Log",
     "Recovery",
     "read_log",
+    "record_log",
     "recover_log",
     "write_log",
     "write_topics",

@@ -2,21 +2,52 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
 from twin.errors import InputError, at
 from twin.log.container import Damaged, Record
+from twin.log.instants import seconds
 from twin.log.layout import Block
 from twin.log.log import AxisLog, Log
-from twin.log.series import Series, seconds
-from twin.log.topics import AXIS_PREFIX, Topics, positive_number
+from twin.log.series import JITTER, Series
+from twin.log.topics import AXIS_PREFIX, Topic, Topics, positive_number
 
 METADATA_NAME = "twin"
+CHECKSUM = "checksum"  # entry of the metadata, as their record has none
 SCHEMA_VERSION = "1"
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is read of a log: axes and fields by name, None for all, and the simulator's truth."""
+
+    axes: Sequence[str] | None = None
+    fields: Sequence[str] | None = None
+    truth: bool = True
+
+    def takes(self, topic: Topic) -> bool:
+        """Whether samples of a topic are wanted."""
+        if self.axes is not None and topic.axis not in self.axes:
+            return False
+        return self.truth or not topic.is_truth
+
+
+EVERYTHING = Wanted()
+
+
+def checksum(metadata: Mapping[str, str]) -> str:
+    """CRC-32, eight digits, of all keys and values of metadata, sorted, each behind its length."""
+    crc = 0
+    for text in (t for entry in sorted(metadata.items()) for t in entry):
+        data = text.encode()
+        crc = zlib.crc32(data, zlib.crc32(len(data).to_bytes(8, "little"), crc))
+    return f"{crc:08x}"
 
 
 class Extras:
@@ -28,6 +59,7 @@ class Extras:
         attachments: dict[str, bytes] | None = None,
     ) -> None:
         self.metadata = metadata or {}
+        self.proved = False  # whether a checksum of its own proves the metadata
         self.attachments = attachments or {}
 
     def add(self, record: Record) -> None:
@@ -35,8 +67,12 @@ class Extras:
         if record.opcode == Opcode.METADATA:
             metadata = record.parsed(Metadata)
             if metadata.name == METADATA_NAME:
-                self._check_version(metadata.metadata)
-                self.metadata = metadata.metadata
+                entries = dict(metadata.metadata)
+                stated = entries.pop(CHECKSUM, None)
+                if stated is not None and stated != checksum(entries):
+                    raise Damaged(f"metadata at byte {record.offset}: wrong checksum")
+                self._check_version(entries)
+                self.metadata, self.proved = entries, stated is not None
         elif record.opcode == Opcode.ATTACHMENT:
             attachment = record.parsed(Attachment)
             crc = int.from_bytes(record.content[-4:], "little")
@@ -57,21 +93,18 @@ class Extras:
 class Run:
     """Samples of all topics without a gap between them.
 
-    axes: those wanted, None for all; capacities: channel -> samples expected; truth: whether the
-    simulator's truth is wanted.
+    capacities: channel -> samples expected.
     """
 
     def __init__(
         self,
         topics: Topics,
-        axes: Sequence[str] | None,
-        capacities: Mapping[int, int],
-        truth: bool = True,
+        wanted: Wanted = EVERYTHING,
+        capacities: Mapping[int, int] | None = None,
     ) -> None:
         self._topics = topics
-        self._axes = axes
-        self._truth = truth
-        self._capacities = capacities
+        self._wanted = wanted
+        self._capacities = capacities or {}
         self._series: dict[int, Series | None] = {}
 
     def append(self, block: Block) -> None:
@@ -89,26 +122,27 @@ class Run:
 
     def _open(self, channel: int) -> Series | None:
         topic = self._topics.topic(channel, b"")
-        if topic is None or (self._axes is not None and topic.axis not in self._axes):
-            return None
-        if topic.is_truth and not self._truth:
+        if topic is None or not self._wanted.takes(topic):
             return None
         if any(s.topic.name == topic.name for s in self._opened()):
             raise InputError(f"two channels have the topic {topic.name}; write one a topic")
         with at(topic.name):
-            return Series(topic, self._capacities.get(channel, 0))
+            fields = None if topic.is_truth else self._wanted.fields
+            return Series(topic, self._capacities.get(channel, 0), fields)
 
     def _opened(self) -> list[Series]:
         return [s for s in self._series.values() if s is not None]
 
-    def check_counts(self, counts: Mapping[int, int]) -> None:
-        """Compare with the number of messages the file announces; raises Damaged."""
-        for channel, series in self._series.items():
-            if series is not None and series.count != counts.get(channel, 0):
-                raise Damaged(
-                    f"{series.topic.name}: {series.count} samples where the statistics "
-                    f"announce {counts.get(channel, 0)}"
-                )
+    @property
+    def counts(self) -> dict[int, int]:
+        """Samples by channel."""
+        return {c: series.count for c, series in self._series.items() if series is not None}
+
+    def holds(self, samples: int) -> bool:
+        """Whether every topic has so many samples or more, all from the same time to the same."""
+        series = self._opened()
+        alike = {(s.start, s.count) for s in series}
+        return len(alike) == 1 and series[0].count >= samples and series[0].rate_is_stated
 
     def spans(self) -> dict[str, slice]:
         """Topic -> the samples of it that all topics have in common."""
@@ -128,6 +162,30 @@ class Run:
     def common_count(self) -> int:
         """Number of samples that all topics have in common."""
         return next((s.stop - s.start for s in self.spans().values()), 0)
+
+    def require_behind(self, before: Run) -> None:
+        """Raise InputError where this does not begin where the run before ended."""
+        for one, other in zip(before._opened(), self._opened(), strict=False):
+            if one is not other:
+                other.require_behind(one)
+
+    def between(self, extras: Extras, start: float, stop: float) -> Log:
+        """The log of the samples from ``start`` to before ``stop`` (s); raises InputError."""
+        series = self._opened()
+        if not series:
+            raise InputError(f"has no samples from {start:g} to {stop:g} s")
+        rate = series[0].sample_rate()
+        zero = max(s.start for s in series) * 1e-9
+        log = self.trimmed_log(extras)
+        first, last = (
+            math.ceil(min(max((t - zero) * rate - JITTER, 0), len(log))) for t in (start, stop)
+        )
+        if first == last:
+            raise InputError(
+                f"has no samples from {start:g} to {stop:g} s; it goes on from {zero:g} s to "
+                f"{zero + len(log) / rate:g} s"
+            )
+        return log.part(first, last)
 
     def log(self, extras: Extras) -> Log:
         """The log; raises InputError where topics differ in time or something is missing."""
@@ -177,7 +235,7 @@ class Run:
     def _check_axes(self) -> None:
         axes = [s for s in self._opened() if not s.topic.is_truth and s.count]
         names = [s.topic.axis for s in axes]
-        for wanted in self._axes if self._axes is not None else ():
+        for wanted in self._wanted.axes or ():
             if wanted not in names:
                 self._refuse_axis(wanted)
         if not axes:

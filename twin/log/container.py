@@ -17,7 +17,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Chunk, DataEnd, Footer, Statistics
+from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Footer, Statistics
 
 from twin.errors import InputError, at
 
@@ -84,7 +84,9 @@ class McapFile:
         self.checked = False  # whether a checksum of all records was found right
         self._stream = stream
         self._check_magic()
-        self._data_end, self.statistics = self._read_summary()
+        self._summary: list[Record] = []
+        self._data_end = self._read_summary()
+        self.statistics = next(iter(self._summarised(Opcode.STATISTICS, Statistics)), None)
 
     def _read_at(self, offset: int, length: int) -> bytes:
         self._stream.seek(offset)
@@ -103,29 +105,52 @@ class McapFile:
         ):
             raise Damaged(f"truncated: ends at byte {self.size} without the closing MCAP magic")
 
-    def _read_summary(self) -> tuple[int, Statistics | None]:
+    def _read_summary(self) -> int:
+        """Keep the records of the summary; returns where the data end."""
         start = self.size - len(MAGIC) - _FOOTER_SIZE
         record = self._record(start, self.size - len(MAGIC))
         if record.opcode != Opcode.FOOTER or len(record.content) != 20:
             raise Damaged(f"no footer record at byte {start}")
         footer = record.parsed(Footer)
         if footer.summary_start == 0:
-            return start, None
+            return start
         if not len(MAGIC) <= footer.summary_start <= start:
             raise Damaged(f"footer at byte {start} points outside the file")
         summary = self._read_at(footer.summary_start, self.size - footer.summary_start)
         covered = summary[: -len(MAGIC) - 4]
         if footer.summary_crc not in (0, zlib.crc32(covered)):
             raise Damaged(f"summary section at byte {footer.summary_start}: wrong checksum")
-        return footer.summary_start, self._find_statistics(footer.summary_start, start)
-
-    def _find_statistics(self, offset: int, end: int) -> Statistics | None:
-        while offset < end:
-            record = self._record(offset, end)
-            if record.opcode == Opcode.STATISTICS:
-                return record.parsed(Statistics)
+        offset = footer.summary_start
+        while offset < start:
+            record = self._record(offset, start)
+            self._summary.append(record)
             offset = record.end
-        return None
+        return footer.summary_start
+
+    def _summarised(self, opcode: int, kind: type[T]) -> list[T]:
+        return [record.parsed(kind) for record in self._summary if record.opcode == opcode]
+
+    def channels(self) -> list[Channel]:
+        """The channels, as the summary lists them."""
+        return self._summarised(Opcode.CHANNEL, Channel)
+
+    def records_between(self, start: float, stop: float) -> Iterator[Record]:
+        """Records before the first chunk, and the chunks with messages from ``start`` on, ns.
+
+        All records where the summary has no index of the chunks.
+        """
+        chunks = self._summarised(Opcode.CHUNK_INDEX, ChunkIndex)
+        if not chunks:
+            yield from self.records()
+            return
+        first = min(c.chunk_start_offset for c in chunks)
+        for record in self.records():
+            if record.offset >= first:
+                break
+            yield record
+        for chunk in sorted(chunks, key=lambda c: c.message_start_time):
+            if chunk.message_end_time >= start and chunk.message_start_time < stop:
+                yield self._record(chunk.chunk_start_offset, self._data_end)
 
     def _record(self, offset: int, end: int) -> Record:
         head = self._read_at(offset, RECORD_HEAD.size)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import struct
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 from mcap.opcode import Opcode
 
-from twin.errors import at
-from twin.log.assemble import Extras, Run
+from twin.errors import InputError, at
+from twin.log.assemble import EVERYTHING, Extras, Run, Wanted
 from twin.log.container import (
     IN_CHUNKS,
     RECORD_HEAD,
@@ -22,47 +25,129 @@ from twin.log.container import (
 )
 from twin.log.layout import Block, MessageLayout, RowLayout
 from twin.log.log import Log
-from twin.log.topics import Topics
+from twin.log.topics import AXIS_PREFIX, Topics
 
 MOST_DEFINITIONS = 100_000  # of schemas and channels in a chunk; there are 65535 of each
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
-def read_log(path: str | Path, axes: Sequence[str] | None = None, *, truth: bool = True) -> Log:
-    """Read an MCAP log; ``axes`` limits it to those named, None reads all.
+def read_log(
+    path: str | Path,
+    axes: Sequence[str] | None = None,
+    *,
+    fields: Sequence[str] | None = None,
+    truth: bool = True,
+    start: float | None = None,
+    stop: float | None = None,
+) -> Log:
+    """Read an MCAP log, or of it what is asked for.
 
-    truth: whether the simulator's truth is read too, which takes more than half of the memory.
+    axes, fields: by name, None for all. truth: whether the simulator's truth is read too, which
+    takes more than half of the memory. start, stop: times in s of the log; the first sample is the
+    first from ``start`` on. Of a log with an index only the chunks between them are read.
 
     Every checksum is verified, and the samples must be complete, evenly spaced and finite.
     Raises InputError otherwise, and where no axis has position and one of current and force.
     """
+    wanted = Wanted(axes, fields, truth)
+    with _remedied(path):
+        if start is None and stop is None:
+            return read_strictly(Path(path), wanted)
+        return read_between(Path(path), wanted, start or 0.0, math.inf if stop is None else stop)
+
+
+def read_parts(
+    path: str | Path, samples: int, *, fields: Sequence[str] | None = None
+) -> Iterator[Log]:
+    """The same log without truth in parts of ``samples`` or a few more, one after the other.
+
+    So that a long one need not be held in memory; the whole is verified when the last part was
+    taken. Raises InputError as read_log does. A log that does not state its sample rate, or whose
+    topics do not lie side by side, is one part.
+    """
+    with _remedied(path):
+        yield from _parts(Path(path), Wanted(None, fields, truth=False), samples)
+
+
+def read_strictly(path: Path, wanted: Wanted = EVERYTHING) -> Log:
+    """``read_log`` without the remedy in its messages."""
+    return next(_parts(path, wanted, None))
+
+
+def samples_by_axis(path: str | Path) -> dict[str, int]:
+    """Samples of each axis as the file's statistics announce them; nothing where there are none."""
+    with _remedied(path), open_mcap(Path(path)) as file:
+        counts = file.statistics.channel_message_counts if file.statistics else {}
+        return {
+            c.topic.removeprefix(AXIS_PREFIX): counts.get(c.id, 0)
+            for c in file.channels()
+            if c.topic.startswith(AXIS_PREFIX)
+        }
+
+
+@contextmanager
+def _remedied(path: str | Path) -> Iterator[None]:
     try:
-        return read_strictly(Path(path), axes, truth)
+        yield
     except Damaged as error:
         raise Damaged(
             f"{error}; copy the file again, or keep what is intact: twin recover {path} -o GOOD"
         ) from error
 
 
-def read_strictly(path: Path, axes: Sequence[str] | None = None, truth: bool = True) -> Log:
-    """``read_log`` without the remedy in its messages."""
+def _parts(path: Path, wanted: Wanted, samples: int | None) -> Iterator[Log]:
+    """The log in parts of ``samples`` or a few more; whole where None."""
+    with open_mcap(path) as file:
+        topics, extras, counts = Topics(), Extras(), Counter[int]()
+        decoder = Decoder(topics)
+        room = _capacities(file, samples)
+        run = before = Run(topics, wanted, room)
+        for payload in payloads(file.records(), extras.add, Inflation(file.size)):
+            if samples is not None and run.holds(samples):
+                run.require_behind(before)
+                counts.update(run.counts)
+                yield run.log(extras)
+                run, before = Run(topics, wanted, room), run
+            with at(payload.place):
+                run.extend(decoder.blocks(payload.data))
+        counts.update(run.counts)
+        _check_counts(file, topics, counts)
+        run.require_behind(before)
+        yield run.log(extras)
+
+
+def read_between(path: Path, wanted: Wanted, start: float, stop: float) -> Log:
+    """The samples from ``start`` to before ``stop``, s."""
+    if not start < stop:
+        raise InputError(f"{path}: start = {start:g} s is not before stop = {stop:g} s")
     with open_mcap(path) as file:
         topics, extras = Topics(), Extras()
-        run = Run(topics, axes, _capacities(file), truth)
-        decoder = Decoder(topics)
-        for payload in payloads(file.records(), extras.add, Inflation(file.size)):
+        decoder, run = Decoder(topics), Run(topics, wanted)
+        records = file.records_between(round(start * 1e9), min(stop * 1e9, 2.0**63))
+        for payload in payloads(records, extras.add, Inflation(file.size)):
             with at(payload.place):
-                for block in decoder.blocks(payload.data):
-                    run.append(block)
-        if file.statistics is not None:
-            run.check_counts(file.statistics.channel_message_counts)
-        return run.log(extras)
+                run.extend(decoder.blocks(payload.data))
+        return run.between(extras, start, stop)
 
 
-def _capacities(file: McapFile) -> dict[int, int]:
+def _check_counts(file: McapFile, topics: Topics, counts: Mapping[int, int]) -> None:
+    """Compare the samples with the number of messages the file announces; raises Damaged."""
+    if file.statistics is None:
+        return
+    announced = file.statistics.channel_message_counts
+    for channel, count in counts.items():
+        if count != announced.get(channel, 0):
+            raise Damaged(
+                f"{topics.channels[channel].topic}: {count} samples where the statistics "
+                f"announce {announced.get(channel, 0)}"
+            )
+
+
+def _capacities(file: McapFile, samples: int | None) -> dict[int, int]:
     """Samples to make room for; no more than bytes in the file, whatever its statistics say."""
     counts = file.statistics.channel_message_counts if file.statistics else {}
-    return {channel: min(count, file.size) for channel, count in counts.items()}
+    most = file.size if samples is None else min(file.size, samples + (samples >> 4))
+    return {channel: min(count, most) for channel, count in counts.items()}
 
 
 class Decoder:
@@ -100,7 +185,7 @@ class Decoder:
     def _register_leading(self, data: bytes) -> int:
         offset = 0
         while offset < len(data):
-            opcode, content, end = _record(data, offset)
+            opcode, content, end = record_at(data, offset)
             if opcode == Opcode.MESSAGE:
                 break
             self._register(opcode, content)
@@ -117,10 +202,10 @@ class Decoder:
         """Layout of the messages up to the one whose channel comes a second time."""
         messages: dict[int, MessageLayout] = {}
         while offset < len(data):
-            opcode, content, offset = _record(data, offset)
+            opcode, content, offset = record_at(data, offset)
             if opcode != Opcode.MESSAGE:
                 return None
-            channel, _, _, _, payload = _message(content)
+            channel, _, _, _, payload = message_parts(content)
             if channel in messages:
                 break
             topic = self._topics.topic(channel, payload)
@@ -133,11 +218,11 @@ class Decoder:
     def _message_blocks(self, data: bytes, offset: int) -> Iterator[Block]:
         samples: dict[int, list[tuple[int, int, Sequence[float]]]] = {}
         while offset < len(data):
-            opcode, content, offset = _record(data, offset)
+            opcode, content, offset = record_at(data, offset)
             if opcode != Opcode.MESSAGE:
                 self._register(opcode, content)
             else:
-                channel, sequence, time, _, payload = _message(content)
+                channel, sequence, time, _, payload = message_parts(content)
                 topic = self._topics.topic(channel, payload)
                 if topic is not None:
                     with at(topic.name):
@@ -151,7 +236,7 @@ class Decoder:
             yield Block(channel, np.array(numbers, "u4"), np.array(times, "u8"), columns)
 
 
-def _record(data: bytes, offset: int) -> tuple[int, bytes, int]:
+def record_at(data: bytes, offset: int) -> tuple[int, bytes, int]:
     """Opcode, content and end of the record at ``offset``."""
     start = offset + RECORD_HEAD.size
     if start > len(data):
@@ -164,7 +249,8 @@ def _record(data: bytes, offset: int) -> tuple[int, bytes, int]:
     return opcode, data[start : start + length], start + length
 
 
-def _message(content: bytes) -> tuple[int, int, int, int, bytes]:
+def message_parts(content: bytes) -> tuple[int, int, int, int, bytes]:
+    """Channel, sequence, log time, publish time (ns) and payload of a message record."""
     if len(content) < _MESSAGE_HEAD.size:
         raise Damaged("a message record is too short")
     return *_MESSAGE_HEAD.unpack_from(content), content[_MESSAGE_HEAD.size :]

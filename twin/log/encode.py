@@ -5,22 +5,24 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import chain
 from pathlib import Path
-from typing import TypeVar
+from typing import BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.files import replacing
-from twin.log.assemble import METADATA_NAME
+from twin.files import recording, replacing
+from twin.log.assemble import CHECKSUM, METADATA_NAME, checksum
 from twin.log.layout import sample_times
 from twin.log.log import Array, Log
-from twin.log.outline import Outline, outline, outline_of_topics
+from twin.log.outline import Outline, Samples, outline, outline_of_topics, samples_of
 from twin.log.writer import McapWriter, PackedChunk, encoded, pack
 
 CHUNK_BYTES = 1 << 20
 WORKERS = 2
 
+S = TypeVar("S")
 T = TypeVar("T")
 
 Progress = Callable[[int, int], None]
@@ -33,7 +35,27 @@ def write_log(log: Log, path: str | Path, progress: Progress | None = None) -> N
     ``path`` appears only when it is complete. Raises InputError for a log that could not be read
     back (a NaN, columns of different length, no position, ...) and where writing fails.
     """
-    _write(outline(log), log.sample_rate, log.attachments, Path(path), progress)
+    plan, samples = outline(log), samples_of(log)
+    with replacing(Path(path)) as stream:
+        for written in _written(stream, plan, [samples], log.sample_rate, log.attachments):
+            if progress is not None:
+                progress(written, len(log))
+
+
+def record_log(parts: Iterable[Log], path: str | Path) -> int:
+    """Write a log part by part while it is being recorded; returns the number of samples.
+
+    The parts follow each other without a gap. The bytes are those that ``write_log`` writes of the
+    whole. ``path`` appears only when it is complete; until then the file is called
+    ``path.unfinished``, and what a killed run leaves of it can be recovered up to the last chunk.
+    Raises InputError as write_log does.
+    """
+    coming = iter(parts)
+    with recording(Path(path)) as stream:
+        first = next(coming)
+        samples = _counted(chain([first], coming))
+        written = _written(stream, outline(first), samples, first.sample_rate, first.attachments)
+        return deque(written, maxlen=1).pop()
 
 
 def write_topics(
@@ -46,59 +68,100 @@ def write_topics(
 
     units: "/model/x/force" -> unit. Raises InputError as write_log does.
     """
-    _write(outline_of_topics(topics, units, sample_rate), sample_rate, {}, Path(path), None)
+    plan, samples = outline_of_topics(topics, units, sample_rate)
+    with replacing(Path(path)) as stream:
+        for _ in _written(stream, plan, [samples], sample_rate, {}):
+            pass
 
 
-def _write(
+def _counted(parts: Iterable[Log]) -> Iterator[Samples]:
+    """The samples of parts that follow each other."""
+    first = 0
+    for part in parts:
+        yield samples_of(part, first)
+        first += len(part)
+
+
+def _written(
+    stream: BinaryIO,
     plan: Outline,
+    parts: Iterable[Samples],
     sample_rate: float,
     attachments: Mapping[str, bytes],
-    path: Path,
-    progress: Progress | None,
-) -> None:
-    with replacing(path) as stream:
-        writer = McapWriter(stream)
-        writer.add_metadata(METADATA_NAME, plan.metadata)
-        for name, data in attachments.items():
-            writer.add_attachment(name, data)
-        for written in _write_chunks(writer, plan, sample_rate):
-            if progress is not None:
-                progress(written, plan.count)
-        writer.finish(plan.schemas, plan.channels)
-
-
-def _write_chunks(writer: McapWriter, plan: Outline, sample_rate: float) -> Iterator[int]:
-    """Write all samples; yields the number written after each chunk.
+) -> Iterator[int]:
+    """Write a whole file; yields the number of samples written after each chunk.
 
     Every chunk begins with all schemas and channels: any one of them can be read alone.
     """
+    writer = McapWriter(stream)
+    proof = {CHECKSUM: checksum(plan.metadata)}
+    writer.add_metadata(METADATA_NAME, {**plan.metadata, **proof})
+    for name, data in attachments.items():
+        writer.add_attachment(name, data)
     head = encoded([*plan.schemas, *plan.channels])
     most = max(1, CHUNK_BYTES // plan.layout.dtype.itemsize)
 
-    def chunk(first: int) -> PackedChunk:
-        times = sample_times(first, min(most, plan.count - first), sample_rate)
-        return _pack_rows(plan, head, first, times)
+    def chunk(item: tuple[int, Samples]) -> PackedChunk:
+        first, samples = item
+        times = sample_times(first, _count(samples), sample_rate)
+        return _pack_rows(plan, head, first, times, samples)
 
     written = 0
-    for packed in _ordered(chunk, range(0, plan.count, most)):
+    for packed in _ordered(chunk, _in_chunks(parts, most)):
         writer.add_chunk(packed)
         written += len(packed.times)
         yield written
+    writer.finish(plan.schemas, plan.channels)
 
 
-def _pack_rows(plan: Outline, head: bytes, first: int, times: NDArray[np.int64]) -> PackedChunk:
+def _in_chunks(parts: Iterable[Samples], most: int) -> Iterator[tuple[int, Samples]]:
+    """The samples in chunks of ``most``, each with the number of its first; the last is shorter."""
+    first, held = 0, None
+    for part in parts:
+        samples = part if held is None else _behind(held, part)
+        whole = _count(samples) // most * most
+        for start in range(0, whole, most):
+            yield first + start, _cut(samples, start, start + most)
+        first += whole
+        held = _cut(samples, whole, _count(samples))
+    if held is not None and _count(held):
+        yield first, held
+
+
+def _count(samples: Samples) -> int:
+    return len(next(iter(samples[0].values())))
+
+
+def _cut(samples: Samples, start: int, stop: int) -> Samples:
+    return tuple({name: c[start:stop] for name, c in columns.items()} for columns in samples)
+
+
+def _behind(before: Samples, after: Samples) -> Samples:
+    return tuple(
+        {name: np.concatenate([column, new[name]]) for name, column in columns.items()}
+        for columns, new in zip(before, after, strict=True)
+    )
+
+
+def _pack_rows(
+    plan: Outline, head: bytes, first: int, times: NDArray[np.int64], samples: Samples
+) -> PackedChunk:
     size = plan.layout.dtype.itemsize
     buffer = np.empty(len(head) + len(times) * size, np.uint8)
     buffer[: len(head)] = np.frombuffer(head, np.uint8)
     rows = buffer[len(head) :].view(plan.layout.dtype)
     plan.layout.fill_constants(rows)
-    _fill(rows, plan, first, times)
+    for (_, records), columns in zip(plan.layout.parts(rows), samples, strict=True):
+        records[".sequence"] = np.arange(first, first + len(rows))
+        records[".log_time"] = records[".publish_time"] = times
+        for name, column in columns.items():
+            records[name] = column
     row_starts = len(head) + size * np.arange(len(times))
     offsets = {m.channel: row_starts + o for m, o in plan.layout.offsets()}
     return pack(buffer.data, times, offsets)
 
 
-def _ordered(function: Callable[[int], T], items: Iterable[int]) -> Iterator[T]:
+def _ordered(function: Callable[[S], T], items: Iterable[S]) -> Iterator[T]:
     """Results in the order of ``items``, a few of them computed ahead on other threads."""
     with ThreadPoolExecutor(WORKERS) as pool:
         pending: deque[Future[T]] = deque()
@@ -108,12 +171,3 @@ def _ordered(function: Callable[[int], T], items: Iterable[int]) -> Iterator[T]:
                 yield pending.popleft().result()
         while pending:
             yield pending.popleft().result()
-
-
-def _fill(rows: np.ndarray, plan: Outline, first: int, times: np.ndarray) -> None:
-    span = slice(first, first + len(rows))
-    for (_, records), columns in zip(plan.layout.parts(rows), plan.columns, strict=True):
-        records[".sequence"] = np.arange(span.start, span.stop)
-        records[".log_time"] = records[".publish_time"] = times
-        for name, column in columns.items():
-            records[name] = column[span]

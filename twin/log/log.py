@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +86,28 @@ class Log:
     def __len__(self) -> int:
         return len(next(iter(self.axes.values())))
 
+    def part(self, first: int, stop: int) -> Log:
+        """Its samples from number ``first`` to before ``stop``."""
+        span = slice(first, stop)
+        axes = {
+            name: replace(axis, columns={f: column[span] for f, column in axis.columns.items()})
+            for name, axis in self.axes.items()
+        }
+        truth = {a: {f: column[span] for f, column in c.items()} for a, c in self.truth.items()}
+        return replace(self, axes=axes, truth=truth)
+
+    def copied(self) -> Log:
+        """The same in memory of its own, where it is a small part of a large log."""
+        return joined([self.part(0, 0), self])
+
+    def with_fields(self, fields: Sequence[str]) -> Log:
+        """The same with the signals of these names alone, without truth and attachments."""
+        axes = {
+            name: replace(axis, columns={f: c for f, c in axis.columns.items() if f in fields})
+            for name, axis in self.axes.items()
+        }
+        return replace(self, axes=axes, truth={}, attachments={})
+
     @property
     def period(self) -> float:
         """Sample period in s."""
@@ -95,3 +117,21 @@ class Log:
     def time(self) -> Array:
         """(n,) sample times in s."""
         return np.arange(len(self)) / self.sample_rate
+
+
+def joined(parts: Iterable[Log]) -> Log:
+    """One log of parts that follow each other without a gap, which all have the same columns."""
+    logs = list(parts)
+    first = logs[0]
+    if len(logs) == 1:
+        return first
+    axes = {
+        name: replace(axis, columns=_one_after_the_other([log.axes[name].columns for log in logs]))
+        for name, axis in first.axes.items()
+    }
+    truth = {name: _one_after_the_other([log.truth[name] for log in logs]) for name in first.truth}
+    return replace(first, axes=axes, truth=truth)
+
+
+def _one_after_the_other(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -11,7 +11,8 @@ from mcap.records import Channel, Schema
 from mcap.well_known import MessageEncoding, SchemaEncoding
 
 from twin.errors import InputError, at
-from twin.log.assemble import SCHEMA_VERSION
+from twin.log.assemble import CHECKSUM, SCHEMA_VERSION
+from twin.log.instants import seconds
 from twin.log.layout import MessageLayout, RowLayout
 from twin.log.log import Array, AxisLog, Log
 from twin.log.schema import (
@@ -21,7 +22,6 @@ from twin.log.schema import (
     file_descriptor_set,
     protobuf_segments,
 )
-from twin.log.series import seconds
 from twin.log.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_units
 
 SERIES = "twin.Series"  # the message of a topic that no log of a machine has
@@ -39,28 +39,41 @@ class Signals:
     metadata: Mapping[str, str]
 
 
+Samples = tuple[Mapping[str, Array], ...]
+"""The columns (n,) of every topic, in the order of its channels."""
+
+
 @dataclass(frozen=True)
 class Outline:
-    """Everything but the samples, and the columns the samples come from (one set a message)."""
+    """Everything but the samples."""
 
-    count: int
     metadata: dict[str, str]
     schemas: tuple[Schema, ...]
     channels: tuple[Channel, ...]
     layout: RowLayout
-    columns: tuple[Mapping[str, Array], ...]
 
 
 def outline(log: Log) -> Outline:
     """Plan the file; raises InputError for a log that could not be read back."""
     _check_log(log)
-    topics = [*_axis_signals(log), *_truth_signals(log)]
-    return _planned(topics, len(log), log.sample_rate, _metadata(log))
+    return _planned(_signals(log), _metadata(log))
+
+
+def samples_of(log: Log, first: int = 0) -> Samples:
+    """The columns of a log, or of a part of one that begins with sample ``first``.
+
+    Raises InputError where a column is not one finite number a sample.
+    """
+    return _checked(_signals(log), len(log), log.sample_rate, first)
+
+
+def _signals(log: Log) -> list[Signals]:
+    return [*_axis_signals(log), *_truth_signals(log)]
 
 
 def outline_of_topics(
     topics: Mapping[str, Mapping[str, Array]], units: Mapping[str, str], sample_rate: float
-) -> Outline:
+) -> tuple[Outline, Samples]:
     """Plan a file of any topics, "/model/x" -> column -> (n,); units: "/model/x/force" -> unit."""
     signals = [
         Signals(
@@ -71,15 +84,18 @@ def outline_of_topics(
         for topic, columns in topics.items()
     ]  # fmt: skip
     count = len(next(iter(signals[0].columns.values())))
-    return _planned(signals, count, sample_rate, {"source": "comparison"})
+    samples = _checked(signals, count, sample_rate)
+    return _planned(signals, {"source": "comparison"}), samples
 
 
-def _planned(
-    topics: Sequence[Signals], count: int, sample_rate: float, metadata: dict[str, str]
-) -> Outline:
+def _checked(topics: Sequence[Signals], count: int, sample_rate: float, first: int = 0) -> Samples:
     for signals in topics:
         with at(signals.topic):
-            _check_columns(signals, count, sample_rate)
+            _check_columns(signals, count, sample_rate, first)
+    return tuple(signals.columns for signals in topics)
+
+
+def _planned(topics: Sequence[Signals], metadata: dict[str, str]) -> Outline:
     schemas: dict[bytes, Schema] = {}
     channels, messages = [], []
     for number, signals in enumerate(topics, 1):
@@ -97,12 +113,10 @@ def _planned(
         )
         messages.append(MessageLayout(number, protobuf_segments(signals.numbers)))
     return Outline(
-        count=count,
         metadata=metadata,
         schemas=tuple(schemas.values()),
         channels=tuple(channels),
         layout=RowLayout(tuple(messages)),
-        columns=tuple(s.columns for s in topics),
     )
 
 
@@ -133,8 +147,9 @@ def _common(axis: str, log: Log) -> dict[str, str]:
 
 
 def _metadata(log: Log) -> dict[str, str]:
+    given = {key: value for key, value in log.metadata.items() if key != CHECKSUM}
     return {
-        **log.metadata,
+        **given,
         "schema_version": SCHEMA_VERSION,
         "sample_rate_hz": repr(float(log.sample_rate)),
         "axes": ",".join(log.axes),
@@ -167,7 +182,7 @@ def _check_axis(axis: AxisLog) -> None:
         raise InputError(f"force constant is {constant} {axis.kind('N/A')}; give a number above 0")
 
 
-def _check_columns(signals: Signals, count: int, sample_rate: float) -> None:
+def _check_columns(signals: Signals, count: int, sample_rate: float, first: int) -> None:
     for name, column in signals.columns.items():
         if not IDENTIFIER.fullmatch(name):
             raise InputError(f"column name {name!r}: use letters, digits and underscores")
@@ -181,6 +196,7 @@ def _check_columns(signals: Signals, count: int, sample_rate: float) -> None:
         if not finite.all():
             i = int(np.argmin(finite))
             raise InputError(
-                f"{name} is {column[i]} at {seconds(i * 1e9 / sample_rate)} (sample {i}); "
+                f"{name} is {column[i]} at {seconds((first + i) * 1e9 / sample_rate)} "
+                f"(sample {first + i}); "
                 "leave out a signal that was not recorded"
             )

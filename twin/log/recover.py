@@ -12,9 +12,9 @@ from twin.errors import InputError
 from twin.log.assemble import Extras, Run
 from twin.log.container import has_checksum, open_mcap, reading
 from twin.log.decode import read_strictly
+from twin.log.instants import seconds
 from twin.log.log import Log
 from twin.log.salvage import Part, Salvage
-from twin.log.series import seconds
 
 METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
 
@@ -96,7 +96,8 @@ class _Stretches:
         log, kept = self._log(runs[longest], counts[longest])
         others = list(self._others(runs, counts, longest))
         lost = self._lost if self._keep_unproved else [*self._lost, *self._salvage.unproved]
-        unproved: list[str] = [METADATA] if self._salvage.extras.metadata else []
+        extras = self._salvage.extras
+        unproved: list[str] = [METADATA] if extras.metadata and not extras.proved else []
         unproved += self._salvage.unproved if self._keep_unproved else []
         recovery = Recovery(
             kept, tuple(dict.fromkeys(lost)), tuple(dict.fromkeys(unproved)), tuple(others)
@@ -152,7 +153,7 @@ class _Stretches:
                 except InputError as error:
                     if not explained:  # no damage was seen where the gap is
                         self._lost.append(f"{part.place}: {error}")
-            runs.append(Run(self._salvage.topics, None, {}))
+            runs.append(Run(self._salvage.topics))
             try:
                 runs[-1].extend(part.blocks)
             except InputError as error:

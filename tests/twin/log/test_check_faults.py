@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from check_cases import Columns, clean_log, faults, late, milliseconds, only, with_axis
 
-from twin.log import Log
+from twin.log import AxisLog, Log
 from twin.log.check import Fault, Severity, check_log
 from twin.log.importers import import_log, load_mapping
 from twin.log.log import Array
@@ -202,3 +202,14 @@ def test_a_finding_is_one_sentence_with_axis_place_and_remedy(clean: Log) -> Non
         r"give force delay_samples = \d+ in the import map",
         str(only(report, Fault.LAG)),
     )
+
+
+def test_a_mass_that_no_acceleration_shows_is_named():
+    t = np.arange(40_000) / 1000.0
+    position = 0.05 * np.sin(0.5 * t) + 0.02 * np.sin(0.35 * t + 1.0)
+    velocity = 0.025 * np.cos(0.5 * t) + 0.007 * np.cos(0.35 * t + 1.0)
+    noise = 1e-8 * np.random.default_rng(1).standard_normal(len(t))
+    slow = {"position": position + noise, "force": 1.5 * np.tanh(velocity / 1e-4) + 40.0 * velocity}
+    (found,) = check_log(Log(1000.0, {"x": AxisLog(slow)})).findings
+    assert found.fault is Fault.WEAK_EXCITATION
+    assert "the mass cannot be identified" in found.what

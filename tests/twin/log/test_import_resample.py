@@ -65,7 +65,7 @@ def test_even_stamps_cost_nothing(tmp_path: Path) -> None:
         (
             lambda c: np.where(np.arange(len(c)) > 1500, c + 1.0, c),
             MAP,
-            r"nothing between 1\.\d+ and",
+            r"nothing between 1\.\d+ s and",
         ),
         (lambda c: np.zeros(len(c)), MAP, "increases in 1 of 3000 rows only"),
         (lambda c: c * np.nan, MAP, "row 1 is nan|cannot be read"),

@@ -214,9 +214,14 @@ def test_attachment_and_metadata_indexes_repeat_what_they_point_at(data):
     assert [parsed(MetadataIndex, p) for p in of(data, METADATA_INDEX)] == [
         MetadataIndex(metadata.start, metadata.end - metadata.start, "twin")
     ]
-    assert parsed(Metadata, metadata).metadata == {
+    entries = parsed(Metadata, metadata).metadata
+    proof = entries.pop("checksum")
+    assert entries == {
         "source": "a test", "schema_version": "1", "sample_rate_hz": "3000.0", "axes": "x,y,z",
     }  # fmt: skip
+    texts = [text.encode() for entry in sorted(entries.items()) for text in entry]
+    stated = b"".join(len(text).to_bytes(8, "little") + text for text in texts)
+    assert proof == f"{zlib.crc32(stated):08x}"
 
 
 def test_the_summary_offsets_cut_the_summary_into_groups_of_one_kind(data):

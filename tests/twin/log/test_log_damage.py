@@ -172,14 +172,21 @@ def test_a_damaged_record_length_hides_no_later_chunk(tmp_path, intact, small_lo
 
 
 def test_damage_outside_the_chunks_costs_no_sample(tmp_path, intact, small_log):
-    place = intact.find(b"simulation")
+    """Neither to an index, nor to the metadata, which have a checksum of their own."""
     path = tmp_path / "damaged.mcap"
-    path.write_bytes(flip(intact, 8 * place))
-    with pytest.raises(InputError, match="wrong checksum though every chunk is intact"):
-        read_log(path)
-    log, recovery = recover_log(path)
-    assert_same_samples(log, small_log)
-    assert "metadata, an attachment or an index is damaged" in recovery.lost[0]
+    index = intact.find(b"\x07" + bytes([6 + 16 * 12]), chunk_offsets(tmp_path / "intact.mcap")[0])
+    for place, why in (
+        (index + 20, "metadata, an attachment or an index is damaged"),
+        (intact.find(b"simulation"), "metadata at byte 42: wrong checksum"),
+    ):
+        path.write_bytes(flip(intact, 8 * place))
+        with pytest.raises(InputError, match=why):
+            read_log(path)
+        log, recovery = recover_log(path)
+        assert_same_samples(log, small_log)
+        assert why in recovery.lost[0]
+        assert not recovery.unproved
+        assert ("source" in log.metadata) is ("metadata at byte" not in why)
 
 
 def test_the_longer_side_is_kept_though_no_rate_is_stated(tmp_path):

@@ -1,6 +1,6 @@
 """Setpoints of the named experiments, as the motion platform (PMP) generates them.
 
-Every generator returns a Setpoint that starts and ends at rest, so that setpoints can be put one
+Every generator returns a setpoint that starts and ends at rest, so that setpoints can be put one
 after the other with `concatenate`. Sample k is the setpoint at t = k / sample_rate. Positions are
 absolute positions on the machine in metres; `at` is the place of the experiment, one position per
 axis, where the axes that do not take part rest.
@@ -31,8 +31,8 @@ from twin.experiments.trajectory.limits import (
 )
 from twin.experiments.trajectory.setpoint import (
     SAMPLE_RATE,
+    PlannedSetpoint,
     Setpoint,
-    closed_loop,
     require_length,
     whole_motion,
 )
@@ -45,7 +45,7 @@ def point_to_point(
     *,
     dwell: float = 0.1,
     sample_rate: float = SAMPLE_RATE,
-) -> Setpoint:
+) -> PlannedSetpoint:
     """Fastest straight moves from waypoint to waypoint, all axes together.
 
     Args:
@@ -81,7 +81,7 @@ def constant_speed_passes(
     at: npt.ArrayLike = (0.0, 0.0),
     dwell: float = 0.1,
     sample_rate: float = SAMPLE_RATE,
-) -> Setpoint:
+) -> PlannedSetpoint:
     """Cable pass: one axis back and forth at one speed (thesis: +-0.1 m/s over +-0.15 m, 10 times).
 
     Args:
@@ -114,7 +114,7 @@ def velocity_staircase(
     at: npt.ArrayLike = (0.0, 0.0),
     dwell: float = 0.1,
     sample_rate: float = SAMPLE_RATE,
-) -> Setpoint:
+) -> PlannedSetpoint:
     """Velocity map: one move each way at every speed (thesis: 0.1 mm/s to 0.25 m/s over 10 mm).
 
     Every move is centred on the place `at`, because friction depends on position, and holds its
@@ -159,7 +159,7 @@ def micro_reversals(
     at: npt.ArrayLike = (0.0, 0.0),
     dwell: float = 0.1,
     sample_rate: float = SAMPLE_RATE,
-) -> Setpoint:
+) -> PlannedSetpoint:
     """Reversals: one axis between `at` - amplitude and `at` + amplitude (thesis: 4 um, 50 times).
 
     Pass limits of lower velocity for slow reversals.
@@ -220,7 +220,8 @@ def open_loop_sine(
         )
     if not math.isfinite(offset):
         raise InputError(f"offset {offset:g} N is not finite: give the cable force at the place")
-    still = closed_loop(rest(place, duration), round(duration * sample_rate), sample_rate)
+    samples = round(duration * sample_rate)
+    still = PlannedSetpoint(rest(place, duration), samples, sample_rate).part(0, samples)
     force = np.zeros_like(still.force)
     angle = 2.0 * np.pi / period * (np.arange(force.shape[0]) / sample_rate)
     force[:, axis] = offset + amplitude * np.sin(angle)
@@ -254,7 +255,7 @@ def _back_and_forth(
     return [move(limits, low, high), rest(high, dwell), move(limits, high, low), rest(low, dwell)]
 
 
-def _repeated(cycle: list[Phases], repeats: int, sample_rate: float) -> Setpoint:
+def _repeated(cycle: list[Phases], repeats: int, sample_rate: float) -> PlannedSetpoint:
     """The rest that ends the cycle, then the cycle `repeats` times."""
     require_count("repeats", repeats)
     require_length(repeats * sum(part.total for part in cycle), sample_rate)

@@ -120,9 +120,9 @@ def join(parts: Sequence[Phases]) -> Phases:
 
 
 def sample(
-    phases: Phases, samples: int, sample_rate: float
+    phases: Phases, samples: int, sample_rate: float, begin: int = 0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Position (m), velocity (m/s) and acceleration (m/s^2) at t = k / sample_rate.
+    """Position (m), velocity (m/s) and acceleration (m/s^2) at t = k / sample_rate, k from `begin`.
 
     Each is an exact evaluation of the cubic of the phase that holds at t, shape
     (samples, n_axes); a sample after the end belongs to the last phase.
@@ -132,7 +132,7 @@ def sample(
     position, velocity, acceleration = np.empty(shape), np.empty(shape), np.empty(shape)
     for first in range(0, samples, _BLOCK):
         block = slice(first, min(first + _BLOCK, samples))
-        time = np.arange(block.start, block.stop) / sample_rate
+        time = np.arange(begin + block.start, begin + block.stop) / sample_rate
         phase = np.searchsorted(starts, time, side="right") - 1
         t = (time - starts[phase])[:, np.newaxis]
         p, v = phases.position[phase], phases.velocity[phase]

@@ -15,7 +15,7 @@ from twin.experiments.trajectory.limits import (
     require_positive,
     travel_box,
 )
-from twin.experiments.trajectory.setpoint import SAMPLE_RATE, Setpoint, closed_loop, require_length
+from twin.experiments.trajectory.setpoint import SAMPLE_RATE, PlannedSetpoint, require_length
 
 _CLOSING_REST = 0.05  # s, too short for another move
 
@@ -29,7 +29,7 @@ def random_tracking(
     cruise: float = 1.0,
     longest_dwell: float = 0.2,
     sample_rate: float = SAMPLE_RATE,
-) -> Setpoint:
+) -> PlannedSetpoint:
     """Tracking: random straight moves of all axes over the whole travel, from rest to rest.
 
     Each move draws its speed from `slowest` to the limit (uniform in the logarithm, one in five
@@ -65,7 +65,7 @@ def random_tracking(
         parts += [step, pause]
         left -= step.total + pause.total
         place = target
-    return closed_loop(join([*parts, rest(place, 0.0)]), samples, sample_rate)
+    return PlannedSetpoint(join([*parts, rest(place, 0.0)]), samples, sample_rate)
 
 
 def _drawn_target(

@@ -1,8 +1,11 @@
 """The sampled setpoint of the controller."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +16,7 @@ from twin.experiments.trajectory.limits import FloatArray, axis_name, require_po
 
 SAMPLE_RATE = 10_000.0  # Hz, of the motion platform
 
-_MOST_SAMPLES = 36_000_000  # one hour at 10 kHz; two axes then take 2.3 GB
+_MOST_SAMPLES = 36_000_000  # one hour at 10 kHz
 _SAME_PLACE = 1e-9  # m
 _AT_REST = 1e-9  # m/s
 
@@ -45,7 +48,77 @@ class Setpoint:
     @property
     def duration(self) -> float:
         """Number of samples / sample rate, s."""
-        return self.position.shape[0] / self.sample_rate
+        return len(self) / self.sample_rate
+
+    def __len__(self) -> int:
+        return self.position.shape[0]
+
+    def part(self, first: int, stop: int) -> Setpoint:
+        """Its samples from number `first` to before `stop`."""
+        span = slice(first, stop)
+        return Setpoint(
+            self.position[span],
+            self.velocity[span],
+            self.acceleration[span],
+            self.force[span],
+            self.sample_rate,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedSetpoint:
+    """A closed-loop setpoint that is sampled where it is asked for: half an hour takes no memory.
+
+    Attributes:
+        phases: the motion.
+        samples: how many.
+        sample_rate: Hz.
+    """
+
+    phases: Phases
+    samples: int
+    sample_rate: float
+
+    @property
+    def duration(self) -> float:
+        """Number of samples / sample rate, s."""
+        return self.samples / self.sample_rate
+
+    def __len__(self) -> int:
+        return self.samples
+
+    def part(self, first: int, stop: int) -> Setpoint:
+        """Its samples from number `first` to before `stop`."""
+        count = min(stop, self.samples) - first
+        columns = sample(self.phases, count, self.sample_rate, first)
+        return Setpoint(*columns, np.zeros_like(columns[0]), self.sample_rate)
+
+    @cached_property
+    def _sampled(self) -> Setpoint:
+        return self.part(0, self.samples)
+
+    @property
+    def position(self) -> FloatArray:
+        """m, shape (n, n_axes)."""
+        return self._sampled.position
+
+    @property
+    def velocity(self) -> FloatArray:
+        """m/s, shape (n, n_axes)."""
+        return self._sampled.velocity
+
+    @property
+    def acceleration(self) -> FloatArray:
+        """m/s^2, shape (n, n_axes)."""
+        return self._sampled.acceleration
+
+    @property
+    def force(self) -> FloatArray:
+        """N, shape (n, n_axes): zero."""
+        return self._sampled.force
+
+
+AnySetpoint = Setpoint | PlannedSetpoint
 
 
 def require_length(duration: float, sample_rate: float) -> None:
@@ -60,24 +133,18 @@ def require_length(duration: float, sample_rate: float) -> None:
         )
 
 
-def closed_loop(phases: Phases, samples: int, sample_rate: float) -> Setpoint:
-    """The first `samples` samples of the phases, without open-loop force."""
-    position, velocity, acceleration = sample(phases, samples, sample_rate)
-    return Setpoint(position, velocity, acceleration, np.zeros_like(position), sample_rate)
-
-
-def whole_motion(parts: Sequence[Phases], sample_rate: float) -> Setpoint:
+def whole_motion(parts: Sequence[Phases], sample_rate: float) -> PlannedSetpoint:
     """All parts in a row; the last sample is at the end of the last part.
 
     Raises:
-        CannotRun: the motion is too long to hold in memory, or takes no time at all.
+        CannotRun: the motion is longer than an hour at 10 kHz, or takes no time at all.
     """
     phases = join(parts)
     require_length(phases.total, sample_rate)
-    return closed_loop(phases, math.ceil(phases.total * sample_rate) + 1, sample_rate)
+    return PlannedSetpoint(phases, math.ceil(phases.total * sample_rate) + 1, sample_rate)
 
 
-def concatenate(*setpoints: Setpoint) -> Setpoint:
+def concatenate(*setpoints: AnySetpoint) -> Setpoint:
     """One setpoint after the other; each must start at rest where the one before ended at rest.
 
     Raises:
@@ -96,7 +163,7 @@ def concatenate(*setpoints: Setpoint) -> Setpoint:
     )
 
 
-def _require_joint(before: Setpoint, after: Setpoint, where: str) -> None:
+def _require_joint(before: AnySetpoint, after: AnySetpoint, where: str) -> None:
     if before.sample_rate != after.sample_rate:
         raise InputError(
             f"sample rates {before.sample_rate:g} and {after.sample_rate:g} Hz {where} differ: "

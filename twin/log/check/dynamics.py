@@ -20,14 +20,19 @@ class Dynamics:
     """residual: (m,) command less the model, N, its first sample being number ``first``.
 
     explains: whether the model holds well. mass: kg, negative where the command is reversed.
-    mass_matters: whether acceleration makes a part of the command worth the name.
+    inertial_share: what acceleration makes of the command, RMS about its mean, as a part of it.
     """
 
     mass: float
     explains: bool
-    mass_matters: bool
+    inertial_share: float
     residual: Array
     first: int
+
+    @property
+    def mass_matters(self) -> bool:
+        """Whether acceleration makes a part of the command worth the name."""
+        return self.inertial_share > _NOTICED
 
 
 def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int) -> Dynamics:
@@ -46,7 +51,7 @@ def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int) -> Dy
     return Dynamics(
         mass=float(gains[0] / size[0]) if size[0] > 0.0 else 0.0,
         explains=float(np.std(residual[use])) < _EXPLAINED * spread,
-        mass_matters=inertial > _NOTICED * spread,
+        inertial_share=inertial / spread if spread > 0.0 else 0.0,
         residual=residual,
         first=first,
     )

@@ -14,6 +14,7 @@ _ROUNDED = 0.05  # the same, where it is the rounding: that is no noise and does
 _ROUNDING = 1.0  # noise of rounding is at most its step
 _CREEP = 0.02  # of the highest speed; slower motion counts as standstill
 _ONE_WAY = 0.02  # share of the moving time
+_INERTIAL = 0.005  # share of the force, below which friction that the check does not know hides it
 _SAME_SPEED = 0.05  # spread of the speeds as a part of their median
 
 
@@ -31,7 +32,21 @@ def check(axis: Axis) -> Iterator[Finding]:
         )
         return
     yield from _directions(axis)
+    yield from _inertia(axis)
     yield from _coarse(axis)
+
+
+def _inertia(axis: Axis) -> Iterator[Finding]:
+    share = axis.dynamics.inertial_share
+    if axis.dynamics.explains and share < _INERTIAL:
+        mass = axis.log.kind.mass_name
+        yield _warning(
+            axis,
+            Fault.WEAK_EXCITATION,
+            f"acceleration makes {100.0 * share:.2g} % of the force that varies, so that the "
+            f"{mass} cannot be identified; with it go all forces in proportion to acceleration",
+            f"add faster changes of speed, or give the {mass} and hold it (fixed)",
+        )
 
 
 def _directions(axis: Axis) -> Iterator[Finding]:
@@ -45,8 +60,8 @@ def _directions(axis: Axis) -> Iterator[Finding]:
             axis,
             Fault.WEAK_EXCITATION,
             f"the axis moves only {'forwards' if forward > 0.5 else 'backwards'} "
-            f"({100.0 * one_way:.3g} % of its moving time), so that friction and a constant "
-            "force look alike",
+            f"({100.0 * one_way:.3g} % of its moving time), so that a constant force "
+            "and the Coulomb friction cannot be told apart",
             "move both ways",
         )
     low, middle, high = np.quantile(np.abs(moving), (0.1, 0.5, 0.9))
@@ -54,8 +69,8 @@ def _directions(axis: Axis) -> Iterator[Finding]:
         yield _warning(
             axis,
             Fault.WEAK_EXCITATION,
-            f"there is one speed only, {middle:.3g} {unit}, so that Coulomb and viscous friction "
-            "look alike",
+            f"there is one speed only, {middle:.3g} {unit}, so that the Coulomb and the viscous "
+            "friction cannot be told apart",
             "add other speeds",
         )
 

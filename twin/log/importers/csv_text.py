@@ -1,7 +1,7 @@
 """Text tables: delimiter, decimal sign, header and first row of numbers are found in the file.
 
 Lines above the header and a line of units below it are ignored. Where there is no header the
-columns are called "1", "2", ...
+columns are called "1", "2", ... An export of TwinCAT Scope is known by its own header.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import codecs
 import csv
 import itertools
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,8 @@ import numpy as np
 
 from twin.errors import InputError
 from twin.log.importers.mapping import CsvLayout, ImportMap
-from twin.log.importers.table import Table, parsing, require_columns
+from twin.log.importers.scope_text import END, find_header
+from twin.log.importers.table import Table, chosen, parsing
 from twin.log.log import Array
 
 _HEAD_BYTES = 1 << 16
@@ -40,9 +41,12 @@ class _Style:
             return text.split()
         return [cell.strip() for cell in next(csv.reader([text], delimiter=self.delimiter), [])]
 
+    def value(self, cell: str) -> float:
+        return float(cell.replace(self.decimal, "."))
+
     def is_number(self, cell: str) -> bool:
         try:
-            float(cell.replace(self.decimal, "."))
+            self.value(cell)
         except ValueError:
             return False
         return True
@@ -58,26 +62,31 @@ class _Style:
 
 @dataclass(frozen=True)
 class _Layout:
-    """encoding, style, names of the columns, and the lines before the first row of numbers."""
+    """encoding, style, names of the columns, and the lines before the first row of numbers.
+
+    sample_rate (Hz) and start_ns (since 1970): where the header states them.
+    """
 
     encoding: str
     style: _Style
     names: tuple[str, ...]
     skip: int
+    sample_rate: float | None = None
+    start_ns: int | None = None
 
 
 def read(path: Path, mapping: ImportMap) -> Table:
     """Columns of a text table; raises InputError."""
     with parsing("a text table"):
         layout = _find_layout(path, mapping.csv)
-        wanted = mapping.column_names()
-        require_columns(wanted, layout.names)
+        wanted = chosen(mapping.column_names(), layout.names)
         where = [layout.names.index(name) for name in wanted]
         try:
             values = _numbers(path, layout, where)
         except ValueError as error:
             raise _first_fault(path, layout, where) or InputError(str(error)) from error
-    return Table(dict(zip(wanted, values, strict=True)))
+    columns = dict(zip(wanted, values, strict=True))
+    return Table(columns, layout.sample_rate, layout.start_ns)
 
 
 def _numbers(path: Path, layout: _Layout, where: Sequence[int]) -> Array:
@@ -92,7 +101,8 @@ def _numbers(path: Path, layout: _Layout, where: Sequence[int]) -> Array:
 def _lines(path: Path, layout: _Layout) -> Generator[str]:
     """Lines of numbers, with a point as decimal sign."""
     with open(path, encoding=layout.encoding, errors="replace") as stream:
-        rows = itertools.islice(stream, layout.skip, None)
+        rows: Iterable[str] = itertools.islice(stream, layout.skip, None)
+        rows = itertools.takewhile(lambda line: not line.startswith(END), rows)
         comma = layout.style.decimal == ","
         yield from (line.replace(",", ".") for line in rows) if comma else rows
 
@@ -104,12 +114,15 @@ def _find_layout(path: Path, stated: CsvLayout) -> _Layout:
     encoding = _encoding(head)
     text = head.decode(encoding, errors="replace")
     lines = text.split("\n") if whole else text.split("\n")[:-1]
-    while lines and not lines[-1].strip():
+    while lines and lines[-1].strip() in ("", END):
         lines.pop()
     if not lines:
         raise InputError("has no line of text; give a table of numbers")
     style = _find_style(lines[-_SAMPLE_LINES:], stated)
     rows = [style.cells(line) for line in lines]
+    scope = find_header(rows, style.is_number, style.value)
+    if scope is not None:
+        return _Layout(encoding, style, scope.names, scope.first, scope.sample_rate, scope.start_ns)
     skip = _first_row(rows, style, stated.header_line)
     return _Layout(encoding, style, _names(rows, skip, stated.header_line), skip)
 

@@ -8,7 +8,15 @@ from typing import Any
 from numpy.typing import NDArray
 
 from twin.log.importers.mapping import ImportMap
-from twin.log.importers.table import Table, extra, parsing, require_columns, split_columns
+from twin.log.importers.table import (
+    Table,
+    chosen,
+    extra,
+    parsing,
+    require_columns,
+    require_fits,
+    split_columns,
+)
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _MATLAB_HEADER = 512  # bytes before the signature in a MAT file of version 7.3
@@ -40,12 +48,14 @@ def read_named(path: Path, mapping: ImportMap, separator: str) -> Table:
         file.visititems(visit)
         # only what may hold a wanted column is read, the rest is known by its name
         columns: dict[str, NDArray] = {}
+        size = 0.0
         for name, dataset in datasets.items():
-            if any(w.startswith(name) for w in wanted):
+            if not wanted or any(w.startswith(name) for w in wanted):
+                size += float(dataset.size or 0) * dataset.dtype.itemsize
+                require_fits(size, path)
                 columns |= _columns(name, dataset, separator)
         require_columns(wanted, {**datasets, **columns})  # lists all there are
-        require_columns(wanted, columns)
-        return Table({name: columns[name] for name in wanted})
+        return Table({name: columns[name] for name in chosen(wanted, columns)})
 
 
 def _columns(name: str, dataset: Any, separator: str) -> dict[str, NDArray]:

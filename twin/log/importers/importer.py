@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,14 +11,14 @@ import numpy as np
 
 from twin.errors import InputError, at
 from twin.log.container import reading
-from twin.log.importers import csv_text, hdf5, json_table, mat, parquet, tdms
+from twin.log.importers import csv_text, hdf5, json_table, mat, mcap_topics, parquet, tdms
 from twin.log.importers.mapping import ImportMap
 from twin.log.importers.resample import clock_of
 from twin.log.importers.sample_rate import rate_of
+from twin.log.importers.several import read_together
 from twin.log.importers.table import Table, numbers
+from twin.log.instants import is_calendar
 from twin.log.log import Array, AxisLog, Log
-
-_EARLIEST, _LATEST = 5e8, 5e9  # s since 1970, between which a time is that of a calendar
 
 
 @dataclass(frozen=True)
@@ -36,43 +36,91 @@ FORMATS: Mapping[str, Format] = {
     "parquet": Format((".parquet", ".pq"), parquet.read),
     "json": Format((".json",), json_table.read),
     "tdms": Format((".tdms",), tdms.read),
+    "mcap": Format((".mcap",), mcap_topics.read),
 }
 
 
-def import_log(path: str | Path, mapping: ImportMap) -> Log:
+def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> Log:
     """Read a log of another program as ``mapping`` says; see ``load_mapping``.
 
-    Samples are in SI, those that delays leave without a partner are cut off at the ends. Raises
-    InputError for a missing file, column or package, a cell that is not a finite number, columns
-    of different length, and times that are not even.
+    path: the file, or the files in the order of the map's. Samples are in SI, those that delays
+    leave without a partner are cut off at the ends. Raises InputError for a missing file, column or
+    package, a cell that is not a finite number, columns of different length, and times that are not
+    even.
     """
-    path = Path(path)
-    with reading(path):
-        name = _format_name(path, mapping)
-        with open(path, "rb") as stream:
-            digest = hashlib.file_digest(stream, "sha256").hexdigest()
-        table = FORMATS[name].read(path, mapping)
-        columns = {n: numbers(n, raw) for n, raw in table.columns.items()}
-        start = _start(table, mapping, columns)
-        count = _common_length(columns)
-        notes: dict[str, str] = {}
-        if mapping.resample is None:
-            rate = _sample_rate(table, mapping, columns)
-        else:
-            rate = mapping.resample
-            columns, notes = _on_one_clock(mapping, columns)
-            count = _common_length(columns)
-        for column, values in columns.items():
-            _require_finite(column, values, rate)
-        span = _undelayed(mapping, count)
-    metadata = {
-        "source": "import",
-        "original_format": name,
-        "original_sha256": digest,
-        "import_map": mapping.text,
-        **start,
-        **notes,
-    }
+    paths = [Path(p) for p in ([path] if isinstance(path, str | Path) else path)]
+    if mapping.files:
+        return _of_several(paths, mapping)
+    if len(paths) != 1:
+        raise InputError(
+            f"{len(paths)} files are given; several need a table [[files]] for each in the map"
+        )
+    with reading(paths[0]):
+        return _of_one(paths[0], mapping)
+
+
+def _of_one(path: Path, mapping: ImportMap) -> Log:
+    table, columns, facts = _read(path, mapping)
+    start = _start(table, mapping, columns)
+    notes: dict[str, str] = {}
+    if mapping.resample is None:
+        rate = _sample_rate(table, mapping, columns)
+    else:
+        rate = mapping.resample
+        columns, notes = _on_one_clock(mapping, columns)
+    return _log(mapping, columns, rate, {**facts, **start, **notes})
+
+
+def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
+    formats, starts = [], []
+
+    def read(path: Path, own: ImportMap) -> tuple[Mapping[str, Array], Array, str]:
+        table, columns, facts = _read(path, own)
+        formats.append(facts["original_format"])
+        start = _start(table, own, columns).get("start_time_unix_ns")
+        starts.append(start)
+        if own.time is None:
+            rate, count = _sample_rate(table, own, columns), _common_length(columns)
+            return columns, np.arange(count) / rate, facts["original_sha256"]
+        times = own.time.to_si(columns[own.time.column])
+        if start is not None and not is_calendar(times[0]):  # dates: seconds since the first
+            times = times - times[0] + int(start) * 1e-9
+        return columns, times, facts["original_sha256"]
+
+    found = read_together(paths, mapping, read)
+    facts = {
+        "original_format": ",".join(formats), "original_sha256": ",".join(found.digests),
+        **found.notes,
+    }  # fmt: skip
+    if is_calendar(found.start):
+        facts["start_time_unix_ns"] = str(round(found.start * 1e9))
+    assert mapping.resample is not None
+    return _log(mapping, found.columns, mapping.resample, facts)
+
+
+def table_of(path: Path, mapping: ImportMap) -> Table:
+    """The columns that a map names, all where it has no axes; raises InputError."""
+    return FORMATS[_format_name(path, mapping)].read(path, mapping)
+
+
+def _read(path: Path, mapping: ImportMap) -> tuple[Table, Mapping[str, Array], dict[str, str]]:
+    """The table, its columns as numbers, and format and sha256 of the file."""
+    name = _format_name(path, mapping)
+    with open(path, "rb") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    table = table_of(path, mapping)
+    columns = {n: numbers(n, raw) for n, raw in table.columns.items()}
+    _common_length(columns)
+    return table, columns, {"original_format": name, "original_sha256": digest}
+
+
+def _log(
+    mapping: ImportMap, columns: Mapping[str, Array], rate: float, facts: Mapping[str, str]
+) -> Log:
+    for column, values in columns.items():
+        _require_finite(column, values, rate)
+    span = _undelayed(mapping, _common_length(columns))
+    metadata = {"source": "import", "import_map": mapping.text, **facts}
     return Log(rate, _axes(mapping, columns, span), metadata)
 
 
@@ -85,24 +133,20 @@ def _on_one_clock(
     with at(f"column '{mapping.time.column}'"):
         clock = clock_of(mapping.time.to_si(columns[mapping.time.column]), mapping.resample)
     even = {n: clock.resampled(c) for n, c in columns.items() if n != mapping.time.column}
-    costs = [
-        f"{axis}.{field} {c.unit.size * abs(c.scale) * clock.cost(columns[c.column]):.2g} "
-        f"{entry.units[field]}"
-        for axis, entry in mapping.axes.items()
-        for field, c in entry.columns.items()
-    ]
-    return even, {"resampled": f"{clock}; error rms about {', '.join(costs)}"}
+    return even, {"resampled": clock.costs(mapping, columns)}
 
 
 def _start(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> dict[str, str]:
-    """When the recording began by the wall clock, where its times are those since 1970."""
+    """When the recording began by the wall clock, where the format or its times say so."""
+    if table.start_ns is not None:
+        return {"start_time_unix_ns": str(table.start_ns)}
     if mapping.time is None:
         return {}
     raw = np.asarray(table.columns[mapping.time.column])
     if raw.dtype.kind == "M" and len(raw):
         return {"start_time_unix_ns": str(int(raw[0].astype("datetime64[ns]").astype(np.int64)))}
     first = mapping.time.to_si(columns[mapping.time.column][:1])
-    if len(first) and _EARLIEST < first[0] < _LATEST:
+    if len(first) and is_calendar(first[0]):
         return {"start_time_unix_ns": str(round(float(first[0]) * 1e9))}
     return {}
 
@@ -186,7 +230,7 @@ def _axes(mapping: ImportMap, columns: Mapping[str, Array], span: range) -> dict
     for name, axis in mapping.axes.items():
         signals = {
             field: c.to_si(
-                columns[c.column][span.start + c.delay_samples : span.stop + c.delay_samples]
+                columns[c.key][span.start + c.delay_samples : span.stop + c.delay_samples]
             )
             for field, c in axis.columns.items()
         }

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.log.importers.mapping import ImportMap
-from twin.log.importers.table import Table, parsing, require_columns, split_columns
+from twin.log.importers.table import Table, chosen, parsing, split_columns
 
 ROWS = "data"  # what the rows of a bare list are called
 
@@ -24,8 +24,7 @@ def read(path: Path, mapping: ImportMap) -> Table:
     with parsing("JSON"):
         content = json.loads(path.read_text(encoding="utf-8-sig"))
         columns = _columns("", content if isinstance(content, dict) else {ROWS: content})
-    require_columns(mapping.column_names(), columns)
-    return Table({name: columns[name] for name in mapping.column_names()})
+    return Table({name: columns[name] for name in chosen(mapping.column_names(), columns)})
 
 
 def _columns(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:

@@ -33,6 +33,18 @@ class ColumnEntry(Entries):
         0, ge=-(10**6), le=10**6,
         description="a whole number: by how many samples the column was recorded too late",
     )  # fmt: skip
+    file: int = Field(
+        1, ge=1, le=1000, description="a whole number: which of several files, the first is 1"
+    )
+
+
+class FileEntry(Entries):
+    """One of several files that are given together, in their order."""
+
+    format: str | None = Field(None, description='a format in quotes, such as "csv"')
+    sample_rate: float | None = Field(None, gt=0.0, description=NUMBER + " above 0, in Hz")
+    time: TimeEntry | None = Field(None, description='a table such as {column = "t", unit = "s"}')
+    offset: float = Field(0.0, description=NUMBER + ", in s, which is added to its times")
 
 
 _SIGNALS: dict[str, Any] = {
@@ -59,6 +71,10 @@ class MapFile(Entries):
         gt=0.0,
         description="a number above 0, in Hz: uneven time stamps are brought onto this clock",
     )
+    files: list[FileEntry] | None = Field(
+        None, min_length=2, description="tables [[files]], one for each file; resample brings "
+        "their columns onto one clock",
+    )  # fmt: skip
     delimiter: str | None = Field(
         None, min_length=1, max_length=1, description="one character, such as ';'"
     )

@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from twin.log.importers.mapping import ImportMap
-from twin.log.importers.table import Table, extra, parsing, require_columns
+from twin.log.importers.table import Table, chosen, extra, parsing, require_fits
 
 
 def read(path: Path, mapping: ImportMap) -> Table:
     """Columns of a Parquet file; raises InputError."""
     parquet = extra("pyarrow.parquet")
-    wanted = list(mapping.column_names())
     with parsing("Parquet"), parquet.ParquetFile(path) as file:
-        require_columns(wanted, file.schema_arrow.names)
+        wanted = list(chosen(mapping.column_names(), file.schema_arrow.names))
+        require_fits(8.0 * file.metadata.num_rows * len(wanted), path)
         table = file.read(columns=wanted)
         return Table({name: table.column(name).to_numpy() for name in wanted})

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
+from twin.log.importers.mapping import ImportMap
+from twin.log.instants import instant
 from twin.log.log import Array
 
 LONGEST_GAP = 20.0  # usual steps, over which a line is no measurement
@@ -32,6 +35,16 @@ class Clock:
         between = np.interp(self.times[1:-1:2], self.times[::2], kept[::2])
         # Of a smooth signal lines twice as long are four times as far off.
         return float(np.sqrt(np.mean((between - kept[1:-1:2]) ** 2))) / 4.0
+
+    def costs(self, mapping: ImportMap, columns: Mapping[str, Array]) -> str:
+        """What the clock costs each signal of a map, one sentence."""
+        each = [
+            f"{axis}.{field} {c.unit.size * abs(c.scale) * self.cost(columns[c.column]):.2g} "
+            f"{entry.units[field]}"
+            for axis, entry in mapping.axes.items()
+            for field, c in entry.columns.items()
+        ]
+        return f"{self}; error rms about {', '.join(each)}"
 
     def __str__(self) -> str:
         steps = np.diff(self.times) * 1e3
@@ -61,8 +74,8 @@ def clock_of(time: Array, rate: float) -> Clock:
     gap = int(np.argmax(steps))
     if steps[gap] > LONGEST_GAP * usual:
         raise InputError(
-            f"there is nothing between {kept[gap]:.6g} and {kept[gap + 1]:.6g} s; import the parts "
-            "before and behind it as logs of their own"
+            f"there is nothing between {instant(kept[gap])} and {instant(kept[gap + 1])}; import "
+            "the parts before and behind it as logs of their own"
         )
     grid = kept[0] + np.arange(int((kept[-1] - kept[0]) * rate * (1.0 + 1e-12)) + 1) / rate
     return Clock(rows, kept, grid, len(time) - len(kept))

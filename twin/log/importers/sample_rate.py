@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.errors import InputError
+from twin.log.instants import instant
 from twin.log.log import Array
 
 JITTER = 0.01  # of a period: how far a time may be off the even grid
@@ -44,7 +45,7 @@ def rate_of(time: Array) -> float:
 def _uneven(fault: str, time: Array, row: int, period: float) -> InputError:
     rate = 1.0 / max(period, 1e-9)
     return InputError(
-        f"the time {fault}: {time[row - 1]:.9g} s is followed by {time[row]:.9g} s in row "
+        f"the time {fault}: {instant(time[row - 1])} is followed by {instant(time[row])} in row "
         f"{row + 1}, usual are {period:.6g} s a sample; give resample = {rate:.6g} "
         "(Hz) in the map, or sample_rate in place of time where only the printed times are inexact"
     )

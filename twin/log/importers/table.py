@@ -7,6 +7,7 @@ import importlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -14,17 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
+from twin.log.container import LARGEST_RATIO
 from twin.log.log import Array
 
 _MOST_NAMES = 40  # columns listed in a message
+SMALLEST_TABLE = 1 << 27  # bytes, whatever the size of the file
 
 
 @dataclass(frozen=True)
 class Table:
-    """Columns as the file holds them; sample_rate (Hz) where the format itself states one."""
+    """Columns as the file holds them; what the format itself states of sample rate and start.
+
+    sample_rate: Hz. start_ns: when the recording began, ns since 1970.
+    """
 
     columns: Mapping[str, NDArray]
     sample_rate: float | None = None
+    start_ns: int | None = None
 
 
 def require_columns(wanted: Iterable[str], there: Collection[str]) -> None:
@@ -43,6 +50,13 @@ def require_columns(wanted: Iterable[str], there: Collection[str]) -> None:
             f"there is no column '{name}'; {hint}columns: "
             f"{', '.join(names[:_MOST_NAMES]) or 'none'}{tail}"
         )
+
+
+def chosen(wanted: Iterable[str], there: Collection[str]) -> tuple[str, ...]:
+    """The wanted columns, all where none is named; raises InputError where one is missing."""
+    names = tuple(wanted)
+    require_columns(names, there)
+    return names or tuple(there)
 
 
 def split_columns(name: str, values: NDArray) -> dict[str, NDArray]:
@@ -84,6 +98,19 @@ def extra(module: str) -> ModuleType:
             f"needs the package {module.partition('.')[0]}; "
             "install it with: pip install proton-twin[import]"
         ) from error
+
+
+def require_fits(size: float, path: Path) -> None:
+    """Raise InputError where columns of ``size`` bytes are more than a file may expand to.
+
+    Recordings shrink to a tenth or so; a file of kB that announces GB has none.
+    """
+    most = SMALLEST_TABLE + LARGEST_RATIO * path.stat().st_size
+    if size > most:
+        raise InputError(
+            f"announces columns of {size:.3g} bytes, a file of this size has at most {most:.3g}; "
+            "export it again"
+        )
 
 
 @contextmanager

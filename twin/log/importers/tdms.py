@@ -6,7 +6,7 @@ from pathlib import Path
 
 from twin.errors import InputError
 from twin.log.importers.mapping import ImportMap
-from twin.log.importers.table import Table, extra, parsing, require_columns
+from twin.log.importers.table import Table, chosen, extra, parsing, require_fits
 
 _PERIOD = "wf_increment"  # s a sample
 
@@ -14,13 +14,12 @@ _PERIOD = "wf_increment"  # s a sample
 def read(path: Path, mapping: ImportMap) -> Table:
     """Columns of a TDMS file; raises InputError."""
     nptdms = extra("nptdms")
-    wanted = mapping.column_names()
     with parsing("TDMS"), nptdms.TdmsFile.open(path) as file:
         channels = {f"{g.name}/{c.name}": c for g in file.groups() for c in g.channels()}
-        require_columns(wanted, channels)
-        chosen = {name: channels[name] for name in wanted}
-        periods = {n: c.properties[_PERIOD] for n, c in chosen.items() if _PERIOD in c.properties}
-        return Table({name: c[:] for name, c in chosen.items()}, _rate(periods))
+        read = {name: channels[name] for name in chosen(mapping.column_names(), channels)}
+        require_fits(sum(8.0 * len(channel) for channel in read.values()), path)
+        periods = {n: c.properties[_PERIOD] for n, c in read.items() if _PERIOD in c.properties}
+        return Table({name: c[:] for name, c in read.items()}, _rate(periods))
 
 
 def _rate(periods: dict[str, float]) -> float | None:

@@ -57,7 +57,7 @@ _QUANTITIES: Mapping[str, Mapping[str, float]] = {
 }
 # what only a scale turns into a physical quantity
 _RAW = ("V", "mV", "count", "counts", "increment", "increments", "digit", "digits", "%", "1")
-_WORD = re.compile(r"^[A-Za-z][A-Za-z0-9_*/^]{0,30}$")
+_WORD = re.compile(r"^[A-Za-z][A-Za-z0-9_*/^· ]{0,30}$")
 _SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "·": "", "*": "", " ": ""})
 
 
@@ -103,7 +103,7 @@ def _size_by_library(text: str, si: str) -> float | None:
     if "rad" in si or not _WORD.search(text):
         return None
     try:
-        return float(_registry()(text.replace("·", "*")).to(si.replace(" ", "*")).magnitude)
+        return float(_registry()(re.sub(r"[· ]+", "*", text)).to(si.replace(" ", "*")).magnitude)
     except Exception:  # whatever a parser of any text may raise: then it is no unit
         return None
 

@@ -1,0 +1,257 @@
+"""Recordings of other programs: TwinCAT Scope, MCAP of other writers, several files at once."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from import_cases import mapping
+
+from twin.errors import InputError
+from twin.log import Log
+from twin.log.importers import import_log
+from twin.log.instants import instant
+
+COUNT = 400
+T = np.arange(COUNT) * 1e-3
+Q, F = 50.0 * np.sin(3.0 * T), 2.0 * np.cos(5.0 * T)
+EPOCH = 1_700_000_000
+FILETIME = 116_444_736_000_000_000 + EPOCH * 10**7
+
+
+def imported(folder: Path, name: str, text: str) -> Log:
+    return import_log(folder / name, mapping(folder, text))
+
+
+def assert_signals(log: Log, axis: str = "x", position: float = 1e-3) -> None:
+    np.testing.assert_allclose(log.axes[axis].position, position * Q, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(log.axes[axis].force, F, rtol=0, atol=1e-9)
+
+
+# --- TwinCAT Scope ------------------------------------------------------------------------------
+
+
+def scope(*, shared: bool, decimal: str = ",", end: str = "EOF\r\n", step: str = "1") -> str:
+    """An export as Beckhoff describes it, a time for each channel or one for both."""
+    between = [] if shared else [None]
+
+    def row(key: str, *values: str) -> str:
+        cells = [key]
+        for k, value in enumerate(values):
+            cells += ([key] if k and not shared else []) + [value]
+        return "\t".join(cells)
+
+    head = [
+        "Name\tScope01", "File\tC:\\a.svd", f"StartRecord\t{FILETIME}\tDienstag\t22:13:20", "",
+        row("Name", "ActPos", "Torque"), row("NetId", "1.1.1.1", "1.1.1.1"),
+        row("Port", "851", "851"), row("SampleTime[ms]", "1", step),
+        row("SymbolName", "MAIN.fPos", "MAIN.fForce"), row("Data-Type", "REAL64", "REAL64"), "",
+    ]  # fmt: skip
+    rows = []
+    for k in range(COUNT):
+        cells = [str(k), repr(float(Q[k])), *([str(k)] * len(between)), repr(float(F[k]))]
+        rows.append("\t".join(cells).replace(".", decimal))
+    return "\r\n".join([*head, *rows]) + "\r\n" + end
+
+
+SCOPE_MAP = """
+[axes.x]
+position = {column = "MAIN.fPos", unit = "mm"}
+force = {column = "MAIN.fForce", unit = "N"}
+"""
+
+
+@pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize(("decimal", "end"), [(",", "EOF\r\n"), (".", "")])
+def test_twincat_scope(tmp_path, shared, decimal, end):
+    (tmp_path / "a.csv").write_text(scope(shared=shared, decimal=decimal, end=end))
+    log = imported(tmp_path, "a.csv", SCOPE_MAP)
+    assert log.sample_rate == 1000.0
+    assert log.metadata["start_time_unix_ns"] == str(EPOCH * 10**9)
+    assert_signals(log)
+    timed = 'time = {column = "time", unit = "ms"}' + SCOPE_MAP
+    assert_signals(imported(tmp_path, "a.csv", timed))
+
+
+def test_channels_of_two_sample_times_are_refused(tmp_path):
+    (tmp_path / "a.csv").write_text(scope(shared=False, step="2"))
+    with pytest.raises(InputError, match="sample times of 1, 2 ms"):
+        imported(tmp_path, "a.csv", SCOPE_MAP)
+
+
+# --- MCAP ---------------------------------------------------------------------------------------
+
+JOINT_STATE = """std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+
+
+def write_joint_states(path: Path) -> None:
+    ros2 = pytest.importorskip("mcap_ros2.writer", reason="extra import")
+    with open(path, "wb") as stream:
+        writer = ros2.Writer(stream)
+        schema = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
+        for k in range(COUNT):
+            at = EPOCH * 10**9 + k * 10**6
+            message = {
+                "header": {"stamp": {"sec": at // 10**9, "nanosec": at % 10**9}, "frame_id": ""},
+                "name": ["wrist", "elbow"], "position": [0.0, Q[k]], "velocity": [0.0, 1.0],
+                "effort": [1.0, F[k]],
+            }  # fmt: skip
+            writer.write_message("/joint_states", schema, message, log_time=at + 7 * (k % 5))
+        writer.finish()
+
+
+@pytest.mark.parametrize("entry", ["[2]", ".elbow"])
+@pytest.mark.parametrize("time", ["header.stamp", "log_time"])
+def test_joint_states_of_ros_2(tmp_path, entry, time):
+    write_joint_states(tmp_path / "a.mcap")
+    text = f"""
+time = {{column = "/joint_states.{time}", unit = "s"}}
+[axes.elbow]
+position = {{column = "/joint_states.position{entry}", unit = "mrad"}}
+force = {{column = "/joint_states.effort{entry}", unit = "Nm"}}
+"""
+    log = imported(tmp_path, "a.mcap", text)
+    assert (log.sample_rate, log.axes["elbow"].kind.kind) == (1000.0, "rotary")
+    assert log.metadata["start_time_unix_ns"] == str(EPOCH * 10**9)
+    assert_signals(log, "elbow")
+    with pytest.raises(InputError, match=r"did you mean '/joint_states.position"):
+        imported(tmp_path, "a.mcap", text.replace("states.position", "states.positin"))
+
+
+def test_json_in_mcap_and_a_damaged_one(tmp_path):
+    from mcap.writer import Writer
+
+    with open(tmp_path / "a.mcap", "wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel("/drive", "json", 0)
+        for k in range(COUNT):
+            message = {"a": {"q": float(Q[k])}, "f": [float(F[k]), 0], "on": True, "id": "z"}
+            text = json.dumps(message)
+            writer.add_message(channel, k * 10**6, text.encode(), k * 10**6)
+        writer.finish()
+    text = """
+sample_rate = 1000.0
+[axes.x]
+position = {column = "/drive.a.q", unit = "mm"}
+force = {column = "/drive.f[1]", unit = "N"}
+"""
+    assert_signals(imported(tmp_path, "a.mcap", text))
+    data = bytearray((tmp_path / "a.mcap").read_bytes())
+    data[len(data) // 4] ^= 1
+    (tmp_path / "a.mcap").write_bytes(data)
+    with pytest.raises(InputError):
+        imported(tmp_path, "a.mcap", text)
+
+
+# --- several files ------------------------------------------------------------------------------
+
+TWO = """
+resample = 1000.0
+[[files]]
+time = {column = "t", unit = "s"}
+[[files]]
+sample_rate = 2000.0
+offset = 1.5
+[axes.x]
+position = {column = "q", unit = "mm"}
+force = {column = "q", unit = "N", file = 2}
+"""
+
+
+def write_two(folder: Path) -> list[Path]:
+    """A position with uneven times; a force that is sampled twice as fast from 1.5 s on."""
+    steps = 1e-3 * (1.0 + 0.2 * np.random.default_rng(1).uniform(-1.0, 1.0, 4000))
+    times, late = np.cumsum(steps), 1.5 + np.arange(3000) / 2000.0
+    for name, columns in (("a.csv", (times, np.sin(times))), ("b.csv", (late, np.cos(late)))):
+        rows = [f"{float(t)!r},{float(q)!r}" for t, q in zip(*columns, strict=True)]
+        (folder / name).write_text("\n".join(["t,q", *rows]) + "\n")
+    return [folder / "a.csv", folder / "b.csv"]
+
+
+def test_two_files_on_one_clock(tmp_path):
+    paths = write_two(tmp_path)
+    log = import_log(paths, mapping(tmp_path, TWO))
+    t = 1.5 + np.arange(len(log)) / 1000.0
+    assert len(log) == pytest.approx(1500, abs=2)
+    np.testing.assert_allclose(log.axes["x"].position, 1e-3 * np.sin(t), atol=2e-10)
+    np.testing.assert_allclose(log.axes["x"].force, np.cos(t), atol=1e-9)
+    assert log.metadata["original_sha256"].count(",") == 1
+    assert "x.position" in log.metadata["resampled_1"]
+    assert "x.force" in log.metadata["resampled_2"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("offset = 1.5", "offset = 15.0"), "no time in common .*a.csv .* s; .*b.csv .* to 16.49"),
+        (("resample = 1000.0", ""), "several clocks; give resample"),
+        (("file = 2", "file = 1"), "no signal with file = 2"),
+        (("file = 2", "file = 3"), r"file = 3: the map has 2 \[\[files\]\]"),
+        (("sample_rate = 2000.0", ""), "files 2: give either time or sample_rate"),
+        (("resample = 1000.0", "resample = 1000.0\nsample_rate = 5.0"), "give them under"),
+    ],
+)
+def test_what_is_wrong_with_several_files_is_said(tmp_path, change, message):
+    paths = write_two(tmp_path)
+    with pytest.raises(InputError, match=message):
+        import_log(paths, mapping(tmp_path, TWO.replace(*change)))
+
+
+def test_as_many_files_as_tables(tmp_path):
+    paths = write_two(tmp_path)
+    with pytest.raises(InputError, match=r"1 files are given, the map has 2 \[\[files\]\]"):
+        import_log(paths[:1], mapping(tmp_path, TWO))
+    with pytest.raises(InputError, match=r"several need a table \[\[files\]\]"):
+        import_log(paths, mapping(tmp_path, SCOPE_MAP))
+
+
+# --- times --------------------------------------------------------------------------------------
+
+
+def test_times_since_1970_are_shown_as_dates(tmp_path):
+    assert instant(1.25) == "1.25 s"
+    assert instant(EPOCH + 0.5) == "2023-11-14 22:13:20.5 UTC"
+    t = EPOCH + T
+    t[200:] += 0.5
+    rows = [f"{float(a)!r},{float(q)!r}" for a, q in zip(t, Q, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["t,q", *rows]) + "\n")
+    text = """
+time = {column = "t", unit = "s"}
+[axes.x]
+position = {column = "q", unit = "mm"}
+force = {column = "q", unit = "N"}
+"""
+    with pytest.raises(InputError, match=r"gap: 2023-11-14 22:13:20\.199 UTC is followed by 2023"):
+        imported(tmp_path, "a.csv", text)
+
+
+@pytest.mark.parametrize(
+    ("unit", "size"), [("kip", 4448.2216), ("lbf", 4.4482216), ("in", 0.0254), ("ozf", 0.27801385)]
+)
+def test_units_of_a_library(tmp_path, unit, size):
+    rows = [f"{float(q)!r},{float(q)!r}" for q in Q]
+    (tmp_path / "a.csv").write_text("\n".join(["a,b", *rows]) + "\n")
+    own = {"position": "m", "force": "N"} | {"position" if unit == "in" else "force": unit}
+    text = "sample_rate = 1000.0\n[axes.x]\n" + "\n".join(
+        f'{field} = {{column = "{c}", unit = "{u}"}}'
+        for (field, u), c in zip(own.items(), "ab", strict=True)
+    )
+    axis = imported(tmp_path, "a.csv", text).axes["x"]
+    got = axis.position if unit == "in" else axis.force
+    np.testing.assert_allclose(got, size * Q, rtol=1e-7)

@@ -1,0 +1,172 @@
+"""MCAP of other writers: protobuf, JSON and ROS 2 messages, one column a number in a message.
+
+A column is ``topic.field``, ``topic.field.inner``, or ``topic.field[1]`` for the first of an array;
+where a message names the entries of its arrays, as sensor_msgs/JointState does, also
+``topic.field.name``. ``topic.log_time`` and time stamps in a message are times since 1970.
+"""
+
+from __future__ import annotations
+
+import json
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.log.container import Inflation, open_mcap, parse, payloads
+from twin.log.decode import message_parts, record_at
+from twin.log.importers.mapping import ImportMap
+from twin.log.importers.table import Table, chosen, extra, parsing, require_columns
+
+LOG_TIME = "log_time"
+_STAMPS = (("sec", "nanosec"), ("seconds", "nanos"))  # ROS 2, protobuf
+
+Decode = Callable[[bytes], Any]
+
+
+def read(path: Path, mapping: ImportMap) -> Table:
+    """Columns of an MCAP file; raises InputError."""
+    wanted = mapping.column_names()
+    with parsing("MCAP"):
+        columns = _read(path, wanted)
+    return Table({name: columns[name] for name in chosen(wanted, columns)})
+
+
+def _read(path: Path, wanted: Sequence[str]) -> dict[str, NDArray]:
+    topics = _Topics()
+    held: dict[str, array] = {}
+    stamps: set[str] = set()
+    seen: dict[str, None] = {}
+    for topic, time, decoded in topics.messages(path, wanted):
+        values = _flat(f"{topic}.", decoded) if decoded is not None else {}
+        values[f"{topic}.{LOG_TIME}"] = np.datetime64(time, "ns")
+        seen.update(dict.fromkeys(values))
+        for name in wanted or values:
+            if name in values:
+                value = values[name]
+                if isinstance(value, np.datetime64):
+                    stamps.add(name)
+                    value = int(value.astype(np.int64))
+                held.setdefault(name, array("q" if name in stamps else "d")).append(value)
+            elif name in held and name.startswith(f"{topic}."):
+                raise InputError(f"a message on {topic} at {time} ns has no '{name}'")
+    require_columns(wanted, seen)
+    return {
+        name: np.array(column, "datetime64[ns]") if name in stamps else np.array(column)
+        for name, column in held.items()
+    }
+
+
+class _Topics:
+    """Schemas, channels and decoders of a file."""
+
+    def __init__(self) -> None:
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._decoders: dict[int, Decode | None] = {}
+
+    def messages(self, path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
+        """Topic, log time in ns and message; of topics that are not wanted the first alone."""
+        shown: set[int] = set()
+        with open_mcap(path) as file:
+            for payload in payloads(file.records(), lambda record: None, Inflation(file.size)):
+                offset = 0
+                while offset < len(payload.data):
+                    opcode, content, offset = record_at(payload.data, offset)
+                    if opcode != Opcode.MESSAGE:
+                        self._register(opcode, content)
+                        continue
+                    number, _, time, _, data = message_parts(content)
+                    topic = self._channels[number].topic
+                    if number in shown and not any(
+                        w.startswith(f"{topic}.") for w in wanted or (f"{topic}.",)
+                    ):
+                        continue
+                    shown.add(number)
+                    decode = self._decoder(number)
+                    yield topic, time, decode(data) if decode else None
+
+    def _register(self, opcode: int, content: bytes) -> None:
+        if opcode == Opcode.SCHEMA:
+            schema = parse(Schema, content, "schema record")
+            self._schemas[schema.id] = schema
+        else:
+            channel = parse(Channel, content, "channel record")
+            self._channels[channel.id] = channel
+
+    def _decoder(self, number: int) -> Decode | None:
+        """How the messages of a channel are read; None where nothing here can."""
+        if number not in self._decoders:
+            channel = self._channels[number]
+            schema = self._schemas.get(channel.schema_id)
+            self._decoders[number] = _decoder_for(channel.message_encoding, schema)
+        return self._decoders[number]
+
+
+def _decoder_for(encoding: str, schema: Schema | None) -> Decode | None:
+    if encoding == "json":
+        return json.loads
+    modules = {"cdr": "mcap_ros2.decoder", "protobuf": "mcap_protobuf.decoder"}
+    if encoding not in modules:
+        return None
+    return extra(modules[encoding]).DecoderFactory().decoder_for(encoding, schema)
+
+
+def _flat(prefix: str, message: Any) -> dict[str, Any]:
+    """The numbers and time stamps of a message by name."""
+    fields = _fields(message)
+    out: dict[str, Any] = {}
+    names = _names_of_entries(fields)
+    for name, value in fields.items():
+        if isinstance(value, bool | int | float | np.number):
+            out[f"{prefix}{name}"] = float(value)
+        elif (
+            isinstance(value, Mapping)
+            or hasattr(value, "__slots__")
+            or hasattr(value, "DESCRIPTOR")
+        ):
+            stamp = _stamp(_fields(value))
+            out |= (
+                {f"{prefix}{name}": stamp}
+                if stamp is not None
+                else _flat(f"{prefix}{name}.", value)
+            )
+        elif not isinstance(value, str | bytes) and hasattr(value, "__len__"):
+            for k, entry in enumerate(value):
+                keys = [f"{prefix}{name}[{k + 1}]"]
+                if len(names) == len(value):
+                    keys.append(f"{prefix}{name}.{names[k]}")
+                if isinstance(entry, bool | int | float | np.number):
+                    out |= dict.fromkeys(keys, float(entry))
+    return out
+
+
+def _fields(message: Any) -> Mapping[str, Any]:
+    if isinstance(message, Mapping):
+        return message
+    if hasattr(message, "DESCRIPTOR"):
+        return {f.name: getattr(message, f.name) for f in message.DESCRIPTOR.fields}
+    return {name: getattr(message, name) for name in getattr(message, "__slots__", ())}
+
+
+def _names_of_entries(fields: Mapping[str, Any]) -> list[str]:
+    """The one list of texts in a message; nothing where there is none."""
+    for value in fields.values():
+        if isinstance(value, str | bytes) or not hasattr(value, "__len__") or not len(value):
+            continue
+        if not isinstance(value, Mapping) and all(isinstance(v, str) for v in value):
+            return list(value)
+    return []
+
+
+def _stamp(fields: Mapping[str, Any]) -> np.datetime64 | None:
+    for seconds, rest in _STAMPS:
+        if set(fields) == {seconds, rest}:
+            return np.datetime64(int(fields[seconds]) * 10**9 + int(fields[rest]), "ns")
+    return None
