@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from identify.dataset.dataset import Dataset, datasets, inertia
+from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.excitation import excitation
 from identify.dataset.motion import Motion, motion_of
 from identify.dataset.test_function import TestFunction
+from identify.dataset.time_scale import inertia
 from identify.estimation.cable_force import CableForce
 from identify.estimation.cable_force import cable_force as of_cable
 from identify.estimation.velocity_map import VelocityMap

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from twin.model.machine import MachineModel
 
 Result = TypeVar("Result")
-MEASURED = frozenset({"position", "velocity", "setpoint_position", "current", "force"})
+MEASURED = ("position", "velocity", "setpoint_position", "current", "force")
 
 app = typer.Typer(
     help="Find out why the model and the machine disagree.",

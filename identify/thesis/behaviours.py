@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.core.control import Controller
+from twin.experiments.follow import follow
 from twin.experiments.kinds import Staircase
-from twin.experiments.named import follow, simulate
+from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
 from twin.log import Log
 from twin.model.machine import MachineModel

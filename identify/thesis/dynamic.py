@@ -32,8 +32,9 @@ from identify.thesis.track import APART, FIRST
 from twin.core.control import Controller
 from twin.effect import Kind
 from twin.effects import Catalogue
+from twin.experiments.follow import follow
 from twin.experiments.kinds import Reversals
-from twin.experiments.named import follow, simulate
+from twin.experiments.named import simulate
 from twin.experiments.trajectory import open_loop_sine
 from twin.log import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
