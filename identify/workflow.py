@@ -247,20 +247,32 @@ def _addition(
     )
     new = model.with_axis(name, best.fit.axis).with_history(step)
     new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
-    first = next(iter(by_log(prepared).values()))
+    moving, replayed = _position_errors(model, new, name, prepared)
     return Addition(
         model=new,
         step=step,
         candidate=best,
         kept=best.supported,
-        position_error=(
-            rms_error(free_run(model, first), name),
-            rms_error(free_run(new, first), name),
-        ),
-        replayed=rms_error(free_run(new, first, MujocoSimulator), name),
+        position_error=moving,
+        replayed=replayed,
         moved=moved,
         set_aside=set_aside,
     )
+
+
+def _position_errors(
+    before: MachineModel, after: MachineModel, axis: str, prepared: Mapping[str, Dataset]
+) -> tuple[tuple[float, float] | None, float | None]:
+    """Free-running position error (m RMS) on the first log: before and after, and in MuJoCo after.
+
+    None where the motion is imposed.
+    """
+    if after.is_imposed:
+        return None, None
+    log = next(iter(by_log(prepared).values()))
+    runs = (free_run(before, log), free_run(after, log), free_run(after, log, MujocoSimulator))
+    was, now, replayed = (rms_error(run, axis) for run in runs)
+    return (was, now), replayed
 
 
 def agree(

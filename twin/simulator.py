@@ -173,10 +173,11 @@ def run(
     controllers: Mapping[str, Controller] | None = None,
     progress: Progress | None = None,
 ) -> Run:
-    """Run a setpoint on the twin, from rest at its first position.
+    """Run a setpoint on the twin, from rest at its first position; raises CannotRun.
 
     rng draws the encoder noise. controllers: by axis; the model's own bandwidths where None.
     """
+    model.require_mass()
     table = model.table()
     setpoints = np.stack(
         [setpoint.position, setpoint.velocity, setpoint.acceleration, setpoint.force], axis=2

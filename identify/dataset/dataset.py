@@ -104,7 +104,7 @@ def datasets(
         if not fit:
             continue
         held, still_held = _moving(holdout, name, tuple(model.axes))
-        length = test_function or choose_test_function(fit, held)
+        length = test_function or choose_test_function(fit, held, imposed=axis.is_imposed)
         out[name] = Dataset(
             axis=name,
             fit=tuple(PreparedLog.of(m, length) for m in fit),
@@ -186,12 +186,14 @@ def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array)
         )
 
 
-def choose_test_function(motions: Sequence[Motion], others: Sequence[Motion] = ()) -> float:
+def choose_test_function(
+    motions: Sequence[Motion], others: Sequence[Motion] = (), *, imposed: bool = False
+) -> float:
     """The shortest test function (s) whose noise floor is small against the force to be explained.
 
-    others: motions whose blocks it must also be long enough for.
+    others: motions whose blocks it must also be long enough for. imposed: whether there is no mass.
     """
-    mass = inertia(motions)
+    mass = 0.0 if imposed else inertia(motions)
     longest_block = max(m.period for m in (*motions, *others))
     for length in TEST_FUNCTIONS:
         if length < LEAST_BLOCKS * longest_block:

@@ -78,6 +78,16 @@ def compare_json(result: Comparison) -> dict[str, Any]:
     return {"axes": {axis: _axis_comparison(c) for axis, c in result.axes.items()}}
 
 
+def _position_error(c: AxisComparison, log: str) -> dict[str, Any]:
+    """The position error of a log; null of imposed motion."""
+    error = c.position_error.get(log)
+    return {
+        "position_error": error,
+        "position_unit": c.units.position,
+        "position_ratio": error and error / max(c.position_floor[log], 1e-300),
+    }
+
+
 def _axis_comparison(c: AxisComparison) -> dict[str, Any]:
     return {
         "logs": {
@@ -85,9 +95,7 @@ def _axis_comparison(c: AxisComparison) -> dict[str, Any]:
                 "force_error": error,
                 "force_unit": c.units.force,
                 "force_ratio": error / c.floor,
-                "position_error": c.position_error[name],
-                "position_unit": c.units.position,
-                "position_ratio": c.position_error[name] / max(c.position_floor[name], 1e-300),
+                **_position_error(c, name),
             }
             for name, error in c.force_error.items()
         },
@@ -265,7 +273,7 @@ def _simulated(t: SimulatedExperiment, several: bool) -> dict[str, Any]:
 
 def add_json(result: Addition) -> dict[str, Any]:
     """Errors before and after, whether the effect is supported, and what it changed."""
-    step = result.step
+    step, (before, after) = result.step, result.position_error or (None, None)
     return {
         "effect": step.effect,
         "axis": step.axis,
@@ -277,8 +285,8 @@ def add_json(result: Addition) -> dict[str, Any]:
         "holdout_error_after": step.holdout_error_after,
         "noise_floor": result.candidate.fit.floor,
         "unit": step.unit,
-        "position_error_before": result.position_error[0],
-        "position_error_after": result.position_error[1],
+        "position_error_before": before,
+        "position_error_after": after,
         "position_error_in_mujoco": result.replayed,
         "position_unit": result.units.position,
         "parameters": dict(result.candidate.fit.axis[step.effect].values),

@@ -123,16 +123,16 @@ class Addition:
 
     step: errors before and after. kept: whether evidence and held-out logs support the effect.
     position_error: free-running RMS error before and after; replayed: the same after, stepped by
-    MuJoCo. Both in the units of the axis. moved: parameters that the effect changed.
-    set_aside: nonparametric effects that were removed from the model before.
+    MuJoCo. Both in the units of the axis, None where the motion is imposed. moved: parameters that
+    the effect changed. set_aside: nonparametric effects that were removed from the model before.
     """
 
     model: MachineModel
     step: HistoryStep
     candidate: Candidate
     kept: bool
-    position_error: tuple[float, float]
-    replayed: float
+    position_error: tuple[float, float] | None
+    replayed: float | None
     moved: tuple[MovedParameter, ...] = ()
     set_aside: tuple[str, ...] = ()
 

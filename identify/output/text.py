@@ -37,6 +37,7 @@ from twin.experiments.kinds import kind_of
 
 if TYPE_CHECKING:  # results print themselves by these functions
     from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+    from identify.validation.misfit_maps import AxisComparison
 
 
 def fit_text(result: FitResult) -> str:
@@ -84,6 +85,14 @@ def _with_interval(e: Estimate, common: NoInterval | None) -> str:
     return text + f" 90 % in [{e.low:.6g}, {e.high:.6g}]"
 
 
+def _position_error(c: AxisComparison, log: str) -> str:
+    """The position error of a log, as the rest of a sentence; nothing of imposed motion."""
+    if log not in c.position_error:
+        return ""
+    error = f"{c.position_error[log]:.3g} {c.units.position}"
+    return f", {c.units.words('free-running position error')} {error}"
+
+
 def compare_text(result: Comparison) -> str:
     """Errors by log, and the three worst regions of each axis."""
     lines = []
@@ -92,8 +101,7 @@ def compare_text(result: Comparison) -> str:
         for name, error in c.force_error.items():
             lines.append(
                 f"axis {axis}, {name}: {words('force error')} {error:.4g} {c.units.force} "
-                f"({error / c.floor:.1f} x noise floor), {words('free-running position error')} "
-                f"{c.position_error[name]:.3g} {c.units.position}"
+                f"({error / c.floor:.1f} x noise floor){_position_error(c, name)}"
             )
         lines += [f"  worst: {region_in_words(region)}" for region in c.worst]
         if not c.worst:
@@ -203,11 +211,12 @@ def add_text(result: Addition) -> str:
             f"  {words('force error on the held-out logs'):33s} {s.holdout_error_before:.4g} -> "
             f"{s.holdout_error_after:.4g} {s.unit}"
         )
-    (before, after), unit = result.position_error, result.units.position
-    lines.append(
-        f"  {words('free-running position error'):33s} {before:.3g} -> {after:.3g} {unit} "
-        f"(MuJoCo: {result.replayed:.3g} {unit})"
-    )
+    if result.position_error is not None:
+        (before, after), unit = result.position_error, result.units.position
+        lines.append(
+            f"  {words('free-running position error'):33s} {before:.3g} -> {after:.3g} {unit} "
+            f"(MuJoCo: {result.replayed:.3g} {unit})"
+        )
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
         lines.append(

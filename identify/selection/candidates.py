@@ -77,6 +77,7 @@ def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
         e
         for e in catalogue.values()
         if e.name not in axis.names
+        and axis.can_have(e)
         and (e.kind is not Kind.MODIFIER or has_friction)
         and not e.is_nonparametric
     ]

@@ -44,8 +44,9 @@ def free_run(
     """Run the model on the commands of one log, prepared for each of its axes.
 
     noise: generator of measurement noise of the log's level, added to its readings and commands;
-    no noise is added where None.
+    no noise is added where None. Raises CannotRun where the motion of an axis is imposed.
     """
+    model.require_mass()
     model = _as_logged(model, logs)
     position, command = _signals(model, logs, noise)
     n, period = len(position), model.period

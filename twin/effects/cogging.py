@@ -53,7 +53,7 @@ EFFECT = Effect(
         Parameter("p", "m", 0.024, 1e-4, 10.0, "magnet pitch", scan=pitches, period=True),
         *(
             Parameter(
-                f"{c}{k}", "N", 0.0, -1e4, 1e4, f"{f} term of harmonic {k}", strength=True,
+                f"{c}{k}", "N", 0.0, -1e7, 1e7, f"{f} term of harmonic {k}", strength=True,
                 screened=k == 1,
             )
             for k in (1, 2, 3)

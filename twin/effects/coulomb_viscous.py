@@ -46,14 +46,14 @@ EFFECT = Effect(
     source="L. Jia 2023, eq. 2.1-2.2, section 2.1.3",
     parameters=(
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.3, 0.0, 1e4, "static friction", strength=True, dry=True, fixed=True,
+            "Fs", "N", 0.3, 0.0, 1e7, "static friction", strength=True, dry=True, fixed=True,
             at_least="Fc", start_rule=lambda e: e.dry_level,
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
     ),
     states=("at_rest",),
     sticks=True,

@@ -149,7 +149,7 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
 
 
 def _knots(names: tuple[str, ...], meaning: str) -> tuple[Parameter, ...]:
-    return tuple(Parameter(n, "N", 0.0, -1e4, 1e4, meaning, strength=True) for n in names)
+    return tuple(Parameter(n, "N", 0.0, -1e7, 1e7, meaning, strength=True) for n in names)
 
 
 EFFECT = of_size(40)

@@ -117,11 +117,11 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
             "elements", "1", elements, elements, elements, "number N, from the model file"
         ),
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.35, 0.0, 1e4, "static friction", strength=True, dry=True, at_least="Fc",
+            "Fs", "N", 0.35, 0.0, 1e7, "static friction", strength=True, dry=True, at_least="Fc",
             start_rule=lambda e: 1.15 * e.dry_level,
         ),
         Parameter(
@@ -129,7 +129,7 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
             start_rule=lambda e: 0.05 * e.speed_max,
             scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
         Parameter(
             "sigma0", "N/m", 300.0, 1.0, 1e9, "stiffness of all elements together",
             start_rule=lambda e: 1e3 * e.dry_level,

@@ -207,13 +207,10 @@ def _added(addition: Addition) -> Answer:
     if step.holdout_error_before is not None and step.holdout_error_after is not None:
         held = _change(step.unit, step.holdout_error_before, step.holdout_error_after)
         tiles.append(Tile(words("Held-out force error"), held, "RMS"))
-    tiles.append(
-        Tile(
-            words("Position, free run"),
-            _change(unit, *addition.position_error),
-            f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo",
-        )
-    )
+    if addition.position_error and addition.replayed is not None:
+        moved = _change(unit, *addition.position_error)
+        replayed = f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo"
+        tiles.append(Tile(words("Position, free run"), moved, replayed))
     sentence = "The evidence and the held-out logs support the effect."
     if not addition.kept:
         sentence = (
