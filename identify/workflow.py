@@ -7,7 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from identify.dataset.dataset import Dataset, by_log, datasets
+from identify.addition import addition
+from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.fit import Fit, holdout_error
@@ -16,23 +17,20 @@ from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.measure import cable_force, velocity_map
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
-from identify.output.words.selection import addition_notes
-from identify.selection.candidates import Candidate, score, try_effect, usable
-from identify.selection.confounded import moved_parameters
+from identify.selection.candidates import score, try_effect, usable
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
-from identify.selection.nonparametric import fit_nonparametric, physics_alone
+from identify.selection.nonparametric import fit_in_place, fit_nonparametric, physics_alone
+from identify.selection.wrong_shape import best_shape, having_shape
 from identify.thesis.study import Reproduction
 from identify.thesis.study import reproduce as study
 from identify.validation.agreement import Agreement, agreement
-from identify.validation.free_run import free_run, rms_error
 from identify.validation.misfit_maps import compare_axis, position_errors
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.log import Log
-from twin.model.machine import AxisModel, HistoryStep, MachineModel
-from twin.simulator import MujocoSimulator
+from twin.model.machine import AxisModel, MachineModel
 
 Logs = Mapping[str, Log]
 Progress = Callable[[str, int, int], None]
@@ -207,7 +205,43 @@ def add(
     tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]
     best = max(tried, key=lambda c: c.delta_bic)
     progress("adding", 1, 1)
-    return _addition(best, before.fits[best.axis], before.datasets, before.model, given)
+    return addition(best, before.fits[best.axis], before.datasets, before.model, given)
+
+
+def add_shape(
+    effect: Effect,
+    model: MachineModel,
+    logs: Logs,
+    holdout: Logs | None = None,
+    *,
+    axis: str | None = None,
+    test_function: float | None = None,
+    progress: Progress = silent,
+) -> Addition:
+    """Give the law of an effect the shape that the logs show, refit and record the errors.
+
+    A free curve takes the law's place, or goes beside a friction law, which holds the axis at rest.
+    axis: that which it helps most where None. Raises InputError where no axis has the effect, where
+    its law assumes no curve, where the axis has a free curve already, and where the logs ask for
+    none.
+    """
+    names = having_shape(effect, model, axis)
+    before = fit(model, logs, holdout, test_function=test_function, progress=progress)
+    tried = [
+        fit_in_place(before.fits[n], before.datasets[n], shape)
+        for n in names
+        if n in before.fits
+        and (shape := best_shape(before.fits[n], before.datasets[n], effect.name))
+    ]
+    if not tried:
+        raise InputError(
+            f"the logs show no other shape of {effect.name}: no curve in its place lowers their "
+            "error; `twin diagnose` says what the model lacks"
+        )
+    best = max(tried, key=lambda c: c.delta_bic)
+    progress("adding", 1, 1)
+    fitted, prepared = before.fits[best.axis], before.datasets
+    return addition(best, fitted, prepared, before.model, model, reshaped=effect.name)
 
 
 def add_named(found: Diagnosis) -> Addition | None:
@@ -219,60 +253,7 @@ def add_named(found: Diagnosis) -> Addition | None:
     if best is None or not any(c is best for c in leading.ranking):
         return None
     prepared = {axis: one.dataset for axis, one in found.axes.items()}
-    return _addition(best, leading.base, prepared, found.model, found.model)
-
-
-def _addition(
-    best: Candidate,
-    base: Fit,
-    prepared: Mapping[str, Dataset],
-    model: MachineModel,
-    given: MachineModel,
-) -> Addition:
-    """The candidate added to a fitted model; ``given``: the model before that was fitted."""
-    name = best.axis
-    moved = moved_parameters(base, best.fit)
-    left = model.axes[name].names
-    set_aside = tuple(n for n in given.axes[name].names if n not in left)
-    step = HistoryStep(
-        action="add",
-        effect=best.effect.name,
-        axis=name,
-        fit_error_before=base.error,
-        fit_error_after=best.fit.error,
-        holdout_error_before=holdout_error(base, prepared[name]),
-        holdout_error_after=holdout_error(best.fit, prepared[name]),
-        unit=best.fit.axis.units.force,
-        notes=addition_notes(best, moved, set_aside),
-    )
-    new = model.with_axis(name, best.fit.axis).with_history(step)
-    new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
-    moving, replayed = _position_errors(model, new, name, prepared)
-    return Addition(
-        model=new,
-        step=step,
-        candidate=best,
-        kept=best.supported,
-        position_error=moving,
-        replayed=replayed,
-        moved=moved,
-        set_aside=set_aside,
-    )
-
-
-def _position_errors(
-    before: MachineModel, after: MachineModel, axis: str, prepared: Mapping[str, Dataset]
-) -> tuple[tuple[float, float] | None, float | None]:
-    """Free-running position error (m RMS) on the first log: before and after, and in MuJoCo after.
-
-    None where the motion is imposed.
-    """
-    if after.is_imposed:
-        return None, None
-    log = next(iter(by_log(prepared).values()))
-    runs = (free_run(before, log), free_run(after, log), free_run(after, log, MujocoSimulator))
-    was, now, replayed = (rms_error(run, axis) for run in runs)
-    return (was, now), replayed
+    return addition(best, leading.base, prepared, found.model, found.model)
 
 
 def agree(
@@ -309,6 +290,7 @@ __all__ = [
     "FitResult",
     "add",
     "add_named",
+    "add_shape",
     "agree",
     "cable_force",
     "compare",

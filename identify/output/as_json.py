@@ -275,6 +275,7 @@ def add_json(result: Addition) -> dict[str, Any]:
     """Errors before and after, whether the effect is supported, and what it changed."""
     step, (before, after) = result.step, result.position_error or (None, None)
     return {
+        "action": step.action,
         "effect": step.effect,
         "axis": step.axis,
         "is_nonparametric": result.candidate.effect.is_nonparametric,
@@ -289,6 +290,6 @@ def add_json(result: Addition) -> dict[str, Any]:
         "position_error_after": after,
         "position_error_in_mujoco": result.replayed,
         "position_unit": result.units.position,
-        "parameters": dict(result.candidate.fit.axis[step.effect].values),
+        "parameters": dict(result.candidate.fit.axis[result.candidate.effect.name].values),
         "notes": list(result.notes),
     }

@@ -22,6 +22,7 @@ from identify.output.words.selection import (
     nonparametric_in_words,
     refit_in_words,
     remainder_in_words,
+    step_in_words,
     verdict_in_words,
 )
 from identify.output.words.validation import (
@@ -202,7 +203,7 @@ def add_text(result: Addition) -> str:
     """The errors before and after adding the effect."""
     s, words = result.step, result.units.words
     lines = [
-        f"added {s.effect} to axis {s.axis}",
+        step_in_words(s),
         f"  {words('force error on the fit logs'):33s} {s.fit_error_before:.4g} -> "
         f"{s.fit_error_after:.4g} {s.unit}",
     ]

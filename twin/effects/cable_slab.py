@@ -5,7 +5,8 @@ F(x) = -(offset + k1 x + k2 x^2 + k3 x^3); it falls with x because the fold of t
 choice: the thesis prints a measured curve, no formula.
 """
 
-from twin.effect import OUT, Coordinate, Curve, Effect, Kind, Parameter, X
+from twin.curve import Coordinate, Curve
+from twin.effect import OUT, Effect, Kind, Parameter, X
 
 
 def law(p, s, io):
@@ -25,7 +26,7 @@ EFFECT = Effect(
         Parameter("k3", "N/m^3", 0.0, -1e7, 1e7, "cubic term", strength=True),
     ),
     law=law,
-    curve=Curve(Coordinate.POSITION),
+    curves=(Curve(Coordinate.POSITION),),
     fingerprint="residual is one smooth curve of position, the same in both directions",
     excited_by="slow passes over the whole travel in both directions",
 )

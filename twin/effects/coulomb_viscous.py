@@ -8,20 +8,8 @@ level allows it, exactly that force acts and the axis is at rest to rounding, so
 
 from math import copysign
 
-from twin.effect import (
-    DRY,
-    HOLD,
-    INDEX,
-    OUT,
-    STATIC,
-    VISCOUS,
-    Coordinate,
-    Curve,
-    Effect,
-    Kind,
-    Parameter,
-    V,
-)
+from twin.curve import FRICTION_CURVES
+from twin.effect import DRY, HOLD, INDEX, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -58,7 +46,7 @@ EFFECT = Effect(
     states=("at_rest",),
     sticks=True,
     law=law,
-    curve=Curve(Coordinate.SPEED, by_direction=True),
+    curves=FRICTION_CURVES,
     fingerprint="force steps at every reversal, and grows in proportion to speed",
     excited_by="constant-speed passes in both directions at several speeds",
 )  # fmt: skip

@@ -10,7 +10,8 @@ r falls along the path as dr/d|x| = -sigma0/Fc r^n, which is integrated exactly 
 
 from math import copysign, exp, expm1, log, log1p
 
-from twin.effect import DRY, DT, OUT, VISCOUS, WHEN, Coordinate, Curve, Effect, Kind, Parameter, V
+from twin.curve import FRICTION_CURVES
+from twin.effect import DRY, DT, OUT, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -54,7 +55,7 @@ EFFECT = Effect(
     ),
     states=("F",),
     law=law,
-    curve=Curve(Coordinate.SPEED, by_direction=True),
+    curves=FRICTION_CURVES,
     fingerprint="residual after every reversal over a fixed distance, the same at every speed",
     excited_by="reversals at several speeds, with travel of micrometres to millimetres after each",
 )  # fmt: skip

@@ -19,7 +19,8 @@ from functools import cache
 from math import copysign, expm1, sqrt
 from typing import Any
 
-from twin.effect import DT, OUT, TIME, WHEN, Effect, Kind, Parameter, Part, V, X
+from twin.curve import Part
+from twin.effect import DT, OUT, TIME, WHEN, Effect, Kind, Parameter, V, X
 
 KNOTS = 11  # where the knots' parameters begin
 SPEEDS = 17

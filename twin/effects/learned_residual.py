@@ -15,7 +15,8 @@ D. Dung, V. Temlyakov, T. Ullrich, Hyperbolic Cross Approximation, Birkhaeuser (
 from math import copysign, cos, expm1, pi
 from typing import Any
 
-from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, Part, V, X
+from twin.curve import Part
+from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V, X
 
 OWN = 6  # where the coefficients begin
 CROSS = 24

@@ -24,20 +24,8 @@ at the mean of the rates at both ends of the step: any stiffness is stable.
 
 from math import copysign, exp, expm1, log1p
 
-from twin.effect import (
-    DRY,
-    DT,
-    OUT,
-    STATIC,
-    VISCOUS,
-    WHEN,
-    Coordinate,
-    Curve,
-    Effect,
-    Kind,
-    Parameter,
-    V,
-)
+from twin.curve import FRICTION_CURVES
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 TURNS = 16  # reversals remembered
 FULL = 1.0 - 1e-12  # part of a gap that counts as all of it
@@ -155,7 +143,7 @@ EFFECT = Effect(
     ),
     states=("F_h", "direction", "depth", *(f"turn_{i + 1}" for i in range(TURNS))),
     law=law,
-    curve=Curve(Coordinate.SPEED, by_direction=True),
+    curves=FRICTION_CURVES,
     fingerprint="residual after a reversal that depends on where the axis turned before",
     excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
 )  # fmt: skip

@@ -9,20 +9,8 @@ v, so any stiffness is stable.
 
 from math import copysign, exp, expm1
 
-from twin.effect import (
-    DRY,
-    DT,
-    OUT,
-    STATIC,
-    VISCOUS,
-    WHEN,
-    Coordinate,
-    Curve,
-    Effect,
-    Kind,
-    Parameter,
-    V,
-)
+from twin.curve import FRICTION_CURVES
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 GONE = 40.0  # exp(-40) is below the rounding of what it is added to
 SHORT = 0.05  # below it the series of 1 - exp(-a) to a^8 is exact to rounding
@@ -84,7 +72,7 @@ EFFECT = Effect(
     ),
     states=("z",),
     law=law,
-    curve=Curve(Coordinate.SPEED, by_direction=True),
+    curves=FRICTION_CURVES,
     fingerprint="residual after every reversal over a few bristle deflections of travel",
     excited_by="slow reversals of a few micrometres to millimetres, and a velocity staircase",
 )  # fmt: skip

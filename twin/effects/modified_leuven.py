@@ -21,20 +21,8 @@ rates at both ends of the step, so it never changes sign and any stiffness is st
 from functools import cache
 from math import copysign, exp, expm1, log, log1p
 
-from twin.effect import (
-    DRY,
-    DT,
-    OUT,
-    STATIC,
-    VISCOUS,
-    WHEN,
-    Coordinate,
-    Curve,
-    Effect,
-    Kind,
-    Parameter,
-    V,
-)
+from twin.curve import FRICTION_CURVES
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 SHARES = 11  # where the elements' own parameters begin
 FULL = 1.0 - 1e-12  # part of a limit, or of a gap, that counts as all of it
@@ -148,7 +136,7 @@ def of_size(elements: int) -> Effect:
         ),
         states=tuple(f"F_{i}" for i in numbers),
         law=law,
-        curve=Curve(Coordinate.SPEED, by_direction=True),
+        curves=FRICTION_CURVES,
         fingerprint="residual after a reversal that depends on where the axis turned before",
         excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
         of_size=of_size,

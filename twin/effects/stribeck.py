@@ -11,19 +11,8 @@ allows it, exactly that force acts, so the axis is at rest to rounding and never
 
 from math import copysign, exp
 
-from twin.effect import (
-    DRY,
-    HOLD,
-    OUT,
-    STATIC,
-    VISCOUS,
-    Coordinate,
-    Curve,
-    Effect,
-    Kind,
-    Parameter,
-    V,
-)
+from twin.curve import FRICTION_CURVES
+from twin.effect import DRY, HOLD, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -66,7 +55,7 @@ EFFECT = Effect(
     states=("at_rest",),
     sticks=True,
     law=law,
-    curve=Curve(Coordinate.SPEED, by_direction=True),
+    curves=FRICTION_CURVES,
     fingerprint="residual rises below the Stribeck velocity, with the sign of the direction",
     excited_by="constant-speed passes in both directions, most of them slow",
 )  # fmt: skip

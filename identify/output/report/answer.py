@@ -211,13 +211,14 @@ def _added(addition: Addition) -> Answer:
         moved = _change(unit, *addition.position_error)
         replayed = f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo"
         tiles.append(Tile(words("Position, free run"), moved, replayed))
+    outcome = "added" if step.action == "add" else "given the shape found"
     sentence = "The evidence and the held-out logs support the effect."
     if not addition.kept:
         sentence = (
             "The evidence and the held-out logs do not both support this effect; leave it out."
         )
     return Answer(
-        headline=f"Axis {step.axis}: {spaced(step.effect)} added",
+        headline=f"Axis {step.axis}: {spaced(step.effect)} {outcome}",
         sentence=sentence,
         tiles=tiles,
         remarks=[],

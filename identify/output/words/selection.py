@@ -15,7 +15,7 @@ from identify.selection.nonparametric import followed
 from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
 from twin.effects import load_catalogue
-from twin.model.machine import Fitted
+from twin.model.machine import Fitted, HistoryStep
 from twin.model.units import units_of
 
 VERDICTS = {
@@ -139,22 +139,36 @@ def nonparametric_in_words(fitted: Fitted) -> str:
 
 def advice() -> str:
     """What lowers the error where no physical effect explains it."""
-    known = [e.name for e in load_catalogue().values() if e.is_nonparametric]
+    every = load_catalogue().values()
+    known = [e.name for e in every if e.is_nonparametric and not e.free_shape]
     return f"twin add {' or '.join(known)} lowers the error by fitted curves, without explaining it"
 
 
+def step_in_words(step: HistoryStep) -> str:
+    """What was done to a model: "added cogging to axis x"."""
+    if step.action == "add":
+        return f"added {step.effect} to axis {step.axis}"
+    return f"gave {step.effect} of axis {step.axis} the shape that the logs show"
+
+
 def addition_notes(
-    added: Candidate, moved: Sequence[MovedParameter], set_aside: Sequence[str]
+    added: Candidate,
+    moved: Sequence[MovedParameter],
+    set_aside: Sequence[str],
+    reshaped: str | None = None,
 ) -> tuple[str, ...]:
     """What a reader should know of an added effect, one sentence each.
 
-    set_aside: nonparametric effects that were removed so that the physical effect explains what
+    reshaped: the effect whose law it gives another shape. set_aside: nonparametric effects that were removed so that the physical effect explains what
     they had taken over.
     """
     notes = [moved_in_words(m) for m in moved]
     if added.effect.is_nonparametric:
         notes.insert(0, nonparametric_in_words(added.fit.axis[added.effect.name]))
-    if set_aside:
+    if reshaped:
+        where = "beside" if reshaped in added.fit.axis.names else "in the place of"
+        notes.insert(0, f"{added.effect.name} is {where} the law of {reshaped}")
+    elif set_aside:
         notes.append(
             f"{', '.join(set_aside)} was removed before {added.effect.name} was added; add it "
             "again for the error that is left"

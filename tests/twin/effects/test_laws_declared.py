@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from effect_runs import CATALOGUE, FRICTIONS
 
-from twin.effect import Effect, Excitation, Kind, Parameter, Part, V
+from twin.curve import Part
+from twin.effect import Effect, Excitation, Kind, Parameter, V
 
 LOG = Excitation(
     position_low=-0.13, position_high=0.21, speed_max=0.37, dry_level=0.83, duration=47.0,
