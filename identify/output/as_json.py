@@ -17,6 +17,7 @@ from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Step
 from identify.selection.findings import Finding
+from identify.selection.found_shape import FoundShape
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import ResidualTests
 from twin.experiments.file import parameters
@@ -200,7 +201,27 @@ def _finding(f: Finding) -> dict[str, Any]:
         "parameters": f.parameters,
         "gain": f.proof and f.proof.gain,
         "best_decoy": f.proof and f.proof.best_decoy,
+        "shape": f.shape and _shape(f.shape),
     }
+
+
+def _shape(s: FoundShape) -> dict[str, Any]:
+    """The curve of a law as it is assumed and as it is found, by direction."""
+    return {
+        "over": s.over.value,
+        "coordinate": s.coordinate.tolist(),
+        "coordinate_unit": s.unit,
+        "period": s.period,
+        "lets_go_at_standstill": s.lets_go,
+        "unit": s.force_unit,
+        "curves": {
+            name: {
+                "assumed": c.assumed.tolist(), "found": c.found.tolist(),
+                "band_90": c.band.tolist(),
+            }
+            for name, c in s.curves.items()
+        },
+    }  # fmt: skip
 
 
 def _remainder(d: AxisDiagnosis) -> dict[str, Any] | None:

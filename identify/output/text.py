@@ -22,6 +22,7 @@ from identify.output.words.selection import (
     nonparametric_in_words,
     refit_in_words,
     remainder_in_words,
+    shape_in_words,
     step_in_words,
     verdict_in_words,
 )
@@ -128,6 +129,8 @@ def diagnose_text(result: Diagnosis) -> str:
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         lines += [f"  {words(finding_in_words(f))}" for f in d.findings]
+        shapes = [shape_in_words(f.effect, f.shape) for f in d.findings if f.shape]
+        lines += [f"  {words(text)}" for text in shapes]
         if remains := remainder_in_words(d):
             lines.append(f"  {remains}")
         if d.unexplained:

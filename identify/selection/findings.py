@@ -8,6 +8,7 @@ from enum import Enum
 from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit, holdout_error
 from identify.selection.decoys import Proof, proof
+from identify.selection.found_shape import FoundShape, found_shape
 from identify.selection.ranking import less
 from identify.selection.wrong_shape import WrongShape
 from twin.effect import Effect
@@ -28,7 +29,8 @@ class Finding:
     above the noise floor that comes back when it alone is taken out, about 0..1. error_before,
     error_after: RMS test error in ``unit`` without it and with it; of a wrong shape with the law
     and with a free curve beside it, as one linear step predicts. parameters: of its law. proof:
-    beside decoys; None where a shift in time makes none.
+    beside decoys; None where a shift in time makes none. shape: the curve that is assumed and the
+    one found, of a wrong shape.
     """
 
     effect: str
@@ -40,6 +42,7 @@ class Finding:
     parameters: dict[str, float]
     proof: Proof | None
     kind: FindingKind = FindingKind.MISSING
+    shape: FoundShape | None = None
 
 
 def found(
@@ -75,6 +78,7 @@ def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> F
         parameters=dict(final.axis[shape.effect].values),
         proof=shape.proof,
         kind=FindingKind.WRONG_SHAPE,
+        shape=found_shape(shape.shape, final, dataset),
     )
 
 

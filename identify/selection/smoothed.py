@@ -68,6 +68,23 @@ class Linearised:
         """The same on some of its test functions, (n,)."""
         return replace(self, force=self.force[mask], columns=self.columns[mask])
 
+    def less(self, effect: str) -> Linearised:
+        """The same without the columns of one effect of the base."""
+        kept = np.array([c.effect != effect for c in self.where])
+        both = np.ix_(kept, kept)
+        parts = {name: (rows[both], mask[kept]) for name, (rows, mask) in self.parts.items()}
+        where = [c for c, k in zip(self.where, kept, strict=True) if k]
+        return Linearised(where, self.force, self.columns[:, kept], self.physics[both], parts)
+
+    def spread(self, stiffness: Mapping[str, float]) -> Array:
+        """Covariance (k, k) of all parameters for noise of 1 N; zero for those left out."""
+        used, penalty = self._chosen(stiffness)
+        columns = self.columns[:, used]
+        full = columns.T @ columns + penalty[np.ix_(used, used)]
+        out = np.zeros((len(used), len(used)))
+        out[np.ix_(used, used)] = solve(full, np.eye(len(full)))
+        return out
+
     def _chosen(self, stiffness: Mapping[str, float]) -> tuple[NDArray[np.bool_], Array]:
         """Which columns are used, and the penalty (k, k), with these parts and their stiffness."""
         used = ~np.any([mask for _, mask in self.parts.values()], axis=0)

@@ -36,13 +36,16 @@ DECOYS = 20
 class Shape:
     """A free curve for a law: where it lies, and how smooth it is.
 
-    empty: the free curve at zero, laid over the law's coordinate. stiffness: of each part that the
+    period: m, of the curve; None where it does not repeat. empty: the free curve at zero, laid over
+    the law's coordinate. lets_go: whether it does at standstill. stiffness: of each part that the
     data ask for.
     """
 
     effect: str
     curve: Curve
+    period: float | None
     empty: Fitted
+    lets_go: bool
     stiffness: Mapping[str, float]
 
     @property
@@ -103,10 +106,15 @@ def having_shape(effect: Effect, model: MachineModel, axis: str | None) -> list[
     free = _free().name
     if taken := [n for n in having if free in model.axis(n).names]:
         raise InputError(
-            f"axis {', '.join(taken)} has a {free} in the place of a law already, and can have one; "
-            "`twin fit` refits it"
+            f"axis {', '.join(taken)} has a {free} in the place of a law already, and can have "
+            "one; `twin fit` refits it"
         )
     return having
+
+
+def sticking(fit: Fit, shape: Shape) -> bool:
+    """Whether a curve says nothing of test functions with standstill."""
+    return sticks(fit.axis) or fit.axis[shape.effect].effect.kind is not Kind.FORCE
 
 
 def stays_at_rest(fitted: Fitted) -> bool:
@@ -133,21 +141,17 @@ def _assumed(axis: AxisModel) -> list[tuple[Fitted, Curve]]:
 
 def _chosen(fit: Fit, dataset: Dataset, law: Fitted, curve: Curve) -> Shape | None:
     """The smoothing and the form at standstill with the least cross-validated error."""
-    mask = moving(dataset.fit, _sticking(fit, law))[fit.kept]
     forms = (False, True) if curve.by_direction else (False,)
     best, least = None, np.inf
     for lets_go in forms:
         shape = _laid(law, curve, dataset, lets_go)
+        mask = moving(dataset.fit, sticking(fit, shape))[fit.kept]
         linear = Linearised.about(fit, dataset, shape.empty).on(mask)
         stiffness = choose_stiffness(linear)
         error = linear.left_out_error(stiffness)
         if stiffness and error < least:
             best, least = replace(shape, stiffness=stiffness), error
     return best if best and (best.turns or not curve.rubs) else None
-
-
-def _sticking(fit: Fit, law: Fitted) -> bool:
-    return sticks(fit.axis) or law.effect.kind is not Kind.FORCE
 
 
 def _laid(law: Fitted, curve: Curve, dataset: Dataset, lets_go: bool) -> Shape:
@@ -158,7 +162,7 @@ def _laid(law: Fitted, curve: Curve, dataset: Dataset, lets_go: bool) -> Shape:
     empty = Fitted.at_start(free, values)
     if not curve.by_direction:
         empty = replace(empty, fixed=empty.fixed | set(free.parts[1].strengths))
-    return Shape(law.effect.name, curve, empty, {})
+    return Shape(law.effect.name, curve, period, empty, lets_go, {})
 
 
 def _free() -> Effect:
@@ -167,9 +171,9 @@ def _free() -> Effect:
 
 
 def _proof(trial: Trial, shape: Shape, fit: Fit, dataset: Dataset, *, decoys: int) -> Proof:
-    sticking = _sticking(fit, fit.axis[shape.effect])
-    samples = int(np.count_nonzero(moving(dataset.fit, sticking)))
-    return trial.proof(_columns(fit.axis, shape, samples), sticking=sticking, decoys=decoys)
+    resting = sticking(fit, shape)
+    samples = int(np.count_nonzero(moving(dataset.fit, resting)))
+    return trial.proof(_columns(fit.axis, shape, samples), sticking=resting, decoys=decoys)
 
 
 def _columns(

@@ -11,6 +11,7 @@ from identify.selection.candidates import Candidate
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
+from identify.selection.found_shape import FoundShape
 from identify.selection.nonparametric import followed
 from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
@@ -57,6 +58,25 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
         return text
     gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.best_decoy))
     return f"{text}; in one linear step it takes {gain:.0f} % of it, its best decoy {decoy:.0f} %"
+
+
+def shape_in_words(effect: str, shape: FoundShape, numbers: Numbers = PLAIN) -> str:
+    """Where a law differs most from the curve found, and what that does at standstill."""
+    direction, curve = max(
+        shape.curves.items(), key=lambda c: np.abs(c[1].found - c[1].assumed).max()
+    )
+    at = int(np.argmax(np.abs(curve.found - curve.assumed)))
+    assumed, found, band = (
+        numbers.amount(float(values[at]), shape.force_unit)
+        for values in (curve.assumed, curve.found, curve.band)
+    )
+    place = numbers.amount(float(shape.coordinate[at]), shape.unit)
+    within = "" if shape.period is None else " of its period"
+    rest = " The force is gone at standstill." if shape.lets_go else ""
+    return (
+        f"The law of {effect} is off most at {shape.over.value} {place}{within}, {direction}: it "
+        f"assumes {assumed}, the logs show {found} ± {band}.{rest}"
+    )
 
 
 def remainder_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str | None:
@@ -159,8 +179,8 @@ def addition_notes(
 ) -> tuple[str, ...]:
     """What a reader should know of an added effect, one sentence each.
 
-    reshaped: the effect whose law it gives another shape. set_aside: nonparametric effects that were removed so that the physical effect explains what
-    they had taken over.
+    reshaped: the effect whose law it gives another shape. set_aside: nonparametric effects that
+    were removed so that the physical effect explains what they had taken over.
     """
     notes = [moved_in_words(m) for m in moved]
     if added.effect.is_nonparametric:
