@@ -5,32 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-import numpy as np
-
-from identify.addition import addition
 from identify.dataset.dataset import Dataset, datasets
-from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.fit import Fit, holdout_error
-from identify.estimation.force_balance import residual
+from identify.estimation.force_balance import require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.measure import cable_force, velocity_map
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
-from identify.selection.candidates import score, try_effect, usable
+from identify.output.words.selection import addition_notes
+from identify.selection.candidates import Candidate, score, try_effect, usable
+from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
-from identify.selection.nonparametric import fit_in_place, fit_nonparametric, physics_alone
-from identify.selection.wrong_shape import best_shape, having_shape
+from identify.selection.nonparametric import fit_nonparametric, physics_alone, reshaped
+from identify.selection.wrong_shape import WrongShape, having_shape
 from identify.thesis.study import Reproduction
 from identify.thesis.study import reproduce as study
 from identify.validation.agreement import Agreement, agreement
+from identify.validation.free_run import errors_of_both
 from identify.validation.misfit_maps import compare_axis, position_errors
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.log import Log
-from twin.model.machine import AxisModel, MachineModel
+from twin.model.machine import HistoryStep, MachineModel
 
 Logs = Mapping[str, Log]
 Progress = Callable[[str, int, int], None]
@@ -70,26 +69,6 @@ def fit(
         model = model.with_axis(axis, result.axis)
         model = model.with_intervals(axis, intervals_to_keep(result, intervals[axis]))
     return FitResult(model, found, fits, intervals, held, given, known)
-
-
-def require_residual(axis: AxisModel, dataset: Dataset) -> None:
-    """Raise InputError where no test function is usable, or the residual is not a number."""
-    kept = moving(dataset.fit, sticks(axis))
-    names = ", ".join(log.motion.name for log in dataset.fit)
-    if not kept.any():
-        raise InputError(
-            f"axis {dataset.axis} comes to rest within every test function of "
-            f"{dataset.test_function_length:g} s of {names}, and at rest its friction is unknown; "
-            "give a log in which it moves for longer at a time, or a shorter --test-function (s)"
-        )
-    with np.errstate(all="ignore"):
-        bad = np.count_nonzero(~np.isfinite(residual(axis, dataset.fit)[kept]))
-    if bad:
-        raise InputError(
-            f"axis {dataset.axis}: the force of the model is not a finite number in {bad} of "
-            f"{np.count_nonzero(kept)} test functions of {names}; check the values of its effects, "
-            "or leave them out to begin with their start values"
-        )
 
 
 def compare(
@@ -227,21 +206,10 @@ def add_shape(
     """
     names = having_shape(effect, model, axis)
     before = fit(model, logs, holdout, test_function=test_function, progress=progress)
-    tried = [
-        fit_in_place(before.fits[n], before.datasets[n], shape)
-        for n in names
-        if n in before.fits
-        and (shape := best_shape(before.fits[n], before.datasets[n], effect.name))
-    ]
-    if not tried:
-        raise InputError(
-            f"the logs show no other shape of {effect.name}: no curve in its place lowers their "
-            "error; `twin diagnose` says what the model lacks"
-        )
-    best = max(tried, key=lambda c: c.delta_bic)
+    fits = {n: before.fits[n] for n in names if n in before.fits}
+    best, shape = reshaped(effect, fits, before.datasets)
     progress("adding", 1, 1)
-    fitted, prepared = before.fits[best.axis], before.datasets
-    return addition(best, fitted, prepared, before.model, model, reshaped=effect.name)
+    return addition(best, fits[best.axis], before.datasets, before.model, model, shape)
 
 
 def add_named(found: Diagnosis) -> Addition | None:
@@ -254,6 +222,50 @@ def add_named(found: Diagnosis) -> Addition | None:
         return None
     prepared = {axis: one.dataset for axis, one in found.axes.items()}
     return addition(best, leading.base, prepared, found.model, found.model)
+
+
+def addition(
+    best: Candidate,
+    base: Fit,
+    prepared: Mapping[str, Dataset],
+    model: MachineModel,
+    given: MachineModel,
+    shape: WrongShape | None = None,
+) -> Addition:
+    """The candidate added to a fitted model; ``given``: the model before that was fitted.
+
+    shape: that of a law of the model which the candidate is; None where it is a missing effect. It
+    is kept if it is proved and lowers the test error: one that differs at a few places lowers the
+    error of a few blocks alone.
+    """
+    name = best.axis
+    moved = moved_parameters(base, best.fit)
+    left = model.axes[name].names
+    set_aside = tuple(n for n in given.axes[name].names if n not in left)
+    step = HistoryStep(
+        action="shape" if shape else "add",
+        effect=shape.effect if shape else best.effect.name,
+        axis=name,
+        fit_error_before=base.error,
+        fit_error_after=best.fit.error,
+        holdout_error_before=holdout_error(base, prepared[name]),
+        holdout_error_after=holdout_error(best.fit, prepared[name]),
+        unit=best.fit.axis.units.force,
+        notes=addition_notes(best, moved, set_aside, shape.effect if shape else None),
+    )
+    new = model.with_axis(name, best.fit.axis).with_history(step)
+    new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
+    moving, replayed = errors_of_both(model, new, name, prepared)
+    return Addition(
+        model=new,
+        step=step,
+        candidate=best,
+        kept=best.supported if shape is None else shape.proof.holds and best.gain.falls,
+        position_error=moving,
+        replayed=replayed,
+        moved=moved,
+        set_aside=set_aside,
+    )
 
 
 def agree(

@@ -17,7 +17,7 @@ IDENTIFY, TWIN = (Path(package.__file__).parent for package in (identify, twin))
 # In the order in which data pass them: a room imports only from those before it.
 ROOMS = (
     "dataset", "estimation", "selection", "validation", "experiment_design", "selftest",
-    "thesis", "measure", "output", "addition", "workflow", "testing", "demo", "cli", "start",
+    "thesis", "measure", "output", "workflow", "testing", "demo", "cli", "start",
 )  # fmt: skip
 MOST_FLOORS = 10
 ONE_OF_EACH = re.compile(r"np\.gradient|savgol|0\.6745|np\.diff\([^)]*\) / ")

@@ -8,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.dataset import Dataset
 from identify.dataset.drive import actual_force, parts_of, reading_error, true_motion
 from identify.dataset.motion import Motion
-from identify.dataset.prepared_log import PreparedLog, total_force, total_forces
+from identify.dataset.prepared_log import PreparedLog, moving, sticks, total_force, total_forces
 from twin.core.calling import P_AT
 from twin.core.native import Table
 from twin.effect import Kind
+from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
 from twin.model.parameters import ParameterReference, read, write
 
@@ -62,6 +64,26 @@ def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
     """Force residual (n,) N: averaged command + effects - mass x acceleration, log after log."""
     inertia = np.concatenate([log.command - axis.mass * log.acceleration for log in logs])
     return np.asarray(inertia + averaged_force(axis, logs))
+
+
+def require_residual(axis: AxisModel, dataset: Dataset) -> None:
+    """Raise InputError where no test function is usable, or the residual is not a number."""
+    kept = moving(dataset.fit, sticks(axis))
+    names = ", ".join(log.motion.name for log in dataset.fit)
+    if not kept.any():
+        raise InputError(
+            f"axis {dataset.axis} comes to rest within every test function of "
+            f"{dataset.test_function_length:g} s of {names}, and at rest its friction is unknown; "
+            "give a log in which it moves for longer at a time, or a shorter --test-function (s)"
+        )
+    with np.errstate(all="ignore"):
+        bad = np.count_nonzero(~np.isfinite(residual(axis, dataset.fit)[kept]))
+    if bad:
+        raise InputError(
+            f"axis {dataset.axis}: the force of the model is not a finite number in {bad} of "
+            f"{np.count_nonzero(kept)} test functions of {names}; check the values of its effects, "
+            "or leave them out to begin with their start values"
+        )
 
 
 def group_of(axis: AxisModel, effect: str) -> AxisModel:

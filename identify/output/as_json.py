@@ -238,7 +238,7 @@ def _remainder(d: AxisDiagnosis) -> dict[str, Any] | None:
         "share_of_error": left.share_of_error,
         "period": left.period,
         "period_unit": left.unit,
-        "advice": advice(),
+        "advice": advice(d.findings),
     }
 
 

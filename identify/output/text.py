@@ -135,7 +135,7 @@ def diagnose_text(result: Diagnosis) -> str:
             lines.append(f"  {remains}")
         if d.unexplained:
             lines.append(f"  {words(dependence_in_words(d.unexplained))}")
-            lines.append(f"  {advice()}")
+            lines.append(f"  {advice(d.findings)}")
         lines += [_ranking_line(c) for c in d.ranking[:4]]
         lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
         lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]

@@ -10,7 +10,7 @@ from functools import cached_property
 from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit
 from identify.selection.candidates import Candidate
-from identify.selection.findings import Finding, found, found_wrong
+from identify.selection.findings import Finding, explains_as_much, found, found_wrong
 from identify.selection.repeating_force import Repeat, not_general
 from identify.selection.residual_dependence import Dependence
 from identify.selection.wrong_shape import wrong_shape
@@ -104,17 +104,26 @@ class AxisDiagnosis:
     def with_findings(self) -> AxisDiagnosis:
         """The same with what each named effect explains, and with a law of the wrong shape.
 
-        It takes a refit for each. A shape is asked about where error remains beside what is named.
+        It takes a refit for each. A shape is asked about where error remains beside what is named;
+        where none does, a free curve of a law that is there may explain as much as what is named.
         """
         final = self.final if self.named else self.base
         findings = [
             found(s.candidate.effect, s.tied, self.base, final, self.dataset)
             for s in (self._proved if self.named else ())
         ]
-        shape = None if self.unexplained is None else wrong_shape(final, self.dataset)
+        beside = self.base if self.unexplained is None else final
+        asked = self.named or self.unexplained is not None
+        shape = wrong_shape(beside, self.dataset) if asked else None
         if shape is None:
             return replace(self, findings=tuple(findings))
-        findings.append(found_wrong(shape, self.base, final, self.dataset))
+        wrong = found_wrong(shape, self.base, beside, self.dataset)
+        if self.unexplained is None:
+            if not explains_as_much(wrong, findings):
+                return replace(self, findings=tuple(findings))
+            rivals = tuple(replace(f, tied=(*f.tied, wrong.effect)) for f in findings)
+            return replace(self, findings=(*rivals, wrong), verdict=Verdict.AMBIGUOUS)
+        findings.append(wrong)
         alone = self.verdict is Verdict.UNEXPLAINED
         verdict = Verdict.WRONG_SHAPE if alone else self.verdict
         return replace(self, findings=tuple(findings), verdict=verdict)

@@ -24,8 +24,9 @@ from identify.estimation.force_balance import residual
 from identify.estimation.variable_projection import fit_without
 from identify.selection.candidates import Candidate
 from identify.selection.smoothed import Linearised, choose_stiffness
-from identify.selection.wrong_shape import Shape, stays_at_rest
+from identify.selection.wrong_shape import Shape, WrongShape, best_shape, stays_at_rest
 from twin.effect import Effect
+from twin.errors import InputError
 from twin.model.machine import AxisModel, Fitted, MachineModel
 
 Array = NDArray[np.float64]
@@ -61,6 +62,26 @@ def fit_in_place(base: Fit, dataset: Dataset, shape: Shape) -> Candidate:
     again = first.fit.axis.without(shape.empty.effect.name)
     second = _attempt(base, _as_it_is(base, again, dataset), dataset, shape.empty)
     return min(first, second, key=lambda c: c.fit.error)
+
+
+def reshaped(
+    effect: Effect, fits: Mapping[str, Fit], prepared: Mapping[str, Dataset]
+) -> tuple[Candidate, WrongShape]:
+    """The shape of an effect's law on the axis that it helps most; fits: by axis that has it.
+
+    Raises InputError where the logs ask for none.
+    """
+    tried = [
+        (fit_in_place(fit, prepared[name], found.shape), found)
+        for name, fit in fits.items()
+        if (found := best_shape(fit, prepared[name], effect.name))
+    ]
+    if not tried:
+        raise InputError(
+            f"the logs show no other shape of {effect.name}: no curve in its place lowers their "
+            "error; `twin diagnose` says what the model lacks"
+        )
+    return max(tried, key=lambda one: one[0].delta_bic)
 
 
 def _as_it_is(base: Fit, axis: AxisModel, dataset: Dataset) -> Fit:

@@ -25,7 +25,7 @@ from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
 
-STIFFNESS = 10.0 ** np.arange(1.0, -5.1, -0.5)  # tried for each part
+STIFFNESS = tuple(10.0 ** np.arange(1.0, -5.1, -0.5))  # tried for each part
 WORTH = 0.99  # a further part must lower the squared cross-validated error below this part
 ROUNDING = 1e-12  # of a unit diagonal, keeps a system solvable
 RIDGE = 1e-4  # on the physics, in units of their columns
@@ -152,32 +152,37 @@ def solve(matrix: Array, right: Array) -> Array:
 
     matrix (..., k, k), right (..., k, m).
     """
-    size = np.sqrt(np.maximum(np.diagonal(matrix, axis1=-2, axis2=-1), 1e-300))[..., None]
+    own = np.diagonal(matrix, axis1=-2, axis2=-1)[..., None]
+    size = np.sqrt(np.where(own > 0.0, own, 1.0))
     scaled = matrix / size / np.swapaxes(size, -1, -2) + ROUNDING * np.eye(matrix.shape[-1])
     return np.asarray(np.linalg.solve(scaled, right / size) / size)
 
 
-def choose_stiffness(linear: Linearised) -> dict[str, float]:
-    """Stiffness of each part that lowers the cross-validated error; other parts are left out.
+def choose_stiffness(linear: Linearised, tried: Sequence[float] = STIFFNESS) -> dict[str, float]:
+    """Stiffness, of those tried, of each part that lowers the cross-validated error.
 
-    Parts are added one by one, the most helpful first; then the earlier ones are tuned again.
+    Other parts are left out. Parts are added one by one, the most helpful first; then the earlier
+    ones are tuned again.
     """
     chosen: dict[str, float] = {}
     error = linear.left_out_error(chosen)
     while len(chosen) < len(linear.parts):
-        found = [_best(linear, chosen, name) for name in linear.parts if name not in chosen]
+        waiting = [name for name in linear.parts if name not in chosen]
+        found = [_best(linear, chosen, name, tried) for name in waiting]
         further, name, value = min(found)
         if not further < WORTH * error:
             break
         earlier, chosen[name] = tuple(chosen), value
         for other in earlier:
-            further, _, chosen[other] = _best(linear, chosen, other)
+            further, _, chosen[other] = _best(linear, chosen, other, tried)
         error = further
     return chosen
 
 
-def _best(linear: Linearised, chosen: Mapping[str, float], name: str) -> tuple[float, str, float]:
+def _best(
+    linear: Linearised, chosen: Mapping[str, float], name: str, tried: Sequence[float]
+) -> tuple[float, str, float]:
     """Squared cross-validated error, name and best stiffness of a part beside the others."""
-    errors = [linear.left_out_error({**chosen, name: v}) for v in STIFFNESS]
+    errors = [linear.left_out_error({**chosen, name: v}) for v in tried]
     least = int(np.argmin(errors))
-    return errors[least], name, float(STIFFNESS[least])
+    return errors[least], name, float(tried[least])

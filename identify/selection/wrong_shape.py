@@ -20,7 +20,7 @@ from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian
 from identify.selection.decoys import Proof, Trial
-from identify.selection.smoothed import Linearised, choose_stiffness
+from identify.selection.smoothed import STIFFNESS, Linearised, choose_stiffness
 from twin.curve import Curve
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
@@ -30,6 +30,7 @@ from twin.model.parameters import ParameterReference
 from twin.signals import Array
 
 DECOYS = 20
+COARSELY = STIFFNESS[::2]  # how smooth a curve may be, to tell whether it helps
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class WrongShape:
-    """A law of another shape than the machine's force, with the proof."""
+    """A free curve in whose place a law has another shape, with the proof."""
 
     shape: Shape
     proof: Proof
@@ -68,25 +69,27 @@ class WrongShape:
 
 
 def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
-    """The law whose free curve takes most of a fit's squared test error, if it is proved."""
+    """The law whose free curve takes most of a fit's squared test error, if it is proved.
+
+    Of those that leave about as little, the one with fewer parts.
+    """
     trial = Trial.of(fit, dataset)
     found = [(s, _proof(trial, s, fit, dataset, decoys=0).gain) for s in _shapes(fit, dataset)]
     if not found:
         return None
     least = min(1.0 - gain for _, gain in found)
-    near = [s for s, gain in found if 1.0 - gain <= RULE.same_error**2 * least]
+    near = [s for s, gain in found if RULE.near * (1.0 - gain) <= least]
     best = min(near, key=lambda s: len(s.stiffness))
     proof = _proof(trial, best, fit, dataset, decoys=DECOYS)
     return WrongShape(best, proof) if proof.holds else None
 
 
-def best_shape(fit: Fit, dataset: Dataset, effect: str) -> Shape | None:
+def best_shape(fit: Fit, dataset: Dataset, effect: str) -> WrongShape | None:
     """The free curve for one law that takes most; None where the data ask for none."""
     trial = Trial.of(fit, dataset)
     shapes = [s for s in _shapes(fit, dataset) if s.effect == effect]
-    return max(
-        shapes, key=lambda s: _proof(trial, s, fit, dataset, decoys=0).gain, default=None
-    )  # fmt: skip
+    tried = [WrongShape(s, _proof(trial, s, fit, dataset, decoys=DECOYS)) for s in shapes]
+    return max(tried, key=lambda w: w.proof.gain, default=None)
 
 
 def having_shape(effect: Effect, model: MachineModel, axis: str | None) -> list[str]:
@@ -147,7 +150,7 @@ def _chosen(fit: Fit, dataset: Dataset, law: Fitted, curve: Curve) -> Shape | No
         shape = _laid(law, curve, dataset, lets_go)
         mask = moving(dataset.fit, sticking(fit, shape))[fit.kept]
         linear = Linearised.about(fit, dataset, shape.empty).on(mask)
-        stiffness = choose_stiffness(linear)
+        stiffness = choose_stiffness(linear, COARSELY)
         error = linear.left_out_error(stiffness)
         if stiffness and error < least:
             best, least = replace(shape, stiffness=stiffness), error

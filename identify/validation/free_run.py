@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.noise_floor import noise_of
 from identify.dataset.prepared_log import PreparedLog
 from twin.core.control import Controller, gain_table
@@ -111,6 +112,21 @@ def rms_error(run: FreeRun, axis: str) -> float:
     """RMS of the free-running position error of one axis, in m; infinite where the run diverges."""
     with np.errstate(over="ignore"):
         return float(np.sqrt(np.nanmean(run.error[axis] ** 2)))
+
+
+def errors_of_both(
+    before: MachineModel, after: MachineModel, axis: str, prepared: Mapping[str, Dataset]
+) -> tuple[tuple[float, float] | None, float | None]:
+    """Free-running position error (m RMS) on the first log: before and after, and in MuJoCo after.
+
+    None where the motion is imposed.
+    """
+    if after.is_imposed:
+        return None, None
+    log = next(iter(by_log(prepared).values()))
+    runs = (free_run(before, log), free_run(after, log), free_run(after, log, MujocoSimulator))
+    was, now, replayed = (rms_error(run, axis) for run in runs)
+    return (was, now), replayed
 
 
 def _as_logged(model: MachineModel, logs: Mapping[str, PreparedLog]) -> MachineModel:

@@ -58,7 +58,7 @@ def _diagnosed(
         remarks.append(_left_over(found.best))
     remarks.extend(_runner_up(found))
     if found.unexplained is not None:
-        remarks.append(f"{advice()}.")
+        remarks.append(f"{advice(found.findings)}.")
     if following is not None:
         remarks.append(_next_step(following))
     if found.verdict is Verdict.NOTHING_MISSING and refit and (changed := refit_in_words(refit)):
@@ -211,7 +211,7 @@ def _added(addition: Addition) -> Answer:
         moved = _change(unit, *addition.position_error)
         replayed = f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo"
         tiles.append(Tile(words("Position, free run"), moved, replayed))
-    outcome = "added" if step.action == "add" else "given the shape found"
+    outcome = "given the shape found" if step.action == "shape" else "added"
     sentence = "The evidence and the held-out logs support the effect."
     if not addition.kept:
         sentence = (

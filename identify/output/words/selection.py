@@ -157,8 +157,11 @@ def nonparametric_in_words(fitted: Fitted) -> str:
     )
 
 
-def advice() -> str:
-    """What lowers the error where no physical effect explains it."""
+def advice(findings: Sequence[Finding] = ()) -> str:
+    """What lowers the error where no physical effect explains it, or a law has the wrong shape."""
+    for finding in findings:
+        if finding.shape is not None:
+            return f"twin add --shape {finding.effect} gives the model the shape that the logs show"
     every = load_catalogue().values()
     known = [e.name for e in every if e.is_nonparametric and not e.free_shape]
     return f"twin add {' or '.join(known)} lowers the error by fitted curves, without explaining it"
@@ -166,9 +169,9 @@ def advice() -> str:
 
 def step_in_words(step: HistoryStep) -> str:
     """What was done to a model: "added cogging to axis x"."""
-    if step.action == "add":
-        return f"added {step.effect} to axis {step.axis}"
-    return f"gave {step.effect} of axis {step.axis} the shape that the logs show"
+    if step.action == "shape":
+        return f"gave {step.effect} of axis {step.axis} the shape that the logs show"
+    return f"added {step.effect} to axis {step.axis}"
 
 
 def addition_notes(

@@ -181,12 +181,13 @@ def test_a_diagnosis():
                 "effect": "cogging", "kind": "missing", "explains": 0.871,
                 "indistinguishable_from": ["quadratic_drag"], "test_error_before": 7.17,
                 "test_error_after": 2.19, "unit": "N", "parameters": {"p": 0.0261},
-                "gain": 0.813, "best_decoy": 0.137,
+                "gain": 0.813, "best_decoy": 0.137, "shape": None,
             },
             {
                 "effect": "lugre", "kind": "missing", "explains": 0.119,
                 "indistinguishable_from": [], "test_error_before": 3.23, "test_error_after": 2.19,
                 "unit": "N", "parameters": {"Fc": 0.31}, "gain": None, "best_decoy": None,
+                "shape": None,
             },
         ],
         "remainder": {
@@ -268,7 +269,8 @@ def test_an_addition(kept):
     a = made.addition(kept)
     s = a.step
     assert strict(add_json(a)) == {
-        "effect": "cogging", "axis": "x", "is_nonparametric": False, "kept": kept,
+        "action": "add", "effect": "cogging", "axis": "x", "is_nonparametric": False,
+        "kept": kept,
         "fit_error_before": s.fit_error_before, "fit_error_after": s.fit_error_after,
         "holdout_error_before": s.holdout_error_before,
         "holdout_error_after": s.holdout_error_after, "noise_floor": made.BEST.fit.floor,

@@ -22,6 +22,8 @@ EVERY = pytest.mark.parametrize(
     ("effect", "p"), PARAMETERS[:], ids=[f"{e.name}-{p.name}" for e, p in PARAMETERS]
 )
 
+PLACES_AND_TIMES = ("start", "low", "high", "phase", "tau", "relaxation", "b", "n")
+
 # --- bounds ---------------------------------------------------------------------------------------
 
 
@@ -31,7 +33,7 @@ def test_bounds_follow_from_what_a_parameter_is(effect: Effect, p: Parameter) ->
         assert p.lower in (0.0, -p.upper) or p.name == "ratio", "one sign, or both alike"
         assert p.start == 0.0 or (effect.kind is Kind.FRICTION and p.name in ("Fc", "Fs"))
         assert p.upper > 0.0
-    elif p.name not in ("start", "low", "high", "phase", "tau", "relaxation", "b", "n"):
+    elif not effect.free_shape and p.name not in PLACES_AND_TIMES:
         assert p.lower > 0.0, "a scale is positive"
     if p.unit == "m" and p.lower < 0.0 and not p.strength:
         assert p.lower == -p.upper
