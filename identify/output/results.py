@@ -139,7 +139,8 @@ class Addition:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader should know beside the errors, one sentence each."""
-        return addition_notes(self.candidate, self.moved, self.set_aside)
+        reshaped = self.step.effect if self.step.action == "shape" else None
+        return addition_notes(self.candidate, self.moved, self.set_aside, reshaped)
 
     @property
     def units(self) -> AxisUnits:

@@ -100,17 +100,17 @@ def having_shape(effect: Effect, model: MachineModel, axis: str | None) -> list[
     if not effect.curves:
         raise InputError(f"the law of {effect.name} assumes no curve that could have another shape")
     names = [axis] if axis else list(model.axes)
+    free = _free().name
+    if taken := [n for n in names if free in model.axis(n).names]:
+        raise InputError(
+            f"axis {', '.join(taken)} has a {free} in the place of a law already, and can have "
+            "one; `twin fit` refits it"
+        )
     having = [n for n in names if effect.name in model.axis(n).names]
     if not having:
         raise InputError(
             f"axis {', '.join(names)} has no effect '{effect.name}'; `twin add {effect.name}` adds "
             "it"
-        )
-    free = _free().name
-    if taken := [n for n in having if free in model.axis(n).names]:
-        raise InputError(
-            f"axis {', '.join(taken)} has a {free} in the place of a law already, and can have "
-            "one; `twin fit` refits it"
         )
     return having
 

@@ -279,13 +279,9 @@ def test_an_addition(kept):
         "position_unit": "m", "parameters": dict(made.BEST.fit.axis["cogging"].values),
         "notes": list(a.notes),
     }  # fmt: skip
-    unheld = replace(a, step=made.STEPS[2], candidate=replace(a.candidate, fit=_with_wear()))
+    unheld = replace(a, step=made.STEPS[2], candidate=made.candidate("wear", 0.5))
     found = strict(add_json(unheld))
     assert (found["holdout_error_before"], found["holdout_error_after"]) == (None, None)
-
-
-def _with_wear():
-    return made.candidate("wear", 0.5).fit
 
 
 @pytest.mark.parametrize("name", ["lugre", "learned_residual", NOISE.name])
