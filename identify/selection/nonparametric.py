@@ -24,7 +24,7 @@ from identify.estimation.force_balance import residual
 from identify.estimation.variable_projection import fit_without
 from identify.selection.candidates import Candidate
 from identify.selection.smoothed import Linearised, choose_stiffness
-from identify.selection.wrong_shape import Shape, WrongShape, best_shape, stays_at_rest
+from identify.selection.wrong_shape import Shape, WrongShape, best_shape
 from twin.effect import Effect
 from twin.errors import InputError
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -54,9 +54,8 @@ def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
 
 
 def fit_in_place(base: Fit, dataset: Dataset, shape: Shape) -> Candidate:
-    """Fit a free curve in the place of a law, or beside one that holds the axis at rest."""
-    beside = stays_at_rest(base.axis[shape.effect])
-    axis = base.axis if beside else base.axis.without(shape.effect)
+    """Fit a free curve in the place of a law, or beside it, see ``Shape.beside``."""
+    axis = base.axis if shape.beside else base.axis.without(shape.effect)
     first = _attempt(base, _as_it_is(base, axis, dataset), dataset, shape.empty)
     # The law's own shape had distorted the other values, so choose again beside the refit.
     again = first.fit.axis.without(shape.empty.effect.name)

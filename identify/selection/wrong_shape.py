@@ -50,6 +50,15 @@ class Shape:
     stiffness: Mapping[str, float]
 
     @property
+    def beside(self) -> bool:
+        """Whether it goes beside the law, not in its place.
+
+        A friction law holds the axis at rest, and any law that does not repeat goes on where the
+        logs have not been; beyond them a curve keeps its end value.
+        """
+        return self.period is None
+
+    @property
     def turns(self) -> bool:
         """Whether a part of it turns with the direction of motion."""
         return self.empty.effect.parts[1].name in self.stiffness
@@ -118,11 +127,6 @@ def having_shape(effect: Effect, model: MachineModel, axis: str | None) -> list[
 def sticking(fit: Fit, shape: Shape) -> bool:
     """Whether a curve says nothing of test functions with standstill."""
     return sticks(fit.axis) or fit.axis[shape.effect].effect.kind is not Kind.FORCE
-
-
-def stays_at_rest(fitted: Fitted) -> bool:
-    """Whether its law holds the axis at rest, so that a curve goes beside it, not in its place."""
-    return fitted.effect.kind is Kind.FRICTION
 
 
 def _shapes(fit: Fit, dataset: Dataset) -> list[Shape]:
