@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, holdout_error
 from identify.selection.decoys import Proof, proof
 from identify.selection.found_shape import FoundShape, found_shape
@@ -84,10 +82,9 @@ def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> F
     )
 
 
-def explains_as_much(wrong: Finding, named: Sequence[Finding]) -> bool:
-    """Whether a free curve of a law that is there leaves about as little as the named effects."""
-    left = min(f.error_after for f in named)
-    return RULE.near * wrong.error_after**2 <= left**2
+def left(finding: Finding) -> float:
+    """Squared test error that a finding leaves, N^2."""
+    return finding.error_after**2
 
 
 def _share(taken: float, base: Fit, dataset: Dataset) -> float:
