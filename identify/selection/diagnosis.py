@@ -114,7 +114,7 @@ class AxisDiagnosis:
             found(s.candidate.effect, s.tied, self.base, final, self.dataset)
             for s in (self._proved if self.named else ())
         )
-        instead = self._wrong_beside(self.base) if self.named else None
+        instead = self._wrong_instead() if self.named else None
         if instead and (RULE.near * left(instead) <= min(map(left, findings))):
             if left(instead) < RULE.beside_decoys * min(map(left, findings)):
                 return replace(self, findings=(instead,), verdict=Verdict.WRONG_SHAPE)
@@ -126,6 +126,13 @@ class AxisDiagnosis:
         alone = self.verdict is Verdict.UNEXPLAINED
         verdict = Verdict.WRONG_SHAPE if alone else self.verdict
         return replace(self, findings=(*findings, wrong), verdict=verdict)
+
+    def _wrong_instead(self) -> Finding | None:
+        """A free curve beside the base alone; not of friction, whose curves hold its modifiers."""
+        shape = wrong_shape(self.base, self.dataset)
+        if shape is None or shape.shape.curve.rubs:
+            return None
+        return found_wrong(shape, self.base, self.base, self.dataset)
 
     def _wrong_beside(self, fit: Fit) -> Finding | None:
         shape = wrong_shape(fit, self.dataset)
