@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from identify.workflow import (
         add,
+        add_shape,
         agree,
         cable_force,
         compare,
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "add",
+    "add_shape",
     "agree",
     "cable_force",
     "compare",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from identify.dataset.dataset import Dataset, by_log, datasets
+from identify.dataset.dataset import Dataset, datasets
 from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.fit import Fit, holdout_error
 from identify.estimation.force_balance import require_residual
@@ -21,17 +21,17 @@ from identify.selection.candidates import Candidate, score, try_effect, usable
 from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
-from identify.selection.nonparametric import fit_nonparametric, physics_alone
+from identify.selection.nonparametric import fit_nonparametric, physics_alone, reshaped
 from identify.selection.unpredictable import noise_known, with_own_noise
+from identify.selection.wrong_shape import WrongShape, having_shape
 from identify.validation.agreement import Agreement, agreement
-from identify.validation.free_run import free_run, rms_error
+from identify.validation.free_run import errors_of_both
 from identify.validation.misfit_maps import compare_axis, position_errors
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.log import Log
 from twin.model.machine import HistoryStep, MachineModel
-from twin.simulator import MujocoSimulator
 
 if TYPE_CHECKING:
     from identify.thesis.chapters import Reproduction
@@ -196,7 +196,32 @@ def add(
     tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]
     best = max(tried, key=lambda c: c.delta_bic)
     progress("adding", 1, 1)
-    return _addition(best, before.fits[best.axis], before.datasets, before.model, given)
+    return addition(best, before.fits[best.axis], before.datasets, before.model, given)
+
+
+def add_shape(
+    effect: Effect,
+    model: MachineModel,
+    logs: Logs,
+    holdout: Logs | None = None,
+    *,
+    axis: str | None = None,
+    test_function: float | None = None,
+    progress: Progress = silent,
+) -> Addition:
+    """Give the law of an effect the shape that the logs show, refit and record the errors.
+
+    A free curve takes the law's place, or goes beside a friction law, which holds the axis at rest.
+    axis: that which it helps most where None. Raises InputError where no axis has the effect, where
+    its law assumes no curve, where the axis has a free curve already, and where the logs ask for
+    none.
+    """
+    names = having_shape(effect, model, axis)
+    before = fit(model, logs, holdout, test_function=test_function, progress=progress)
+    fits = {n: before.fits[n] for n in names if n in before.fits}
+    best, shape = reshaped(effect, fits, before.datasets)
+    progress("adding", 1, 1)
+    return addition(best, fits[best.axis], before.datasets, before.model, model, shape)
 
 
 def add_named(found: Diagnosis) -> Addition | None:
@@ -208,45 +233,48 @@ def add_named(found: Diagnosis) -> Addition | None:
     if best is None or not any(c is best for c in leading.ranking):
         return None
     prepared = {axis: one.dataset for axis, one in found.axes.items()}
-    return _addition(best, leading.base, prepared, found.model, found.model)
+    return addition(best, leading.base, prepared, found.model, found.model)
 
 
-def _addition(
+def addition(
     best: Candidate,
     base: Fit,
     prepared: Mapping[str, Dataset],
     model: MachineModel,
     given: MachineModel,
+    shape: WrongShape | None = None,
 ) -> Addition:
-    """The candidate added to a fitted model; ``given``: the model before that was fitted."""
+    """The candidate added to a fitted model; ``given``: the model before that was fitted.
+
+    shape: that of a law of the model which the candidate is; None where it is a missing effect. It
+    is kept if it is proved and lowers the test error: one that differs at a few places lowers the
+    error of a few blocks alone.
+    """
     name = best.axis
     moved = moved_parameters(base, best.fit)
     left = model.axes[name].names
     set_aside = tuple(n for n in given.axes[name].names if n not in left)
     step = HistoryStep(
-        action="add",
-        effect=best.effect.name,
+        action="shape" if shape else "add",
+        effect=shape.effect if shape else best.effect.name,
         axis=name,
         fit_error_before=base.error,
         fit_error_after=best.fit.error,
         holdout_error_before=holdout_error(base, prepared[name]),
         holdout_error_after=holdout_error(best.fit, prepared[name]),
         unit=best.fit.axis.units.force,
-        notes=addition_notes(best, moved, set_aside),
+        notes=addition_notes(best, moved, set_aside, shape.effect if shape else None),
     )
     new = model.with_axis(name, best.fit.axis).with_history(step)
     new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
-    first = next(iter(by_log(prepared).values()))
+    moving, replayed = errors_of_both(model, new, name, prepared)
     return Addition(
         model=new,
         step=step,
         candidate=best,
-        kept=best.supported,
-        position_error=(
-            rms_error(free_run(model, first), name),
-            rms_error(free_run(new, first), name),
-        ),
-        replayed=rms_error(free_run(new, first, MujocoSimulator), name),
+        kept=best.supported if shape is None else shape.proof.holds and best.gain.falls,
+        position_error=moving,
+        replayed=replayed,
         moved=moved,
         set_aside=set_aside,
     )
@@ -289,6 +317,7 @@ __all__ = [
     "SimulationFit",
     "add",
     "add_named",
+    "add_shape",
     "agree",
     "cable_force",
     "compare",

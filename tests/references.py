@@ -192,6 +192,20 @@ def roller_spikes(p: Values, q: Columns) -> Results:
     return {OUT: -(p["ahead"] * (1.0 + d) / 2.0 - p["behind"] * (1.0 - d) / 2.0) * bump}
 
 
+@written_from(
+    "F = w (E(q) + d O(q)),  q = x per_metre + sqrt(|v| per_speed) - offset;  w = min(|v|/rest, 1)"
+)
+def free_curve(p: Values, q: Columns) -> Results:
+    """Of a closed curve the last knot is the first."""
+    place = q.x * p["per_metre"] + np.sqrt(np.abs(q.v) * p["per_speed"]) - p["offset"]
+    even, odd = numbered(p, "e_"), numbered(p, "o_")
+    if p["closed"]:
+        place, even, odd = np.mod(place, 1.0), np.r_[even[:-1], even[0]], np.r_[odd[:-1], odd[0]]
+    grid = np.linspace(0.0, 1.0, int(p["elements"]) + 1)
+    force = np.interp(place, grid, even) + followed(q, p["turn"]) * np.interp(place, grid, odd)
+    return {OUT: force * (np.clip(np.abs(q.v) / p["rest"], 0.0, 1.0) if p["rest"] else 1.0)}
+
+
 # --- modifiers ------------------------------------------------------------------------------------
 
 

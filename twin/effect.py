@@ -26,6 +26,8 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+from twin.curve import Curve, FreeShape, Part
+
 # Slots of ``io``. Compiled laws freeze these numbers.
 INDEX = 0  # sample index, 0 at the first sample
 TIME = 1  # s
@@ -149,41 +151,6 @@ class Parameter:
         return min(max(value, self.lower), self.upper)
 
 
-class Coordinate(Enum):
-    """What a curve is drawn over."""
-
-    POSITION = "position"
-    SPEED = "speed"
-
-
-@dataclass(frozen=True)
-class Curve:
-    """The curve that a law assumes, which on a machine may have another shape.
-
-    over: its coordinate. period: name of the parameter that is the length after which it repeats;
-    None where it does not. by_direction: whether each direction of motion has a curve of its own.
-    """
-
-    over: Coordinate
-    period: str | None = None
-    by_direction: bool = False
-
-
-@dataclass(frozen=True)
-class Part:
-    """Strengths of a nonparametric effect that belong to one curve, and how it is smoothed.
-
-    strengths: names, in order along the curve. stiffness: name of the parameter (a ratio) that
-    weighs the smoothing; chosen from the data. rows: number of strengths n -> (m, n) such that a
-    fit adds the square of stiffness x rows @ strengths to the mean square of the residual.
-    """
-
-    name: str
-    strengths: tuple[str, ...]
-    stiffness: str
-    rows: Callable[[int], Any]
-
-
 @dataclass(frozen=True)
 class Effect:
     """One physical effect, or a nonparametric effect: a curve with no physical law.
@@ -198,9 +165,11 @@ class Effect:
     sticks: whether it is a friction that holds the axis at rest with any force up to a level.
     simplest: the same force with simpler values, such as a shorter pitch where only harmonics were
     used. parts: the curves of a nonparametric effect, whose force is linear in its strengths; such
-    an effect is never the answer of a diagnosis. curve: that which the law assumes, where a
-    diagnosis may ask whether a free curve does better. several: whether an axis may have the effect
-    more than once, as cogging of poles and of slots; number: which of these it is.
+    an effect is never the answer of a diagnosis. free_shape: of one that stands in the place of a
+    law, and stays where other nonparametric effects are set aside. curves: those which the law
+    assumes, where a diagnosis may ask whether a free curve does better. several: whether an axis
+    may have the effect more than once, as cogging of poles and of slots; number: which of these it
+    is.
     """
 
     kind: Kind
@@ -218,7 +187,8 @@ class Effect:
     sticks: bool = False
     simplest: Callable[[Mapping[str, float]], dict[str, float]] | None = None
     parts: tuple[Part, ...] = ()
-    curve: Curve | None = None
+    free_shape: FreeShape | None = None
+    curves: tuple[Curve, ...] = ()
     several: bool = False
     number: int = 1
 

@@ -176,11 +176,12 @@ def run(
     controllers: Mapping[str, Controller] | None = None,
     progress: Progress | None = None,
 ) -> Run:
-    """Run a setpoint on the twin, from rest at its first position.
+    """Run a setpoint on the twin, from rest at its first position; raises CannotRun.
 
     rng draws the encoder noise. controllers: by axis; the model's own bandwidths where None. Raises
     CannotRun where the simulation breaks down.
     """
+    model.require_mass()
     parts = run_parts(
         model, setpoint, rng, simulator=simulator, controllers=controllers, progress=progress
     )

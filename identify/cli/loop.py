@@ -160,10 +160,14 @@ def add(
         str | None, typer.Option(help="Axis; the one that it improves most if left out.")
     ] = None,
     test_function: TestFunction = None,
+    shape: Annotated[
+        bool,
+        typer.Option("--shape", help="The model has the effect: give its law the shape found."),
+    ] = False,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Add an effect, refit, and record the error before and after."""
+    """Add an effect, or the shape of one, refit, and record the error before and after."""
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
@@ -171,9 +175,9 @@ def add(
 
     require_folder(out)
     catalogue = catalogue_with(effects)
-    chosen = catalogue[effect]
+    chosen, made = catalogue[effect], workflow.add_shape if shape else workflow.add
     result, findings = with_holdout(
-        partial(workflow.add, chosen, axis=axis, test_function=test_function),
+        partial(made, chosen, axis=axis, test_function=test_function),
         machine_model(model, catalogue), logs, holdout,
     )  # fmt: skip
     save_model(result.model, out)

@@ -119,9 +119,9 @@ def datasets(
             continue
         held_going, still_held = _moving(holdout, name)
         motions_at = cache(partial(_motions, going, held_going, name, tuple(model.axes)))
-        length = test_function or choose_length(motions_at)
+        length = test_function or choose_length(motions_at, imposed=axis.is_imposed)
         fit, held = motions_at(length)
-        begun = beginnings([*fit, *held])
+        begun = {} if axis.is_imposed else beginnings([*fit, *held])
         fit, held = ([m.after(begun.get(m.name, 0.0)) for m in some] for some in (fit, held))
         out[name] = Dataset(
             axis=name,

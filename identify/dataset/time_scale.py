@@ -56,16 +56,18 @@ class Scale:
         return cls(length, float(np.sqrt(np.mean(left**2))), floor)
 
 
-def choose_length(motions_at: Callable[[float | None], tuple[Motions, Motions]]) -> float:
+def choose_length(
+    motions_at: Callable[[float | None], tuple[Motions, Motions]], *, imposed: bool = False
+) -> float:
     """Length of the test functions, s, for the logs to fit and the held-out ones.
 
     motions_at: these for test functions of a length, whose blocks are short enough for it; for
-    None as long as their noise asks for.
+    None as long as their noise asks for. imposed: whether there is no mass.
     """
     motions, others = motions_at(None)
-    chosen = choose_test_function(motions, others)
+    chosen = choose_test_function(motions, others, imposed=imposed)
     shorter = [length for length in TEST_FUNCTIONS if length < chosen]
-    if not shorter:
+    if imposed or not shorter:
         return chosen
     quiet = Scale.of(chosen, motions)
     for length in shorter:
@@ -77,12 +79,12 @@ def choose_length(motions_at: Callable[[float | None], tuple[Motions, Motions]])
     return chosen
 
 
-def choose_test_function(motions: Motions, others: Motions = ()) -> float:
+def choose_test_function(motions: Motions, others: Motions = (), *, imposed: bool = False) -> float:
     """The shortest test function (s) whose noise floor is small against the force to be explained.
 
-    others: motions whose blocks it must also be long enough for.
+    others: motions whose blocks it must also be long enough for. imposed: whether there is no mass.
     """
-    mass = inertia(motions)
+    mass = 0.0 if imposed else inertia(motions)
     longest_block = max(m.period for m in (*motions, *others))
     for length in TEST_FUNCTIONS:
         if length < LEAST_BLOCKS * longest_block:

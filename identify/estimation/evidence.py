@@ -76,6 +76,11 @@ class Gain:
     after: float
     t: float
 
+    @property
+    def falls(self) -> bool:
+        """Whether the error falls."""
+        return self.after < self.before
+
 
 def held_out_gain(before: Array, after: Array, floor: float) -> Gain:
     """Compare two models on the same held-out residual samples (n,) N, with noise floor (N).

@@ -66,6 +66,26 @@ def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
     return np.asarray(inertia + averaged_force(axis, logs))
 
 
+def require_residual(axis: AxisModel, dataset: Dataset) -> None:
+    """Raise InputError where no test function is usable, or the residual is not a number."""
+    kept = moving(dataset.fit, sticks(axis))
+    names = ", ".join(log.motion.name for log in dataset.fit)
+    if not kept.any():
+        raise InputError(
+            f"axis {dataset.axis} comes to rest within every test function of "
+            f"{dataset.test_function_length:g} s of {names}, and at rest its friction is unknown; "
+            "give a log in which it moves for longer at a time, or a shorter --test-function (s)"
+        )
+    with np.errstate(all="ignore"):
+        bad = np.count_nonzero(~np.isfinite(residual(axis, dataset.fit)[kept]))
+    if bad:
+        raise InputError(
+            f"axis {dataset.axis}: the force of the model is not a finite number in {bad} of "
+            f"{np.count_nonzero(kept)} test functions of {names}; check the values of its effects, "
+            "or leave them out to begin with their start values"
+        )
+
+
 def group_of(axis: AxisModel, effect: str) -> AxisModel:
     """The part of the axis whose force can change when a parameter of that effect does.
 
@@ -165,23 +185,3 @@ def difference_step(c: ParameterReference, value: float) -> float:
     p = c.parameter
     size = 1e-5 * max(abs(value), abs(p.start), 1e-6 * min(p.upper - p.lower, 1e3))
     return size if value + size <= p.upper else -size
-
-
-def require_residual(axis: AxisModel, dataset: Dataset) -> None:
-    """Raise InputError where no test function is usable, or the residual is not a number."""
-    kept = moving(dataset.fit, sticks(axis))
-    names = ", ".join(log.motion.name for log in dataset.fit)
-    if not kept.any():
-        raise InputError(
-            f"axis {dataset.axis} comes to rest within every test function of "
-            f"{dataset.test_function_length:g} s of {names}, and at rest its friction is unknown; "
-            "give a log in which it moves for longer at a time, or a shorter --test-function (s)"
-        )
-    with np.errstate(all="ignore"):
-        bad = np.count_nonzero(~np.isfinite(residual(axis, dataset.fit)[kept]))
-    if bad:
-        raise InputError(
-            f"axis {dataset.axis}: the force of the model is not a finite number in {bad} of "
-            f"{np.count_nonzero(kept)} test functions of {names}; check the values of its effects, "
-            "or leave them out to begin with their start values"
-        )

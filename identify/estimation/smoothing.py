@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.effect import Part
+from twin.curve import Part
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference
 

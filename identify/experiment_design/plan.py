@@ -140,6 +140,7 @@ def _planned(
     effects: Mapping[str, Effect],
     progress: Progress | None = None,
 ) -> Plan:
+    arena.machine.require_mass()
     logs = arena.logs
     favourite, evidence = favoured(arena)
     if evidence > RULE.least_separation:

@@ -17,6 +17,7 @@ from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Step
 from identify.selection.findings import Finding
+from identify.selection.found_shape import FoundShape
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import ResidualTests
 from twin.experiments.file import parameters
@@ -82,6 +83,16 @@ def compare_json(result: Comparison) -> dict[str, Any]:
     return {"axes": {axis: _axis_comparison(c) for axis, c in result.axes.items()}}
 
 
+def _position_error(c: AxisComparison, log: str) -> dict[str, Any]:
+    """The position error of a log; null of imposed motion."""
+    error = c.position_error.get(log)
+    return {
+        "position_error": error,
+        "position_unit": c.units.position,
+        "position_ratio": error and error / max(c.position_floor[log], 1e-300),
+    }
+
+
 def _axis_comparison(c: AxisComparison) -> dict[str, Any]:
     return {
         "logs": {
@@ -89,9 +100,7 @@ def _axis_comparison(c: AxisComparison) -> dict[str, Any]:
                 "force_error": error,
                 "force_unit": c.units.force,
                 "force_ratio": error / c.floor,
-                "position_error": c.position_error[name],
-                "position_unit": c.units.position,
-                "position_ratio": c.position_error[name] / max(c.position_floor[name], 1e-300),
+                **_position_error(c, name),
             }
             for name, error in c.force_error.items()
         },
@@ -197,7 +206,27 @@ def _finding(f: Finding) -> dict[str, Any]:
         "parameters": f.parameters,
         "gain": f.proof and f.proof.gain,
         "best_decoy": f.proof and f.proof.best_decoy,
+        "shape": f.shape and _shape(f.shape),
     }
+
+
+def _shape(s: FoundShape) -> dict[str, Any]:
+    """The curve of a law as it is assumed and as it is found, by direction."""
+    return {
+        "over": s.over.value,
+        "coordinate": s.coordinate.tolist(),
+        "coordinate_unit": s.unit,
+        "period": s.period,
+        "lets_go_at_standstill": s.lets_go,
+        "unit": s.force_unit,
+        "curves": {
+            name: {
+                "assumed": c.assumed.tolist(), "found": c.found.tolist(),
+                "band_90": c.band.tolist(),
+            }
+            for name, c in s.curves.items()
+        },
+    }  # fmt: skip
 
 
 def _remainder(d: AxisDiagnosis) -> dict[str, Any] | None:
@@ -214,7 +243,7 @@ def _remainder(d: AxisDiagnosis) -> dict[str, Any] | None:
         "share_of_error": left.share_of_error,
         "period": left.period,
         "period_unit": left.unit,
-        "advice": advice(),
+        "advice": advice(d.findings),
     }
 
 
@@ -270,8 +299,9 @@ def _simulated(t: SimulatedExperiment, several: bool) -> dict[str, Any]:
 
 def add_json(result: Addition) -> dict[str, Any]:
     """Errors before and after, whether the effect is supported, and what it changed."""
-    step = result.step
+    step, (before, after) = result.step, result.position_error or (None, None)
     return {
+        "action": step.action,
         "effect": step.effect,
         "axis": step.axis,
         "is_nonparametric": result.candidate.effect.is_nonparametric,
@@ -282,10 +312,10 @@ def add_json(result: Addition) -> dict[str, Any]:
         "holdout_error_after": step.holdout_error_after,
         "noise_floor": result.candidate.fit.floor,
         "unit": step.unit,
-        "position_error_before": result.position_error[0],
-        "position_error_after": result.position_error[1],
+        "position_error_before": before,
+        "position_error_after": after,
         "position_error_in_mujoco": result.replayed,
         "position_unit": result.units.position,
-        "parameters": dict(result.candidate.fit.axis[step.effect].values),
+        "parameters": dict(result.candidate.fit.axis[result.candidate.effect.name].values),
         "notes": list(result.notes),
     }

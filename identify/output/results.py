@@ -145,23 +145,24 @@ class Addition:
 
     step: errors before and after. kept: whether evidence and held-out logs support the effect.
     position_error: free-running RMS error before and after; replayed: the same after, stepped by
-    MuJoCo. Both in the units of the axis. moved: parameters that the effect changed.
-    set_aside: nonparametric effects that were removed from the model before.
+    MuJoCo. Both in the units of the axis, None where the motion is imposed. moved: parameters that
+    the effect changed. set_aside: nonparametric effects that were removed from the model before.
     """
 
     model: MachineModel
     step: HistoryStep
     candidate: Candidate
     kept: bool
-    position_error: tuple[float, float]
-    replayed: float
+    position_error: tuple[float, float] | None
+    replayed: float | None
     moved: tuple[MovedParameter, ...] = ()
     set_aside: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader should know beside the errors, one sentence each."""
-        return addition_notes(self.candidate, self.moved, self.set_aside)
+        reshaped = self.step.effect if self.step.action == "shape" else None
+        return addition_notes(self.candidate, self.moved, self.set_aside, reshaped)
 
     @property
     def units(self) -> AxisUnits:

@@ -22,6 +22,8 @@ from identify.output.words.selection import (
     nonparametric_in_words,
     refit_in_words,
     remainder_in_words,
+    shape_in_words,
+    step_in_words,
     verdict_in_words,
 )
 from identify.output.words.validation import (
@@ -37,6 +39,7 @@ from twin.experiments.kinds import kind_of
 
 if TYPE_CHECKING:  # results print themselves by these functions
     from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+    from identify.validation.misfit_maps import AxisComparison
 
 
 def fit_text(result: FitResult) -> str:
@@ -83,6 +86,14 @@ def _with_interval(e: Estimate, common: NoInterval | None) -> str:
     return text + f" 90 % in [{e.low:.6g}, {e.high:.6g}]"
 
 
+def _position_error(c: AxisComparison, log: str) -> str:
+    """The position error of a log, as the rest of a sentence; nothing of imposed motion."""
+    if log not in c.position_error:
+        return ""
+    error = f"{c.position_error[log]:.3g} {c.units.position}"
+    return f", {c.units.words('free-running position error')} {error}"
+
+
 def compare_text(result: Comparison) -> str:
     """Errors by log, and the three worst regions of each axis."""
     lines = []
@@ -91,8 +102,7 @@ def compare_text(result: Comparison) -> str:
         for name, error in c.force_error.items():
             lines.append(
                 f"axis {axis}, {name}: {words('force error')} {error:.4g} {c.units.force} "
-                f"({error / c.floor:.1f} x noise floor), {words('free-running position error')} "
-                f"{c.position_error[name]:.3g} {c.units.position}"
+                f"({error / c.floor:.1f} x noise floor){_position_error(c, name)}"
             )
         lines += [f"  worst: {region_in_words(region)}" for region in c.worst]
         if not c.worst:
@@ -118,11 +128,13 @@ def diagnose_text(result: Diagnosis) -> str:
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         lines += [f"  {words(finding_in_words(f))}" for f in d.findings]
+        shapes = [shape_in_words(f.effect, f.shape) for f in d.findings if f.shape]
+        lines += [f"  {words(text)}" for text in shapes]
         if remains := remainder_in_words(d):
             lines.append(f"  {remains}")
         if d.unexplained:
             lines.append(f"  {words(dependence_in_words(d.unexplained))}")
-            lines.append(f"  {advice()}")
+            lines.append(f"  {advice(d.findings)}")
         lines += [_ranking_line(c) for c in d.ranking[:4]]
         lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
         lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]
@@ -193,7 +205,7 @@ def add_text(result: Addition) -> str:
     """The errors before and after adding the effect."""
     s, words = result.step, result.units.words
     lines = [
-        f"added {s.effect} to axis {s.axis}",
+        step_in_words(s),
         f"  {words('force error on the fit logs'):33s} {s.fit_error_before:.4g} -> "
         f"{s.fit_error_after:.4g} {s.unit}",
     ]
@@ -202,11 +214,12 @@ def add_text(result: Addition) -> str:
             f"  {words('force error on the held-out logs'):33s} {s.holdout_error_before:.4g} -> "
             f"{s.holdout_error_after:.4g} {s.unit}"
         )
-    (before, after), unit = result.position_error, result.units.position
-    lines.append(
-        f"  {words('free-running position error'):33s} {before:.3g} -> {after:.3g} {unit} "
-        f"(MuJoCo: {result.replayed:.3g} {unit})"
-    )
+    if result.position_error is not None:
+        (before, after), unit = result.position_error, result.units.position
+        lines.append(
+            f"  {words('free-running position error'):33s} {before:.3g} -> {after:.3g} {unit} "
+            f"(MuJoCo: {result.replayed:.3g} {unit})"
+        )
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
         lines.append(

@@ -81,7 +81,9 @@ def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
     return [
         e
         for e in catalogue.after(axis.names)
-        if (e.kind is not Kind.MODIFIER or has_friction) and not e.is_nonparametric
+        if axis.can_have(e)
+        and (e.kind is not Kind.MODIFIER or has_friction)
+        and not e.is_nonparametric
     ]
 
 

@@ -33,6 +33,7 @@ DECOYS = 40
 SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
 SEED = 0  # of the shifts, the same for each effect
 RIDGE = 1e-4  # of a column's length, which keeps what the motion does not excite finite
+TINY = 1e-300  # N, of a column that is nothing
 
 
 @dataclass(frozen=True)
@@ -67,9 +68,11 @@ def proof(without: Fit, fitted: Fitted, dataset: Dataset) -> Proof | None:
     if fitted.effect.kind is Kind.FRICTION or timed or not where:
         return None
 
+    size = _ridge(jacobian(axis, dataset.fit, where))
+
     def columns(logs: Sequence[PreparedLog]) -> list[Array]:
         ends = np.cumsum([len(log) for log in logs])[:-1]
-        return np.split(jacobian(axis, logs, where), ends)
+        return np.split(jacobian(axis, logs, where) / size, ends)
 
     return Trial.of(without, dataset).proof(columns, sticking=sticks(axis))
 
@@ -87,30 +90,28 @@ class Trial:
     @classmethod
     def of(cls, base: Fit, dataset: Dataset) -> Trial:
         """The trial on the logs of a dataset."""
-        held = _Part.of(base, dataset.holdout) if dataset.holdout else None
-        return cls(_Part.of(base, dataset.fit), held)
+        size = _ridge(base.jacobian)
+        held = _Part.of(base, dataset.holdout, size) if dataset.holdout else None
+        return cls(_Part.of(base, dataset.fit, size), held)
 
     def of_power(self) -> Trial:
         """The same of the residual's square beside a constant, which of steady noise is all."""
         return Trial(self.fit.of_power(), self.held and self.held.of_power())
 
-    def proof(
-        self, columns: Columns, *, sticking: bool, ridge: float = RIDGE, decoys: int = DECOYS
-    ) -> Proof:
+    def proof(self, columns: Columns, *, sticking: bool, decoys: int = DECOYS) -> Proof:
         """What columns take of the fit's squared test error in one linear step, and their decoys.
 
-        columns: logs -> forces (m, j) of each log, N. sticking: whether test functions with
-        standstill are left out. ridge: of the length of a column.
+        columns: logs -> forces (m, j) N of each log, for strengths with a unit penalty. sticking:
+        whether test functions with standstill are left out.
         """
         fit = self.fit.with_columns(columns, sticking)
         held = self.held and self.held.with_columns(columns, sticking)
         count = len(fit.columns) + (len(held.columns) if held else 0)
         rng = np.random.default_rng(SEED)
-        before = _left(fit, held, None, ridge)
-        gain = 1.0 - _left(fit, held, np.zeros(count), ridge) / before
+        before = _left(fit, held, None)
+        gain = 1.0 - _left(fit, held, np.zeros(count)) / before
         untrue = (
-            1.0 - _left(fit, held, rng.uniform(*SHIFTS, count), ridge) / before
-            for _ in range(decoys)
+            1.0 - _left(fit, held, rng.uniform(*SHIFTS, count)) / before for _ in range(decoys)
         )
         return Proof(float(gain), float(max(untrue, default=-np.inf)))
 
@@ -119,7 +120,7 @@ class Trial:
 class _Part:
     """Some logs: residual (n,) N and the base's columns (n, k), of the test functions kept.
 
-    columns: those that are tried, (m, j) for each log.
+    columns: those that are tried, (m, j) for each log. All are for strengths with a unit penalty.
     """
 
     logs: Sequence[PreparedLog]
@@ -129,9 +130,9 @@ class _Part:
     columns: Sequence[Array] = ()
 
     @classmethod
-    def of(cls, base: Fit, logs: Sequence[PreparedLog]) -> _Part:
+    def of(cls, base: Fit, logs: Sequence[PreparedLog], size: Array) -> _Part:
         force = residual(base.axis, logs)
-        own = jacobian(base.axis, logs, base.scaling.where)
+        own = jacobian(base.axis, logs, base.scaling.where) / size
         return cls(logs, force, own, np.ones(len(force), dtype=bool))
 
     def of_power(self) -> _Part:
@@ -154,16 +155,19 @@ class _Part:
         return np.hstack([self.base, np.concatenate(moved)[self.kept]])
 
 
-def _left(fit: _Part, held: _Part | None, shifts: Array | None, ridge: float) -> float:
+def _ridge(columns: Array) -> Array:
+    """The size (k,) of columns (n, k), N per unit, by which a weak penalty on them is one."""
+    return RIDGE * np.maximum(np.linalg.norm(columns, axis=0), TINY)
+
+
+def _left(fit: _Part, held: _Part | None, shifts: Array | None) -> float:
     """Mean squared test error N^2 after a linear step with columns so shifted."""
     first = len(fit.columns)
     columns = fit.shifted(None if shifts is None else shifts[:first])
-    norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    columns = columns / norms
-    normal = columns.T @ columns + ridge**2 * np.eye(len(norms))
+    normal = columns.T @ columns + np.eye(columns.shape[1])
     step = np.linalg.solve(normal, columns.T @ fit.force)
     if held is None:
         solved = fit.force - columns @ step
-        return float(np.mean(left_out(solved, columns, np.full(len(norms), ridge)) ** 2))
+        return float(np.mean(left_out(solved, columns, np.ones(len(step))) ** 2))
     there = held.shifted(None if shifts is None else shifts[first:])
-    return float(np.mean((held.force - there / norms @ step) ** 2))
+    return float(np.mean((held.force - there @ step) ** 2))

@@ -8,9 +8,10 @@ from enum import Enum
 from functools import cached_property
 
 from identify.dataset.dataset import Dataset
+from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
 from identify.selection.candidates import Candidate
-from identify.selection.findings import Finding, found, found_wrong
+from identify.selection.findings import Finding, found, found_wrong, left
 from identify.selection.repeating_force import Repeat, not_general
 from identify.selection.residual_dependence import Dependence
 from identify.selection.wrong_shape import wrong_shape
@@ -104,20 +105,38 @@ class AxisDiagnosis:
     def with_findings(self) -> AxisDiagnosis:
         """The same with what each named effect explains, and with a law of the wrong shape.
 
-        It takes a refit for each. A shape is asked about where error remains beside what is named.
+        It takes a refit for each. A free curve of a law that is there competes with what is named:
+        it is the answer where it leaves clearly less error by itself, and told as well where it
+        leaves about as little. Where error remains beside what is named, it is asked about there.
         """
         final = self.final if self.named else self.base
-        findings = [
+        findings = tuple(
             found(s.candidate.effect, s.tied, self.base, final, self.dataset)
             for s in (self._proved if self.named else ())
-        ]
-        shape = None if self.unexplained is None else wrong_shape(final, self.dataset)
-        if shape is None:
-            return replace(self, findings=tuple(findings))
-        findings.append(found_wrong(shape, self.base, final, self.dataset))
+        )
+        instead = self._wrong_instead() if self.named else None
+        if instead and (RULE.near * left(instead) <= min(map(left, findings))):
+            if left(instead) < RULE.beside_decoys * min(map(left, findings)):
+                return replace(self, findings=(instead,), verdict=Verdict.WRONG_SHAPE)
+            rivals = tuple(replace(f, tied=(*f.tied, instead.effect)) for f in findings)
+            return replace(self, findings=(*rivals, instead), verdict=Verdict.AMBIGUOUS)
+        wrong = None if self.unexplained is None else self._wrong_beside(final)
+        if wrong is None:
+            return replace(self, findings=findings)
         alone = self.verdict is Verdict.UNEXPLAINED
         verdict = Verdict.WRONG_SHAPE if alone else self.verdict
-        return replace(self, findings=tuple(findings), verdict=verdict)
+        return replace(self, findings=(*findings, wrong), verdict=verdict)
+
+    def _wrong_instead(self) -> Finding | None:
+        """A free curve beside the base alone; not of friction, whose curves hold its modifiers."""
+        shape = wrong_shape(self.base, self.dataset)
+        if shape is None or shape.shape.curve.rubs:
+            return None
+        return found_wrong(shape, self.base, self.base, self.dataset)
+
+    def _wrong_beside(self, fit: Fit) -> Finding | None:
+        shape = wrong_shape(fit, self.dataset)
+        return None if shape is None else found_wrong(shape, self.base, fit, self.dataset)
 
     @property
     def _proved(self) -> list[Step]:

@@ -10,6 +10,7 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit, holdout_error
 from identify.selection.confidence import confidence
 from identify.selection.decoys import Proof, proof
+from identify.selection.found_shape import FoundShape, found_shape
 from identify.selection.ranking import less
 from identify.selection.wrong_shape import WrongShape
 from twin.effect import Effect
@@ -32,7 +33,8 @@ class Finding:
     above the noise floor that comes back when it alone is taken out, about 0..1. error_before,
     error_after: RMS test error in ``unit`` without it and with it; of a wrong shape with the law
     and with a free curve beside it, as one linear step predicts. parameters: of its law. proof:
-    beside decoys; None where a shift in time makes none.
+    beside decoys; None where a shift in time makes none. shape: the curve that is assumed and the
+    one found, of a wrong shape.
     """
 
     effect: str
@@ -44,6 +46,7 @@ class Finding:
     parameters: dict[str, float]
     proof: Proof | None
     kind: FindingKind = FindingKind.MISSING
+    shape: FoundShape | None = None
 
     @property
     def margin(self) -> float:
@@ -92,7 +95,13 @@ def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> F
         parameters=dict(final.axis[shape.effect].values),
         proof=shape.proof,
         kind=FindingKind.WRONG_SHAPE,
+        shape=found_shape(shape.shape, final, dataset),
     )
+
+
+def left(finding: Finding) -> float:
+    """Squared test error that a finding leaves, N^2."""
+    return finding.error_after**2
 
 
 def _share(taken: float, base: Fit, dataset: Dataset) -> float:

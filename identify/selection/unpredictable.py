@@ -61,7 +61,7 @@ def is_unpredictable(fit: Fit, dataset: Dataset) -> bool:
     own = replace(trial, held=None)
     trials = [(t, RULE.least_share) for t in (trial, own)]
     trials += [(t.of_power(), RULE.foretold) for t in (trial, own)]
-    predictors = list(_predictors(dataset))
+    predictors = [_kept_small(columns, dataset) for columns in _predictors(dataset)]
     return not any(
         _foretells(t, columns, least, sticking)
         for (t, least), columns in itertools.product(trials, predictors)
@@ -70,11 +70,18 @@ def is_unpredictable(fit: Fit, dataset: Dataset) -> bool:
 
 def _foretells(trial: Trial, columns: Columns, least: float, sticking: bool) -> bool:
     """Whether columns take at least a part of the squared test error, and more than decoys do."""
-    proof = trial.proof(columns, sticking=sticking, ridge=RIDGE, decoys=0)
+    proof = trial.proof(columns, sticking=sticking, decoys=0)
     if proof.gain < least:
         return False
-    proof = trial.proof(columns, sticking=sticking, ridge=RIDGE, decoys=DECOYS)
+    proof = trial.proof(columns, sticking=sticking, decoys=DECOYS)
     return proof.gain > proof.best_decoy
+
+
+def _kept_small(columns: Columns, dataset: Dataset) -> Columns:
+    """The same for strengths with a unit penalty that is weak beside what is often visited."""
+    every = np.linalg.norm(np.concatenate(columns(dataset.fit)), axis=0)
+    size = RIDGE * np.maximum(every, RIDGE * every.max())
+    return lambda logs: [part / size for part in columns(logs)]
 
 
 def _predictors(dataset: Dataset) -> Iterator[Columns]:

@@ -1,117 +1,206 @@
 """Wrong shape: a law that is there, in whose place a free curve does better.
 
-A curve of hats over the coordinate that the law assumes is put beside the law: what it takes of the
-squared test error in one linear step is what the law's own shape cannot. It is proved as an absent
-effect is, against the same curve shifted in time. The number of hats is chosen on the fit logs, and
-whether the curve lets go at standstill. Of a friction, test functions with standstill are left out:
-there it may be anything.
+A smooth curve over the coordinate that the law assumes is put beside the law: what it takes of the
+squared test error in one linear step is what the law's own shape cannot. Blocks left out of the fit
+logs choose how smooth it is, whether it turns with the direction of motion, and whether it lets go
+at standstill. It is proved as an absent effect is, against the same curve shifted in time. Of a
+friction, test functions with standstill are left out: there it may be anything.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.prepared_log import PreparedLog, at_rest, last_direction, sticks
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
+from identify.estimation.force_balance import jacobian
 from identify.selection.decoys import Proof, Trial
-from twin.effect import Coordinate, Curve, Kind
-from twin.model.machine import Fitted
+from identify.selection.smoothed import STIFFNESS, Linearised, choose_stiffness
+from twin.curve import Curve
+from twin.effect import Effect, Kind
+from twin.effects import load_catalogue
+from twin.errors import InputError
+from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.model.parameters import ParameterReference
 from twin.signals import Array
 
-HATS = (12, 40)  # along a curve
 DECOYS = 20
-RIDGE = 0.03  # of a hat's length, which keeps those that are seldom visited small
-
-
-@dataclass(frozen=True)
-class WrongShape:
-    """An effect whose law has another shape than the machine's force, with the proof."""
-
-    effect: str
-    curve: Curve
-    proof: Proof
-
-
-def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
-    """The effect whose free curve takes most of a fit's squared test error, if it is proved."""
-    curved = [f for f in fit.axis.effects if f.effect.curve]
-    trial = Trial.of(fit, dataset)
-    tried = [_tried(trial, f, dataset.fit, sticks(fit.axis)) for f in curved]
-    best = max(tried, key=lambda w: w.proof.gain, default=None)
-    return best if best and best.proof.holds else None
-
-
-def _tried(trial: Trial, fitted: Fitted, logs: Sequence[PreparedLog], sticking: bool) -> WrongShape:
-    """The curve with as many hats, and at standstill, as blocks left out of the fit logs say."""
-    curve = fitted.effect.curve
-    assert curve is not None
-    is_force = fitted.effect.kind is Kind.FORCE
-    sticking = sticking or not is_force
-    rests = (False, True) if is_force and curve.by_direction else (False,)
-    among = replace(trial, held=None)
-
-    def gain(hats: _Hats) -> float:
-        return among.proof(hats.columns, sticking=sticking, ridge=RIDGE, decoys=0).gain
-
-    best = max((_Hats.of(fitted, logs, n, at_rest=r) for n in HATS for r in rests), key=gain)
-    found = trial.proof(best.columns, sticking=sticking, ridge=RIDGE, decoys=DECOYS)
-    return WrongShape(fitted.effect.name, curve, found)
+COARSELY = STIFFNESS[::2]  # how smooth a curve may be, to tell whether it helps
 
 
 @dataclass(frozen=True, eq=False)
-class _Hats:
-    """Hats over a curve's coordinate. knots (k,): in its unit, or parts of its period.
+class Shape:
+    """A free curve for a law: where it lies, and how smooth it is.
 
-    at_rest: whether a curve of each direction stays at standstill as it was before.
+    period: m, of the curve; None where it does not repeat. empty: the free curve at zero, laid over
+    the law's coordinate. lets_go: whether it does at standstill. stiffness: of each part that the
+    data ask for.
     """
 
+    effect: str
     curve: Curve
     period: float | None
-    knots: Array
-    at_rest: bool
+    empty: Fitted
+    lets_go: bool
+    stiffness: Mapping[str, float]
 
-    @classmethod
-    def of(
-        cls, fitted: Fitted, logs: Sequence[PreparedLog], count: int, *, at_rest: bool = False
-    ) -> _Hats:
-        curve = fitted.effect.curve
-        assert curve is not None
-        if curve.period is not None:
-            knots = np.linspace(0.0, 1.0, count + 1)
-            return cls(curve, fitted.values[curve.period], knots, at_rest)
-        where = np.concatenate([_coordinate(curve, log) for log in logs])
-        # As many samples to a hat as to any other: a friction curve bends where speeds are low.
-        knots = np.unique(np.quantile(where, np.linspace(0.0, 1.0, count)))
-        return cls(curve, None, knots, at_rest)
+    @property
+    def beside(self) -> bool:
+        """Whether it goes beside the law, not in its place.
 
-    def columns(self, logs: Sequence[PreparedLog]) -> list[Array]:
-        """Means of the hats by test functions, (m, k) for each log; k doubles by direction."""
-        return [self._of(log) for log in logs]
+        A friction law holds the axis at rest, and any law that does not repeat goes on where the
+        logs have not been; beyond them a curve keeps its end value.
+        """
+        return self.period is None
 
-    def _of(self, log: PreparedLog) -> Array:
-        where = _coordinate(self.curve, log)
-        if self.period is not None:
-            where = np.mod(where / self.period, 1.0)
-        hats = np.stack([np.interp(where, self.knots, unit) for unit in np.eye(len(self.knots))])
-        if self.period is not None:  # the last is the first
-            hats[0] += hats[-1]
-            hats = hats[:-1]
-        if self.curve.by_direction:
-            direction = self._direction(log.motion.velocity)
-            hats = np.concatenate([hats * (direction > 0.0), hats * (direction < 0.0)])
-        return log.test_function.mean(hats).T
-
-    def _direction(self, velocity: Array) -> Array:
-        """Sign (n,) of the velocity; at standstill 0, or as it was before."""
-        direction = last_direction(velocity)
-        return direction if self.at_rest else np.where(at_rest(velocity), 0.0, direction)
+    @property
+    def turns(self) -> bool:
+        """Whether a part of it turns with the direction of motion."""
+        return self.empty.effect.parts[1].name in self.stiffness
 
 
-def _coordinate(curve: Curve, log: PreparedLog) -> Array:
-    if curve.over is Coordinate.SPEED:
-        return np.abs(log.motion.velocity)
-    return log.motion.position
+@dataclass(frozen=True, eq=False)
+class WrongShape:
+    """A free curve in whose place a law has another shape, with the proof."""
+
+    shape: Shape
+    proof: Proof
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect whose law it is."""
+        return self.shape.effect
+
+
+def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
+    """The law whose free curve takes most of a fit's squared test error, if it is proved.
+
+    Of those that leave about as little, the one with fewer parts.
+    """
+    trial = Trial.of(fit, dataset)
+    found = [(s, _proof(trial, s, fit, dataset, decoys=0).gain) for s in _shapes(fit, dataset)]
+    if not found:
+        return None
+    least = min(1.0 - gain for _, gain in found)
+    near = [s for s, gain in found if RULE.near * (1.0 - gain) <= least]
+    best = min(near, key=lambda s: len(s.stiffness))
+    proof = _proof(trial, best, fit, dataset, decoys=DECOYS)
+    return WrongShape(best, proof) if proof.holds else None
+
+
+def best_shape(fit: Fit, dataset: Dataset, effect: str) -> WrongShape | None:
+    """The free curve for one law that takes most; None where the data ask for none."""
+    trial = Trial.of(fit, dataset)
+    shapes = [s for s in _shapes(fit, dataset) if s.effect == effect]
+    tried = [WrongShape(s, _proof(trial, s, fit, dataset, decoys=DECOYS)) for s in shapes]
+    return max(tried, key=lambda w: w.proof.gain, default=None)
+
+
+def having_shape(effect: Effect, model: MachineModel, axis: str | None) -> list[str]:
+    """The axes of a model, or the one given, where a free curve can replace the effect's law.
+
+    Raises InputError where there is none.
+    """
+    if not effect.curves:
+        raise InputError(f"the law of {effect.name} assumes no curve that could have another shape")
+    names = [axis] if axis else list(model.axes)
+    free = _free().name
+    if taken := [n for n in names if free in model.axis(n).names]:
+        raise InputError(
+            f"axis {', '.join(taken)} has a {free} in the place of a law already, and can have "
+            "one; `twin fit` refits it"
+        )
+    having = [n for n in names if effect.name in model.axis(n).names]
+    if not having:
+        raise InputError(
+            f"axis {', '.join(names)} has no effect '{effect.name}'; `twin add {effect.name}` adds "
+            "it"
+        )
+    return having
+
+
+def sticking(fit: Fit, shape: Shape) -> bool:
+    """Whether a curve says nothing of test functions with standstill."""
+    return sticks(fit.axis) or fit.axis[shape.effect].effect.kind is not Kind.FORCE
+
+
+def _shapes(fit: Fit, dataset: Dataset) -> list[Shape]:
+    """A free curve for each curve that a law of the fit assumes, where the data ask for one."""
+    made = (_chosen(fit, dataset, *laws) for laws in _assumed(fit.axis))
+    return [s for s in made if s is not None]
+
+
+def _assumed(axis: AxisModel) -> list[tuple[Fitted, Curve]]:
+    """The laws with their curves; of two over the same coordinate the more special one."""
+    frictions_first = sorted(axis.effects, key=lambda f: f.effect.kind is not Kind.FRICTION)
+    unlike: dict[tuple[object, ...], tuple[Fitted, Curve]] = {}
+    for fitted in frictions_first:
+        for curve in fitted.effect.curves:
+            period = fitted.values.get(curve.period or "")
+            unlike[curve.over, period, curve.by_direction] = (fitted, curve)
+    return list(unlike.values())
+
+
+def _chosen(fit: Fit, dataset: Dataset, law: Fitted, curve: Curve) -> Shape | None:
+    """The smoothing and the form at standstill with the least cross-validated error."""
+    forms = (False, True) if curve.by_direction else (False,)
+    best, least = None, np.inf
+    for lets_go in forms:
+        shape = _laid(law, curve, dataset, lets_go)
+        mask = moving(dataset.fit, sticking(fit, shape))[fit.kept]
+        linear = Linearised.about(fit, dataset, shape.empty).on(mask)
+        stiffness = choose_stiffness(linear, COARSELY)
+        error = linear.left_out_error(stiffness)
+        if stiffness and error < least:
+            best, least = replace(shape, stiffness=stiffness), error
+    return best if best and (best.turns or not curve.rubs) else None
+
+
+def _laid(law: Fitted, curve: Curve, dataset: Dataset, lets_go: bool) -> Shape:
+    free = _free()
+    assert free.free_shape is not None
+    period = None if curve.period is None else law.values[curve.period]
+    values = free.free_shape.laid(curve, period, dataset.excitation, lets_go)
+    empty = Fitted.at_start(free, values)
+    if not curve.by_direction:
+        empty = replace(empty, fixed=empty.fixed | set(free.parts[1].strengths))
+    return Shape(law.effect.name, curve, period, empty, lets_go, {})
+
+
+def _free() -> Effect:
+    """The effect that stands in the place of a law."""
+    return next(e for e in load_catalogue().values() if e.free_shape)
+
+
+def _proof(trial: Trial, shape: Shape, fit: Fit, dataset: Dataset, *, decoys: int) -> Proof:
+    resting = sticking(fit, shape)
+    samples = int(np.count_nonzero(moving(dataset.fit, resting)))
+    return trial.proof(_columns(fit.axis, shape, samples), sticking=resting, decoys=decoys)
+
+
+def _columns(
+    axis: AxisModel, shape: Shape, samples: int
+) -> Callable[[Sequence[PreparedLog]], list[Array]]:
+    """Forces (m, j) N of each log such that the smoothing of j strengths is a unit penalty."""
+    effect = shape.empty.effect
+    alone = replace(axis, effects=(shape.empty,))
+    parts = [p for p in effect.parts if p.name in shape.stiffness]
+    scales = []
+    for part in parts:
+        rows = np.sqrt(samples) * shape.stiffness[part.name] * part.rows(len(part.strengths))
+        scales.append(np.linalg.inv(np.linalg.cholesky(rows.T @ rows)).T)
+
+    def columns(logs: Sequence[PreparedLog]) -> list[Array]:
+        ends = np.cumsum([len(log) for log in logs])[:-1]
+        every = []
+        for part, scale in zip(parts, scales, strict=True):
+            where = [ParameterReference(effect.name, effect.parameter(n)) for n in part.strengths]
+            every.append(jacobian(alone, logs, where) @ scale)
+        return np.split(np.hstack(every), ends)
+
+    return columns

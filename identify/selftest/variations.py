@@ -107,7 +107,7 @@ VARIATIONS: Mapping[str, Variation] = {
 
 def _in_place(drawn: Drawn, axis: str, form: Effect, own: Mapping[str, float]) -> Drawn:
     """The machine with a form in place of the effect that assumes the same kind of curve."""
-    old = next(f for f in drawn.true.axes[axis].effects if f.effect.curve == form.curve)
+    old = next(f for f in drawn.true.axes[axis].effects if f.effect.curves == form.curves)
     known = {**old.values, **own}
     new = Fitted.at_start(form, {p.name: known[p.name] for p in form.parameters if p.name in known})
     out = drawn.on(axis, lambda a: a.without(old.effect.name).with_effect(new))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.noise_floor import noise_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.open_loop import START_FIT, as_logged, open_loop, states_along
@@ -41,8 +42,9 @@ def free_run(
     """Run the model on the commands of one log, prepared for each of its axes.
 
     noise: generator of measurement noise of the log's level, added to its readings and commands;
-    no noise is added where None.
+    no noise is added where None. Raises CannotRun where the motion of an axis is imposed.
     """
+    model.require_mass()
     model = as_logged(model, logs)
     position, command = _signals(model, logs, noise)
     n, period = len(position), model.period
@@ -107,3 +109,18 @@ def rms_error(run: FreeRun, axis: str) -> float:
     """RMS of the free-running position error of one axis, in m; infinite where the run diverges."""
     with np.errstate(over="ignore"):
         return float(np.sqrt(np.nanmean(run.error[axis] ** 2)))
+
+
+def errors_of_both(
+    before: MachineModel, after: MachineModel, axis: str, prepared: Mapping[str, Dataset]
+) -> tuple[tuple[float, float] | None, float | None]:
+    """Free-running position error (m RMS) on the first log: before and after, and in MuJoCo after.
+
+    None where the motion is imposed.
+    """
+    if after.is_imposed:
+        return None, None
+    log = next(iter(by_log(prepared).values()))
+    runs = (free_run(before, log), free_run(after, log), free_run(after, log, MujocoSimulator))
+    was, now, replayed = (rms_error(run, axis) for run in runs)
+    return (was, now), replayed

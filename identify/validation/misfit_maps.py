@@ -164,10 +164,13 @@ def _by_log(axis: AxisModel, dataset: Dataset) -> dict[str, float]:
 def position_errors(
     model: MachineModel, found: Mapping[str, Dataset], progress: Callable[[int, int], None]
 ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
-    """Free-running position error, and that of noise alone: axis -> log -> m RMS."""
+    """Free-running position error, and that of noise alone: axis -> log -> m RMS.
+
+    There is none where the motion is imposed.
+    """
     errors: dict[str, dict[str, float]] = {a: {} for a in found}
     floors: dict[str, dict[str, float]] = {a: {} for a in found}
-    logs = by_log(found)
+    logs = {} if model.is_imposed else by_log(found)
     for i, (name, parts) in enumerate(logs.items()):
         progress(i, len(logs))
         run = free_run(model, parts)

@@ -17,7 +17,8 @@ from identify.output.words.selection import moved_in_words
 from identify.selection import confounded
 from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import Verdict
-from identify.workflow import _addition, add
+from identify.validation import free_run as free_runs
+from identify.workflow import add, addition
 from twin.errors import CannotRun, InputError
 from twin.model.machine import MachineModel
 
@@ -240,7 +241,7 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
     seen = []
     monkeypatch.setattr(workflow, "fit", lambda *a, **k: seen.append((a, k)) or both)
     monkeypatch.setattr(workflow, "try_effect", attempt)
-    monkeypatch.setattr(workflow, "_addition", lambda best, base, *_: (best, base))
+    monkeypatch.setattr(workflow, "addition", lambda best, base, *_: (best, base))
     wear = CATALOGUE["wear"]
     best, base = add(wear, made.MODEL, "logs", "held", test_function=0.07)
     assert (best.axis, base) == ("y", both.fits["y"])
@@ -276,8 +277,8 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     errors = {(1, "reduced"): 5.1, (2, "reduced"): 1.7}
     monkeypatch.setattr(workflow, "estimates", lambda fit: (fit,))
     monkeypatch.setattr(workflow, "intervals_to_keep", lambda fit, found: (fit.error, found))
-    monkeypatch.setattr(workflow, "free_run", run)
-    monkeypatch.setattr(workflow, "rms_error", lambda r, axis: errors.get(r, 1.9))
+    monkeypatch.setattr(free_runs, "free_run", run)
+    monkeypatch.setattr(free_runs, "rms_error", lambda r, axis: errors.get(r, 1.9))
     monkeypatch.setattr(
         workflow, "holdout_error", lambda fit, s: {7.3: 8.1, 2.9: 3.3}[round(fit.error, 9)]
     )
@@ -287,7 +288,7 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
         lambda a, b: (replace(made.MOVED, before=a.error, after=b.error),),
     )
     whole = model.with_axis("x", axis_of(fitted("empirical_map")))
-    found = _addition(best, base, {"x": dataset}, model, whole)
+    found = addition(best, base, {"x": dataset}, model, whole)
     step = found.step
     assert (step.action, step.effect, step.axis) == ("add", "cogging", "x")
     assert (step.fit_error_before, step.fit_error_after) == pytest.approx((7.3, 2.9))
@@ -307,7 +308,7 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
 
 def test_what_a_diagnosis_names_is_added_as_it_was_fitted(monkeypatch):
     """One of a pair was fitted beside the other, so that it has to be fitted by itself."""
-    monkeypatch.setattr(workflow, "_addition", lambda best, base, *_: (best, base))
+    monkeypatch.setattr(workflow, "addition", lambda best, base, *_: (best, base))
 
     def added(found):
         return workflow.add_named(workflow.Diagnosis(made.MODEL, {"x": found}, made.compared()))

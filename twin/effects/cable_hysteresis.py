@@ -36,7 +36,7 @@ EFFECT = Effect(
         ),
         *(
             Parameter(
-                f"f{i}", "N", 0.0, 0.0, 1e3, f"force of the layer that slips at reach/{2 ** i}",
+                f"f{i}", "N", 0.0, 0.0, 1e7, f"force of the layer that slips at reach/{2 ** i}",
                 strength=True,
             )
             for i in range(4)

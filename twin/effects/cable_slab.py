@@ -5,7 +5,8 @@ F(x) = -(offset + k1 x + k2 x^2 + k3 x^3); it falls with x because the fold of t
 choice: the thesis prints a measured curve, no formula.
 """
 
-from twin.effect import OUT, Coordinate, Curve, Effect, Kind, Parameter, X
+from twin.curve import Coordinate, Curve
+from twin.effect import OUT, Effect, Kind, Parameter, X
 
 
 def law(p, s, io):
@@ -19,13 +20,13 @@ EFFECT = Effect(
     equation="F = -(offset + k1 x + k2 x^2 + k3 x^3)",
     source="L. Jia 2023, cable pass; the polynomial form is an assumption",
     parameters=(
-        Parameter("offset", "N", 0.0, -1e4, 1e4, "force at x = 0", strength=True),
+        Parameter("offset", "N", 0.0, -1e7, 1e7, "force at x = 0", strength=True),
         Parameter("k1", "N/m", 0.0, -1e5, 1e5, "stiffness", strength=True),
         Parameter("k2", "N/m^2", 0.0, -1e6, 1e6, "quadratic term", strength=True),
         Parameter("k3", "N/m^3", 0.0, -1e7, 1e7, "cubic term", strength=True),
     ),
     law=law,
-    curve=Curve(Coordinate.POSITION),
+    curves=(Curve(Coordinate.POSITION),),
     fingerprint="residual is one smooth curve of position, the same in both directions",
     excited_by="slow passes over the whole travel in both directions",
 )

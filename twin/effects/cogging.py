@@ -8,7 +8,8 @@ force is a Fourier series in position with period set by pole pitch and slot pit
 from collections.abc import Mapping
 from math import cos, hypot, pi, sin
 
-from twin.effect import OUT, Coordinate, Curve, Effect, Excitation, Kind, Parameter, X
+from twin.curve import Coordinate, Curve
+from twin.effect import OUT, Effect, Excitation, Kind, Parameter, X
 
 
 def law(p, s, io):
@@ -53,7 +54,7 @@ EFFECT = Effect(
         Parameter("p", "m", 0.024, 1e-4, 10.0, "magnet pitch", scan=pitches, period=True),
         *(
             Parameter(
-                f"{c}{k}", "N", 0.0, -1e4, 1e4, f"{f} term of harmonic {k}", strength=True,
+                f"{c}{k}", "N", 0.0, -1e7, 1e7, f"{f} term of harmonic {k}", strength=True,
                 screened=k == 1,
             )
             for k in (1, 2, 3)
@@ -62,7 +63,7 @@ EFFECT = Effect(
     ),
     law=law,
     simplest=simplest,
-    curve=Curve(Coordinate.POSITION, period="p"),
+    curves=(Curve(Coordinate.POSITION, period="p"),),
     several=True,
     fingerprint="residual repeats along the track, the same in both directions and at every force",
     excited_by="constant-speed passes over many magnet pitches",

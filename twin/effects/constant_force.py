@@ -15,7 +15,7 @@ EFFECT = Effect(
     summary="constant force: tilt, preload or amplifier offset",
     equation="F = F0",
     source="statics; in EMPS (Janot et al. 2019) the 'offset' of the drive force",
-    parameters=(Parameter("F0", "N", 0.0, -1e4, 1e4, "the force", strength=True),),
+    parameters=(Parameter("F0", "N", 0.0, -1e7, 1e7, "the force", strength=True),),
     law=law,
     fingerprint="residual has the same mean everywhere, in both directions",
     excited_by="any motion in both directions",

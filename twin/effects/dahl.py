@@ -10,7 +10,8 @@ r falls along the path as dr/d|x| = -sigma0/Fc r^n, which is integrated exactly 
 
 from math import copysign, exp, expm1, log, log1p
 
-from twin.effect import DRY, DT, OUT, VISCOUS, WHEN, Coordinate, Curve, Effect, Kind, Parameter, V
+from twin.curve import FRICTION_CURVES
+from twin.effect import DRY, DT, OUT, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -41,10 +42,10 @@ EFFECT = Effect(
     source="Dahl 1968; Dahl 1976; with the viscous part added",
     parameters=(
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
         Parameter(
             "sigma0", "N/m", 300.0, 1.0, 1e9, "stiffness at F = 0",
             start_rule=lambda e: 1e3 * e.dry_level,
@@ -54,7 +55,7 @@ EFFECT = Effect(
     ),
     states=("F",),
     law=law,
-    curve=Curve(Coordinate.SPEED, by_direction=True),
+    curves=FRICTION_CURVES,
     fingerprint="residual after every reversal over a fixed distance, the same at every speed",
     excited_by="reversals at several speeds, with travel of micrometres to millimetres after each",
 )  # fmt: skip

@@ -19,7 +19,8 @@ from functools import cache
 from math import copysign, expm1, sqrt
 from typing import Any
 
-from twin.effect import DT, OUT, TIME, WHEN, Effect, Kind, Parameter, Part, V, X
+from twin.curve import Part
+from twin.effect import DT, OUT, TIME, WHEN, Effect, Kind, Parameter, V, X
 
 KNOTS = 11  # where the knots' parameters begin
 SPEEDS = 17
@@ -149,7 +150,7 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
 
 
 def _knots(names: tuple[str, ...], meaning: str) -> tuple[Parameter, ...]:
-    return tuple(Parameter(n, "N", 0.0, -1e4, 1e4, meaning, strength=True) for n in names)
+    return tuple(Parameter(n, "N", 0.0, -1e7, 1e7, meaning, strength=True) for n in names)
 
 
 EFFECT = of_size(40)

@@ -21,20 +21,8 @@ integrated exactly over the sample for constant v, so any stiffness and C are st
 from functools import cache
 from math import copysign, exp, expm1, log
 
-from twin.effect import (
-    DRY,
-    DT,
-    OUT,
-    STATIC,
-    VISCOUS,
-    WHEN,
-    Coordinate,
-    Curve,
-    Effect,
-    Kind,
-    Parameter,
-    V,
-)
+from twin.curve import FRICTION_CURVES
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 SHARES = 9  # where the elements' own parameters begin
 
@@ -104,7 +92,7 @@ def of_size(elements: int) -> Effect:
         ),
         states=(*(f"F_{i}" for i in numbers), *(f"slip_{i}" for i in numbers)),
         law=law,
-        curve=Curve(Coordinate.SPEED, by_direction=True),
+        curves=FRICTION_CURVES,
         fingerprint="residual after a reversal that depends on where the axis turned before",
         excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
         of_size=of_size,
@@ -117,11 +105,11 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
             "elements", "1", elements, elements, elements, "number N, from the model file"
         ),
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.35, 0.0, 1e4, "static friction", strength=True, dry=True, at_least="Fc",
+            "Fs", "N", 0.35, 0.0, 1e7, "static friction", strength=True, dry=True, at_least="Fc",
             start_rule=lambda e: 1.15 * e.dry_level,
         ),
         Parameter(
@@ -129,7 +117,7 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
             start_rule=lambda e: 0.05 * e.speed_max,
             scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
         Parameter(
             "sigma0", "N/m", 300.0, 1.0, 1e9, "stiffness of all elements together",
             start_rule=lambda e: 1e3 * e.dry_level,

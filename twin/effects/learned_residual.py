@@ -15,7 +15,8 @@ D. Dung, V. Temlyakov, T. Ullrich, Hyperbolic Cross Approximation, Birkhaeuser (
 from math import copysign, cos, expm1, pi
 from typing import Any
 
-from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, Part, V, X
+from twin.curve import Part
+from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V, X
 
 OWN = 6  # where the coefficients begin
 CROSS = 24
@@ -101,7 +102,7 @@ EFFECT = Effect(
             start_rule=lambda e: 0.05 * e.travel,
         ),
         Parameter("stiff", "1", 0.1, 1e-9, 1e9, "ridge on the coefficients", fixed=True),
-        *(Parameter(n, "N", 0.0, -1e4, 1e4, "a coefficient", strength=True) for n in ORDERS),
+        *(Parameter(n, "N", 0.0, -1e7, 1e7, "a coefficient", strength=True) for n in ORDERS),
     ),
     states=("z1", "z2"),
     law=law,

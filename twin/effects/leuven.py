@@ -24,20 +24,8 @@ at the mean of the rates at both ends of the step: any stiffness is stable.
 
 from math import copysign, exp, expm1, log1p
 
-from twin.effect import (
-    DRY,
-    DT,
-    OUT,
-    STATIC,
-    VISCOUS,
-    WHEN,
-    Coordinate,
-    Curve,
-    Effect,
-    Kind,
-    Parameter,
-    V,
-)
+from twin.curve import FRICTION_CURVES
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 TURNS = 16  # reversals remembered
 FULL = 1.0 - 1e-12  # part of a gap that counts as all of it
@@ -130,11 +118,11 @@ EFFECT = Effect(
     source="Swevers et al. 2000; L. Jia 2023, eq. 2.10-2.12",
     parameters=(
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.35, 0.0, 1e4, "static friction", strength=True, dry=True, at_least="Fc",
+            "Fs", "N", 0.35, 0.0, 1e7, "static friction", strength=True, dry=True, at_least="Fc",
             start_rule=lambda e: 1.15 * e.dry_level,
         ),
         Parameter(
@@ -142,20 +130,20 @@ EFFECT = Effect(
             start_rule=lambda e: 0.05 * e.speed_max,
             scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
         Parameter(
             "sigma0", "N/m", 300.0, 1.0, 1e9, "stiffness after a reversal",
             start_rule=lambda e: 1e3 * e.dry_level,
             scan=lambda e: tuple(e.dry_level / z for z in (1e-3, 1e-4, 1e-5)),
         ),
-        Parameter("sigma1", "N s/m", 0.5, 1e-6, 1e5, "bristle damping"),
+        Parameter("sigma1", "N s/m", 0.5, 1e-6, 1e8, "bristle damping"),
         Parameter("b", "1", 1.5, 0.0, 10.0, "log of the factor the stiffness falls by up to Fs"),
         Parameter("m", "1", 16.0, 1.0, 50.0, "sharpness of the onset of sliding", fixed=True),
         Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
     ),
     states=("F_h", "direction", "depth", *(f"turn_{i + 1}" for i in range(TURNS))),
     law=law,
-    curve=Curve(Coordinate.SPEED, by_direction=True),
+    curves=FRICTION_CURVES,
     fingerprint="residual after a reversal that depends on where the axis turned before",
     excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
 )  # fmt: skip

@@ -9,20 +9,8 @@ v, so any stiffness is stable.
 
 from math import copysign, exp, expm1
 
-from twin.effect import (
-    DRY,
-    DT,
-    OUT,
-    STATIC,
-    VISCOUS,
-    WHEN,
-    Coordinate,
-    Curve,
-    Effect,
-    Kind,
-    Parameter,
-    V,
-)
+from twin.curve import FRICTION_CURVES
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 GONE = 40.0  # exp(-40) is below the rounding of what it is added to
 SHORT = 0.05  # below it the series of 1 - exp(-a) to a^8 is exact to rounding
@@ -61,11 +49,11 @@ EFFECT = Effect(
     source="Canudas de Wit et al. 1995, as in L. Jia 2023, eq. 2.6-2.9",
     parameters=(
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.35, 0.0, 1e4, "static friction", strength=True, dry=True, at_least="Fc",
+            "Fs", "N", 0.35, 0.0, 1e7, "static friction", strength=True, dry=True, at_least="Fc",
             start_rule=lambda e: 1.15 * e.dry_level,
         ),
         Parameter(
@@ -73,18 +61,18 @@ EFFECT = Effect(
             start_rule=lambda e: 0.05 * e.speed_max,
             scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
         Parameter(
             "sigma0", "N/m", 300.0, 1.0, 1e9, "bristle stiffness",
             start_rule=lambda e: 1e3 * e.dry_level,
             scan=lambda e: tuple(e.dry_level / z for z in (1e-3, 1e-4, 1e-5)),
         ),
-        Parameter("sigma1", "N s/m", 0.5, 1e-6, 1e5, "bristle damping"),
+        Parameter("sigma1", "N s/m", 0.5, 1e-6, 1e8, "bristle damping"),
         Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
     ),
     states=("z",),
     law=law,
-    curve=Curve(Coordinate.SPEED, by_direction=True),
+    curves=FRICTION_CURVES,
     fingerprint="residual after every reversal over a few bristle deflections of travel",
     excited_by="slow reversals of a few micrometres to millimetres, and a velocity staircase",
 )  # fmt: skip

@@ -7,7 +7,8 @@ section on the velocity maps: Fc and Fs fall along the track, v0 and sigma2 show
 
 from math import cos, pi
 
-from twin.effect import DRY, Coordinate, Curve, Effect, Kind, Parameter, X
+from twin.curve import Coordinate, Curve
+from twin.effect import DRY, Effect, Kind, Parameter, X
 
 
 def law(p, s, io):
@@ -43,7 +44,7 @@ EFFECT = Effect(
         ),
     ),
     law=law,
-    curve=Curve(Coordinate.POSITION, by_direction=True),
+    curves=(Curve(Coordinate.POSITION, by_direction=True, rubs=True),),
     fingerprint="residual flips with direction and has the same shape along the track",
     excited_by="constant-speed passes over the whole travel in both directions",
 )  # fmt: skip

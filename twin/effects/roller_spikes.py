@@ -10,7 +10,8 @@ has no jump at rest. L. Jia 2023: rollers 34 mm apart make force spikes every 34
 
 from math import copysign, expm1, floor
 
-from twin.effect import DT, OUT, WHEN, Coordinate, Curve, Effect, Kind, Parameter, V, X
+from twin.curve import Coordinate, Curve
+from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V, X
 
 TURN = 2e-5  # m of travel over which a reversal turns the braking part round
 TURNED = 1e-12  # less of a turn than this is left when it is over
@@ -52,12 +53,12 @@ EFFECT = Effect(
             "phase", "m", 0.0, -1.0, 1.0, "position of one bump",
             scan=lambda e: tuple(0.034 * k / 24 for k in range(24)),
         ),
-        Parameter("ahead", "N", 0.0, -1e3, 1e3, "braking height moving forwards", strength=True),
-        Parameter("behind", "N", 0.0, -1e3, 1e3, "braking height moving backwards", strength=True),
+        Parameter("ahead", "N", 0.0, -1e7, 1e7, "braking height moving forwards", strength=True),
+        Parameter("behind", "N", 0.0, -1e7, 1e7, "braking height moving backwards", strength=True),
     ),
     states=("direction",),
     law=law,
-    curve=Curve(Coordinate.POSITION, period="pitch", by_direction=True),
+    curves=(Curve(Coordinate.POSITION, period="pitch", by_direction=True),),
     fingerprint="narrow peaks of the residual at equal distances along the track",
     excited_by="constant-speed passes over several pitches in both directions",
 )  # fmt: skip

@@ -11,19 +11,8 @@ allows it, exactly that force acts, so the axis is at rest to rounding and never
 
 from math import copysign, exp
 
-from twin.effect import (
-    DRY,
-    HOLD,
-    OUT,
-    STATIC,
-    VISCOUS,
-    Coordinate,
-    Curve,
-    Effect,
-    Kind,
-    Parameter,
-    V,
-)
+from twin.curve import FRICTION_CURVES
+from twin.effect import DRY, HOLD, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -48,11 +37,11 @@ EFFECT = Effect(
     source="Tustin 1947 (n = 1); Bo, Pavelescu 1982 (n); L. Jia 2023, eq. 2.4-2.5",
     parameters=(
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e4, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.35, 0.0, 1e4, "static friction", strength=True, dry=True, at_least="Fc",
+            "Fs", "N", 0.35, 0.0, 1e7, "static friction", strength=True, dry=True, at_least="Fc",
             start_rule=lambda e: 1.15 * e.dry_level,
         ),
         Parameter(
@@ -60,13 +49,13 @@ EFFECT = Effect(
             start_rule=lambda e: 0.05 * e.speed_max,
             scan=lambda e: tuple(share * e.speed_max for share in (0.01, 0.03, 0.1, 0.3)),
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e5, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
         Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
     ),
     states=("at_rest",),
     sticks=True,
     law=law,
-    curve=Curve(Coordinate.SPEED, by_direction=True),
+    curves=FRICTION_CURVES,
     fingerprint="residual rises below the Stribeck velocity, with the sign of the direction",
     excited_by="constant-speed passes in both directions, most of them slow",
 )  # fmt: skip

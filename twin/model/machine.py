@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, Effect, Kind, Parameter
-from twin.errors import InputError
+from twin.errors import CannotRun, InputError
 from twin.model.intervals import AxisIntervals
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 from twin.numbers import is_number
@@ -17,6 +17,7 @@ MASS = Parameter(LINEAR.mass_name, LINEAR.mass, 1.0, 1e-6, 1e6, "moved mass")
 # Declared linear as all parameters are; a small motor has a millionth of a kg m^2.
 INERTIA = Parameter(ROTARY.mass_name, LINEAR.mass, 1.0, 1e-12, 1e6, "moment of inertia")
 MOST_ELEMENTS = 1000
+OF_IMPOSED_MOTION = (Kind.FORCE, Kind.MODIFIER, Kind.FRICTION)  # need neither mass nor motor
 MOST_AXES_OF_A_PAIR = 2  # with more, which is the other axis?
 
 
@@ -107,7 +108,9 @@ class AxisModel:
     """One axis: moved mass (kg), hardware, and its effects in the order they were added.
 
     rotary: whether it turns; then ``mass`` is the moment of inertia (kg m^2) and all lengths are
-    angles. mass_fixed: whether a fit holds the mass.
+    angles. mass_fixed: whether a fit holds the mass. Zero mass: the motion is imposed, and the
+    force of a log is the one that it takes; such an axis cannot be simulated. Raises InputError
+    for a mass below zero, two frictions, and an effect that the axis cannot have.
     """
 
     mass: float
@@ -117,14 +120,36 @@ class AxisModel:
     rotary: bool = False
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.mass) and self.mass > 0):
-            name, unit = self.units.mass_name, self.units.mass
-            raise InputError(f"{name} = {self.mass} {unit}: must be a positive number of {unit}")
+        name, unit = self.units.mass_name, self.units.mass
+        if not (math.isfinite(self.mass) and self.mass >= 0):
+            raise InputError(
+                f"{name} = {self.mass} {unit}: must be a positive number of {unit}, or 0 where the "
+                "motion is imposed"
+            )
         frictions = [f.effect.name for f in self.effects if f.effect.kind is Kind.FRICTION]
         if len(frictions) > 1:
             raise InputError(
                 f"an axis has one friction model, given {' and '.join(frictions)}; remove one"
             )
+        for f in self.effects:
+            if not self.can_have(f.effect):
+                raise InputError(
+                    f"{f.effect.name} acts through the motor or the moved mass, and {name} = 0 "
+                    f"{unit} says that the motion is imposed; remove it, or give the {name}"
+                )
+
+    @property
+    def is_imposed(self) -> bool:
+        """Whether the motion is imposed, so that there is no mass to move."""
+        return self.mass == 0.0
+
+    def can_have(self, effect: Effect) -> bool:
+        """Whether the effect acts on this axis at all: imposed motion has no motor and no mass.
+
+        A law that reads the motor's force would read there what it is to explain.
+        """
+        own = effect.kind in OF_IMPOSED_MOTION and not effect.reads("U")
+        return own or not self.is_imposed
 
     @property
     def units(self) -> AxisUnits:
@@ -221,6 +246,21 @@ class MachineModel:
                 f"{len(self.axes)} axes has several; remove it, or give a model of the two axes "
                 "alone"
             )
+
+    @property
+    def is_imposed(self) -> bool:
+        """Whether the motion of an axis is imposed, so that no motion can be simulated."""
+        return any(axis.is_imposed for axis in self.axes.values())
+
+    def require_mass(self) -> None:
+        """Raise CannotRun where the motion of an axis is imposed."""
+        for name, axis in self.axes.items():
+            if axis.is_imposed:
+                mass, unit = axis.units.mass_name, axis.units.mass
+                raise CannotRun(
+                    f"axis {name}: {mass} = 0 {unit} says that its motion is imposed, so that "
+                    f"none can be simulated; give the {mass} that is moved"
+                )
 
     @property
     def period(self) -> float:

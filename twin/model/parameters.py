@@ -26,8 +26,9 @@ class ParameterReference:
 
 
 def free_parameters(axis: AxisModel) -> tuple[ParameterReference, ...]:
-    """The free numbers of an axis: its mass unless fixed, then those of its effects."""
-    mass = () if axis.mass_fixed else (ParameterReference("", axis.mass_parameter),)
+    """The free numbers of an axis: its mass unless fixed or none, then those of its effects."""
+    held = axis.mass_fixed or axis.is_imposed
+    mass = () if held else (ParameterReference("", axis.mass_parameter),)
     return mass + tuple(
         ParameterReference(f.effect.name, p)
         for f in axis.effects

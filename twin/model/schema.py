@@ -32,6 +32,17 @@ def _quantity(unit: str, meaning: str, *, zero: bool = False, most: float = 1e12
     return Field(None, **bounds, description=f"{least}, in {units}: {meaning}")
 
 
+def _none_or_from(least: float) -> AfterValidator:
+    """A moved mass: 0, of an axis whose motion is imposed, or a number from the least one."""
+
+    def check(mass: float) -> float:
+        if 0.0 < mass < least:
+            raise ValueError
+        return mass
+
+    return AfterValidator(check)
+
+
 def _ordered(travel: tuple[float, float]) -> tuple[float, float]:
     if not travel[0] < travel[1]:
         raise ValueError
@@ -51,12 +62,15 @@ class EffectEntry(Entries):
 class AxisEntry(Entries):
     """One axis, with ``mass`` or with ``inertia``; what is left out has the default of Hardware."""
 
-    mass: float | None = Field(
-        None, ge=1e-6, le=1e6, description="a number from 1e-06 to 1e+06, in kg: the moved mass"
-    )
-    inertia: float | None = Field(
-        None, ge=1e-12, le=1e6,
-        description="a number from 1e-12 to 1e+06, in kg m^2: the moment of inertia",
+    mass: Annotated[float, _none_or_from(1e-6)] | None = Field(
+        None, ge=0.0, le=1e6,
+        description="a number from 1e-06 to 1e+06, in kg: the moved mass; or 0, where the motion "
+        "is imposed and the force that it takes was measured",
+    )  # fmt: skip
+    inertia: Annotated[float, _none_or_from(1e-12)] | None = Field(
+        None, ge=0.0, le=1e6,
+        description="a number from 1e-12 to 1e+06, in kg m^2: the moment of inertia; or 0, where "
+        "the motion is imposed and the torque that it takes was measured",
     )  # fmt: skip
     fixed: list[Name] | None = Field(
         None, description='["mass"] (["inertia"] on a rotary axis), where a fit holds it'

@@ -9,6 +9,7 @@ from identify.output.report import (
     answer,
     equations,
     growth,
+    law_shape,
     logs,
     notes,
     overlay,
@@ -30,6 +31,7 @@ from twin.model.machine import HistoryStep
 
 SECTIONS: tuple[Callable[[Subject], Section | None], ...] = (
     answer.section,
+    law_shape.section,
     overlay.section,
     residuals.section,
     regions.section,

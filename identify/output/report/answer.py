@@ -58,7 +58,7 @@ def _diagnosed(
         remarks.append(_left_over(found.best))
     remarks.extend(_runner_up(found))
     if found.unexplained is not None:
-        remarks.append(f"{advice()}.")
+        remarks.append(f"{advice(found.findings)}.")
     if following is not None:
         remarks.append(_next_step(following))
     if found.verdict is Verdict.NOTHING_MISSING and refit and (changed := refit_in_words(refit)):
@@ -207,20 +207,18 @@ def _added(addition: Addition) -> Answer:
     if step.holdout_error_before is not None and step.holdout_error_after is not None:
         held = _change(step.unit, step.holdout_error_before, step.holdout_error_after)
         tiles.append(Tile(words("Held-out force error"), held, "RMS"))
-    tiles.append(
-        Tile(
-            words("Position, free run"),
-            _change(unit, *addition.position_error),
-            f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo",
-        )
-    )
+    if addition.position_error and addition.replayed is not None:
+        moved = _change(unit, *addition.position_error)
+        replayed = f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo"
+        tiles.append(Tile(words("Position, free run"), moved, replayed))
+    outcome = "given the shape found" if step.action == "shape" else "added"
     sentence = "The evidence and the held-out logs support the effect."
     if not addition.kept:
         sentence = (
             "The evidence and the held-out logs do not both support this effect; leave it out."
         )
     return Answer(
-        headline=f"Axis {step.axis}: {spaced(step.effect)} added",
+        headline=f"Axis {step.axis}: {spaced(step.effect)} {outcome}",
         sentence=sentence,
         tiles=tiles,
         remarks=[],

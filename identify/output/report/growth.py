@@ -120,7 +120,7 @@ def _table(steps: Sequence[HistoryStep]) -> Table:
 def _positions(additions: Sequence[Addition]) -> Table:
     scales = {
         unit: Scale.of(
-            unit, [e for a in additions if a.units.position == unit for e in a.position_error]
+            unit, [e for a in additions if a.units.position == unit for e in a.position_error or ()]
         )
         for unit in {a.units.position for a in additions}
     }
@@ -128,8 +128,7 @@ def _positions(additions: Sequence[Addition]) -> Table:
         Row(
             (
                 f"{title_case(a.step.effect)} on {a.step.axis}",
-                scales[a.units.position].text(a.position_error[0]),
-                scales[a.units.position].text(a.position_error[1]),
+                *(scales[a.units.position].text(e) for e in a.position_error or (None, None)),
                 scales[a.units.position].text(a.replayed),
                 "kept" if a.kept else "not supported",
             )

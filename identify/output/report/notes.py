@@ -18,7 +18,8 @@ def section(subject: Subject) -> Section | None:
                 for note in remarks_on(subject.diagnosis, axis.axis)
             )
     for step in (*subject.steps, *(a.step for a in subject.additions)):
-        what = f"Axis {step.axis}, {spaced(step.effect)} added"
+        done = "given the shape found" if step.action == "shape" else "added"
+        what = f"Axis {step.axis}, {spaced(step.effect)} {done}"
         notes.extend(f"{what}: {_sentence(note)}" for note in step.notes)
     return Section("notes", "Notes", [Listing(tuple(dict.fromkeys(notes)))]) if notes else None
 

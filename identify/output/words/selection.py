@@ -11,11 +11,12 @@ from identify.selection.candidates import Candidate
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
+from identify.selection.found_shape import FoundShape
 from identify.selection.nonparametric import followed
 from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
 from twin.effects import load_catalogue
-from twin.model.machine import Fitted
+from twin.model.machine import Fitted, HistoryStep
 from twin.model.units import units_of
 
 VERDICTS = {
@@ -59,6 +60,25 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.best_decoy))
     step = f"in one linear step it takes {gain:.0f} % of it, its best decoy {decoy:.0f} %"
     return f"{text}; {step}; {sure}"
+
+
+def shape_in_words(effect: str, shape: FoundShape, numbers: Numbers = PLAIN) -> str:
+    """Where a law differs most from the curve found, and what that does at standstill."""
+    direction, curve = max(
+        shape.curves.items(), key=lambda c: np.abs(c[1].found - c[1].assumed).max()
+    )
+    at = int(np.argmax(np.abs(curve.found - curve.assumed)))
+    assumed, found, band = (
+        numbers.amount(float(values[at]), shape.force_unit)
+        for values in (curve.assumed, curve.found, curve.band)
+    )
+    place = numbers.amount(float(shape.coordinate[at]), shape.unit)
+    within = "" if shape.period is None else " of its period"
+    rest = " The force is gone at standstill." if shape.lets_go else ""
+    return (
+        f"The law of {effect} is off most at {shape.over.value} {place}{within}, {direction}: it "
+        f"assumes {assumed}, the logs show {found} ± {band}.{rest}"
+    )
 
 
 def remainder_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str | None:
@@ -139,24 +159,41 @@ def nonparametric_in_words(fitted: Fitted) -> str:
     )
 
 
-def advice() -> str:
-    """What lowers the error where no physical effect explains it."""
-    known = [e.name for e in load_catalogue().values() if e.is_nonparametric]
+def advice(findings: Sequence[Finding] = ()) -> str:
+    """What lowers the error where no physical effect explains it, or a law has the wrong shape."""
+    for finding in findings:
+        if finding.shape is not None:
+            return f"twin add --shape {finding.effect} gives the model the shape that the logs show"
+    every = load_catalogue().values()
+    known = [e.name for e in every if e.is_nonparametric and not e.free_shape]
     return f"twin add {' or '.join(known)} lowers the error by fitted curves, without explaining it"
 
 
+def step_in_words(step: HistoryStep) -> str:
+    """What was done to a model: "added cogging to axis x"."""
+    if step.action == "shape":
+        return f"gave {step.effect} of axis {step.axis} the shape that the logs show"
+    return f"added {step.effect} to axis {step.axis}"
+
+
 def addition_notes(
-    added: Candidate, moved: Sequence[MovedParameter], set_aside: Sequence[str]
+    added: Candidate,
+    moved: Sequence[MovedParameter],
+    set_aside: Sequence[str],
+    reshaped: str | None = None,
 ) -> tuple[str, ...]:
     """What a reader should know of an added effect, one sentence each.
 
-    set_aside: nonparametric effects that were removed so that the physical effect explains what
-    they had taken over.
+    reshaped: the effect whose law it gives another shape. set_aside: nonparametric effects that
+    were removed so that the physical effect explains what they had taken over.
     """
     notes = [moved_in_words(m) for m in moved]
     if added.effect.is_nonparametric:
         notes.insert(0, nonparametric_in_words(added.fit.axis[added.effect.name]))
-    if set_aside:
+    if reshaped:
+        where = "beside" if reshaped in added.fit.axis.names else "in the place of"
+        notes.insert(0, f"{added.effect.name} is {where} the law of {reshaped}")
+    elif set_aside:
         notes.append(
             f"{', '.join(set_aside)} was removed before {added.effect.name} was added; add it "
             "again for the error that is left"

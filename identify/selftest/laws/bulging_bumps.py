@@ -6,7 +6,8 @@ long where it rises and three quarters where it falls; d follows the direction w
 
 from math import copysign, cos, expm1, floor, pi
 
-from twin.effect import DT, OUT, WHEN, Coordinate, Curve, Effect, Kind, Parameter, V, X
+from twin.curve import Coordinate, Curve
+from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V, X
 
 TURN = 6e-5  # m
 
@@ -38,7 +39,7 @@ EFFECT = Effect(
     ),
     states=("direction",),
     law=law,
-    curve=Curve(Coordinate.POSITION, period="pitch", by_direction=True),
+    curves=(Curve(Coordinate.POSITION, period="pitch", by_direction=True),),
     fingerprint="none",
     excited_by="any motion",
 )

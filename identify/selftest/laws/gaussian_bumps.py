@@ -7,7 +7,8 @@ of the model; the form is unlike theirs.
 
 from math import exp, floor, tanh
 
-from twin.effect import OUT, Coordinate, Curve, Effect, Kind, Parameter, V, X
+from twin.curve import Coordinate, Curve
+from twin.effect import OUT, Effect, Kind, Parameter, V, X
 
 SLIDES = 2e-4  # m/s
 
@@ -32,7 +33,7 @@ EFFECT = Effect(
         Parameter("behind", "N", 0.0, -1e3, 1e3, "height moving backwards", strength=True),
     ),
     law=law,
-    curve=Curve(Coordinate.POSITION, period="pitch", by_direction=True),
+    curves=(Curve(Coordinate.POSITION, period="pitch", by_direction=True),),
     fingerprint="none",
     excited_by="any motion",
 )

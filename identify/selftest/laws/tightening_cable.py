@@ -5,7 +5,8 @@ Offset and k1 mean what they mean for the cable of the model; no cubic has this 
 
 from math import expm1
 
-from twin.effect import OUT, Coordinate, Curve, Effect, Kind, Parameter, X
+from twin.curve import Coordinate, Curve
+from twin.effect import OUT, Effect, Kind, Parameter, X
 
 
 def law(p, s, io):
@@ -23,7 +24,7 @@ EFFECT = Effect(
         Parameter("fold", "m", 0.13, 1e-3, 1.0, "travel in which it grows e-fold"),
     ),
     law=law,
-    curve=Curve(Coordinate.POSITION),
+    curves=(Curve(Coordinate.POSITION),),
     fingerprint="none",
     excited_by="any motion",
 )

@@ -20,7 +20,8 @@ from identify.estimation.fit import (
 )
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.smoothing import has_nonparametric, part_rows, smoothing
-from twin.effect import Parameter, Part
+from twin.curve import Part
+from twin.effect import Parameter
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters, read
 

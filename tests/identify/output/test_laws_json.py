@@ -182,13 +182,14 @@ def test_a_diagnosis():
                 "effect": "cogging", "kind": "missing", "explains": 0.871,
                 "indistinguishable_from": ["quadratic_drag"], "test_error_before": 7.17,
                 "test_error_after": 2.19, "unit": "N", "parameters": {"p": 0.0261},
-                "gain": 0.813, "best_decoy": 0.137, "confidence": made.FOUND[0].confidence,
+                "gain": 0.813, "best_decoy": 0.137, "shape": None,
+                "confidence": made.FOUND[0].confidence,
             },
             {
                 "effect": "lugre", "kind": "missing", "explains": 0.119,
                 "indistinguishable_from": [], "test_error_before": 3.23, "test_error_after": 2.19,
                 "unit": "N", "parameters": {"Fc": 0.31}, "gain": None, "best_decoy": None,
-                "confidence": made.FOUND[1].confidence,
+                "shape": None, "confidence": made.FOUND[1].confidence,
             },
         ],
         "remainder": {
@@ -270,7 +271,8 @@ def test_an_addition(kept):
     a = made.addition(kept)
     s = a.step
     assert strict(add_json(a)) == {
-        "effect": "cogging", "axis": "x", "is_nonparametric": False, "kept": kept,
+        "action": "add", "effect": "cogging", "axis": "x", "is_nonparametric": False,
+        "kept": kept,
         "fit_error_before": s.fit_error_before, "fit_error_after": s.fit_error_after,
         "holdout_error_before": s.holdout_error_before,
         "holdout_error_after": s.holdout_error_after, "noise_floor": made.BEST.fit.floor,
@@ -279,13 +281,9 @@ def test_an_addition(kept):
         "position_unit": "m", "parameters": dict(made.BEST.fit.axis["cogging"].values),
         "notes": list(a.notes),
     }  # fmt: skip
-    unheld = replace(a, step=made.STEPS[2], candidate=replace(a.candidate, fit=_with_wear()))
+    unheld = replace(a, step=made.STEPS[2], candidate=made.candidate("wear", 0.5))
     found = strict(add_json(unheld))
     assert (found["holdout_error_before"], found["holdout_error_after"]) == (None, None)
-
-
-def _with_wear():
-    return made.candidate("wear", 0.5).fit
 
 
 @pytest.mark.parametrize("name", ["lugre", "learned_residual", NOISE.name])

@@ -8,8 +8,9 @@ import pytest
 from foreign_diagnoses import CATALOGUE, STAGE, diagnosed, model_for
 from foreign_effects import INSIDE, OUTSIDE
 from foreign_kernel import SLIP_ELEMENTS
-from foreign_machine import AHEAD, BEHIND, FORCE, drawn, gaussian
+from foreign_machine import AHEAD, BEHIND, FORCE, PLACE, drawn, gaussian, logs_of, run
 
+from identify import workflow
 from identify.selection.diagnosis import Verdict
 from identify.selection.forward_selection import diagnose_axis
 from twin.effects import Catalogue
@@ -95,6 +96,30 @@ def test_bumps_that_let_go_at_rest_are_told_as_bumps_of_another_shape(seed):
     if not answer.base.at_floor:
         assert answer.verdict is Verdict.WRONG_SHAPE
         assert [f.effect for f in answer.findings] == ["roller_spikes"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [200, 203, 204])
+def test_friction_that_varies_along_the_track_differently_each_way_is_told(seed):
+    """And with that curve the error on a log that chose nothing falls."""
+    rng = np.random.default_rng(seed)
+    machine = drawn(rng, 2e3)
+    for row, place in zip((AHEAD, BEHIND), rng.uniform(-0.1, 0.1, 2), strict=True):
+        machine = machine.plus(row, 0.03 * gaussian(PLACE - place, 0.05))
+    answer = diagnosed(STAGE, machine, seed).with_findings()
+    (finding,) = answer.findings
+    assert (answer.verdict, finding.effect) == (Verdict.WRONG_SHAPE, "lugre")
+    assert finding.shape is not None
+    assert set(finding.shape.curves) == {"forwards", "backwards"}
+
+    logs, held = logs_of(machine, seed, 10.0)
+    better = workflow.add_shape(CATALOGUE["lugre"], STAGE, logs, held)
+    assert better.kept
+    before, after = (
+        workflow.compare(m, {"test": run(machine, 77_000 + seed, 10.0)}).axes["x"].total_error
+        for m in (workflow.fit(STAGE, logs).model, better.model)
+    )
+    assert after < 0.6 * before
 
 
 @pytest.mark.slow

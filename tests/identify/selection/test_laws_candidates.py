@@ -62,7 +62,7 @@ def test_a_noise_need_not_lower_the_error_and_needs_its_evidence():
 
 def test_absent_are_all_effects_but_those_there_and_descriptions():
     names = {e.name for e in absent_effects(axis_of(fitted("cogging")), CATALOGUE)}
-    described = {"empirical_map", "learned_residual"}
+    described = {"empirical_map", "learned_residual", "free_curve"}
     assert names == set(CATALOGUE) - {"cogging", "coulomb_viscous"} - described | {"cogging_2"}
     bare = replace(PLAIN, effects=())
     modifiers = {e.name for e in CATALOGUE.values() if e.kind is Kind.MODIFIER}

@@ -15,16 +15,18 @@ from identify.estimation.force_balance import jacobian, residual
 from identify.output.words.selection import nonparametric_in_words
 from identify.selection import nonparametric as module
 from identify.selection.nonparametric import (
+    _attempt,
+    _filled,
+    nonparametric_labels,
+    physics_alone,
+)
+from identify.selection.smoothed import (
     RIDGE,
     ROUNDING,
     STIFFNESS,
-    _attempt,
-    _filled,
-    _Linear,
-    _solve,
+    Linearised,
     choose_stiffness,
-    nonparametric_labels,
-    physics_alone,
+    solve,
 )
 from twin.model.machine import Fitted, MachineModel
 from twin.model.parameters import ParameterReference
@@ -36,7 +38,7 @@ MAP = CATALOGUE["empirical_map"]
 PARTS = [part.name for part in MAP.parts]
 
 
-def linear(n: int = 260, seed: int = 1) -> _Linear:
+def linear(n: int = 260, seed: int = 1) -> Linearised:
     """Two columns of physics and two parts of three and two columns, of sizes far apart."""
     rng = np.random.default_rng(seed)
     columns = rng.standard_normal((n, 7)) * (1e3, 1e-2, 1.0, 2.0, 0.5, 3.0, 1.0)
@@ -51,14 +53,14 @@ def linear(n: int = 260, seed: int = 1) -> _Linear:
 
     parts = {"a": penalty([2, 3, 4], 5), "b": penalty([5, 6], 6)}
     where = [ParameterReference("", PLAIN.effects[0].effect.parameters[0])] * 7
-    return _Linear(where, force, columns, physics, parts)
+    return Linearised(where, force, columns, physics, parts)
 
 
 USED = {(): [0, 1], ("a",): [0, 1, 2, 3, 4], ("b",): [0, 1, 5, 6], ("a", "b"): list(range(7))}
 CHOICES = [{}, {"a": 0.3}, {"b": 2.0}, {"a": 0.05, "b": 0.7}]
 
 
-def dense(found: _Linear, stiffness, rows):
+def dense(found: Linearised, stiffness, rows):
     """Normal matrix, right side and columns from the definition, on some rows alone."""
     used = USED[tuple(stiffness)]
     penalty = found.physics.copy()
@@ -105,11 +107,11 @@ def test_a_system_of_unlike_units_is_solved():
     matrix = np.array([[2.0, 0.3, 0.1], [0.3, 1.0, -0.2], [0.1, -0.2, 3.0]]) * np.outer(size, size)
     several = np.stack([matrix, 2.0 * matrix, matrix + np.diag(size**2)])
     wanted = RNG.standard_normal((3, 4)) / size[:, None]
-    np.testing.assert_allclose(_solve(matrix, matrix @ wanted), wanted, rtol=1e-8)
-    for system, found in zip(several, _solve(several, several @ wanted), strict=True):
-        np.testing.assert_allclose(found, _solve(system, system @ wanted), rtol=1e-12)
+    np.testing.assert_allclose(solve(matrix, matrix @ wanted), wanted, rtol=1e-8)
+    for system, found in zip(several, solve(several, several @ wanted), strict=True):
+        np.testing.assert_allclose(found, solve(system, system @ wanted), rtol=1e-12)
         np.testing.assert_allclose(found, wanted, rtol=1e-8)
-    singular = _solve(np.diag([1.0, 0.0]), np.array([[2.0], [0.0]]))
+    singular = solve(np.diag([1.0, 0.0]), np.array([[2.0], [0.0]]))
     np.testing.assert_allclose(singular, [[2.0 / (1.0 + ROUNDING)], [0.0]])
 
 
@@ -188,7 +190,7 @@ def about():
     dataset = built_dataset("run")
     base = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
     empty = Fitted.at_start(MAP)
-    return base, dataset, empty, _Linear.about(base, dataset, empty)
+    return base, dataset, empty, Linearised.about(base, dataset, empty)
 
 
 def test_the_columns_are_physics_then_the_description(about):
@@ -238,7 +240,7 @@ def test_an_attempt_is_judged_by_the_degrees_of_freedom_it_takes(monkeypatch, ab
     dataset = built_dataset("run", held=("held",)) if held else dataset
     after = axis_of(fitted("constant_force", F0=0.7)).with_effect(fitted("lugre"))
     fit = built_fit(0, 0.02, after, residual=0.5 * base.residual + 0.01)
-    monkeypatch.setattr(module._Linear, "about", classmethod(lambda cls, *_: found))
+    monkeypatch.setattr(module.Linearised, "about", classmethod(lambda cls, *_: found))
     monkeypatch.setattr(module, "choose_stiffness", lambda linear: stiffness)
     monkeypatch.setattr(module, "fit_axis", lambda axis, logs: fit)
     made = _attempt(base, base, dataset, empty)

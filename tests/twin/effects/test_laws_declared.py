@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from effect_runs import CATALOGUE, FRICTIONS
 
-from twin.effect import Effect, Excitation, Kind, Parameter, Part, V
+from twin.curve import Part
+from twin.effect import Effect, Excitation, Kind, Parameter, V
 
 LOG = Excitation(
     position_low=-0.13, position_high=0.21, speed_max=0.37, dry_level=0.83, duration=47.0,
@@ -21,6 +22,8 @@ EVERY = pytest.mark.parametrize(
     ("effect", "p"), PARAMETERS[:], ids=[f"{e.name}-{p.name}" for e, p in PARAMETERS]
 )
 
+PLACES_AND_TIMES = ("start", "low", "high", "phase", "tau", "relaxation", "b", "n")
+
 # --- bounds ---------------------------------------------------------------------------------------
 
 
@@ -30,7 +33,7 @@ def test_bounds_follow_from_what_a_parameter_is(effect: Effect, p: Parameter) ->
         assert p.lower in (0.0, -p.upper) or p.name == "ratio", "one sign, or both alike"
         assert p.start == 0.0 or (effect.kind is Kind.FRICTION and p.name in ("Fc", "Fs"))
         assert p.upper > 0.0
-    elif p.name not in ("start", "low", "high", "phase", "tau", "relaxation", "b", "n"):
+    elif not effect.free_shape and p.name not in PLACES_AND_TIMES:
         assert p.lower > 0.0, "a scale is positive"
     if p.unit == "m" and p.lower < 0.0 and not p.strength:
         assert p.lower == -p.upper

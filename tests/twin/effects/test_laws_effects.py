@@ -38,6 +38,7 @@ SPECIAL = {
     },
     "thermal_drift": {"dry": 70.0, "viscous": 40.0, "tau": 0.2},
     "wear": {"rate": 300.0},
+    "free_curve": {"per_metre": 2.9, "offset": -0.375, "turn": 3e-6, "rest": 0.03},
     "end_stop": {"low": -0.05, "high": 0.07, "stiffness": 3e4, "relaxation": 3e-3},
     "roller_spikes": {"pitch": 0.03, "width": 0.025, "phase": 0.004, "ahead": 0.7, "behind": 0.3},
     "periodic_disturbance": {"f": 730.0, "a": 0.6, "b": -0.4},

@@ -57,6 +57,15 @@ def mirrored_residual(p: Values) -> dict[str, float]:
     return turned
 
 
+def mirrored_curve(p: Values) -> dict[str, float]:
+    """E changes sign, O goes with the direction and does not; the knots turn round."""
+    turned = {**p, "offset": -p["offset"] - 1.0}
+    for key, sign in (("e", -1.0), ("o", 1.0)):
+        names = [n for n in p if n.startswith(f"{key}_")]
+        turned |= {n: sign * p[m] for n, m in zip(names, names[::-1], strict=True)}
+    return turned
+
+
 # What a mirror does to the parameters; nothing where the effect is not listed.
 MIRRORS = {
     "asymmetric_friction": negated("coulomb", "viscous"),
@@ -73,6 +82,7 @@ MIRRORS = {
     },
     "position_dependent_friction": mirrored_track,
     "empirical_map": mirrored_map,
+    "free_curve": mirrored_curve,
     "learned_residual": mirrored_residual,
 }  # fmt: skip
 # At exact halves of a step rounding is upwards on both sides; no other law knows its direction.

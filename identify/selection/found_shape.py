@@ -1,0 +1,110 @@
+"""The curve that a law assumes beside the curve that the logs show, with its band."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.prepared_log import moving
+from identify.estimation.evidence import effective_samples
+from identify.estimation.fit import Fit, rms
+from identify.estimation.force_balance import averaged_force
+from identify.selection.smoothed import Linearised, solve
+from identify.selection.wrong_shape import Shape, sticking
+from twin.curve import Coordinate
+from twin.model.units import LINEAR
+from twin.signals import Array
+
+BAND = 1.645  # standard deviations, 90 %
+UNITS = {Coordinate.POSITION: LINEAR.position, Coordinate.SPEED: LINEAR.velocity}
+BOTH, AHEAD, BEHIND = "both directions", "forwards", "backwards"
+WEAK = 1e-6  # of the data's weight: smoothing under which a law's own force is read off
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """One curve, each (k,) N: as the law assumes it, as the logs show it, half its 90 % band."""
+
+    assumed: Array
+    found: Array
+    band: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FoundShape:
+    """A law's curve as it is assumed and as it is found.
+
+    over: its coordinate (k,) in ``unit``, within one period (m) where it has one. lets_go: whether
+    the force is gone at standstill. curves: by direction of motion.
+    """
+
+    over: Coordinate
+    coordinate: Array
+    unit: str
+    period: float | None
+    lets_go: bool
+    force_unit: str
+    curves: Mapping[str, Drawn]
+
+
+def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
+    """Draw a law of a fit and the free curve for it. The correction is smoothed, not the whole.
+
+    The force of the law is read off where the curve lies: its mean over what else it depends on.
+    """
+    mask = moving(dataset.fit, sticking(fit, shape))[fit.kept]
+    without = fit.axis.without(shape.effect)
+    linear = Linearised.about(fit, dataset, shape.empty).on(mask).less(shape.effect)
+    law = averaged_force(fit.axis, dataset.fit) - averaged_force(without, dataset.fit)
+    own = np.array([c.effect == shape.empty.effect.name for c in linear.where])
+    assumed = _read_off(linear.columns[:, own], law[fit.kept][mask])
+    correction, spread = _corrected(linear, shape.stiffness)
+    coordinate, index = _knots(shape)
+    curves = {}
+    for name, weights in _directions(shape, index, len(assumed)).items():
+        full = np.zeros((len(weights), len(own)))
+        full[:, own] = weights
+        curves[name] = Drawn(
+            assumed=weights @ assumed,
+            found=weights @ (assumed + correction[own]),
+            band=BAND * np.sqrt(np.einsum("ki,ij,kj->k", full, spread, full)),
+        )
+    unit = fit.axis.units(UNITS[shape.curve.over])
+    force = fit.axis.units.force
+    return FoundShape(
+        shape.curve.over, coordinate, unit, shape.period, shape.lets_go, force, curves
+    )
+
+
+def _knots(shape: Shape) -> tuple[Array, list[int]]:
+    free = shape.empty.effect.free_shape
+    assert free is not None
+    coordinate, index = free.knots(shape.empty.values)
+    return np.array(coordinate), index
+
+
+def _directions(shape: Shape, index: list[int], strengths: int) -> dict[str, Array]:
+    """By direction, weights (k, strengths) of the strengths in the curve's value at each knot."""
+    even = np.eye(strengths)[index]
+    if not shape.curve.by_direction:
+        return {BOTH: even}
+    odd = np.eye(strengths)[[i + strengths // 2 for i in index]]
+    return {AHEAD: even + odd, BEHIND: even - odd}
+
+
+def _read_off(columns: Array, force: Array) -> Array:
+    """Strengths (k,) whose columns (n, k) come nearest to a force (n,) N."""
+    gram = columns.T @ columns
+    weak = WEAK * np.trace(gram) / len(gram) * np.eye(len(gram))
+    return np.asarray(solve(gram + weak, (columns.T @ force)[:, None])[:, 0])
+
+
+def _corrected(linear: Linearised, stiffness: Mapping[str, float]) -> tuple[Array, Array]:
+    """Change (k,) of all strengths, and its covariance (k, k); the noise is taken as coloured."""
+    change, _ = linear.solution(stiffness)
+    left = linear.force + linear.columns @ change
+    noise = rms(left) ** 2 * len(left) / effective_samples(left)
+    return change, noise * linear.spread(stiffness)

@@ -1,0 +1,144 @@
+"""A force as a free curve of position, of the phase of a pitch, or of speed: a law's shape, found.
+
+F = w (E(q) + d O(q)): E is the same in both directions, O turns with the direction d. The
+coordinate is q = x per_metre + sqrt(|v| per_speed) - offset, of which one part is used: along the
+track q goes from 0 to 1 over the covered travel, and a root of speed is finer near standstill.
+E and O are piecewise linear over ``elements`` equal intervals of q and hold their end values beyond
+them; where ``closed`` is 1 the curve repeats after each whole number of q, as along a pitch, and
+its last knot is not used. d follows the motion within ``turn`` metres of travel. At standstill the
+curve lets go: w = min(|v|/rest, 1); where ``rest`` is 0 it stays as it was, w = 1.
+
+``twin add --shape EFFECT`` puts it where the law of an effect has the wrong shape. E and O are
+smoothed each by its ``stiff``: a fit adds stiff^2 times the squared second differences of its
+knots, and their squares over the square of their number, to the mean square of the residual
+(P-splines: P. H. C. Eilers, B. D. Marx, "Flexible smoothing with B-splines and penalties", Statist.
+Sci. 11, 1996).
+"""
+
+from collections.abc import Mapping
+from functools import cache
+from math import copysign, expm1, floor, sqrt
+from typing import Any
+
+from twin.curve import Coordinate, Curve, FreeShape, Part
+from twin.effect import DT, OUT, WHEN, Effect, Excitation, Kind, Parameter, V, X
+
+KNOTS = 9  # where the knots' parameters begin
+TURNED = 1e-12  # less of a turn than this is left when it is over
+
+
+def law(p, s, io):
+    count = int(p[0])
+    closed = p[4] > 0.5
+    speed = abs(io[V])
+    direction = s[0]
+    if io[V] != 0.0:
+        change = copysign(1.0, io[V]) - s[0]
+        if abs(change) > TURNED:
+            change *= -expm1(-speed * io[DT] / p[5])
+        direction += io[WHEN] * change
+        s[0] += change
+    q = p[1] * io[X] + sqrt(p[2] * speed) - p[3]
+    q = q - floor(q) if closed else min(max(q, 0.0), 1.0)
+    left = min(int(q * count), count - 1)
+    right = 0 if closed and left == count - 1 else left + 1
+    part = q * count - left
+    even, odd = KNOTS, KNOTS + count + 1
+    force = (1.0 - part) * p[even + left] + part * p[even + right]
+    force += direction * ((1.0 - part) * p[odd + left] + part * p[odd + right])
+    if speed < p[6]:
+        force *= speed / p[6]
+    io[OUT] = force
+
+
+LETS_GO = 1e-3  # of the highest speed, below which a curve that lets go does
+AT_ONCE = 1e-9  # m of travel
+HELD = 1e-4  # of the covered travel, that turns the direction of one that stays
+
+
+def laid(
+    curve: Curve, period: float | None, covered: Excitation, lets_go: bool
+) -> dict[str, float]:
+    """Values that lay the curve over a coordinate; see FreeShape."""
+    values = {
+        "per_metre": 0.0, "per_speed": 0.0, "offset": 0.0, "closed": float(period is not None),
+        "turn": AT_ONCE if lets_go else HELD * covered.travel,
+        "rest": LETS_GO * covered.speed_max if lets_go else 0.0,
+    }  # fmt: skip
+    if curve.over is Coordinate.SPEED:
+        return {**values, "per_speed": 1.0 / covered.speed_max}
+    length = period or covered.travel
+    begin = 0.0 if period else covered.position_low / length
+    return {**values, "per_metre": 1.0 / length, "offset": begin}
+
+
+def knots(values: Mapping[str, float]) -> tuple[list[float], list[int]]:
+    """Coordinate (k,) of each knot, m or m/s, and which knot it is; see FreeShape."""
+    count = int(values["elements"])
+    index = [*range(count), 0 if values["closed"] else count]
+    along = [i / count for i in range(count + 1)]
+    if values["per_speed"]:
+        return [q * q / values["per_speed"] for q in along], index
+    return [(q + values["offset"]) / values["per_metre"] for q in along], index
+
+
+def smooth(knots: int) -> Any:
+    """Second differences, and the values over their number: rows (2 knots - 2, knots)."""
+    import numpy as np  # the catalogue is listed without it
+
+    return np.vstack([np.diff(np.eye(knots), 2, axis=0), np.eye(knots) / knots])
+
+
+@cache
+def of_size(elements: int) -> Effect:
+    """The curve with that many intervals."""
+    even, odd = (tuple(f"{c}_{i}" for i in range(1, elements + 2)) for c in "eo")
+    return Effect(
+        kind=Kind.FORCE,
+        summary="free curve of position, phase or speed in a law's place; not a physical law",
+        equation="F = w (E(q) + d O(q)),  q = x per_metre + sqrt(|v| per_speed) - offset;  "
+        "w = min(|v|/rest, 1)",
+        source="none; smoothing after Eilers, Marx 1996",
+        parameters=(
+            Parameter("elements", "1", elements, elements, elements, "number of intervals"),
+            Parameter(
+                "per_metre", "1/m", 3.0, 0.0, 1e6, "coordinate by position", fixed=True,
+                start_rule=lambda e: 1.0 / max(e.travel, 1e-6),
+            ),
+            Parameter("per_speed", "s/m", 0.0, 0.0, 1e6, "coordinate by speed", fixed=True),
+            Parameter(
+                "offset", "1", 0.0, -1e9, 1e9, "coordinate where the curve begins", fixed=True,
+                start_rule=lambda e: e.position_low / max(e.travel, 1e-6),
+            ),
+            Parameter("closed", "1", 0.0, 0.0, 1.0, "1 where the curve repeats", fixed=True),
+            Parameter(
+                "turn", "m", 3e-5, AT_ONCE, 1.0, "travel that turns the direction", fixed=True,
+                start_rule=lambda e: HELD * e.travel,
+            ),
+            Parameter(
+                "rest", "m/s", 0.0, 0.0, 1e3, "speed below which the curve lets go", fixed=True,
+            ),
+            *(
+                Parameter(f"stiff_{c}", "N", 1e-3, 1e-12, 1e6, f"bend expected of {c.upper()}",
+                          fixed=True)
+                for c in "eo"
+            ),
+            *(Parameter(n, "N", 0.0, -1e7, 1e7, "E, in both directions", strength=True)
+              for n in even),
+            *(Parameter(n, "N", 0.0, -1e7, 1e7, "O, that turns with the direction", strength=True)
+              for n in odd),
+        ),
+        states=("direction",),
+        law=law,
+        fingerprint="what a law leaves whose shape differs from that of the machine's force",
+        excited_by="passes over the whole range of the coordinate in both directions",
+        of_size=of_size,
+        free_shape=FreeShape(laid, knots),
+        parts=(
+            Part("both directions", even, "stiff_e", smooth),
+            Part("direction", odd, "stiff_o", smooth),
+        ),
+    )  # fmt: skip
+
+
+EFFECT = of_size(40)
