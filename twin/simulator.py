@@ -181,7 +181,6 @@ def run(
     rng draws the encoder noise. controllers: by axis; the model's own bandwidths where None. Raises
     CannotRun where the simulation breaks down.
     """
-    model.require_mass()
     parts = run_parts(
         model, setpoint, rng, simulator=simulator, controllers=controllers, progress=progress
     )
@@ -198,6 +197,7 @@ def run_parts(
     progress: Progress | None = None,
 ) -> Iterator[Run]:
     """``run`` in parts, one after the other, so that a long one need not be held in memory."""
+    model.require_mass()
     table = model.table()
     n, n_axes = len(setpoint), len(model.axes)
     start = setpoint.part(0, 1).position

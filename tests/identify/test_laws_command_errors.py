@@ -98,15 +98,15 @@ def test_files_are_read_by_the_names_they_were_given(monkeypatch):
 
 
 def test_identification_holds_no_more_of_a_log_than_it_reads(tmp_path):
-    """Six columns and the truth of a simulation are four times what is fitted."""
+    """Seven columns and the truth of a simulation are four times what is fitted."""
     t = 1e-3 * np.arange(3000)
     own = {
         "position": 0.05 * np.sin(3.0 * t), "force": np.cos(3.0 * t), "current": np.cos(3.0 * t),
         "setpoint_position": 0.05 * np.sin(3.0 * t),
+        "velocity": 0.15 * np.cos(3.0 * (t - 0.02)),  # late; the check says so
     }  # fmt: skip
-    late = 0.15 * np.cos(3.0 * (t - 0.02))  # only the check of the whole log sees it
     whole = Log(
-        1000.0, {"x": AxisLog({**own, "velocity": late}, force_constant=1.0)}, {"a": "b"},
+        1000.0, {"x": AxisLog({**own, "setpoint_velocity": np.cos(t)}, force_constant=1.0)}, {"a": "b"},
         truth={"x": {"position": own["position"]}}, attachments={"model.toml": b""},
     )  # fmt: skip
     path = tmp_path / "a.mcap"

@@ -85,7 +85,7 @@ def test_a_step_beyond_a_bound_stops_there_and_the_others_follow():
     assert found[1] == pytest.approx(0.1 + step, rel=1e-4)
 
 
-@pytest.mark.parametrize("wanted", [-0.9, 2e4])
+@pytest.mark.parametrize("wanted", [-0.9, 2e7])
 def test_a_strength_alone_stops_at_either_bound(wanted):
     column = RNG.standard_normal((300, 1))
     effect = CATALOGUE["coulomb_viscous"]
@@ -94,7 +94,9 @@ def test_a_strength_alone_stops_at_either_bound(wanted):
     found = 0.5 + _bounded_step(
         np.zeros((300, 0)), -column[:, 0] * (wanted - 0.5), column, where, first
     )
-    assert found[0] == pytest.approx(0.0 if wanted < 0.0 else 1e4, abs=1e-4)
+    highest = effect.parameter("Fc").upper
+    assert wanted < highest * 3.0
+    assert found[0] == pytest.approx(0.0 if wanted < 0.0 else highest, rel=1e-9, abs=1e-4)
 
 
 def test_a_ridge_decides_where_the_base_explains_a_strength_already():
@@ -204,8 +206,8 @@ def test_every_combination_of_the_scanned_values_is_tried_once():
 
 def test_a_shape_starts_from_the_data_within_its_bounds():
     effect = CATALOGUE["coulomb_viscous"]
-    found = _clipped(effect, replace(SEEN, dry_level=0.37), {"sigma2": -2.0, "Fs": 1e9})
-    assert found == {"Fc": 0.37, "Fs": 1e4, "sigma2": 0.0}
+    found = _clipped(effect, replace(SEEN, dry_level=0.37), {"sigma2": -2.0, "Fs": 1e12})
+    assert found == {"Fc": 0.37, "Fs": effect.parameter("Fs").upper, "sigma2": 0.0}
 
 
 def of_size(squared: float, shape=None, fitted=None) -> Start:
