@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 
 FIRST_EVALUATIONS = 12  # of a refit, after which it must show some evidence to go on
 HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
+EDGE = 1e-3  # relative distance from a bound at which a value ended there
 RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion does not excite
 
 
@@ -42,8 +43,9 @@ RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion doe
 class Candidate:
     """A model with one effect more: its refit, evidence and held-out gain.
 
-    repeats: whether the axis travels far enough for what repeats along the track to be seen to; one
-    cycle over all of the travel is any smooth force of position.
+    plausible: whether the axis travels far enough for what repeats along the track to be seen to,
+    as one cycle over all of the travel is any smooth force of position; and no time, length or
+    frequency of the law ended at its bound, beyond which it is another law.
     """
 
     effect: Effect
@@ -51,7 +53,7 @@ class Candidate:
     fit: Fit
     evidence: Evidence
     gain: Gain
-    repeats: bool = True
+    plausible: bool = True
 
     def __repr__(self) -> str:
         return f"<Candidate {self.effect.name} on {self.axis}: evidence {self.delta_bic:.4g}>"
@@ -63,9 +65,9 @@ class Candidate:
 
     @property
     def supported(self) -> bool:
-        """Whether both the evidence and the held-out logs support the effect, and it repeats."""
+        """Whether evidence and held-out logs support the effect, and its values are plausible."""
         return (
-            self.delta_bic > RULE.least_bic and self.gain.t > RULE.least_t and self.repeats
+            self.delta_bic > RULE.least_bic and self.gain.t > RULE.least_t and self.plausible
             and (self.is_noise or self.gain.after < self.gain.before)
         )  # fmt: skip
 
@@ -228,13 +230,21 @@ def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
         fit=fit,
         evidence=proof,
         gain=held_out_gain(pair[0], pair[1], base.floor),
-        repeats=_repeats(fit, effect),
+        plausible=proof.delta_bic < RULE.least_bic or _is_plausible(fit, effect),
     )
 
 
-def _repeats(fit: Fit, effect: Effect) -> bool:
-    """Whether the logs travel over enough periods of what the effect repeats along the track."""
+def _is_plausible(fit: Fit, effect: Effect) -> bool:
+    """Whether the values that an effect was fitted with are its own; see Candidate."""
     found = [f for f in fit.axis.effects if f.effect.name == effect.name]
+    scales = [
+        (f.values[p.name], p)
+        for f in found
+        for p in effect.parameters
+        if p.lower > 0.0 and p.name not in f.fixed
+    ]
+    if any(v <= p.lower * (1.0 + EDGE) or v >= p.upper * (1.0 - EDGE) for v, p in scales):
+        return False
     periods = [f.values[p.name] for f in found for p in effect.parameters if p.period]
     if not periods:
         return True

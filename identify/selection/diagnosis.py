@@ -13,6 +13,7 @@ from identify.estimation.fit import Fit
 from identify.selection.candidates import Candidate
 from identify.selection.findings import Finding, found, found_wrong, left
 from identify.selection.repeating_force import Repeat, not_general
+from identify.selection.reshaping import Reshaped
 from identify.selection.residual_dependence import Dependence
 from identify.selection.wrong_shape import wrong_shape
 
@@ -59,7 +60,8 @@ class AxisDiagnosis:
     base: the fitted model. ranking: candidates beside it, by falling evidence. steps: the effects
     added one after another while there was evidence. final: the fit with those that were kept.
     unexplained: what the residual depends on, where it is not noise. findings: what each named
-    effect explains, by ``with_findings``.
+    effect explains, by ``with_findings``. curve: that in the place of a law, beside which effects
+    were added.
     """
 
     dataset: Dataset
@@ -70,6 +72,7 @@ class AxisDiagnosis:
     verdict: Verdict
     unexplained: Dependence | None
     findings: tuple[Finding, ...] = ()
+    curve: Reshaped | None = None
 
     def __repr__(self) -> str:
         answer = f"{self.verdict.name.lower()} {list(self.answers)}"
@@ -109,11 +112,15 @@ class AxisDiagnosis:
         it is the answer where it leaves clearly less error by itself, and told as well where it
         leaves about as little. Where error remains beside what is named, it is asked about there.
         """
-        final = self.final if self.named else self.base
+        final = self.final if self.named or self.curve else self.base
         findings = tuple(
             found(s.candidate.effect, s.tied, self.base, final, self.dataset)
             for s in (self._proved if self.named else ())
         )
+        if self.curve is not None:
+            shape, before = self.curve.shape, self.curve.before
+            other = found_wrong(shape, self.base, before, self.dataset)
+            return replace(self, findings=(*findings, other))
         instead = self._wrong_instead() if self.named else None
         if instead and (RULE.near * left(instead) <= min(map(left, findings))):
             if left(instead) < RULE.beside_decoys * min(map(left, findings)):
@@ -126,6 +133,14 @@ class AxisDiagnosis:
         alone = self.verdict is Verdict.UNEXPLAINED
         verdict = Verdict.WRONG_SHAPE if alone else self.verdict
         return replace(self, findings=(*findings, wrong), verdict=verdict)
+
+    def beside(self, base: Fit, curve: Reshaped | None) -> AxisDiagnosis:
+        """The same of a base before one of its laws was given a free curve."""
+        if curve is None:
+            return self
+        none = self.verdict in (Verdict.NOTHING_MISSING, Verdict.UNEXPLAINED)
+        verdict = Verdict.WRONG_SHAPE if none else self.verdict
+        return replace(self, base=base, curve=curve, verdict=verdict)
 
     def _wrong_instead(self) -> Finding | None:
         """A free curve beside the base alone; not of friction, whose curves hold its modifiers."""

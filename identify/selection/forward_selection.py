@@ -17,6 +17,7 @@ from identify.selection.decoys import proof
 from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, Verdict, kept
 from identify.selection.pair_search import held_at_floor, search_pairs
 from identify.selection.ranking import Progress, less, rank, tie, took_friction
+from identify.selection.reshaping import Reshaped, curve_in_place
 from identify.selection.residual_dependence import explains, find_dependence
 from identify.selection.unpredictable import is_unpredictable, with_own_noise
 from twin.effect import Kind
@@ -44,7 +45,13 @@ def diagnose_axis(
     steps: list[Step] = []
     states = [SelectionState((), base)]
     final, found = base, ranking
-    while len(steps) < RULE.most_steps and (more := _next(final, dataset, found, ranked)):
+    curve: Reshaped | None = None
+    while len(steps) < RULE.most_steps:
+        if curve is None and (curve := curve_in_place(final, dataset, found)):
+            final, states[-1] = curve.fit, replace(states[-1], fit=curve.fit)
+            final, found = ranked(final, dataset)
+        if not (more := _next(final, dataset, found, ranked)):
+            break
         earlier = [s.candidate for s in kept(steps)]
         final, dropped = _eliminated_backwards(base, more[-1].candidate.fit, dataset, earlier)
         steps += [*more[:-1], replace(more[-1], dropped=dropped)]
@@ -58,7 +65,7 @@ def diagnose_axis(
         final, found = ranked(final, dataset)
         states[-1] = replace(states[-1], fit=final)
     dataset, states = _with_own_noise(dataset, states)
-    return _decided(dataset, ranking, states)
+    return _decided(dataset, ranking, states).beside(base, curve)
 
 
 def _with_own_noise(

@@ -106,7 +106,8 @@ def test_identification_holds_no_more_of_a_log_than_it_reads(tmp_path):
         "velocity": 0.15 * np.cos(3.0 * (t - 0.02)),  # late; the check says so
     }  # fmt: skip
     whole = Log(
-        1000.0, {"x": AxisLog({**own, "setpoint_velocity": np.cos(t)}, force_constant=1.0)}, {"a": "b"},
+        1000.0,
+        {"x": AxisLog({**own, "setpoint_velocity": np.cos(t)}, force_constant=1.0)}, {"a": "b"},
         truth={"x": {"position": own["position"]}}, attachments={"model.toml": b""},
     )  # fmt: skip
     path = tmp_path / "a.mcap"

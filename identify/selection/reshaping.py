@@ -1,0 +1,78 @@
+"""A free curve in the place of a law competes with absent effects in the same selection.
+
+Where a law that is there has another shape than the machine's force, what it leaves hides other
+effects, or is taken for one. Where its free curve leaves clearly less of the held-out logs than the
+best absent effect, the selection goes on beside the curve. Friction does not take part: its curves
+contain what modifies friction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from identify.dataset.dataset import Dataset
+from identify.estimation.decision import RULE
+from identify.estimation.fit import Fit, holdout_error
+from identify.selection.candidates import Candidate
+from identify.selection.nonparametric import fit_in_place
+from identify.selection.ranking import less
+from identify.selection.unpredictable import is_unpredictable
+from identify.selection.wrong_shape import WrongShape, wrong_shape
+
+MOST_TRIED = 3  # effects beside which a curve is sought
+
+
+@dataclass(frozen=True, eq=False)
+class Reshaped:
+    """A law's free curve, the fit beside which it was found, and the fit with it."""
+
+    shape: WrongShape
+    before: Fit
+    fit: Fit
+
+
+def curve_in_place(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:
+    """The free curve that the selection should go on beside; None where there is none.
+
+    Also where the fit is at the noise floor, or has a free curve already.
+    """
+    if fit.at_floor or any(f.effect.free_shape for f in fit.axis.effects):
+        return None
+    alone = _reshaped(fit, dataset, ranking)
+    if alone or any(c.supported for c in ranking) or is_unpredictable(fit, dataset):
+        return alone
+    return _beside_an_effect(fit, dataset, ranking)
+
+
+def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:
+    """The free curve that leaves clearly less than the best absent effect; None where none does."""
+    shape = wrong_shape(fit, dataset)
+    if shape is None or shape.shape.curve.rubs:
+        return None
+    curve = fit_in_place(fit, dataset, shape.shape)
+    supported = [c.gain.after for c in ranking if c.supported]
+    if supported and curve.gain.after**2 > RULE.beside_decoys * min(supported) ** 2:
+        return None
+    return Reshaped(shape, fit, curve.fit)
+
+
+def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:
+    """The free curve that a fit needs together with an absent effect; its fit is without that.
+
+    Each distorts what the other leaves, so that neither has evidence alone.
+    """
+    likely = [c for c in ranking if c.plausible and c.delta_bic > RULE.least_bic]
+    for candidate in sorted(likely, key=lambda c: -c.delta_bic)[:MOST_TRIED]:
+        found = _reshaped(candidate.fit, dataset, ())
+        if found is not None and _lessened(fit, found.fit, dataset) > RULE.nearly_all:
+            without = less(candidate.effect, found.fit, fit, dataset)
+            return Reshaped(found.shape, candidate.fit, without)
+    return None
+
+
+def _lessened(before: Fit, after: Fit, dataset: Dataset) -> float:
+    """Part of the squared test error above the noise floor that is gone, at most 1."""
+    was, left = (holdout_error(f, dataset) or f.error for f in (before, after))
+    above = was**2 - before.floor**2
+    return 1.0 - (left**2 - after.floor**2) / above if above > 0.0 else 0.0
