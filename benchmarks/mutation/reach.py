@@ -41,18 +41,24 @@ class Reach:
 
         Tests that name the subject of its file, such as an effect, come first, then those of its
         folder, the quickest first.
-        Coverage does not record native code and code that runs at import; there any test counts.
+        Coverage does not record native code, nor what runs at import or in a process of its own;
+        there any test of the folder counts, or any at all.
         """
         by_line = self.contexts.get(fault.path, {})
-        chosen = by_line.get(fault.line) or frozenset().union(*by_line.values())
+        own = by_line.get(fault.line, frozenset())
+        chosen = own or frozenset().union(*by_line.values())
         chosen = {t for t in self.seconds if t in chosen or t.partition("::")[0] in chosen}
+        room = self._room(fault)
         if native or not chosen:
             chosen = set(self.seconds)
-        subject, room = Path(fault.path).stem, f"tests/{Path(fault.path).parent.as_posix()}/"
+        elif not own:
+            chosen |= {t for t in self.seconds if _folder(t) == room}
+        subject = Path(fault.path).stem
         out, spent = [], 0.0
 
-        def order(test: str) -> tuple[bool, bool, float, str]:
-            return subject not in test, not test.startswith(room), self.seconds[test], test
+        def order(test: str) -> tuple[bool, bool, bool, float, str]:
+            near = _folder(test) == room, f"{_folder(test)}/".startswith(f"{room}/")
+            return subject not in test, not near[0], not near[1], self.seconds[test], test
 
         for test in sorted(chosen, key=order):
             spent += self.seconds[test]
@@ -60,6 +66,16 @@ class Reach:
                 break
             out.append(test)
         return out
+
+    def _room(self, fault: Fault) -> str:
+        """The folder of tests that is nearest to a fault's own."""
+        folders = {_folder(t) for t in self.seconds}
+        own = Path("tests") / Path(fault.path).parent
+        return next((f.as_posix() for f in (own, *own.parents) if f.as_posix() in folders), "tests")
+
+
+def _folder(test: str) -> str:
+    return Path(test.partition("::")[0]).parent.as_posix()
 
 
 @cache

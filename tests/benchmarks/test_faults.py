@@ -39,6 +39,9 @@ def test_the_same_seed_draws_the_same_faults_and_each_changes_the_code(drawn) ->
         ("y = f(a, b, c)", "SwapArguments", {"y = f(b, a, c)", "y = f(a, c, b)"}),
         ("y = f(a, a)", "SwapArguments", set()),
         ("y = f(a, key=b)", "SwapArguments", set()),
+        ("y = np.maximum(a, b)", "SwapArguments", set()),
+        ("y = zip(a, b, strict=True)", "ReplaceTrueWithFalse", set()),
+        ("y = f(a, sure=True)", "ReplaceTrueWithFalse", {"y = f(a, sure=False)"}),
         ("y = a + b - c", "DropTerm", {"y = a - c", "y = a + b"}),
     ],
 )
@@ -59,7 +62,8 @@ def test_tests_of_a_line_come_quickest_first_and_within_the_budget() -> None:
     known = Reach({"a": 3.0, "b": 1.0, "c": 2.0, "d": 0.5}, {"x.py": {7: frozenset("abc")}})
     assert known.tests_for(Fault("x.py", 7, "k", 0), 10.0) == ["b", "c", "a"]
     assert known.tests_for(Fault("x.py", 7, "k", 0), 3.5) == ["b", "c"]
-    assert known.tests_for(Fault("x.py", 9, "k", 0), 10.0) == ["b", "c", "a"]  # native or import
+    # What runs at import, or in a process of its own: those of the folder as well.
+    assert known.tests_for(Fault("x.py", 9, "k", 0), 10.0) == ["d", "b", "c", "a"]
     assert known.tests_for(Fault("y.py", 1, "k", 0), 1.0) == ["d"]
     assert known.tests_for(Fault("x.py", 7, "k", 0), 1.0, native=True) == ["d"]
     shared = Reach({"t.py::a": 1.0, "t.py::b": 2.0, "c": 0.1}, {"x.py": {7: frozenset({"t.py"})}})

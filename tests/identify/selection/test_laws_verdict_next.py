@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -94,9 +95,10 @@ def looped(monkeypatch, errors, *, moved=(), shifts=2):
 
     def decide(dataset, ranking, stages):
         seen.update(dataset=dataset, ranking=ranking, stages=stages)
-        return seen
+        return SimpleNamespace(beside=lambda base, curve: (base, curve))
 
     monkeypatch.setattr(module, "rank", lambda base, dataset, **_: (base, (built("wear"),)))
+    monkeypatch.setattr(module, "curve_in_place", lambda fit, dataset, ranking: None)
     monkeypatch.setattr(module, "_next", following)
     monkeypatch.setattr(module, "_eliminated_backwards", back)
     monkeypatch.setattr(module, "_decided", decide)

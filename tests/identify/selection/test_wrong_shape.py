@@ -6,15 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import PLAIN, axis_of, built_dataset, fitted
+from built_fits import PLAIN, axis_of, built, built_dataset, fitted
 
 from identify.estimation.fit import Outcome, finished
+from identify.estimation.force_balance import residual
 from identify.output.words.selection import shape_in_words
 from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import FindingKind
 from identify.selection.found_shape import AHEAD, BEHIND, BOTH, found_shape
 from identify.selection.nonparametric import fit_in_place
+from identify.selection.reshaping import curve_in_place
 from identify.selection.residual_dependence import Dependence
 from identify.selection.wrong_shape import best_shape, wrong_shape
 from identify.workflow import add_shape
@@ -153,3 +155,30 @@ def test_a_shape_is_the_verdict_where_it_is_all_that_is_found(dataset) -> None:
 def test_what_has_no_shape_to_give_is_one_line(effect, model, message) -> None:
     with pytest.raises(InputError, match=message):
         add_shape(CATALOGUE[effect], MachineModel("m", {"x": model}), {})
+
+
+def test_a_curve_takes_part_in_the_selection_where_no_effect_leaves_as_little(dataset) -> None:
+    there = machine(dataset, step)
+    base = base_of(there)
+    found = curve_in_place(base, there, ())
+    assert found is not None
+    assert found.shape.effect == "cable_slab"
+    assert found.fit.error < 0.3 * base.error
+    before = float(np.sqrt(np.mean(residual(base.axis, there.holdout or there.fit) ** 2)))
+    better = built(before=before, after=1e-4 * before)
+    assert curve_in_place(base, there, (better,)) is None
+    assert curve_in_place(found.fit, there, ()) is None  # has one already
+    nothing = machine(dataset, lambda x, _: 0.0 * x)
+    assert curve_in_place(base_of(nothing), nothing, ()) is None
+
+
+def test_what_is_found_beside_a_curve_is_told_with_it(dataset) -> None:
+    there = machine(dataset, step)
+    base = base_of(there)
+    curve = curve_in_place(base, there, ())
+    assert curve is not None
+    alone = AxisDiagnosis(there, curve.fit, (), (), curve.fit, Verdict.NOTHING_MISSING, None)
+    told = alone.beside(base, curve).with_findings()
+    assert (told.base, told.verdict) == (base, Verdict.WRONG_SHAPE)
+    assert [f.effect for f in told.findings] == ["cable_slab"]
+    assert alone.beside(base, None) is alone
