@@ -241,7 +241,7 @@ def _is_plausible(fit: Fit, effect: Effect) -> bool:
         (f.values[p.name], p)
         for f in found
         for p in effect.parameters
-        if p.lower > 0.0 and p.name not in f.fixed
+        if 0.0 < p.lower < p.upper and p.name not in f.fixed
     ]
     if any(v <= p.lower * (1.0 + EDGE) or v >= p.upper * (1.0 - EDGE) for v, p in scales):
         return False
