@@ -126,7 +126,7 @@ def diagnose(
 ) -> None:
     """Find which physical effect is missing, with the evidence for it."""
     from identify import workflow
-    from identify.output import as_json
+    from identify.output import diagnosis_json
     from identify.output import text as as_text
 
     if out:
@@ -146,7 +146,7 @@ def diagnose(
             out, title=f"{machine.name}: what the model lacks", diagnosis=result,
             comparison=result.comparison, history=result.model.history,
         )  # fmt: skip
-    say(as_text.diagnose_text(result), as_json.diagnose_json(result), as_json_, findings)
+    say(as_text.diagnose_text(result), diagnosis_json.diagnose_json(result), as_json_, findings)
 
 
 @app.command()
@@ -196,7 +196,7 @@ def demo(
 ) -> None:
     """Run the whole loop on a machine with a hidden effect."""
     from identify.demo import demo as run
-    from identify.output import as_json
+    from identify.output import as_json, diagnosis_json
 
     catalogue = catalogue_with(effects)
     machine = machine_model(model, catalogue)
@@ -211,7 +211,7 @@ def demo(
         "hidden": hidden,
         "named": result.named,
         "report": str(result.report),
-        "diagnosis": as_json.diagnose_json(result.diagnosis),
+        "diagnosis": diagnosis_json.diagnose_json(result.diagnosis),
         "addition": result.addition and as_json.add_json(result.addition),
     }
     verdict = "the diagnosis is right" if result.named else "the diagnosis did not name it"

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from identify.dataset.resolution import step_of
 from identify.dataset.velocity import together
 from twin.errors import InputError
 from twin.log import AxisLog, Log
@@ -29,9 +30,7 @@ EQUAL = 1e-9  # relative difference by which whole samples may miss a length
 READ_BACK = 32  # readings that a controller is supposed to use
 ENOUGH = 200_000  # samples that tell the noise of a command
 SMOOTHED = 11  # samples over which readings are smoothed to undo their errors
-GAP = 8.0  # ratio of differences between readings that only a resolution leaves empty
 FOLLOWS = 0.5  # squared correlation of position and setpoint from which the loop is closed
-WHOLE = 0.15  # of a step, RMS, by which such differences may miss whole steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +180,7 @@ class Motion:
         apart = np.sort(np.abs(self.raw[0])) * self.sample_period
         apart = apart[len(apart) // 100 :]
         for held in (apart[apart > 0.0], np.maximum(apart, np.finfo(float).tiny)):
-            if step := _step(held, fewest=len(apart) // 100):
+            if step := step_of(held, fewest=len(apart) // 100):
                 return step
         return 0.0
 
@@ -297,18 +296,3 @@ def _blocks(position: Array, velocity: Array, force: Array, samples: int) -> Arr
     whole = len(position) // samples * samples
     stacked = np.stack([position[:whole], velocity[:whole], force[:whole]])
     return np.ascontiguousarray(stacked.reshape(3, -1, samples).mean(axis=2))
-
-
-def _step(apart: Array, fewest: int) -> float:
-    """Step of which rising distances (n,) m are near whole multiples, or 0."""
-    if len(apart) < 2 or fewest < 1:
-        return 0.0
-    widest = int(np.argmax(apart[1:] / apart[:-1]))
-    step = apart[widest + 1]
-    if step < GAP * apart[widest] or not fewest <= len(apart) - widest:
-        return 0.0
-    for reach in (1.5, 4.5, 16.5):
-        near = apart[widest + 1 :][apart[widest + 1 :] < reach * step]
-        counts = np.rint(near / step)
-        step = float(near @ counts / (counts @ counts))
-    return step if np.std(near / step - counts) < WHOLE else 0.0

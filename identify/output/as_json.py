@@ -7,17 +7,11 @@ from typing import Any
 from identify.estimation.intervals import Estimate
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
-from identify.output.remarks import remarks_on
-from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+from identify.output.results import Addition, Comparison, FitResult
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
 from identify.output.words.experiment_design import gap_in_words, not_run_in_words
-from identify.output.words.selection import advice, verdict_in_words
 from identify.output.words.validation import loop_in_words, region_in_words
-from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
-from identify.selection.diagnosis import AxisDiagnosis, Step
-from identify.selection.findings import Finding
-from identify.selection.found_shape import FoundShape
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import ResidualTests
 from twin.experiments.file import parameters
@@ -45,7 +39,7 @@ def fit_json(result: FitResult) -> dict[str, Any]:
                 "beginnings_left_out": dict(result.datasets[axis].begun),
                 "beginnings_left_out_unit": "s",
                 "parameters": {e.label: _estimate(e) for e in result.estimates[axis]},
-                "refit": _refit(result.refits[axis]),
+                "refit": refit_json(result.refits[axis]),
             }
             for axis, fit in result.fits.items()
         },
@@ -61,7 +55,7 @@ def _estimate(e: Estimate) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _refit(changed: Refit | None) -> dict[str, Any] | None:
+def refit_json(changed: Refit | None) -> dict[str, Any] | None:
     if changed is None:
         return None
     return {
@@ -139,133 +133,6 @@ def _residual_tests(t: ResidualTests, units: AxisUnits) -> dict[str, Any]:
             for c in t.correlations
         },
     }  # fmt: skip
-
-
-def diagnose_json(result: Diagnosis) -> dict[str, Any]:
-    """The documented object for the axis that the answer is about, and the same by axis."""
-    leading = result.leading
-    by_axis = {axis: _axis_diagnosis(result, axis) for axis in result.axes}
-    return {**by_axis[leading.dataset.axis], "axes": by_axis}
-
-
-def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
-    d = result.axes[axis]
-    units = d.base.axis.units
-    dependence = d.unexplained
-    following = result.next_experiments.get(axis)
-    return {
-        "verdict": d.verdict.name.lower(),
-        "explanation": units.words(verdict_in_words(d.verdict)),
-        "axis": axis,
-        "effect": d.best.effect.name if d.best else None,
-        "ranking": [_candidate(c) for c in d.ranking],
-        "ambiguous_with": list(d.ambiguous_with),
-        "missing": list(d.named),
-        "steps": [_step(s) for s in d.steps],
-        "unexplained": dependence
-        and {
-            "share_of_error": dependence.share_of_error,
-            "depends_on": dependence.depends_on,
-            "period": dependence.period,
-            "unit": dependence.unit,
-        },
-        "findings": [_finding(f) for f in d.findings],
-        "remainder": _remainder(d),
-        "force_error": d.base.error,
-        "noise_floor": d.base.floor,
-        "unit": units.force,
-        "force_shift": d.dataset.channel_delay,
-        "force_shift_unit": "s",
-        "repeats_not_general": d.repeat
-        and {
-            "period": d.repeat.period,
-            "period_unit": units.position,
-            "amplitude": dict(d.repeat.amplitude),
-            "unit": units.force,
-            "phase": dict(d.repeat.phase),
-            "phase_unit": "rad",
-        },
-        "refit": _refit(result.refits.get(axis)),
-        "not_tried": list(result.not_tried),
-        "notes": list(remarks_on(result, axis)),
-        "next_experiment": following and plan_json(following),
-        "next_experiment_refused": result.not_planned.get(axis),
-    }
-
-
-def _finding(f: Finding) -> dict[str, Any]:
-    return {
-        "effect": f.effect,
-        "kind": f.kind.value,
-        "explains": f.explains,
-        "confidence": f.confidence,
-        "indistinguishable_from": list(f.tied),
-        "test_error_before": f.error_before,
-        "test_error_after": f.error_after,
-        "unit": f.unit,
-        "parameters": f.parameters,
-        "gain": f.proof and f.proof.gain,
-        "best_decoy": f.proof and f.proof.best_decoy,
-        "shape": f.shape and _shape(f.shape),
-    }
-
-
-def _shape(s: FoundShape) -> dict[str, Any]:
-    """The curve of a law as it is assumed and as it is found, by direction."""
-    return {
-        "over": s.over.value,
-        "coordinate": s.coordinate.tolist(),
-        "coordinate_unit": s.unit,
-        "period": s.period,
-        "lets_go_at_standstill": s.lets_go,
-        "unit": s.force_unit,
-        "curves": {
-            name: {
-                "assumed": c.assumed.tolist(), "found": c.found.tolist(),
-                "band_90": c.band.tolist(),
-            }
-            for name, c in s.curves.items()
-        },
-    }  # fmt: skip
-
-
-def _remainder(d: AxisDiagnosis) -> dict[str, Any] | None:
-    """What stands above the noise floor beside the findings."""
-    left = d.unexplained
-    if left is None:
-        return None
-    fit = d.final if d.named else d.base
-    return {
-        "error": fit.error,
-        "over_noise_floor": fit.ratio,
-        "unit": fit.axis.units.force,
-        "depends_on": left.depends_on,
-        "share_of_error": left.share_of_error,
-        "period": left.period,
-        "period_unit": left.unit,
-        "advice": advice(d.findings),
-    }
-
-
-def _step(s: Step) -> dict[str, Any]:
-    return {
-        **_candidate(s.candidate),
-        "ambiguous_with": list(s.tied),
-        "dropped": list(s.dropped),
-        "beside": s.beside,
-    }
-
-
-def _candidate(c: Candidate) -> dict[str, Any]:
-    return {
-        "effect": c.effect.name,
-        "delta_bic": c.delta_bic,
-        "holdout_error_before": c.gain.before,
-        "holdout_error_after": c.gain.after,
-        "unit": c.fit.axis.units.force,
-        "supported": c.supported,
-        "parameters": dict(c.fit.axis[c.effect.name].values),
-    }
 
 
 def plan_json(result: Plan) -> dict[str, Any]:

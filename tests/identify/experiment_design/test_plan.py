@@ -18,7 +18,8 @@ from identify.experiment_design.discrimination import (
     contest,
     require_within_limits,
 )
-from identify.output.as_json import diagnose_json, plan_json
+from identify.output.as_json import plan_json
+from identify.output.diagnosis_json import diagnose_json
 from identify.output.report import sections
 from identify.output.report.drawing import drawing_style
 from identify.output.report.subject import Subject

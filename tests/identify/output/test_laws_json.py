@@ -15,10 +15,10 @@ from identify.output import remarks
 from identify.output.as_json import (
     add_json,
     compare_json,
-    diagnose_json,
     fit_json,
     plan_json,
 )
+from identify.output.diagnosis_json import diagnose_json
 from identify.output.machine_json import check_json, effect_json
 from identify.output.plain import plain
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
