@@ -138,9 +138,11 @@ class AxisDiagnosis:
         """The same of a base before one of its laws was given a free curve."""
         if curve is None:
             return self
+        beside = replace(self, base=base, curve=curve)
         none = self.verdict in (Verdict.NOTHING_MISSING, Verdict.UNEXPLAINED)
-        verdict = Verdict.WRONG_SHAPE if none else self.verdict
-        return replace(self, base=base, curve=curve, verdict=verdict)
+        return (
+            replace(beside, verdict=Verdict.WRONG_SHAPE) if none or not beside._proved else beside
+        )
 
     def _wrong_instead(self) -> Finding | None:
         """A free curve beside the base alone; not of friction, whose curves hold its modifiers."""
@@ -155,7 +157,9 @@ class AxisDiagnosis:
 
     @property
     def _proved(self) -> list[Step]:
-        return [s for s in kept(self.steps) if s.proved]
+        """Steps that are named; a law beside its own free curve is part of that shape."""
+        own = self.curve.shape.effect if self.curve else None
+        return [s for s in kept(self.steps) if s.proved and s.candidate.effect.name != own]
 
 
 def kept(steps: Sequence[Step]) -> list[Step]:
