@@ -23,7 +23,7 @@ import twin.log.long
 import twin.model.file
 from identify import workflow
 from identify.cli.shared import sentences
-from identify.output import as_json, machine_json, machine_text
+from identify.output import as_json, diagnosis_json, machine_json, machine_text
 from identify.output import selftest as selftest_output
 from identify.output import text as as_text
 from identify.selftest.case import Case
@@ -41,7 +41,8 @@ def cli(monkeypatch, capsys, tmp_path):
 def printed(monkeypatch, name: str) -> None:
     """Both forms of a result are a mark of the form and the result."""
     monkeypatch.setattr(as_text, f"{name}_text", lambda r: f"text of {name}", raising=False)
-    monkeypatch.setattr(as_json, f"{name}_json", lambda r: {"json of": name, "bad": float("nan")})
+    told = diagnosis_json if name == "diagnose" else as_json
+    monkeypatch.setattr(told, f"{name}_json", lambda r: {"json of": name, "bad": float("nan")})
 
 
 def refuse(constant: str) -> None:
@@ -226,7 +227,7 @@ def test_effects(monkeypatch, cli):
 
 @pytest.mark.parametrize(("named", "code"), [(True, 0), (False, 1)])
 def test_demo(monkeypatch, cli, named, code):
-    monkeypatch.setattr(as_json, "diagnose_json", lambda d: {"d": d})
+    monkeypatch.setattr(diagnosis_json, "diagnose_json", lambda d: {"d": d})
     monkeypatch.setattr(as_json, "add_json", lambda a: {"a": a})
     hidden = SimpleNamespace(effect=SimpleNamespace(name="wear"))
     result = SimpleNamespace(

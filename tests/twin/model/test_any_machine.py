@@ -17,7 +17,7 @@ from matplotlib.text import Text
 
 from identify import workflow
 from identify.dataset.dataset import datasets
-from identify.output import as_json, text
+from identify.output import as_json, diagnosis_json, text
 from identify.output.plain import plain
 from identify.output.report import write_report
 from identify.output.results import Addition, Comparison, Diagnosis, FitResult
@@ -270,7 +270,7 @@ def test_texts_model_file_and_report_are_in_units_of_the_axis(gone_round: Round)
 def test_json_is_in_units_of_the_axis(gone_round: Round) -> None:
     objects = [
         as_json.fit_json(gone_round.fitted), as_json.compare_json(gone_round.compared),
-        as_json.diagnose_json(gone_round.found), as_json.add_json(gone_round.added),
+        diagnosis_json.diagnose_json(gone_round.found), as_json.add_json(gone_round.added),
     ]  # fmt: skip
     units = set().union(*(stated_units(json.loads(json.dumps(plain(o)))) for o in objects))
     kind = gone_round.units
@@ -285,7 +285,7 @@ def test_an_effect_of_the_other_axis_is_no_candidate_where_there_are_several(
 ) -> None:
     left_out = ("axis_coupling",) if gone_round.kind == "three" else ()
     assert gone_round.found.not_tried == left_out
-    told = as_json.diagnose_json(gone_round.found)
+    told = diagnosis_json.diagnose_json(gone_round.found)
     assert told["not_tried"] == list(left_out)
     notes = [n for n in told["notes"] if "not tried" in n]
     assert bool(notes) == bool(left_out)
