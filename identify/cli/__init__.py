@@ -34,8 +34,8 @@ def main() -> None:
     except Exception as error:
         if _was_interrupted(error):
             fail("interrupted")
-            sys.exit(INTERRUPTED)
-        if hasattr(error, "format_message"):  # a usage error; its class moves between versions
+            code = INTERRUPTED
+        elif hasattr(error, "format_message"):  # a usage error; its class moves between versions
             code = fail(f"{error.format_message()} See `twin --help`.")
         elif "TWIN_TRACEBACK" in os.environ:
             raise

@@ -118,11 +118,14 @@ def datasets(
         if not going:
             continue
         held_going, still_held = _moving(holdout, name)
-        motions_at = cache(partial(_motions, going, held_going, name, tuple(model.axes)))
+        made = cache(partial(_motions, going, held_going, name, tuple(model.axes)))
+        motions_at = partial(_long_enough, made)
         length = test_function or choose_length(motions_at, imposed=axis.is_imposed)
         fit, held = motions_at(length)
         begun = {} if axis.is_imposed else beginnings([*fit, *held])
-        fit, held = ([m.after(begun.get(m.name, 0.0)) for m in some] for some in (fit, held))
+        fit, held = (
+            [m.after(begun[m.name]) if m.name in begun else m for m in some] for some in (fit, held)
+        )
         out[name] = Dataset(
             axis=name,
             fit=tuple(PreparedLog.of(m, length) for m in fit),
@@ -192,15 +195,27 @@ def _moving(logs: Mapping[str, Log], axis: str) -> tuple[dict[str, Log], list[st
     return going, [name for name in held if name not in going]
 
 
+def _long_enough(
+    made: Callable[[float], tuple[list[Motion], list[Motion]]], length: float | None
+) -> tuple[list[Motion], list[Motion]]:
+    """Motions whose blocks suit test functions of a length (s), made anew only where they do not.
+
+    None: in blocks as long as their noise asks for.
+    """
+    usual = made(LONGEST_BLOCK)
+    if length is None or length >= LEAST_BLOCKS * max(m.period for some in usual for m in some):
+        return usual
+    return made(length / LEAST_BLOCKS)
+
+
 def _motions(
     logs: Mapping[str, Log],
     holdout: Mapping[str, Log],
     axis: str,
     machine: tuple[str, ...],
-    length: float | None,
+    longest: float,
 ) -> tuple[list[Motion], list[Motion]]:
-    """Motions to fit and held out, in blocks short enough for test functions of a length (s)."""
-    longest = LONGEST_BLOCK if length is None else length / LEAST_BLOCKS
+    """Motions to fit and held out, in blocks of at most a length (s)."""
     fit, held = (
         [motion_of(log, axis, name, machine, longest) for name, log in some.items()]
         for some in (logs, holdout)

@@ -80,25 +80,22 @@ class Motion:
     def head(self, duration: float) -> Motion:
         """Its first ``duration`` seconds."""
         n = min(max(round(duration / self.period), 1), self.signals.shape[1])
-        samples = self.raw.shape[1] // self.signals.shape[1]
-        return replace(
-            self,
-            signals=np.ascontiguousarray(self.signals[:, :n]),
-            others=np.ascontiguousarray(self.others[:, :n]),
-            raw=self.raw[:, : n * samples],
-            beside={a: replace(o, signals=o.signals[:, :n]) for a, o in self.beside.items()},
-        )
+        return self._of_blocks(slice(n))
 
     def after(self, instant: float) -> Motion:
         """What follows its first ``instant`` seconds, as a log that begins there."""
         first = min(round(instant / self.period), self.signals.shape[1] - 1)
+        return self._of_blocks(slice(first, None))
+
+    def _of_blocks(self, blocks: slice) -> Motion:
         samples = self.raw.shape[1] // self.signals.shape[1]
+        ends = (None if end is None else end * samples for end in (blocks.start, blocks.stop))
         return replace(
             self,
-            signals=np.ascontiguousarray(self.signals[:, first:]),
-            others=np.ascontiguousarray(self.others[:, first:]),
-            raw=np.ascontiguousarray(self.raw[:, first * samples :]),
-            beside={a: replace(o, signals=o.signals[:, first:]) for a, o in self.beside.items()},
+            signals=np.ascontiguousarray(self.signals[:, blocks]),
+            others=np.ascontiguousarray(self.others[:, blocks]),
+            raw=np.ascontiguousarray(self.raw[:, slice(*ends)]),
+            beside={a: replace(o, signals=o.signals[:, blocks]) for a, o in self.beside.items()},
         )
 
     def with_force_ahead(self, shift: float) -> Motion:

@@ -67,7 +67,7 @@ def found(
 ) -> Finding:
     """The finding of one effect of a final fit, all others left in it."""
     without = less(effect, final, base, dataset)
-    before, after = (_unseen(f, dataset) for f in (without, final))
+    before, after = (unseen_error(f, dataset) for f in (without, final))
     fitted = final.axis[effect.name]
     return Finding(
         effect=effect.name,
@@ -83,7 +83,7 @@ def found(
 
 def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> Finding:
     """The finding of a law with the wrong shape in a final fit."""
-    before = _unseen(final, dataset)
+    before = unseen_error(final, dataset)
     taken = shape.proof.gain * before**2
     return Finding(
         effect=shape.effect,
@@ -106,11 +106,11 @@ def left(finding: Finding) -> float:
 
 def _share(taken: float, base: Fit, dataset: Dataset) -> float:
     """Part of the base's squared test error above the noise floor that this much (N^2) is."""
-    above = _unseen(base, dataset) ** 2 - base.floor**2
+    above = unseen_error(base, dataset) ** 2 - base.floor**2
     return taken / above if above > 0.0 else 0.0
 
 
-def _unseen(fit: Fit, dataset: Dataset) -> float:
+def unseen_error(fit: Fit, dataset: Dataset) -> float:
     """RMS test error (N): on the held-out logs, or on the fit logs where there are none."""
     held = holdout_error(fit, dataset)
     return fit.error if held is None else held

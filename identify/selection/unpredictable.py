@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -47,6 +48,7 @@ def noise_known(axis: AxisModel, dataset: Dataset) -> Dataset:
     return with_own_noise(finished(axis, axis, dataset.fit, Outcome.CONVERGED), dataset)[0]
 
 
+@lru_cache(maxsize=1)  # a selection asks it of one fit for its curves, its pairs and its end
 def is_unpredictable(fit: Fit, dataset: Dataset) -> bool:
     """Whether neither the motion nor its past foretells the residual, and no line stands out.
 
@@ -94,11 +96,13 @@ def _predictors(dataset: Dataset) -> Iterator[Columns]:
     yield _past
 
 
+@dataclass(frozen=True, eq=False)
 class _Hats:
-    """Hats over a coordinate, of which a force that turns with the direction is made, or not."""
+    """Hats over a coordinate, with knots (k,) in its unit; turned: with the direction of motion."""
 
-    def __init__(self, name: str, knots: Array, *, turned: bool) -> None:
-        self.name, self.knots, self.turned = name, knots, turned
+    name: str
+    knots: Array
+    turned: bool
 
     def __call__(self, logs: Sequence[PreparedLog]) -> list[Array]:
         return [self._of(coordinates_of(log)) for log in logs]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -77,6 +78,7 @@ class WrongShape:
         return self.shape.effect
 
 
+@lru_cache(maxsize=4)  # in the selection, and beside what it named
 def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
     """The law whose free curve takes most of a fit's squared test error, if it is proved.
 

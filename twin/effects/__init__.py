@@ -74,13 +74,13 @@ def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:
     names = [m.name for m in pkgutil.iter_modules(__path__)]
     effects = [importlib.import_module(f"{__name__}.{name}").EFFECT for name in names]
     for path in map(Path, user_files):
-        _require_name(path, [e.name for e in effects])
+        _require_name(path, Catalogue(effects))
         _try_apart(path)
         effects.append(_load(path))
     return Catalogue(effects)
 
 
-def _require_name(path: Path, taken: Sequence[str]) -> None:
+def _require_name(path: Path, taken: Catalogue) -> None:
     if not path.is_file():
         raise InputError(f"{path}: no such effect file; give a Python file that defines EFFECT")
     if not path.stem.isidentifier():

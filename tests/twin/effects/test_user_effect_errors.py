@@ -91,6 +91,13 @@ def test_the_name_of_another_effect_is_refused(tmp_path: Path) -> None:
         load_catalogue([tmp_path / "mine.py"] * 2)
 
 
+def test_the_name_of_a_second_instance_is_refused(tmp_path: Path) -> None:
+    """It could never be given: `cogging_2` is the second cogging of an axis."""
+    (tmp_path / "cogging_2.py").write_text(SOURCE.read_text(encoding="utf-8"), encoding="utf-8")
+    with pytest.raises(InputError, match="there is an effect 'cogging_2' already"):
+        load_catalogue([tmp_path / "cogging_2.py"])
+
+
 def test_the_help_says_that_loading_runs_code() -> None:
     done = twin("effects", "--help", folder=Path.cwd())
     assert "loading it runs its code" in " ".join(done.stdout.split())
