@@ -26,7 +26,7 @@ from identify.selection.unpredictable import noise_known, with_own_noise
 from identify.selection.wrong_shape import WrongShape, having_shape
 from identify.validation.agreement import Agreement, agreement
 from identify.validation.free_run import errors_of_both
-from identify.validation.misfit_maps import compare_axis, position_errors
+from identify.validation.misfit_maps import compare_axis, position_errors, worst_region
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
@@ -141,9 +141,11 @@ def diagnose(
         for axis, fitted in result.fits.items()
     }
     plans, not_planned = _next_experiments(axes, result.model, test_function)
+    regions = {axis: worst_region(d.told, d.dataset) for axis, d in axes.items() if d.unexplained}
     return Diagnosis(
         result.model, axes, _compared(result.model, result.datasets, progress), plans,
         result.refits, tuple(name for name in catalogue if name not in known), not_planned,
+        {axis: region for axis, region in regions.items() if region},
     )  # fmt: skip
 
 

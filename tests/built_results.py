@@ -73,7 +73,7 @@ def plan_of(*between: str, **changes: object) -> Plan:
     return replace(plan, **changes)
 
 
-def diagnosis_of(verdict: Verdict = Verdict.AMBIGUOUS, **changes: object) -> AxisDiagnosis:
+def diagnosis_of(verdict: Verdict = Verdict.MISSING_EFFECTS, **changes: object) -> AxisDiagnosis:
     steps = (
         Step(BEST, ("quadratic_drag",)),
         Step(LATER, (), dropped=("wear",), beside="cogging"),
@@ -94,6 +94,7 @@ FOUND = (
 STRUCTURE = Dependence(
     0.631, "other_axis_position", 0.0273, "m", {"time": 0.117, "position": 0.231}
 )
+LEFT_OVER = Region("speed", "m/s", 0.0137, 0.0291, 4.71, 2.32, 0.417)
 REPEAT = Repeat(0.00253, {"run 1": 1.07, "run 2": 0.93}, {"run 1": 0.31, "run 2": 2.13})
 
 
@@ -167,6 +168,7 @@ def diagnosed(x: AxisDiagnosis | None = None) -> Diagnosis:
     return Diagnosis(
         MODEL, {"y": y, "x": x or diagnosis_of()}, compared(),
         {"x": plan_of("cogging", "quadratic_drag")}, {"x": refit_of(0.0), "y": refit_of(0.01)},
+        left_over={"x": LEFT_OVER} if x and x.unexplained else {},
     )  # fmt: skip
 
 

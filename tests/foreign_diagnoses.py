@@ -10,23 +10,39 @@ from pathlib import Path
 
 import numpy as np
 from foreign_effects import INSIDE, OUTSIDE, Planted
-from foreign_machine import Machine, drawn, gaussian, logs_of, run
+from foreign_machine import (
+    AHEAD,
+    BEHIND,
+    FORCE,
+    PITCH,
+    PLACE,
+    WIDTH,
+    Machine,
+    drawn,
+    gaussian,
+    logs_of,
+    run,
+    train,
+)  # fmt: skip
 from machines import one_axis
 
 from identify import workflow
+from identify.selection.findings import FindingKind
 from identify.selection.forward_selection import diagnose_axis
 from twin.effects import load_catalogue
 from twin.model.file import load_model
 
 CATALOGUE = load_catalogue()
 STAGE = one_axis(load_model("proton_xy", CATALOGUE))
-EFFECTS = INSIDE | OUTSIDE
+NOTHING = {"nothing": Planted(lambda m, size, rng: m, fixed=True)}
+EFFECTS = INSIDE | OUTSIDE | NOTHING
 DURATION = 10.0  # s of each log
 VARIANTS = ("", "Gaussian bumps", "no bumps at rest", "decimated", "half early", "one early")
 EARLY = {"half early": 0.5, "one early": 1.0}  # samples
 FIELDS = (
-    "planted", "seed", "floors", "size", "verdict", "named", "mark", "with", "top", "held", "s",
+    "planted", "seed", "floors", "left", "size", "verdict", "findings", "mark", "top", "held", "s",
 )  # fmt: skip
+FORMS = {"bumps": "roller_spikes", "cable": "cable_slab", "stribeck": "lugre"}  # what has another
 
 
 def model_for(planted: Planted):
@@ -36,6 +52,26 @@ def model_for(planted: Planted):
     return STAGE.with_axis("x", replace(axis, effects=kept))
 
 
+def reshaped(machine: Machine, forms, rng: np.random.Generator) -> Machine:
+    """The machine with base effects of other forms than the catalogue's.
+
+    Gaussian bumps that let go at rest, a cable that folds over at two places, and a Stribeck curve
+    with an exponent about 1.
+    """
+    if "bumps" in forms:
+        rows = machine.tables.copy()
+        shape = train(PITCH, 0.006 + rng.uniform(-0.002, 0.002), 1.3 * WIDTH, gaussian)
+        rows[AHEAD], rows[BEHIND] = (rows[r].max() * shape for r in (AHEAD, BEHIND))
+        machine = replace(machine, tables=rows).having(turn=0.0)
+    if "cable" in forms:
+        at, wide = rng.uniform(-0.08, 0.08, 2), rng.uniform(0.015, 0.04, 2)
+        folds = [np.tanh((PLACE - a) / w) for a, w in zip(at, wide, strict=True)]
+        machine = machine.plus(FORCE, 0.03 * folds[0] - 0.02 * folds[1])
+    if "stribeck" in forms:
+        machine = machine.having(n=rng.uniform(0.7, 1.3))
+    return machine
+
+
 def excess(machine: Machine, model, seed: int) -> float:
     """How far the fitted model's error stands above its floor, in floors."""
     fit = workflow.fit(model, {"log 1": run(machine, 1000 * seed + 1, DURATION)}).fits["x"]
@@ -43,8 +79,8 @@ def excess(machine: Machine, model, seed: int) -> float:
 
 
 def sized(planted: Planted, base: Machine, model, wanted: float, seed: int):
-    """The machine with the effect as large as leaves that many floors of error in the model."""
-    size = planted.start
+    """The machine with the effect as large as adds that many floors of error to the model's."""
+    size, before = planted.start, excess(base, model, seed)
 
     def make(size):
         return planted.make(base, size, np.random.default_rng(seed))
@@ -52,7 +88,7 @@ def sized(planted: Planted, base: Machine, model, wanted: float, seed: int):
     if planted.fixed:
         return make(1.0), 1.0
     for _ in range(5):
-        seen = excess(make(size), model, seed)
+        seen = np.sqrt(max(excess(make(size), model, seed) ** 2 - before**2, 1e-4))
         if 0.8 < seen / wanted < 1.25 or (size == planted.largest and seen < wanted):
             break
         size = min(size * np.clip(wanted / seen, 0.1, 10.0), planted.largest)
@@ -65,16 +101,25 @@ def diagnosed(model, machine: Machine, seed: int, duration=DURATION, catalogue=C
     return diagnose_axis(fitted.fits["x"], fitted.datasets["x"], catalogue)
 
 
-def describe(d, planted: Planted) -> dict:
+def describe(d, planted: Planted, forms=()) -> dict:
     """The answer in a line."""
-    name = d.best.effect.name if d.best else "-"
-    if not d.best:
-        mark = "quiet"
-    else:
-        mark = next(
-            (m for m in ("right", "near") if name in getattr(planted, m)),
-            "among" if set(d.ambiguous_with) & {*planted.right, *planted.near} else "WRONG",
-        )
+    d = d.with_findings()
+    missing = [(f.effect, *f.tied) for f in d.findings if f.kind is FindingKind.MISSING]
+    wrong = [f.effect for f in d.findings if f.kind is not FindingKind.MISSING]
+    true = [{*planted.right, *planted.near} & {*names} for names in missing]
+    shapes = {FORMS[f] for f in forms}
+    marks = [
+        "quiet" if not d.findings else "",
+        "right" if any({*planted.right} & {*names} for names in missing) else "",
+        "near" if any(true) else "",
+        "shape" if shapes & {*wrong} else "",
+        "WRONG" if not all(true) else "",
+        "WRONG SHAPE" if not {*wrong} <= shapes else "",
+    ]
+    told = "; ".join(
+        f"{f.kind.value} {'/'.join((f.effect, *f.tied))} {f.explains:.2f} c{f.confidence:.2f}"
+        for f in d.findings
+    )
     top = ", ".join(
         f"{c.effect.name} {c.delta_bic:.0f}{'' if c.supported else '-'} "
         f"x{c.fit.ratio:.2f}" for c in d.ranking[:3]
@@ -82,22 +127,28 @@ def describe(d, planted: Planted) -> dict:
     gain = d.ranking[0].gain
     floor = d.base.floor
     return {
-        "floors": f"{d.base.ratio:.2f}", "verdict": d.verdict.name.lower(), "named": name,
-        "mark": mark, "with": " ".join(d.ambiguous_with), "top": top,
+        "floors": f"{d.base.ratio:.2f}", "left": f"{d.final.ratio:.2f}",
+        "verdict": d.verdict.name.lower(), "findings": told or "-",
+        "mark": " ".join(m for m in marks if m), "top": top,
         "held": f"{gain.before / floor:.2f}>{gain.after / floor:.2f}",
     }  # fmt: skip
 
 
-def dataset(name: str, wanted: float, seed: int) -> dict:
-    """One machine, diagnosed."""
+def dataset(name: str, wanted: float, seed: int, forms=()) -> dict:
+    """One machine, diagnosed; nothing is planted where the name is that."""
     planted = EFFECTS[name]
     code = 1000 * seed + zlib.crc32(name.encode()) % 997
-    base, model = drawn(np.random.default_rng(code)), model_for(planted)
+    rng = np.random.default_rng(code)
+    base, model = reshaped(drawn(rng), forms, rng), model_for(planted)
     machine, size = sized(planted, base, model, wanted, code)
     begun = time.perf_counter()
     found = diagnosed(model, machine, code)
-    row = {"planted": f"{name} @{wanted:g}", "seed": seed, "size": f"{size:.3g}"}
-    return row | describe(found, planted) | {"s": f"{time.perf_counter() - begun:.0f}"}
+    row = {
+        "planted": " ".join((f"{name} @{wanted:g}", *forms)),
+        "seed": seed,
+        "size": f"{size:.3g}",
+    }
+    return row | describe(found, planted, forms) | {"s": f"{time.perf_counter() - begun:.0f}"}
 
 
 def empty(seed: int) -> dict:
@@ -137,6 +188,7 @@ def main() -> None:
     parser.add_argument("--empty", type=int, nargs=2, metavar=("FIRST", "END"))
     parser.add_argument("--effects", nargs="*", default=[], help="names, or inside, or outside")
     parser.add_argument("--floors", type=float, nargs="*", default=[5.0, 20.0])
+    parser.add_argument("--forms", nargs="*", default=[], choices=list(FORMS), help="of their own")
     parser.add_argument("--seeds", type=int, nargs="*", default=[1])
     parser.add_argument("-o", "--out", type=Path, default=Path("foreign.md"))
     given = parser.parse_args()
@@ -146,7 +198,7 @@ def main() -> None:
     for seed in given.seeds:
         for n in names:
             levels = given.floors[:1] if EFFECTS[n].fixed else given.floors
-            jobs += [(dataset, (n, floors, seed)) for floors in levels]
+            jobs += [(dataset, (n, floors, seed, given.forms)) for floors in levels]
     if not given.out.exists():
         given.out.write_text(line({f: f for f in FIELDS}) + "|---" * len(FIELDS) + "|\n")
     for job, args in jobs:

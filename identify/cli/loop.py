@@ -146,7 +146,12 @@ def diagnose(
             out, title=f"{machine.name}: what the model lacks", diagnosis=result,
             comparison=result.comparison, history=result.model.history,
         )  # fmt: skip
-    say(as_text.diagnose_text(result), diagnosis_json.diagnose_json(result), as_json_, findings)
+    say(
+        as_text.diagnose_text(result),
+        diagnosis_json.diagnose_json(result, findings),
+        as_json_,
+        findings,
+    )
 
 
 @app.command()

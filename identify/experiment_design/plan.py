@@ -26,7 +26,7 @@ from identify.experiment_design.rival_hypotheses import (
     simulated_dataset,
 )
 from identify.selection.candidates import Candidate, usable
-from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
 from twin.effect import Effect
 from twin.effects import Catalogue
@@ -117,10 +117,10 @@ def next_experiment(
     """The experiment that separates the explanations that an ambiguous diagnosis left.
 
     test_function: length that the diagnosis used, s; None where it was chosen from the noise.
-    Returns None for any other verdict. Raises CannotRun where the machine can run none, and where
-    the model does not say how far its axes may travel.
+    Returns None where it left less than two. Raises CannotRun where the machine can run none, and
+    where the model does not say how far its axes may travel.
     """
-    if found.verdict is not Verdict.AMBIGUOUS or found.best is None:
+    if found.best is None:
         return None
     names = (found.best.effect.name, *found.ambiguous_with)[:MOST_RIVALS]
     rivals = [c for c in found.ranking if c.effect.name in names]

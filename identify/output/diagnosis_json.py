@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from identify.output.as_json import plan_json, refit_json
@@ -12,13 +13,18 @@ from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis, Step
 from identify.selection.findings import Finding
 from identify.selection.found_shape import FoundShape
+from identify.validation.misfit_maps import Region
 
 
-def diagnose_json(result: Diagnosis) -> dict[str, Any]:
-    """The documented object for the axis that the answer is about, and the same by axis."""
+def diagnose_json(result: Diagnosis, data_faults: Sequence[str] = ()) -> dict[str, Any]:
+    """The documented object for the axis that the answer is about, and the same by axis.
+
+    data_faults: what the check of the logs found, one sentence each.
+    """
     leading = result.leading
     by_axis = {axis: _axis_diagnosis(result, axis) for axis in result.axes}
-    return {**by_axis[leading.dataset.axis], "axes": by_axis}
+    answer = by_axis[leading.dataset.axis]
+    return {**answer, "data_faults": list(data_faults), "axes": by_axis}
 
 
 def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
@@ -28,7 +34,7 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
     following = result.next_experiments.get(axis)
     return {
         "verdict": d.verdict.name.lower(),
-        "explanation": units.words(verdict_in_words(d.verdict)),
+        "explanation": units.words(verdict_in_words(d)),
         "axis": axis,
         "effect": d.best.effect.name if d.best else None,
         "ranking": [_candidate(c) for c in d.ranking],
@@ -43,7 +49,7 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
             "unit": dependence.unit,
         },
         "findings": [_finding(f) for f in d.findings],
-        "remainder": _remainder(d),
+        "remainder": _remainder(d, result.left_over.get(axis)),
         "force_error": d.base.error,
         "noise_floor": d.base.floor,
         "unit": units.force,
@@ -102,12 +108,12 @@ def _shape(s: FoundShape) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _remainder(d: AxisDiagnosis) -> dict[str, Any] | None:
+def _remainder(d: AxisDiagnosis, region: Region | None) -> dict[str, Any] | None:
     """What stands above the noise floor beside the findings."""
     left = d.unexplained
     if left is None:
         return None
-    fit = d.final if d.named else d.base
+    fit = d.told
     return {
         "error": fit.error,
         "over_noise_floor": fit.ratio,
@@ -116,6 +122,17 @@ def _remainder(d: AxisDiagnosis) -> dict[str, Any] | None:
         "share_of_error": left.share_of_error,
         "period": left.period,
         "period_unit": left.unit,
+        "where": region
+        and {
+            "coordinate": region.coordinate,
+            "low": region.low,
+            "high": region.high,
+            "coordinate_unit": region.unit,
+            "error": region.rms,
+            "unit": region.force_unit,
+            "over_noise_floor": region.ratio,
+            "share_of_error": region.share,
+        },
         "advice": advice(d.findings),
     }
 

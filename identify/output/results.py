@@ -17,7 +17,7 @@ from identify.output.words.selection import addition_notes
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import MovedParameter, Refit, refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.validation.misfit_maps import AxisComparison
+from identify.validation.misfit_maps import AxisComparison, Region
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.model.machine import HistoryStep, MachineModel
@@ -103,7 +103,8 @@ class Diagnosis:
     next_experiments: for an axis whose diagnosis is ambiguous, the experiment that decides.
     refits: what fitting changed of the given model, by axis. not_tried: effects of the catalogue
     that depend on the other axis, on a machine with more than two axes. not_planned: for an
-    ambiguous axis without next experiment, why the machine can run none.
+    ambiguous axis without next experiment, why the machine can run none. left_over: for an axis
+    with a remainder, where that is largest.
     """
 
     model: MachineModel
@@ -113,12 +114,13 @@ class Diagnosis:
     refits: Mapping[str, Refit] = field(default_factory=dict)
     not_tried: tuple[str, ...] = ()
     not_planned: Mapping[str, str] = field(default_factory=dict)
+    left_over: Mapping[str, Region] = field(default_factory=dict)
 
     @property
     def leading(self) -> AxisDiagnosis:
         """The axis that the answer is about."""
         order = [Verdict.NOTHING_MISSING, Verdict.UNEXPLAINED, Verdict.WRONG_SHAPE]
-        order += [Verdict.AMBIGUOUS, Verdict.MISSING_EFFECT]
+        order += [Verdict.MISSING_EFFECTS]
 
         def weight(d: AxisDiagnosis) -> tuple[bool, int, float]:
             bic = d.ranking[0].delta_bic if d.ranking else 0.0

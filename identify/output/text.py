@@ -118,7 +118,7 @@ def diagnose_text(result: Diagnosis) -> str:
     for axis, d in result.axes.items():
         unit, words = d.base.axis.units.force, d.base.axis.units.words
         named = f" {d.best.effect.name}." if d.best else ""
-        lines.append(f"axis {axis}: {words(verdict_in_words(d.verdict))}{named}")
+        lines.append(f"axis {axis}: {words(verdict_in_words(d))}{named}")
         lines.append(
             f"  {words('force error')} {d.base.error:.4g} {unit}, noise floor "
             f"{d.base.floor:.4g} {unit} (ratio {d.base.ratio:.2f})"
@@ -134,6 +134,8 @@ def diagnose_text(result: Diagnosis) -> str:
             lines.append(f"  {remains}")
         if d.unexplained:
             lines.append(f"  {words(dependence_in_words(d.unexplained))}")
+            if axis in result.left_over:
+                lines.append(f"  it is largest at {words(region_in_words(result.left_over[axis]))}")
             lines.append(f"  {advice(d.findings)}")
         lines += [_ranking_line(c) for c in d.ranking[:4]]
         lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]

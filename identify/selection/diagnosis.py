@@ -11,7 +11,7 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
 from identify.selection.candidates import Candidate
-from identify.selection.findings import Finding, found, found_wrong, left
+from identify.selection.findings import Finding, found, found_wrong, left, with_shape
 from identify.selection.repeating_force import Repeat, not_general
 from identify.selection.reshaping import Reshaped
 from identify.selection.residual_dependence import Dependence
@@ -21,9 +21,8 @@ from identify.selection.wrong_shape import wrong_shape
 class Verdict(Enum):
     """The answer of a diagnosis."""
 
-    MISSING_EFFECT = "missing effect"
+    MISSING_EFFECTS = "missing effects"
     NOTHING_MISSING = "nothing missing"
-    AMBIGUOUS = "ambiguous"
     WRONG_SHAPE = "wrong shape"
     UNEXPLAINED = "unexplained"
 
@@ -91,9 +90,14 @@ class AxisDiagnosis:
     @property
     def answers(self) -> tuple[tuple[str, ...], ...]:
         """Each missing effect, followed by those that explain as much."""
-        if self.verdict not in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS):
+        if self.verdict is not Verdict.MISSING_EFFECTS:
             return ()
         return tuple((s.candidate.effect.name, *s.tied) for s in self._proved)
+
+    @property
+    def told(self) -> Fit:
+        """The fit with what is named, beside which a remainder is left."""
+        return self.final if self.named or self.curve else self.base
 
     @property
     def best(self) -> Candidate | None:
@@ -112,37 +116,42 @@ class AxisDiagnosis:
         it is the answer where it leaves clearly less error by itself, and told as well where it
         leaves about as little. Where error remains beside what is named, it is asked about there.
         """
-        final = self.final if self.named or self.curve else self.base
+        final = self.told
+        own = self.curve and self.curve.shape.effect
         findings = tuple(
-            found(s.candidate.effect, s.tied, self.base, final, self.dataset)
+            found(
+                s.candidate.effect, s.tied, self.base,
+                self.curve.before if self.curve and s.candidate.effect.name == own else final,
+                self.dataset,
+            )
             for s in (self._proved if self.named else ())
-        )
+        )  # fmt: skip
         if self.curve is not None:
             shape, before = self.curve.shape, self.curve.before
             other = found_wrong(shape, self.base, before, self.dataset)
-            return replace(self, findings=(*findings, other))
+            return replace(self, findings=with_shape(findings, other))
         instead = self._wrong_instead() if self.named else None
         if instead and (RULE.near * left(instead) <= min(map(left, findings))):
             if left(instead) < RULE.beside_decoys * min(map(left, findings)):
                 return replace(self, findings=(instead,), verdict=Verdict.WRONG_SHAPE)
             rivals = tuple(replace(f, tied=(*f.tied, instead.effect)) for f in findings)
-            return replace(self, findings=(*rivals, instead), verdict=Verdict.AMBIGUOUS)
+            return replace(self, findings=(*rivals, instead))
         wrong = None if self.unexplained is None else self._wrong_beside(final)
         if wrong is None:
             return replace(self, findings=findings)
         alone = self.verdict is Verdict.UNEXPLAINED
         verdict = Verdict.WRONG_SHAPE if alone else self.verdict
-        return replace(self, findings=(*findings, wrong), verdict=verdict)
+        return replace(self, findings=with_shape(findings, wrong), verdict=verdict)
 
     def beside(self, base: Fit, curve: Reshaped | None) -> AxisDiagnosis:
         """The same of a base before one of its laws was given a free curve."""
         if curve is None:
             return self
         beside = replace(self, base=base, curve=curve)
-        none = self.verdict in (Verdict.NOTHING_MISSING, Verdict.UNEXPLAINED)
-        return (
-            replace(beside, verdict=Verdict.WRONG_SHAPE) if none or not beside._proved else beside
-        )
+        if self.verdict in (Verdict.NOTHING_MISSING, Verdict.UNEXPLAINED):
+            beside = replace(beside, steps=tuple(replace(s, proved=False) for s in self.steps))
+        verdict = Verdict.MISSING_EFFECTS if beside._proved else Verdict.WRONG_SHAPE
+        return replace(beside, verdict=verdict)
 
     def _wrong_instead(self) -> Finding | None:
         """A free curve beside the base alone; not of friction, whose curves hold its modifiers."""
@@ -157,9 +166,16 @@ class AxisDiagnosis:
 
     @property
     def _proved(self) -> list[Step]:
-        """Steps that are named; a law beside its own free curve is part of that shape."""
+        """Steps that are named; also that of an effect whose law a free curve has replaced.
+
+        Of an effect that the model has, the law beside its own free curve is part of that shape.
+        """
         own = self.curve.shape.effect if self.curve else None
-        return [s for s in kept(self.steps) if s.proved and s.candidate.effect.name != own]
+        lacked = own not in self.base.axis.names
+        return [
+            s for s in kept(self.steps)
+            if (lacked if s.candidate.effect.name == own else s.proved)
+        ]  # fmt: skip
 
 
 def kept(steps: Sequence[Step]) -> list[Step]:

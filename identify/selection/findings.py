@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 from math import log
 
@@ -19,10 +20,15 @@ ALL = 0.999999  # of the squared error; no effect takes more
 
 
 class FindingKind(Enum):
-    """What is wrong with the model."""
+    """What is wrong with the model.
+
+    It lacks an effect; a law of it has another shape than the machine's force; it lacks an effect
+    that the nearest one of the catalogue resembles, with another shape of its law.
+    """
 
     MISSING = "missing"
     WRONG_SHAPE = "wrong_shape"
+    RESEMBLES = "resembles"
 
 
 @dataclass(frozen=True)
@@ -34,7 +40,7 @@ class Finding:
     error_after: RMS test error in ``unit`` without it and with it; of a wrong shape with the law
     and with a free curve beside it, as one linear step predicts. parameters: of its law. proof:
     beside decoys; None where a shift in time makes none. shape: the curve that is assumed and the
-    one found, of a wrong shape.
+    one found, where they differ.
     """
 
     effect: str
@@ -96,6 +102,16 @@ def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> F
         proof=shape.proof,
         kind=FindingKind.WRONG_SHAPE,
         shape=found_shape(shape.shape, final, dataset),
+    )
+
+
+def with_shape(findings: Sequence[Finding], wrong: Finding) -> tuple[Finding, ...]:
+    """The findings with a wrong shape: that of an effect among them says what it resembles."""
+    if wrong.effect not in [f.effect for f in findings]:
+        return (*findings, wrong)
+    return tuple(
+        replace(f, kind=FindingKind.RESEMBLES, shape=wrong.shape) if f.effect == wrong.effect else f
+        for f in findings
     )
 
 

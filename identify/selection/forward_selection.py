@@ -197,8 +197,7 @@ def _decided(
         if graded is not None:
             steps, final, enough = *graded, True
     if enough:
-        first = next(s for s in kept(steps) if s.proved)
-        verdict = Verdict.AMBIGUOUS if first.tied else Verdict.MISSING_EFFECT
+        verdict = Verdict.MISSING_EFFECTS
         done = final.at_floor or held_at_floor(final, dataset)
         dependence = None if done else find_dependence(final, dataset)
     elif len(states) == 1 and base.at_floor:

@@ -87,8 +87,8 @@ class TrialResult:
 
     @property
     def named(self) -> bool:
-        """Whether each planted effect is in an answer of its own, as missing."""
-        missing = [a.names for a in self.answers if a.kind is FindingKind.MISSING]
+        """Whether each planted effect is in an answer of its own, as missing or much like it."""
+        missing = [a.names for a in self.answers if a.kind is not FindingKind.WRONG_SHAPE]
         return any(
             all(name in answer for name, answer in zip(self.case.effects, order, strict=True))
             for order in permutations(missing, len(self.case.effects))
@@ -136,14 +136,22 @@ def run(case: Case) -> TrialResult:
 
 
 def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
-    """A finding as an answer; of a wrong shape, right where the machine's law has another."""
+    """A finding as an answer.
+
+    Right is a wrong shape where the machine's law has another; and that a missing effect only
+    resembles one of the catalogue where what is planted is none of it.
+    """
     names = (finding.effect, *finding.tied)
-    missing = finding.kind is FindingKind.MISSING
-    true = {*case.effects, *built.right} if missing else built.reshaped
+    match finding.kind:
+        case FindingKind.MISSING:
+            right = not {*case.effects, *built.right}.isdisjoint(names)
+        case FindingKind.WRONG_SHAPE:
+            right = not {*built.reshaped}.isdisjoint(names)
+        case FindingKind.RESEMBLES:
+            right = any(e in OUTSIDE for e in case.effects)
     return Answer(
-        names, finding.kind, any(n in true for n in names), finding.margin,
-        finding.proof is not None, finding.confidence,
-    )  # fmt: skip
+        names, finding.kind, right, finding.margin, finding.proof is not None, finding.confidence
+    )
 
 
 def _tested(found: AxisDiagnosis, test: Dataset, built: Machine) -> float:

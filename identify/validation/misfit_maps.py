@@ -13,7 +13,7 @@ from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import PreparedLog, at_rest, moving, sticks
 from identify.estimation.evidence import effective_samples
-from identify.estimation.fit import rms
+from identify.estimation.fit import Fit, rms
 from identify.estimation.force_balance import residual
 from identify.selection.residual_dependence import UNITS, gathered, unit_of
 from identify.validation.error_spectrum import bands
@@ -125,11 +125,7 @@ def compare_axis(
     floor = floor_of(axis, dataset.fit)
     where = {k: v[kept] for k, v in _coordinates(axis, dataset.fit).items()}
     force = every[kept]
-    motion = dataset.fit[0].motion
-    maps = [
-        misfit_map(name, force, values, floor, unit_of(name, motion, KNOWN_UNITS), axis.units.force)
-        for name, values in where.items()
-    ]
+    maps = _maps(axis, dataset, force, where)
     maps.append(misfit_by_frequency(axis, dataset.fit))
     return AxisComparison(
         axis=dataset.axis,
@@ -144,6 +140,24 @@ def compare_axis(
         worst=worst_regions(maps, effective_samples(force)),
         tests=residual_tests(dataset.fit, every, kept, floor, loop_of(dataset.fit)),
     )
+
+
+def worst_region(fit: Fit, dataset: Dataset) -> Region | None:
+    """Where the force error of a fit stands most above its noise floor; None where nowhere."""
+    where = {k: v[fit.kept] for k, v in _coordinates(fit.axis, dataset.fit).items()}
+    maps = _maps(fit.axis, dataset, fit.residual, where)
+    return next(iter(worst_regions(maps, effective_samples(fit.residual))), None)
+
+
+def _maps(
+    axis: AxisModel, dataset: Dataset, force: Array, where: Mapping[str, Array]
+) -> list[MisfitMap]:
+    """The misfit of a force (n,) N along each coordinate (n,)."""
+    motion, floor = dataset.fit[0].motion, floor_of(axis, dataset.fit)
+    return [
+        misfit_map(name, force, values, floor, unit_of(name, motion, KNOWN_UNITS), axis.units.force)
+        for name, values in where.items()
+    ]
 
 
 def _coordinates(axis: AxisModel, logs: Sequence[PreparedLog]) -> dict[str, Array]:

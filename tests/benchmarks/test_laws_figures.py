@@ -21,7 +21,7 @@ def named(effect: str) -> tuple[Answer, ...]:
 
 
 EVERY = [
-    TrialResult(Case(("a",), 5.0, 1), "MISSING_EFFECT", named("a")),
+    TrialResult(Case(("a",), 5.0, 1), "MISSING_EFFECTS", named("a")),
     TrialResult(Case(("a",), 5.0, 2), "UNEXPLAINED"),
     TrialResult(Case((), 0.0, 1), "NOTHING_MISSING"),
 ]
@@ -46,7 +46,7 @@ def test_the_share_of_an_answer_stands_in_its_row_and_column(tmp_path, monkeypat
 
     drawn = []
     monkeypatch.setattr(Drawing, "savefig", lambda self, out, format: drawn.append((self, format)))
-    other = TrialResult(Case(("b",), 5.0, 3), "MISSING_EFFECT", named("c"))
+    other = TrialResult(Case(("b",), 5.0, 3), "MISSING_EFFECTS", named("c"))
     draw([*EVERY, *EVERY[:2], other, EVERY[0]], tmp_path / "m.pdf")
     ((figure, kind),) = drawn
     (axes,) = figure.axes

@@ -30,7 +30,7 @@ LEAST_FORCE, AT_FLOOR, MOST_TOLD = 0.1, 1.3, 3
 
 
 def axis_with(verdict: Verdict, bic: float = 1.0, ratio: float = 2.0):
-    steps = made.diagnosis_of().steps[:1] if verdict.name in ("MISSING_EFFECT", "AMBIGUOUS") else ()
+    steps = made.diagnosis_of().steps[:1] if verdict is Verdict.MISSING_EFFECTS else ()
     ranking = (built("wear", bic=bic),)
     return made.diagnosis_of(verdict, steps=steps, ranking=ranking, base=built_fit(ratio, 1.0))
 
@@ -44,8 +44,8 @@ def test_the_answer_is_about_the_axis_with_the_strongest_verdict():
     order = [
         Verdict.NOTHING_MISSING,
         Verdict.UNEXPLAINED,
-        Verdict.AMBIGUOUS,
-        Verdict.MISSING_EFFECT,
+        Verdict.WRONG_SHAPE,
+        Verdict.MISSING_EFFECTS,
     ]
     for i, weak in enumerate(order):
         for strong in order[i + 1 :]:
@@ -56,7 +56,7 @@ def test_the_answer_is_about_the_axis_with_the_strongest_verdict():
 
 @pytest.mark.parametrize("verdict", list(Verdict))
 def test_of_like_verdicts_evidence_or_else_the_error_decides(verdict):
-    named = verdict in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS)
+    named = verdict is Verdict.MISSING_EFFECTS
     a = axis_with(verdict, bic=90.0, ratio=2.0)
     b = axis_with(verdict, bic=80.0, ratio=3.0)
     assert leading(a=a, b=b) == ("a" if named else "b")
@@ -185,7 +185,10 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
 
     def diagnose_axis(fit, dataset, catalogue, progress):
         progress(1, 2)
-        told = SimpleNamespace(axis=dataset.axis, fit=fit, catalogue=catalogue)
+        told = SimpleNamespace(
+            axis=dataset.axis, fit=fit, catalogue=catalogue, dataset=dataset,
+            told=f"fit of {dataset.axis}", unexplained=dataset.axis == "y",
+        )  # fmt: skip
         return SimpleNamespace(with_findings=lambda: told)
 
     bars = []
@@ -196,6 +199,7 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
         workflow, "next_experiment", lambda d, model, length: plans[d.axis] and (d, model, length)
     )
     monkeypatch.setattr(workflow, "_compared", lambda *given: given)
+    monkeypatch.setattr(workflow, "worst_region", lambda *given: given)
     progress = lambda *done: bars.append(done)  # noqa: E731
     found = workflow.diagnose(
         described, "logs", "held", catalogue="known", test_function=0.07, progress=progress
@@ -209,6 +213,7 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
     assert found.next_experiments == {"y": (found.axes["y"], result.model, 0.07)}
     assert found.comparison == (result.model, result.datasets, progress)
     assert found.refits is result.refits
+    assert found.left_over == {"y": ("fit of y", result.datasets["y"])}
 
 
 def test_an_axis_whose_experiment_cannot_run_says_why(monkeypatch):
@@ -313,7 +318,7 @@ def test_what_a_diagnosis_names_is_added_as_it_was_fitted(monkeypatch):
     def added(found):
         return workflow.add_named(workflow.Diagnosis(made.MODEL, {"x": found}, made.compared()))
 
-    paired = axis_with(Verdict.MISSING_EFFECT)
+    paired = axis_with(Verdict.MISSING_EFFECTS)
     assert paired.best is not None
     alone = replace(paired, ranking=(paired.best,))
     assert added(alone) == (alone.best, alone.base)

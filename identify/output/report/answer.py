@@ -18,9 +18,10 @@ from identify.output.words.selection import (
     remainder_in_words,
     verdict_in_words,
 )
+from identify.output.words.validation import region_in_words
 from identify.selection.candidates import Candidate
-from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from identify.selection.findings import FindingKind
 from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
 from twin.model.units import AxisUnits
@@ -37,19 +38,22 @@ def section(subject: Subject) -> Section:
         if found is None:
             cards.append(_compared(axis))
         else:
-            cards.append(_diagnosed(axis, found, following, subject.refit(axis.axis)))
+            cards.append(_diagnosed(axis, found, following, subject))
     return Section("answer", "Answer", cards)
 
 
 def _diagnosed(
-    axis: AxisComparison, found: AxisDiagnosis, following: Plan | None, refit: Refit | None
+    axis: AxisComparison, found: AxisDiagnosis, following: Plan | None, subject: Subject
 ) -> Answer:
     remarks: list[str] = []
-    sentence = axis.units.words(verdict_in_words(found.verdict))
+    refit = subject.refit(axis.axis)
+    sentence = axis.units.words(verdict_in_words(found))
     if remains := remainder_in_words(found, SCALED):
         sentence = f"{sentence} {capitalised(remains)}"
     if found.unexplained is not None:
         sentence = f"{sentence} {dependence_in_words(found.unexplained, SCALED)}"
+    if region := subject.left_over(axis.axis):
+        sentence = f"{sentence} It is largest at {region_in_words(region, SCALED)}."
     remarks.extend(
         axis.units.words(f"{capitalised(spaced(finding_in_words(f, SCALED)))}")
         for f in found.findings
@@ -73,10 +77,12 @@ def _diagnosed(
 
 
 def _headline(found: AxisDiagnosis) -> str:
-    first, *more = [spaced(name) for name in found.named] or [""]
+    alike = {f.effect for f in found.findings if f.kind is FindingKind.RESEMBLES}
+    like = {name: "something like " if name in alike else "" for name in found.named}
+    first, *more = [f"{like[name]}{spaced(name)}" for name in found.named] or [""]
     either = " or ".join([first, *map(spaced, found.ambiguous_with)])
     match found.verdict:
-        case Verdict.MISSING_EFFECT | Verdict.AMBIGUOUS:
+        case Verdict.MISSING_EFFECTS:
             return f"{' and '.join([either, *more])} {'are' if more else 'is'} missing"
         case Verdict.WRONG_SHAPE:
             return f"{spaced(found.findings[0].effect)} has another shape"

@@ -16,7 +16,7 @@ from identify.output.results import Addition, Comparison, Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.validation.misfit_maps import AxisComparison
+from identify.validation.misfit_maps import AxisComparison, Region
 from twin.model.machine import AxisModel, HistoryStep
 from twin.model.units import LINEAR
 
@@ -51,6 +51,10 @@ class Subject:
     def next_experiment(self, axis: str) -> Plan | None:
         """The experiment that decides what the diagnosis of one axis could not."""
         return self.diagnosis.next_experiments.get(axis) if self.diagnosis else None
+
+    def left_over(self, axis: str) -> Region | None:
+        """Where what the diagnosis leaves of one axis is largest."""
+        return self.diagnosis.left_over.get(axis) if self.diagnosis else None
 
     def refit(self, axis: str) -> Refit | None:
         """What fitting changed of the given model on one axis."""

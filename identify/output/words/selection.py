@@ -20,13 +20,10 @@ from twin.model.machine import Fitted, HistoryStep
 from twin.model.units import units_of
 
 VERDICTS = {
-    Verdict.MISSING_EFFECT: (
+    Verdict.MISSING_EFFECTS: (
         "The model lacks an effect: the fit logs and the held-out logs prove it."
     ),
     Verdict.NOTHING_MISSING: "Nothing is missing: the force error is at its noise floor.",
-    Verdict.AMBIGUOUS: (
-        "Several effects explain the error equally well; these data cannot separate them."
-    ),
     Verdict.WRONG_SHAPE: (
         "The model has the effect, but its law has another shape than the force of the machine."
     ),
@@ -34,11 +31,13 @@ VERDICTS = {
         "The error is above the noise floor, and no effect of the catalogue explains it."
     ),
 }
+SEVERAL = "Several effects explain the error equally well; these data cannot separate them."
 
 
-def verdict_in_words(verdict: Verdict) -> str:
+def verdict_in_words(found: AxisDiagnosis) -> str:
     """The answer of a diagnosis."""
-    return VERDICTS[verdict]
+    several = found.ambiguous_with or any(f.tied for f in found.findings)
+    return SEVERAL if several else VERDICTS[found.verdict]
 
 
 def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
@@ -47,6 +46,8 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     error = units_of(unit).words("test error")
     before, after = (numbers.amount(e, unit) for e in (finding.error_before, finding.error_after))
     what, without, with_it = f"{finding.effect} explains", "without it", "with it"
+    if finding.kind is FindingKind.RESEMBLES:
+        what = f"what is missing resembles {finding.effect}, in another shape; that law explains"
     if finding.kind is FindingKind.WRONG_SHAPE:
         what = f"{finding.effect} has another shape: a free curve beside its law explains"
         without, with_it = "with the law", "with the curve"
@@ -85,7 +86,7 @@ def remainder_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str | 
     """How large the error is that remains beside what was named, or None where it is noise."""
     if not found.findings or found.unexplained is None:
         return None
-    fit = found.final if found.named else found.base
+    fit = found.told
     error = numbers.amount(fit.error, fit.axis.units.force)
     beside = " beside the named effects" if found.named else ""
     return f"what remains{beside} is {error}, {fit.ratio:.1f} times the noise floor"
@@ -161,9 +162,11 @@ def nonparametric_in_words(fitted: Fitted) -> str:
 
 def advice(findings: Sequence[Finding] = ()) -> str:
     """What lowers the error where no physical effect explains it, or a law has the wrong shape."""
-    for finding in findings:
-        if finding.shape is not None:
-            return f"twin add --shape {finding.effect} gives the model the shape that the logs show"
+    for f in findings:
+        if f.shape is not None:
+            first = f"twin add {f.effect}, then " if f.kind is FindingKind.RESEMBLES else ""
+            shaped = f"{first}twin add --shape {f.effect}"
+            return f"{shaped} gives the model the shape that the logs show"
     every = load_catalogue().values()
     known = [e.name for e in every if e.is_nonparametric and not e.free_shape]
     return f"twin add {' or '.join(known)} lowers the error by fitted curves, without explaining it"

@@ -41,9 +41,13 @@ def trial_in_words(result: TrialResult) -> str:
             f"{case}: cannot reach {case.strength:g} times the noise floor within its bounds on "
             "this stage's motion"
         )
-    shape = {FindingKind.MISSING: "", FindingKind.WRONG_SHAPE: " of another shape"}
+    kinds = {
+        FindingKind.MISSING: "{}",
+        FindingKind.WRONG_SHAPE: "{} of another shape",
+        FindingKind.RESEMBLES: "something like {}",
+    }
     answers = [
-        f"{' or '.join(a.names)}{shape[a.kind]} ({100 * a.confidence:.0f} %)"
+        f"{kinds[a.kind].format(' or '.join(a.names))} ({100 * a.confidence:.0f} %)"
         for a in result.answers
     ]
     return f"{case}: {' and '.join(answers) or result.verdict.lower().replace('_', ' ')}"

@@ -122,7 +122,7 @@ FEW = Catalogue(
 def test_it_is_named_where_it_makes_the_error_noise(coarse):
     found = diagnose_axis(fit_axis(STAGE.axes["x"], coarse.fit), coarse, FEW)
     assert found.named == ("encoder_quantization",)
-    assert found.verdict is Verdict.MISSING_EFFECT
+    assert found.verdict is Verdict.MISSING_EFFECTS
     assert found.best.is_noise
     step = found.final.axis["encoder_quantization"].values["step"]
     assert step == pytest.approx(STEP, rel=1e-3)

@@ -70,7 +70,7 @@ def test_a_pump_is_named_whatever_its_phase_in_each_log(dataset):
     found = diagnose_axis(
         fit_axis(STAGE.axes["x"], dataset.fit), with_time_origins(STAGE.axes["x"], dataset), FEW
     )
-    assert found.verdict is Verdict.MISSING_EFFECT
+    assert found.verdict is Verdict.MISSING_EFFECTS
     assert found.named == ("periodic_disturbance",)
     values = found.final.axis["periodic_disturbance"].values
     assert values["f"] == pytest.approx(23.7, rel=1e-4)

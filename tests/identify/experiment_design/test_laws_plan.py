@@ -123,7 +123,7 @@ def test_an_ambiguous_diagnosis_asks_for_an_experiment_between_its_rivals(monkey
     assert plans.next_experiment(x, STAGE, 0.07) == "the plan"
     effects = {n: CATALOGUE[n] for n in ("cogging", "quadratic_drag")}
     assert asked == [(tuple(effects), x.dataset.fit, 0.07, (10.0, 3, False, effects))]
-    assert plans.next_experiment(replace(x, verdict=Verdict.MISSING_EFFECT), STAGE) is None
+    assert plans.next_experiment(replace(x, verdict=Verdict.UNEXPLAINED), STAGE) is None
     assert plans.next_experiment(replace(x, ranking=(made.BEST, made.WEAK)), STAGE) is None
     tied = replace(x.steps[0], tied=("quadratic_drag", "constant_force", "wear"))
     many = replace(x, steps=(tied,), ranking=(*x.ranking, built("wear")))

@@ -248,7 +248,7 @@ def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
     else:
         pytest.fail("the poor motion tells the two apart")
     found = before.next_experiments.get("x")
-    if before.axes["x"].verdict is not Verdict.AMBIGUOUS:
+    if before.axes["x"].verdict is not Verdict.MISSING_EFFECTS:
         assert found is None
         rivals = [CATALOGUE[e] for e in case.pair]
         found = plan(
@@ -264,7 +264,7 @@ def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
     new = {"new": simulate(machine, found.chosen.experiment, seed=3, simulator=ReducedSimulator)}
     logs = {**poor, **new}
     after = diagnose(case.stage, logs, held, catalogue=catalogue, test_function=WINDOW).axes["x"]
-    assert after.verdict is Verdict.MISSING_EFFECT
+    assert after.verdict is Verdict.MISSING_EFFECTS
     assert after.ranking[0].effect.name == truth
     assert separation(after.ranking) > RULE.least_separation
 
@@ -299,7 +299,7 @@ def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     ]
     catalogue = Catalogue([CATALOGUE[e] for e in case.pair])
     found = diagnose(case.stage, *logs, catalogue=catalogue, test_function=WINDOW)
-    assert found.axes["x"].verdict is Verdict.AMBIGUOUS
+    assert found.axes["x"].verdict is Verdict.MISSING_EFFECTS
     following = diagnose_json(found)["next_experiment"]
     assert following["decides"]
     assert following["experiment"]["kind"] in KINDS

@@ -23,7 +23,7 @@ from identify.output.machine_json import check_json, effect_json
 from identify.output.plain import plain
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
 from identify.output.words.experiment_design import gap_in_words
-from identify.output.words.selection import advice, verdict_in_words
+from identify.output.words.selection import SEVERAL, advice
 from identify.output.words.validation import loop_in_words, region_in_words
 from identify.selection.diagnosis import Verdict
 from twin.log.check import CheckReport, Fault, Finding, Severity
@@ -155,15 +155,16 @@ def expected_candidate(c):
 
 
 def test_a_diagnosis():
-    x = made.diagnosis_of(Verdict.AMBIGUOUS, unexplained=made.STRUCTURE, findings=made.FOUND)
+    x = made.diagnosis_of(Verdict.MISSING_EFFECTS, unexplained=made.STRUCTURE, findings=made.FOUND)
     x.__dict__["repeat"] = made.REPEAT
     result = made.diagnosed(x)
-    found = strict(diagnose_json(result))
+    found = strict(diagnose_json(result, ["run 1: a gap", "held 1: late"]))
     axes = found.pop("axes")
     assert list(axes) == ["y", "x"]
+    assert found.pop("data_faults") == ["run 1: a gap", "held 1: late"]
     assert found == axes["x"]
     assert found == {
-        "verdict": "ambiguous", "explanation": verdict_in_words(Verdict.AMBIGUOUS), "axis": "x",
+        "verdict": "missing_effects", "explanation": SEVERAL, "axis": "x",
         "effect": "cogging", "ranking": [expected_candidate(c) for c in x.ranking],
         "ambiguous_with": ["quadratic_drag"], "missing": ["cogging", "lugre"],
         "steps": [
@@ -196,6 +197,10 @@ def test_a_diagnosis():
             "error": pytest.approx(3.19), "over_noise_floor": pytest.approx(3.19 / 2.03),
             "unit": "N", "depends_on": "other_axis_position", "share_of_error": 0.631,
             "period": 0.0273, "period_unit": "m", "advice": advice(),
+            "where": {
+                "coordinate": "speed", "low": 0.0137, "high": 0.0291, "coordinate_unit": "m/s",
+                "error": 4.71, "unit": "N", "over_noise_floor": 2.32, "share_of_error": 0.417,
+            },
         },
         "force_error": pytest.approx(8.37), "noise_floor": 2.11, "unit": "N",
         "force_shift": 0.000217, "force_shift_unit": "s",

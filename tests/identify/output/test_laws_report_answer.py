@@ -27,9 +27,10 @@ from identify.output.report.subject import Subject
 from identify.output.report.units import SCALED, Scale, number, quantity, spaced, title_case
 from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.numbers import capitalised
-from identify.output.words.selection import advice, refit_in_words, verdict_in_words
+from identify.output.words.selection import SEVERAL, VERDICTS, advice, refit_in_words
 from identify.output.words.validation import region_in_words
 from identify.selection.diagnosis import Verdict
+from identify.selection.findings import FindingKind
 
 
 @pytest.fixture(autouse=True)
@@ -70,7 +71,7 @@ def cards(diagnosis=None, **changes):
 def test_the_answer_for_an_ambiguity():
     first, second = cards(made.diagnosed())
     assert first.headline == "Axis x: cogging or quadratic drag and lugre are missing"
-    assert (first.sentence, first.tone) == (verdict_in_words(Verdict.AMBIGUOUS), Tone.STRONG)
+    assert (first.sentence, first.tone) == (SEVERAL, Tone.STRONG)
     tiles = [(t.name, t.value, t.remark) for t in first.tiles]
     ratio = f"{number(8.37 / 2.11)} → {number(1.19 / 1.03)}"
     assert tiles == [
@@ -103,20 +104,31 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     left = made.diagnosis_of(unexplained=made.STRUCTURE, findings=made.FOUND)
     card, _ = cards(made.diagnosed(left))
     assert card.sentence.startswith(
-        f"{verdict_in_words(Verdict.AMBIGUOUS)} What remains beside the named effects is 3.19 N, "
+        f"{SEVERAL} What remains beside the named effects is 3.19 N, "
         "1.6 times the noise floor. The error depends most on other axis position"
     )
+    where = region_in_words(made.LEFT_OVER, SCALED)
+    assert card.sentence.endswith(f"It is largest at {where}.")
     assert [r.split(" explains ")[0] for r in card.remarks[:2]] == ["Cogging", "Lugre"]
     assert "without it the test error is 7.17 N, with it 2.19 N; in one" in card.remarks[0]
     assert not any("is at its noise floor" in r for r in card.remarks)
 
 
+def test_an_effect_that_a_missing_one_resembles():
+    like = replace(made.FOUND[0], kind=FindingKind.RESEMBLES)
+    card, _ = cards(made.diagnosed(made.diagnosis_of(findings=(like, made.FOUND[1]))))
+    assert card.headline == (
+        "Axis x: something like cogging or quadratic drag and lugre are missing"
+    )
+    assert card.remarks[0].startswith("What is missing resembles cogging, in another shape; that ")
+
+
 def test_the_answer_for_what_nothing_explains():
     lost = made.diagnosis_of(Verdict.UNEXPLAINED, unexplained=made.STRUCTURE)
-    card, _ = cards(made.diagnosed(lost))
+    card, _ = cards(replace(made.diagnosed(lost), left_over={}))
     assert card.headline == "Axis x: something outside the catalogue is missing"
     assert card.sentence == (
-        f"{verdict_in_words(Verdict.UNEXPLAINED)} The error depends most on other axis position, "
+        f"{VERDICTS[Verdict.UNEXPLAINED]} The error depends most on other axis position, "
         "which accounts for 63 % of the squared error, with a period of 27.3 mm."
     )
     assert f"{advice()}." in card.remarks
@@ -129,7 +141,7 @@ def test_the_answer_for_one_effect_that_leaves_more():
     best = replace(made.BEST, fit=built_fit(3.1, 1.0, made.BEST.fit.axis))
     steps = (replace(made.diagnosis_of().steps[0], candidate=best, tied=()),)
     one = made.diagnosis_of(
-        Verdict.MISSING_EFFECT, steps=steps, dataset=replace(made.DATASET, holdout=())
+        Verdict.MISSING_EFFECTS, steps=steps, dataset=replace(made.DATASET, holdout=())
     )
     found = made.diagnosed(one)
     card, _ = cards(replace(found, next_experiments={"x": made.plan_of("a", "b", ranking=(

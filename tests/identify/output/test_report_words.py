@@ -60,7 +60,7 @@ def test_an_addition_is_the_answer_where_nothing_was_diagnosed(case: Case) -> No
 def ambiguous(case: Case) -> AxisDiagnosis:
     """The diagnosis of the case, had drag explained as much."""
     first = replace(case.x.steps[0], tied=("quadratic_drag",))
-    return replace(case.x, verdict=Verdict.AMBIGUOUS, steps=(first,))
+    return replace(case.x, verdict=Verdict.MISSING_EFFECTS, steps=(first,))
 
 
 def test_every_verdict_has_its_words(case: Case) -> None:
@@ -76,7 +76,7 @@ def test_every_verdict_has_its_words(case: Case) -> None:
     for headline, found in expected.items():
         (card,) = answers(case.subject(case.concluding(found)))
         assert card.headline == headline
-        assert card.sentence.startswith(verdict_in_words(found.verdict))
+        assert card.sentence.startswith(verdict_in_words(found))
         assert ("27.0 mm" in card.sentence) == (found is lost)
         assert ("63 %" in card.sentence) == (found is lost)
 

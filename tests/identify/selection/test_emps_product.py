@@ -67,7 +67,7 @@ def test_the_four_parameter_fit_is_near_the_published_one(found):
 
 
 def test_direction_dependent_friction_is_named_first(found):
-    assert found.leading.verdict is Verdict.MISSING_EFFECT
+    assert found.leading.verdict is Verdict.MISSING_EFFECTS
     assert found.effect is not None
     assert found.effect.name == "asymmetric_friction"
 

@@ -48,10 +48,10 @@ def assert_named(effect, force, catalogue, duration, stage):
     hidden = machine(stage, CATALOGUE, effect, force, seed, duration)
     found = diagnose(stage, hidden.logs, hidden.holdout, catalogue=catalogue)
     # A weak delay and a weak lag look alike in this motion; then both are named.
-    assert found.leading.verdict in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS)
+    assert found.leading.verdict is Verdict.MISSING_EFFECTS
     assert found.effect is not None
     assert effect in (found.effect.name, *found.leading.ambiguous_with)
-    if found.leading.verdict is Verdict.MISSING_EFFECT:
+    if found.leading.verdict is Verdict.MISSING_EFFECTS:
         assert found.effect.name == effect
     added = add(found.effect, found.model, hidden.logs, hidden.holdout)
     assert added.kept

@@ -48,13 +48,12 @@ def test_what_a_later_step_made_needless_is_not_an_answer():
         step("lugre", dropped=("cogging",)),
     )
     assert [s.candidate.effect.name for s in kept(steps)] == ["quadratic_drag", "lugre"]
-    for verdict in (Verdict.MISSING_EFFECT, Verdict.AMBIGUOUS):
-        found = diagnosis(verdict, *steps)
-        expected = (("quadratic_drag", "payload_mass", "constant_force"), ("lugre",))
-        assert found.answers == expected
-        assert found.named == ("quadratic_drag", "lugre")
-        assert found.best is steps[1].candidate
-        assert found.ambiguous_with == ("payload_mass", "constant_force")
+    found = diagnosis(Verdict.MISSING_EFFECTS, *steps)
+    expected = (("quadratic_drag", "payload_mass", "constant_force"), ("lugre",))
+    assert found.answers == expected
+    assert found.named == ("quadratic_drag", "lugre")
+    assert found.best is steps[1].candidate
+    assert found.ambiguous_with == ("payload_mass", "constant_force")
 
 
 @pytest.mark.parametrize("verdict", [Verdict.UNEXPLAINED, Verdict.NOTHING_MISSING])
@@ -178,7 +177,7 @@ STAGES = [stage(HIGH), stage(built_fit(5.0), FIRST), stage(built_fit(4.0), FIRST
 
 def test_stages_that_do_not_convince_are_taken_back_one_by_one(monkeypatch):
     found, sought = decided(monkeypatch, STAGES, lambda a, b: b == 1)
-    assert found.verdict is Verdict.MISSING_EFFECT
+    assert found.verdict is Verdict.MISSING_EFFECTS
     assert (found.base, found.final, found.steps) == (HIGH, STAGES[1].fit, (FIRST,))
     assert found.unexplained is STRUCTURE
     assert sought == [STAGES[1].fit]
@@ -191,14 +190,13 @@ def test_the_whole_must_convince_against_the_base(monkeypatch):
     assert sought == [HIGH]
 
 
-@pytest.mark.parametrize(
-    ("first", "verdict"), [(FIRST, Verdict.MISSING_EFFECT), (SECOND, Verdict.AMBIGUOUS)]
-)
-def test_a_tie_of_the_first_effect_that_stays_is_an_ambiguity(monkeypatch, first, verdict):
+@pytest.mark.parametrize("first", [FIRST, SECOND])
+def test_a_tie_of_the_first_effect_that_stays_is_told(monkeypatch, first):
     second = FIRST if first is SECOND else SECOND
     stages = [stage(HIGH), stage(LOW, first), stage(LOW, first, second)]
     found, sought = decided(monkeypatch, stages, lambda a, b: True)
-    assert found.verdict is verdict
+    assert found.verdict is Verdict.MISSING_EFFECTS
+    assert found.ambiguous_with == first.tied
     assert (found.unexplained, sought) == (None, [])
 
 
@@ -211,7 +209,7 @@ def test_what_is_proved_is_named_although_other_error_remains(monkeypatch):
     steps = (replace(FIRST, proved=False), SECOND)
     fit = built_fit(4.4)
     found, sought = decided(monkeypatch, STAGES, lambda a, b: False, graded=(steps, fit))
-    assert (found.verdict, found.named) == (Verdict.AMBIGUOUS, ("wear",))
+    assert (found.verdict, found.named) == (Verdict.MISSING_EFFECTS, ("wear",))
     assert found.best is SECOND.candidate
     assert (found.final, found.unexplained, sought) == (fit, STRUCTURE, [fit])
 

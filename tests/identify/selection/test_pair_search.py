@@ -46,7 +46,7 @@ def test_both_are_named_on_most_machines():
 @pytest.mark.slow
 def test_both_are_named(case):
     found = diagnose_axis(*case, FEW)
-    assert found.verdict is Verdict.MISSING_EFFECT
+    assert found.verdict is Verdict.MISSING_EFFECTS
     assert set(found.named) == set(PLANTED)
     assert {s.beside for s in found.steps} == set(PLANTED)
     assert found.final.ratio < 1.2 < 3.0 < found.base.ratio
