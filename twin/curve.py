@@ -62,9 +62,10 @@ class FreeShape:
 
     Its first part is the same in both directions of motion, its second turns with the direction.
     laid: (curve, its period in m or None, the motion covered, whether it lets go at standstill) ->
-    values by parameter name. knots: values -> the coordinate (k,) of each knot to draw, in m or
-    m/s, and which strength (k,) of a part it is.
+    values by parameter name. over: names of those that say which coordinate it is. knots: values ->
+    the coordinate (k,) of each knot to draw, in m or m/s, and which strength (k,) of a part it is.
     """
 
     laid: Callable[[Curve, float | None, Excitation, bool], dict[str, float]]
+    over: tuple[str, ...]
     knots: Callable[[Mapping[str, float]], tuple[list[float], list[int]]]

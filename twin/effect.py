@@ -169,7 +169,8 @@ class Effect:
     law, and stays where other nonparametric effects are set aside. curves: those which the law
     assumes, where a diagnosis may ask whether a free curve does better. several: whether an axis
     may have the effect more than once, as cogging of poles and of slots; number: which of these it
-    is.
+    is. is_itself: (values by name, the motion covered) -> whether the law with these values is the
+    effect, and not some other force that it imitates.
     """
 
     kind: Kind
@@ -191,6 +192,7 @@ class Effect:
     curves: tuple[Curve, ...] = ()
     several: bool = False
     number: int = 1
+    is_itself: Callable[[Mapping[str, float], Excitation], bool] | None = None
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 
@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 TRIED = 8.0  # s of motion on which nonlinear parameters are scanned before all of it is used
 SHORTEST_HEAD = 2.0  # s of each log
+MARGIN = 0.05  # of the range of the fit logs, by which a held-out log may exceed it
+LEAST_SHARED = 0.2  # part of the held-out logs that must lie within it
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,6 +48,12 @@ class Dataset:
     channel_delay: float = 0.0
     still: tuple[str, ...] = ()
     begun: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def beyond(self) -> dict[str, float]:
+        """Part of each held-out log, 0..1 by name, that lies where no fit log has been."""
+        parts = {log.motion.name: 1.0 - float(np.mean(log.reached)) for log in self.holdout}
+        return {name: part for name, part in parts.items() if part > 0.0}
 
     def __repr__(self) -> str:
         return (
@@ -129,7 +137,7 @@ def datasets(
         out[name] = Dataset(
             axis=name,
             fit=tuple(PreparedLog.of(m, length) for m in fit),
-            holdout=tuple(PreparedLog.of(m, length) for m in held),
+            holdout=_held_out(held, length, fit),
             covered=cache(partial(excitation, fit, axis.hardware.travel)),
             still=(*still, *still_held),
             begun=begun,
@@ -141,6 +149,22 @@ def datasets(
             f"{', '.join(known)}; name the axes alike, or give a log in which one moves"
         )
     return out
+
+
+def _held_out(
+    held: Sequence[Motion], length: float, fit: Sequence[Motion]
+) -> tuple[PreparedLog, ...]:
+    """The held-out logs, which test a fit where its logs have been.
+
+    Beyond, a force of position is extrapolated, and says nothing of what is there. All of them
+    where they have little in common with the fit logs.
+    """
+    low, high = min(m.position.min() for m in fit), max(m.position.max() for m in fit)
+    margin = MARGIN * (high - low)
+    within = [PreparedLog.of(m, length, (low - margin, high + margin)) for m in held]
+    if sum(np.count_nonzero(w.reached) for w in within) < LEAST_SHARED * sum(map(len, within)):
+        return tuple(PreparedLog.of(m, length) for m in held)
+    return tuple(within)
 
 
 def by_log(found: Mapping[str, Dataset]) -> dict[str, dict[str, PreparedLog]]:

@@ -17,6 +17,8 @@ from twin.model.machine import AxisModel, axis_table
 
 Array = NDArray[np.float64]
 
+Reach = tuple[float, float]  # lowest and highest position, m
+EVERYWHERE: Reach = (-np.inf, np.inf)
 REST_SPEED = 1e-3  # of the highest speed; below it the force of a friction that sticks is unknown
 
 
@@ -26,7 +28,8 @@ class PreparedLog:
 
     test_function, fine: over the motion's blocks, and the same over the log's samples. command (n,)
     N and acceleration (n,) m/s^2 are means by test functions. force_noise: N RMS by test functions,
-    which sensors do not make and nothing predicts; part of the noise floor.
+    which sensors do not make and nothing predicts; part of the noise floor. reach: positions (m)
+    between which its test functions count; those of the fit logs, of a log that is held out.
     """
 
     motion: Motion
@@ -35,6 +38,7 @@ class PreparedLog:
     command: Array
     acceleration: Array
     force_noise: float = 0.0
+    reach: Reach = EVERYWHERE
 
     def __repr__(self) -> str:
         return (
@@ -43,13 +47,21 @@ class PreparedLog:
         )
 
     @classmethod
-    def of(cls, motion: Motion, length: float) -> PreparedLog:
+    def of(cls, motion: Motion, length: float, reach: Reach = EVERYWHERE) -> PreparedLog:
         """The log with test functions of that length (s)."""
         test_function = TestFunction.of_length(length, motion.period)
         samples = round(motion.period / motion.sample_period)
         fine, test_function = test_function.refined(samples), test_function.sharpened(samples)
         velocity, command = motion.raw
-        return cls(motion, test_function, fine, fine.mean(command), fine.acceleration(velocity))
+        acceleration = fine.acceleration(velocity)
+        return cls(motion, test_function, fine, fine.mean(command), acceleration, reach=reach)
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Which test functions (n,) lie within reach."""
+        low, high = self.reach
+        position = self.test_function.mean(self.motion.position)
+        return np.asarray((position >= low) & (position <= high))
 
     @property
     def time(self) -> Array:
@@ -103,9 +115,15 @@ def last_direction(velocity: Array) -> Array:
 
 
 def moving(logs: Sequence[PreparedLog], sticks: bool) -> NDArray[np.bool_]:
-    """Which test functions carry information: with static friction, those without standstill."""
+    """Which test functions carry information: those within reach.
+
+    With static friction, those without standstill.
+    """
     masks = []
     for log in logs:
-        still = at_rest(log.motion.velocity).astype(float)
-        masks.append(log.test_function.mean(still) < 0.02 if sticks else np.ones(len(log), bool))
+        mask = np.ones(len(log), bool) if log.reach == EVERYWHERE else log.reached
+        if sticks:
+            still = at_rest(log.motion.velocity).astype(float)
+            mask &= log.test_function.mean(still) < 0.02
+        masks.append(mask)
     return np.concatenate(masks)

@@ -119,5 +119,6 @@ def realigned(dataset: Dataset, shift: float) -> Dataset:
 
 def _moved(logs: Sequence[PreparedLog], shift: float) -> tuple[PreparedLog, ...]:
     return tuple(
-        PreparedLog.of(w.motion.with_force_ahead(shift), w.test_function.length) for w in logs
+        PreparedLog.of(w.motion.with_force_ahead(shift), w.test_function.length, w.reach)
+        for w in logs
     )

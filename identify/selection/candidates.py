@@ -230,11 +230,11 @@ def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
         fit=fit,
         evidence=proof,
         gain=held_out_gain(pair[0], pair[1], base.floor),
-        plausible=proof.delta_bic < RULE.least_bic or _is_plausible(fit, effect),
+        plausible=proof.delta_bic < RULE.least_bic or _is_plausible(fit, effect, dataset),
     )
 
 
-def _is_plausible(fit: Fit, effect: Effect) -> bool:
+def _is_plausible(fit: Fit, effect: Effect, dataset: Dataset) -> bool:
     """Whether the values that an effect was fitted with are its own; see Candidate."""
     found = [f for f in fit.axis.effects if f.effect.name == effect.name]
     scales = [
@@ -244,6 +244,9 @@ def _is_plausible(fit: Fit, effect: Effect) -> bool:
         if 0.0 < p.lower < p.upper and p.name not in f.fixed
     ]
     if any(v <= p.lower * (1.0 + EDGE) or v >= p.upper * (1.0 - EDGE) for v, p in scales):
+        return False
+    itself = effect.is_itself
+    if itself and not all(itself(f.values, dataset.excitation) for f in found):
         return False
     periods = [f.values[p.name] for f in found for p in effect.parameters if p.period]
     if not periods:

@@ -59,7 +59,7 @@ class AxisDiagnosis:
     base: the fitted model. ranking: candidates beside it, by falling evidence. steps: the effects
     added one after another while there was evidence. final: the fit with those that were kept.
     unexplained: what the residual depends on, where it is not noise. findings: what each named
-    effect explains, by ``with_findings``. curve: that in the place of a law, beside which effects
+    effect explains, by ``with_findings``. curves: those in the place of laws, beside which effects
     were added.
     """
 
@@ -71,7 +71,7 @@ class AxisDiagnosis:
     verdict: Verdict
     unexplained: Dependence | None
     findings: tuple[Finding, ...] = ()
-    curve: Reshaped | None = None
+    curves: tuple[Reshaped, ...] = ()
 
     def __repr__(self) -> str:
         answer = f"{self.verdict.name.lower()} {list(self.answers)}"
@@ -97,7 +97,7 @@ class AxisDiagnosis:
     @property
     def told(self) -> Fit:
         """The fit with what is named, beside which a remainder is left."""
-        return self.final if self.named or self.curve else self.base
+        return self.final if self.named or self.curves else self.base
 
     @property
     def best(self) -> Candidate | None:
@@ -110,48 +110,46 @@ class AxisDiagnosis:
         return self._proved[0].tied if self.named else ()
 
     def with_findings(self) -> AxisDiagnosis:
-        """The same with what each named effect explains, and with a law of the wrong shape.
+        """The same with what each named effect explains, and with laws of the wrong shape.
 
         It takes a refit for each. A free curve of a law that is there competes with what is named:
         it is the answer where it leaves clearly less error by itself, and told as well where it
         leaves about as little. Where error remains beside what is named, it is asked about there.
         """
-        final = self.told
-        own = self.curve and self.curve.shape.effect
-        findings = tuple(
-            found(
-                s.candidate.effect, s.tied, self.base,
-                self.curve.before if self.curve and s.candidate.effect.name == own else final,
-                self.dataset,
-            )
-            for s in (self._proved if self.named else ())
-        )  # fmt: skip
-        if self.curve is not None:
-            shape, before = self.curve.shape, self.curve.before
-            other = found_wrong(shape, self.base, before, self.dataset)
-            return replace(self, findings=with_shape(findings, other))
-        instead = self._wrong_instead() if self.named else None
+        findings = tuple(map(self._found, self._proved if self.named else ()))
+        for curve in self.curves:
+            wrong = found_wrong(curve.shape, self.base, curve.before, self.dataset)
+            findings = with_shape(findings, wrong)
+        instead = self._wrong_instead() if self.named and not self.curves else None
         if instead and (RULE.near * left(instead) <= min(map(left, findings))):
             if left(instead) < RULE.beside_decoys * min(map(left, findings)):
                 return replace(self, findings=(instead,), verdict=Verdict.WRONG_SHAPE)
             rivals = tuple(replace(f, tied=(*f.tied, instead.effect)) for f in findings)
             return replace(self, findings=(*rivals, instead))
-        wrong = None if self.unexplained is None else self._wrong_beside(final)
-        if wrong is None:
-            return replace(self, findings=findings)
-        alone = self.verdict is Verdict.UNEXPLAINED
-        verdict = Verdict.WRONG_SHAPE if alone else self.verdict
-        return replace(self, findings=with_shape(findings, wrong), verdict=verdict)
+        shape = None if self.unexplained is None else wrong_shape(self.told, self.dataset)
+        if shape is not None:
+            wrong = found_wrong(shape, self.base, self.told, self.dataset)
+            findings = with_shape(findings, wrong)
+        alone = findings and self.verdict is Verdict.UNEXPLAINED
+        return replace(
+            self, findings=findings, verdict=Verdict.WRONG_SHAPE if alone else self.verdict
+        )
 
-    def beside(self, base: Fit, curve: Reshaped | None) -> AxisDiagnosis:
-        """The same of a base before one of its laws was given a free curve."""
-        if curve is None:
+    def beside(self, base: Fit, curves: tuple[Reshaped, ...]) -> AxisDiagnosis:
+        """The same of a base before some of its laws were given free curves."""
+        if not curves:
             return self
-        beside = replace(self, base=base, curve=curve)
+        beside = replace(self, base=base, curves=curves)
         if self.verdict in (Verdict.NOTHING_MISSING, Verdict.UNEXPLAINED):
             beside = replace(beside, steps=tuple(replace(s, proved=False) for s in self.steps))
         verdict = Verdict.MISSING_EFFECTS if beside._proved else Verdict.WRONG_SHAPE
         return replace(beside, verdict=verdict)
+
+    def _found(self, step: Step) -> Finding:
+        """What an effect explains; one whose law has a free curve now, before it had that."""
+        effect = step.candidate.effect
+        own = (c.before for c in self.curves if c.shape.effect == effect.name)
+        return found(effect, step.tied, self.base, next(own, self.told), self.dataset)
 
     def _wrong_instead(self) -> Finding | None:
         """A free curve beside the base alone; not of friction, whose curves hold its modifiers."""
@@ -160,22 +158,19 @@ class AxisDiagnosis:
             return None
         return found_wrong(shape, self.base, self.base, self.dataset)
 
-    def _wrong_beside(self, fit: Fit) -> Finding | None:
-        shape = wrong_shape(fit, self.dataset)
-        return None if shape is None else found_wrong(shape, self.base, fit, self.dataset)
-
     @property
     def _proved(self) -> list[Step]:
-        """Steps that are named; also that of an effect whose law a free curve has replaced.
+        """Steps that are named; also those of effects whose law a free curve has replaced.
 
         Of an effect that the model has, the law beside its own free curve is part of that shape.
         """
-        own = self.curve.shape.effect if self.curve else None
-        lacked = own not in self.base.axis.names
-        return [
-            s for s in kept(self.steps)
-            if (lacked if s.candidate.effect.name == own else s.proved)
-        ]  # fmt: skip
+        reshaped = {c.shape.effect for c in self.curves}
+
+        def is_named(step: Step) -> bool:
+            name = step.candidate.effect.name
+            return name not in self.base.axis.names if name in reshaped else step.proved
+
+        return list(filter(is_named, kept(self.steps)))
 
 
 def kept(steps: Sequence[Step]) -> list[Step]:

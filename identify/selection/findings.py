@@ -106,11 +106,14 @@ def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> F
 
 
 def with_shape(findings: Sequence[Finding], wrong: Finding) -> tuple[Finding, ...]:
-    """The findings with a wrong shape: that of an effect among them says what it resembles."""
-    if wrong.effect not in [f.effect for f in findings]:
+    """The findings with a wrong shape: that of a missing effect says what it resembles."""
+    same = [f for f in findings if f.effect == wrong.effect]
+    if not same:
         return (*findings, wrong)
     return tuple(
-        replace(f, kind=FindingKind.RESEMBLES, shape=wrong.shape) if f.effect == wrong.effect else f
+        replace(f, kind=FindingKind.RESEMBLES, shape=wrong.shape)
+        if f in same and f.kind is FindingKind.MISSING
+        else f
         for f in findings
     )
 

@@ -45,11 +45,13 @@ def diagnose_axis(
     steps: list[Step] = []
     states = [SelectionState((), base)]
     final, found = base, ranking
-    curve: Reshaped | None = None
+    curves: list[Reshaped] = []
     while len(steps) < RULE.most_steps:
-        if curve is None and (curve := curve_in_place(final, dataset, found)):
-            final, states[-1] = curve.fit, replace(states[-1], fit=curve.fit)
+        while curve := curve_in_place(final, dataset, found):
+            curves.append(curve)
+            steps, final = _needed_beside(curve, steps, base, dataset)
             final, found = ranked(final, dataset)
+            states[-1] = SelectionState(tuple(steps), final)
         if not (more := _next(final, dataset, found, ranked)):
             break
         earlier = [s.candidate for s in kept(steps)]
@@ -64,8 +66,26 @@ def diagnose_axis(
         dataset, final = synchronised(final, dataset)
         final, found = ranked(final, dataset)
         states[-1] = replace(states[-1], fit=final)
-    dataset, states = _with_own_noise(dataset, states)
-    return _decided(dataset, ranking, states).beside(base, curve)
+    if not any(map(_foretells, found)):
+        dataset, states = _with_own_noise(dataset, states)
+    return _decided(dataset, ranking, states).beside(base, tuple(curves))
+
+
+def _needed_beside(
+    curve: Reshaped, steps: Sequence[Step], base: Fit, dataset: Dataset
+) -> tuple[list[Step], Fit]:
+    """The steps without effects that had imitated what a free curve now explains, and the fit."""
+    earlier = [s.candidate for s in kept(steps) if s.candidate.effect.name != curve.shape.effect]
+    fit, dropped = _eliminated_backwards(base, curve.fit, dataset, earlier)
+    if not dropped:
+        return list(steps), fit
+    return [*steps[:-1], replace(steps[-1], dropped=(*steps[-1].dropped, *dropped))], fit
+
+
+def _foretells(candidate: Candidate) -> bool:
+    """Whether a candidate, though not supported, takes so much that what is left is no noise."""
+    taken = 1.0 - (candidate.gain.after / candidate.gain.before) ** 2
+    return candidate.delta_bic > RULE.least_bic and taken > RULE.least_share
 
 
 def _with_own_noise(
@@ -91,7 +111,9 @@ def _next(
         near = tuple(c for c in ranking[1:] if c.supported and _near(best, c))
         tied = tuple(c.effect.name for c in near if tie(dataset, best, c))
         return [Step(best, tied or _friction_instead(base, best, ranking), rivals=near)]
-    if base.at_floor or held_at_floor(base, dataset) or is_unpredictable(base, dataset):
+    if base.at_floor or held_at_floor(base, dataset):
+        return []
+    if not any(map(_foretells, ranking)) and is_unpredictable(base, dataset):
         return []
     pairs = search_pairs(base, dataset, ranking, ranked)
     if not pairs:

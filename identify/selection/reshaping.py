@@ -22,6 +22,7 @@ from identify.selection.unpredictable import is_unpredictable
 from identify.selection.wrong_shape import WrongShape, wrong_shape
 
 MOST_TRIED = 3  # effects beside which a curve is sought
+MOST_CURVES = 3  # on one axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +37,12 @@ class Reshaped:
 def curve_in_place(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:
     """The free curve that the selection should go on beside; None where there is none.
 
-    Also where the fit is at the noise floor, or has a free curve already.
+    Also where the fit is at the noise floor, or has as many as MOST_CURVES.
     """
-    if fit.at_floor or any(f.effect.free_shape for f in fit.axis.effects):
+    if (
+        fit.at_floor
+        or sum(f.effect.free_shape is not None for f in fit.axis.effects) >= MOST_CURVES
+    ):
         return None
     alone = _reshaped(fit, dataset, ranking)
     if alone or any(c.supported for c in ranking) or is_unpredictable(fit, dataset):

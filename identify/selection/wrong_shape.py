@@ -85,7 +85,8 @@ def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
     Of those that leave about as little, the one with fewer parts.
     """
     trial = Trial.of(fit, dataset)
-    found = [(s, _proof(trial, s, fit, dataset, decoys=0).gain) for s in _shapes(fit, dataset)]
+    shapes = [s for s in _shapes(fit, dataset) if _rubs(trial, s, fit, dataset)]
+    found = [(s, _proof(trial, s, fit, dataset, decoys=0).gain) for s in shapes]
     if not found:
         return None
     least = min(1.0 - gain for _, gain in found)
@@ -111,12 +112,6 @@ def having_shape(effect: Effect, model: MachineModel, axis: str | None) -> list[
     if not effect.curves:
         raise InputError(f"the law of {effect.name} assumes no curve that could have another shape")
     names = [axis] if axis else list(model.axes)
-    free = _free().name
-    if taken := [n for n in names if free in model.axis(n).names]:
-        raise InputError(
-            f"axis {', '.join(taken)} has a {free} in the place of a law already, and can have "
-            "one; `twin fit` refits it"
-        )
     having = [n for n in names if effect.name in model.axis(n).names]
     if not having:
         raise InputError(
@@ -134,7 +129,7 @@ def sticking(fit: Fit, shape: Shape) -> bool:
 def _shapes(fit: Fit, dataset: Dataset) -> list[Shape]:
     """A free curve for each curve that a law of the fit assumes, where the data ask for one."""
     made = (_chosen(fit, dataset, *laws) for laws in _assumed(fit.axis))
-    return [s for s in made if s is not None]
+    return [s for s in made if s is not None and not _has(fit.axis, s)]
 
 
 def _assumed(axis: AxisModel) -> list[tuple[Fitted, Curve]]:
@@ -153,7 +148,7 @@ def _chosen(fit: Fit, dataset: Dataset, law: Fitted, curve: Curve) -> Shape | No
     forms = (False, True) if curve.by_direction else (False,)
     best, least = None, np.inf
     for lets_go in forms:
-        shape = _laid(law, curve, dataset, lets_go)
+        shape = _laid(fit.axis, law, curve, dataset, lets_go)
         mask = moving(dataset.fit, sticking(fit, shape))[fit.kept]
         linear = Linearised.about(fit, dataset, shape.empty).on(mask)
         stiffness = choose_stiffness(linear, COARSELY)
@@ -163,8 +158,19 @@ def _chosen(fit: Fit, dataset: Dataset, law: Fitted, curve: Curve) -> Shape | No
     return best if best and (best.turns or not curve.rubs) else None
 
 
-def _laid(law: Fitted, curve: Curve, dataset: Dataset, lets_go: bool) -> Shape:
-    free = _free()
+def _has(axis: AxisModel, shape: Shape) -> bool:
+    """Whether the axis has a free curve of such parts over that coordinate."""
+    own = set(shape.stiffness)
+    return any(
+        own <= {p.name for p in f.effect.parts if not f.fixed.issuperset(p.strengths)}
+        and all(np.isclose(f.values[n], shape.empty.values[n]) for n in f.effect.free_shape.over)
+        for f in axis.effects
+        if f.effect.free_shape
+    )
+
+
+def _laid(axis: AxisModel, law: Fitted, curve: Curve, dataset: Dataset, lets_go: bool) -> Shape:
+    free = _free(axis)
     assert free.free_shape is not None
     period = None if curve.period is None else law.values[curve.period]
     values = free.free_shape.laid(curve, period, dataset.excitation, lets_go)
@@ -174,9 +180,21 @@ def _laid(law: Fitted, curve: Curve, dataset: Dataset, lets_go: bool) -> Shape:
     return Shape(law.effect.name, curve, period, empty, lets_go, {})
 
 
-def _free() -> Effect:
-    """The effect that stands in the place of a law."""
-    return next(e for e in load_catalogue().values() if e.free_shape)
+def _free(axis: AxisModel) -> Effect:
+    """The effect that can stand in the place of a further law of an axis."""
+    return next(e for e in load_catalogue().after(axis.names) if e.free_shape)
+
+
+def _rubs(trial: Trial, shape: Shape, fit: Fit, dataset: Dataset) -> bool:
+    """Whether a curve for friction does so: what turns with the direction is proved by itself.
+
+    What does not is any force of its coordinate.
+    """
+    if not shape.curve.rubs:
+        return True
+    turned = shape.empty.effect.parts[1].name
+    alone = replace(shape, stiffness={turned: shape.stiffness[turned]})
+    return _proof(trial, alone, fit, dataset, decoys=DECOYS).holds
 
 
 def _proof(trial: Trial, shape: Shape, fit: Fit, dataset: Dataset, *, decoys: int) -> Proof:

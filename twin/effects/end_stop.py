@@ -12,6 +12,8 @@ from twin.effect import DT, MASS, OUT, Effect, Kind, Parameter, V, X
 # Places tried, parts of the travel from its ends; soft stops a tenth off pass for a cable.
 STOPS = (0.005, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4)
 
+LEAST_FREE = 0.5  # part of the travel between the stops; nearer ones imitate any force of position
+
 
 def law(p, s, io):
     depth = 0.0
@@ -49,4 +51,5 @@ EFFECT = Effect(
     law=law,
     fingerprint="residual pushes inwards at the ends of the travel and is zero between",
     excited_by="slow moves to both ends of the travel",
+    is_itself=lambda v, e: v["high"] - v["low"] > LEAST_FREE * e.travel,
 )  # fmt: skip

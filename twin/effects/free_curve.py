@@ -129,11 +129,12 @@ def of_size(elements: int) -> Effect:
               for n in odd),
         ),
         states=("direction",),
+        several=True,
         law=law,
         fingerprint="what a law leaves whose shape differs from that of the machine's force",
         excited_by="passes over the whole range of the coordinate in both directions",
         of_size=of_size,
-        free_shape=FreeShape(laid, knots),
+        free_shape=FreeShape(laid, ("per_metre", "per_speed", "closed"), knots),
         parts=(
             Part("both directions", even, "stiff_e", smooth),
             Part("direction", odd, "stiff_o", smooth),

@@ -81,7 +81,7 @@ def _sized(effect: Effect, values: Mapping[str, float]) -> Effect:
             f"{effect.name}.{ELEMENTS} = {count!s:.60}: give a whole number of elements from 1 to "
             f"{MOST_ELEMENTS}"
         )
-    return effect.of_size(int(count))
+    return effect.of_size(int(count)).numbered(effect.number)
 
 
 def _check_value(effect: Effect, name: str, value: float, units: AxisUnits) -> None:

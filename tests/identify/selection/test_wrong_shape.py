@@ -10,10 +10,10 @@ from built_fits import PLAIN, axis_of, built, built_dataset, fitted
 
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
-from identify.output.words.selection import shape_in_words
+from identify.output.words.selection import advice, finding_in_words, shape_in_words
 from identify.selection.decoys import Proof
-from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.findings import FindingKind
+from identify.selection.diagnosis import AxisDiagnosis, Step, Verdict
+from identify.selection.findings import FindingKind, with_shape
 from identify.selection.found_shape import AHEAD, BEHIND, BOTH, found_shape
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.reshaping import curve_in_place
@@ -149,7 +149,6 @@ def test_a_shape_is_the_verdict_where_it_is_all_that_is_found(dataset) -> None:
     [
         ("constant_force", MODEL, "constant_force assumes no curve"),
         ("roller_spikes", MODEL, "no effect 'roller_spikes'; `twin add roller_spikes` adds it"),
-        ("cogging", replace(MODEL, effects=(*MODEL.effects, fitted("free_curve"))), "already"),
     ],
 )
 def test_what_has_no_shape_to_give_is_one_line(effect, model, message) -> None:
@@ -167,9 +166,42 @@ def test_a_curve_takes_part_in_the_selection_where_no_effect_leaves_as_little(da
     before = float(np.sqrt(np.mean(residual(base.axis, there.holdout or there.fit) ** 2)))
     better = built(before=before, after=1e-4 * before)
     assert curve_in_place(base, there, (better,)) is None
-    assert curve_in_place(found.fit, there, ()) is None  # has one already
+    assert curve_in_place(found.fit, there, ()) is None  # has it already
     nothing = machine(dataset, lambda x, _: 0.0 * x)
     assert curve_in_place(base_of(nothing), nothing, ()) is None
+
+
+def test_each_law_of_a_wrong_shape_gets_a_curve_of_its_own(dataset) -> None:
+    there = machine(dataset, lambda x, d: step(x, d) + 9.0 * bump(x, d))
+    first = curve_in_place(base_of(there), there, ())
+    assert first is not None
+    second = curve_in_place(first.fit, there, ())
+    assert second is not None
+    assert {first.shape.effect, second.shape.effect} == {"cable_slab", "cogging"}
+    assert {"free_curve", "free_curve_2"} <= set(second.fit.axis.names)
+    assert second.fit.ratio < 0.5 * first.fit.ratio
+    assert curve_in_place(second.fit, there, ()) is None
+
+
+def test_a_missing_effect_of_another_shape_is_resembled(dataset) -> None:
+    """Cogging with bumps for sines on an axis whose model has none."""
+    there = machine(dataset, bump)
+    lacking = axis_of(CABLE)
+    base = finished(lacking, lacking, there.fit, Outcome.CONVERGED)
+    candidate = built("cogging", fit=base_of(there))
+    curve = curve_in_place(candidate.fit, there, ())
+    assert curve is not None
+    steps = (Step(candidate, (), proved=False),)
+    done = AxisDiagnosis(there, base, (), steps, curve.fit, Verdict.UNEXPLAINED, None)
+    told = done.beside(base, (curve,)).with_findings()
+    assert (told.verdict, told.named) == (Verdict.MISSING_EFFECTS, ("cogging",))
+    (finding,) = told.findings
+    assert (finding.effect, finding.kind) == ("cogging", FindingKind.RESEMBLES)
+    assert finding.shape is not None
+    assert "what is missing resembles cogging, in another shape" in finding_in_words(finding)
+    assert advice(told.findings).startswith("twin add cogging, then twin add --shape cogging")
+    before = with_shape((finding,), replace(finding, kind=FindingKind.WRONG_SHAPE))
+    assert before == (finding,)
 
 
 def test_what_is_found_beside_a_curve_is_told_with_it(dataset) -> None:
@@ -178,7 +210,7 @@ def test_what_is_found_beside_a_curve_is_told_with_it(dataset) -> None:
     curve = curve_in_place(base, there, ())
     assert curve is not None
     alone = AxisDiagnosis(there, curve.fit, (), (), curve.fit, Verdict.NOTHING_MISSING, None)
-    told = alone.beside(base, curve).with_findings()
+    told = alone.beside(base, (curve,)).with_findings()
     assert (told.base, told.verdict) == (base, Verdict.WRONG_SHAPE)
     assert [f.effect for f in told.findings] == ["cable_slab"]
-    assert alone.beside(base, None) is alone
+    assert alone.beside(base, ()) is alone
