@@ -54,8 +54,17 @@ def test_no_pair_is_sought_at_the_floor(monkeypatch, base, held):
 def test_no_pair_is_sought_where_nothing_foretells_what_is_left(monkeypatch):
     monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: False)
     monkeypatch.setattr(module, "is_unpredictable", lambda fit, dataset: dataset is DATASET)
-    monkeypatch.setattr(module, "search_pairs", lambda *_: pytest.fail("sought"))
-    assert _next(HIGH, DATASET, [built(t=1.0)], None) == []
+    sought = []
+    monkeypatch.setattr(module, "search_pairs", lambda *_: sought.append(1))
+    for taken, bic in ((0.05, 90.0), (0.2, 9.0)):  # a small part, or without evidence
+        left = (1.0 - taken) ** 0.5
+        assert (
+            _next(HIGH, DATASET, [built(bic=bic, t=1.0, before=2.0, after=2.0 * left)], None) == []
+        )
+    assert not sought
+    foretold = built(bic=90.0, t=1.0, before=2.0, after=1.7)
+    assert _next(HIGH, DATASET, [built(bic=9.0, t=1.0), foretold], None) == []
+    assert sought
 
 
 def test_a_pair_is_added_with_the_others_that_tie_with_it(monkeypatch):
