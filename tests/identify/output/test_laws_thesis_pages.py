@@ -7,6 +7,7 @@ from dataclasses import replace
 import built_chapters as made
 import numpy as np
 import pytest
+from report_cases import readable
 
 from identify.output.report.blocks import Answer, Picture, Table, Tone
 from identify.output.report.drawing import BLUE, ORANGE, drawing_style
@@ -67,6 +68,15 @@ def test_every_chapter_has_its_section_under_its_own_name(pages) -> None:
     assert {name: page.section.anchor for name, page in pages.items()} == {
         name: name for name in made.CHAPTERS
     }
+
+
+def test_every_picture_can_be_read(pages) -> None:
+    for page in pages.values():
+        for figure in page.figures:
+            readable(figure)
+            for legend in (*figure.legends, *(axes.get_legend() for axes in figure.axes)):
+                if legend is not None:
+                    assert legend._ncols in (1, len(legend.get_texts())), "one row, or one column"
 
 
 def test_the_cables_numbers_and_its_bands(pages) -> None:

@@ -249,6 +249,7 @@ def test_each_law_is_fitted_to_the_logs_of_every_machine(monkeypatch):
 
     def datasets(model, logs, held, length):
         assert length == models.TEST_FUNCTION
+        assert (list(logs), held) == (["map", "loop"], {})
         hardware = model.axes["x"].hardware
         assert hardware.current_noise * hardware.force_constant == models.FORCE_NOISE
         assert (hardware.encoder_noise, model.sample_rate) == (models.READING_NOISE, models.RATE)
