@@ -158,7 +158,7 @@ def test_an_error_says_where_in_one_line_and_stays_of_its_kind(kind):
         with at("file a"):
             raise error
 
-    with pytest.raises(kind, match="^file a: one two$") as told:
+    with pytest.raises(kind, match=r"^file a: one two$") as told:
         fail(kind("one\ntwo"))
     assert type(told.value) is kind
     with pytest.raises(KeyError):  # no fault of the input

@@ -116,9 +116,7 @@ def test_each_log_has_its_own_error_and_that_of_its_noise(monkeypatch):
 
     monkeypatch.setattr(misfit_maps, "free_run", lambda model, parts: name(parts))
     monkeypatch.setattr(misfit_maps, "drift_of_noise", lambda model, parts, run: 10 * size[run])
-    monkeypatch.setattr(
-        misfit_maps, "rms_error", lambda run, axis: size[run] if run in size else run
-    )
+    monkeypatch.setattr(misfit_maps, "rms_error", lambda run, axis: size.get(run, run))
     dataset = dataset_of(prepared(name="one"), holdout=(prepared(name="two"),))
     told = []
     errors, floors = position_errors(stage(), {"x": dataset}, lambda *at: told.append(at))
