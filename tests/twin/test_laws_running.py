@@ -175,6 +175,12 @@ def test_a_toml_file_is_read_up_to_its_limit(tmp_path, monkeypatch):
     path.write_text("a = 11\n")
     with pytest.raises(InputError, match=rf"^{path}: is larger than 0 MB"):
         read_toml(path)
+    monkeypatch.undo()
+    path.write_bytes(b"#" * 5_000_000)
+    assert read_toml(path) == {}
+    path.write_bytes(b"#" * 5_000_001)
+    with pytest.raises(InputError, match=r"is larger than 5 MB; give a TOML file$"):
+        read_toml(path)
     path.write_text("a = ")
     with pytest.raises(InputError, match="is not a TOML file"):
         read_toml(path)
