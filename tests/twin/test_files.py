@@ -102,11 +102,15 @@ def test_a_run_that_was_killed_leaves_nothing_behind_the_next(tmp_path: Path) ->
 
 @pytest.mark.parametrize("kind", [replacing, recording])
 def test_a_program_that_ends_at_once_leaves_nothing_half_written(kind, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be written"), kind(tmp_path / "a.bin") as stream:
-        stream.write(b"half")
-        assert len(list(tmp_path.iterdir())) == 1
-        remove_unfinished()
-        assert list(tmp_path.iterdir()) == []
+    def end_at_once() -> None:
+        with kind(tmp_path / "a.bin") as stream:
+            stream.write(b"half")
+            assert len(list(tmp_path.iterdir())) == 1
+            remove_unfinished()
+            assert list(tmp_path.iterdir()) == []
+
+    with pytest.raises(InputError, match="cannot be written"):
+        end_at_once()
 
 
 def test_a_run_that_lives_keeps_its_part(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""How a user's law is tried before it runs: with samples as a simulation gives them, all guarded."""
+"""How a user's law is tried: with samples as a simulation gives them, and guarded arrays."""
 
 from __future__ import annotations
 
