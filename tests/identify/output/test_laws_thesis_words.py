@@ -248,7 +248,7 @@ def test_what_the_residual_tests_say_in_words() -> None:
     with_first, named, with_it = words.residuals_in_words(made.RESIDUALS)
     assert "with lugre fitted to a machine with gms the test error is 0.0431 N" in with_first
     assert "20.8 times the noise floor" in with_first
-    assert named == "the diagnosis names gms (missing effect)"
+    assert named == f"the diagnosis names gms ({made.RESIDUALS.verdict.value})"
     assert "0.00219 N, 1.06 times" in with_it
     assert with_first.endswith("its residual is not white")
     assert with_it.endswith("the residual is white")
