@@ -182,3 +182,15 @@ def test_several_of_one_effect_have_a_number_each() -> None:
     assert "cogging_3" in names
     assert not {"cogging", "cogging_2", "lugre"} & set(names)
     assert len(names) == len(CATALOGUE) - 1
+
+
+def test_of_harmonics_the_first_alone_is_screened() -> None:
+    """A scan tries every shape with the screened strengths; the others come with the best."""
+    numbered = [
+        (f"{e.name}.{p.name}", p.screened, int(p.name[1:]))
+        for e, p in PARAMETERS
+        if not all(q.screened for q in e.strengths) and p in e.strengths
+    ]
+    assert {number for _, _, number in numbered} >= {1, 2}
+    for name, screened, number in numbered:
+        assert screened == (number == 1), name
