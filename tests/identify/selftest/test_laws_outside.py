@@ -82,6 +82,15 @@ def test_a_law_is_its_equation(name: str) -> None:
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-12)
 
 
+def test_a_cable_that_tightens_stops_to_tighten_at_ten_folds() -> None:
+    """Beyond any travel; a law must give a number there as well."""
+    effect = EFFECTS["tightening_cable"]
+    values = {"offset": 0.0, "k1": 1.0, "fold": 0.01}
+    far = Motion(1e-3, np.array([0.099, 0.1, 0.2, 1e6]), *np.zeros((2, 4)))
+    found = -trace(effect, values, far, law=effect.law).after[:, OUT]
+    np.testing.assert_allclose(found, 0.01 * np.expm1([9.9, 10.0, 10.0, 10.0]), rtol=1e-9)
+
+
 def test_noise_has_its_size_its_memory_and_four_uniform_numbers_a_sample() -> None:
     """Park and Miller's numbers: 16807 times the last, modulo 2^31 - 1."""
     values = {"size": 0.4, "memory": 0.02, "seed": 7.0}
