@@ -152,6 +152,3 @@ def readable(figure: Figure) -> None:
             assert not marked or 2.0 <= line.get_markersize() <= 7.0
         for artist in (*axes.get_lines(), *axes.collections, *axes.patches):
             assert artist.get_alpha() is None or 0.1 <= artist.get_alpha() <= 1.0
-        for axis in (axes.xaxis, axes.yaxis):
-            labels = axis.get_ticklabels()
-            assert all(5.0 <= label.get_fontsize() <= 14.0 for label in labels)
