@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import built_chapters as chapters
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset
+from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted
 
 from identify.estimation.fit import Outcome
 from identify.estimation.replay import Beginning
@@ -21,9 +21,12 @@ from identify.output.results import SimulationFit
 from identify.output.signature import FORCE, MASS, exemplary_motion, signature
 from identify.output.simulation_fit import simulation_fit_json, simulation_fit_text
 from identify.output.words.estimation import HELD_OUT_GREW, MOTION_OUTCOMES, motion_fit_in_words
+from identify.output.words.selection import addition_notes, step_in_words
+from identify.selection.confounded import MovedParameter
 from identify.validation.agreement import Agreement, Cause
 from twin.effect import Kind
 from twin.laws import verdict
+from twin.model.machine import HistoryStep
 from twin.model.parameters import free_parameters, read, write
 
 # --- a fit of simulated motion -------------------------------------------------------------
@@ -92,6 +95,42 @@ def test_a_motion_fit_in_words() -> None:
         row = found[c.label]
         assert row[1] == f"{1.07 * value:.6g}"
         assert row[-1] == f"{value:.6g})"
+
+
+# --- what a reader should know of an added effect ------------------------------------------
+
+
+def test_an_added_effect_is_noted_by_what_it_moved_removed_and_replaced() -> None:
+    moved = MovedParameter("mass", 5.0, 5.5, "kg", False)
+    gone = MovedParameter("constant_force.F0", 0.3, 0.01, "N", True)
+    added = built("cogging", fit=built_fit(0.1, axis=axis_of(fitted("cogging"))))
+    plain = addition_notes(added, [moved, gone], ["empirical_map"])
+    assert plain == (
+        "mass moved from 5 to 5.5 kg: more than its interval",
+        "constant_force.F0 collapsed from 0.3 to 0.01 N: it had taken over the missing effect's "
+        "force",
+        "empirical_map was removed before cogging was added; add it again for the error that is "
+        "left",
+    )
+    assert addition_notes(added, [], []) == ()
+    (beside,) = addition_notes(added, [], [], "coulomb_viscous")  # which the axis still has
+    assert beside == "cogging is beside the law of coulomb_viscous"
+    instead, note = addition_notes(added, [moved], ["empirical_map"], "roller_spikes")
+    assert instead == "cogging is in the place of the law of roller_spikes"
+    assert note.startswith("mass moved")
+    curve = built("empirical_map", fit=built_fit(0.1, axis=axis_of(fitted("empirical_map"))))
+    told, note = addition_notes(curve, [moved], [])
+    assert told.startswith("empirical_map is a fitted curve, not a physical law")
+    assert note.startswith("mass moved")
+
+
+@pytest.mark.parametrize(
+    ("action", "said"),
+    [("add", "added wear to axis y"),
+     ("shape", "gave wear of axis y the shape that the logs show")],
+)  # fmt: skip
+def test_a_step_of_a_models_history_is_said(action, said) -> None:
+    assert step_in_words(HistoryStep(action, "wear", "y", 3.0, 2.0, None, None)) == said
 
 
 # --- whether two fits agree ----------------------------------------------------------------
