@@ -13,10 +13,10 @@ endif
 demo: $(VENV)/runtime
 	$(BIN)/twin demo --out demo
 
+# Types are one of the tests (tests/test_types.py), so that they take no time of their own.
 test: $(VENV)/tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 check: $(VENV)/tests

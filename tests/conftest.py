@@ -22,8 +22,10 @@ LONGEST_WAIT = 300.0  # s for what another worker compiles
 # With `--dist loadfile` a file is one worker's: what its tests share is made once. The longest
 # begin first, so that the workers end together.
 LONGEST = (
+    "test_types",
     "test_catalogue_recovery",
     "test_readme",
+    "test_compiled",
     "test_nonparametric",
     "test_plan",
     "test_catalogue_laws",

@@ -58,6 +58,17 @@ def moved(
     return motion_of(log_of(rate, x, force, other), "x", name)
 
 
+def ridden(command: Callable[[Motion], Array], duration: float = 6.0) -> Motion:
+    """A motion with all of dry, viscous and position dependent force, and a command added to it."""
+    t = (np.arange(round(duration * 1000.0))) / 1000.0
+    x = waves((0.04, 0.4, 0.3), (0.02, 0.9, 1.0))
+    motion = motion_of(log_of(1000.0, x(t), t), "x", "log")
+    m, v = motion.position, motion.velocity
+    force = 1.3 * np.gradient(v, 1e-3) + 0.7 * np.sign(v) + 0.9 * v + 0.2 - 3.0 * m + 40.0 * m**3
+    u = force + command(motion)
+    return replace(motion, signals=np.stack([m, v, u]), raw=np.stack([motion.raw[0], u]))
+
+
 def windowed(motion: Motion, length: float = 0.05) -> PreparedLog:
     """The motion in windows of that length (s)."""
     return PreparedLog.of(motion, length)

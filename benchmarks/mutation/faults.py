@@ -18,6 +18,7 @@ from cosmic_ray.operators.operator import Example, Operator
 from cosmic_ray.plugins import get_operator
 
 PACKAGES = ("twin", "identify")
+LEAST = 5  # faults in a folder: of fewer, a share says nothing of three in five
 # A comparison is inverted; moving its boundary (< to <=) hardly ever matters between doubles.
 KINDS = (
     *(f"ReplaceBinaryOperator_{k}" for k in (
@@ -31,9 +32,17 @@ KINDS = (
     "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd",
     "ReplaceBreakWithContinue", "NumberReplacer", "ZeroIterationForLoop",
 )  # fmt: skip
-# Faults in these change nothing, so that no test can notice them.
-COMMUTE = {"min", "max", "minimum", "maximum", "hypot"}
-GUARDS = ("strict=",)  # of sequences that are of one length
+# Faults that change nothing, whatever the code around them, so that no test can notice them:
+# arguments of a symmetric function swapped (of the second kind the first two alone),
+SYMMETRIC = {"min", "max"}
+SYMMETRIC_IN_TWO = {
+    "minimum", "maximum", "hypot", "convolve", "array_equal", "union1d", "intersect1d",
+    "logical_and", "logical_or", "multiply", "gcd",
+}  # fmt: skip
+# whether zip looks at the lengths of sequences that are of one length,
+GUARDS = ("strict=",)
+# and what type checkers alone read: annotations (they are never evaluated) and these calls.
+TYPING = {"TypeVar", "ParamSpec"}
 
 
 class SwapArguments(Operator):
@@ -59,10 +68,11 @@ class SwapArguments(Operator):
         """Where two positional arguments that differ stand side by side."""
         if node.type != "arglist" or getattr(node.parent, "type", "") == "classdef":
             return []
-        if node.get_previous_leaf().get_previous_leaf().value in COMMUTE:
+        function = node.get_previous_leaf().get_previous_leaf().value
+        if function in SYMMETRIC:
             return []
         found = []
-        for i in range(0, len(node.children) - 2, 2):
+        for i in range(2 * (function in SYMMETRIC_IN_TWO), len(node.children) - 2, 2):
             one, other = node.children[i], node.children[i + 2]
             plain = all(c.type != "argument" for c in (one, other))
             if plain and one.get_code(False) != other.get_code(False):
@@ -135,8 +145,8 @@ class Fault:
 
 
 def faults_on(path: str, source: str, line: int) -> list[Fault]:
-    """Every fault that can be put into one line."""
-    if line in _idle_lines(source) or "| None" in source.splitlines()[line - 1]:
+    """Every fault that can be put into one line, but for those that change nothing."""
+    if line in _idle_lines(source):
         return []
     found, text = [], source.splitlines()[line - 1]
     tree = get_ast(source)
@@ -145,7 +155,8 @@ def faults_on(path: str, source: str, line: int) -> list[Fault]:
         occurrence = 0
         for node in nodes:
             for begin, _ in operator.mutation_positions(node):
-                if begin[0] == line and not text[: begin[1]].endswith(GUARDS):
+                guarded = text[: begin[1]].endswith(GUARDS)
+                if begin[0] == line and not guarded and not _annotates(source, begin):
                     found.append(Fault(path, line, kind, occurrence))
                 occurrence += 1
     return [f for f in found if _compiles(f.applied(source), source)]
@@ -182,7 +193,23 @@ def _idle_lines(source: str) -> frozenset[int]:
             idle.update(range(node.lineno, body))
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             add(node)
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in TYPING:
+            add(node)
     return frozenset(idle)
+
+
+def _annotates(source: str, place: tuple[int, int]) -> bool:
+    """Whether a place (line, column) is within an annotation."""
+    return any(begin <= place < end for begin, end in _annotations(source))
+
+
+@cache
+def _annotations(source: str) -> tuple[tuple[tuple[int, int], tuple[int, int]], ...]:
+    """Begin and end of the annotation of every variable."""
+    nodes = [n.annotation for n in ast.walk(ast.parse(source)) if isinstance(n, ast.AnnAssign)]
+    return tuple(
+        ((n.lineno, n.col_offset), (n.end_lineno or 0, n.end_col_offset or 0)) for n in nodes
+    )
 
 
 def is_native(source: str, line: int) -> bool:
@@ -202,8 +229,11 @@ def files(root: Path) -> list[str]:
     return [str(p.relative_to(root)) for p in found]
 
 
-def draw(root: Path, count: int, seed: int, least: int = 3) -> list[Fault]:
-    """Faults in lines drawn at random: of each folder its part by lines, and ``least`` at least."""
+def draw(root: Path, count: int, seed: int, least: int = LEAST) -> list[Fault]:
+    """Faults in lines drawn at random: ``least`` of each folder, the rest by its lines.
+
+    Where ``count`` is too few for that, as many of each folder as there are for all.
+    """
     rng = np.random.default_rng(seed)
     sources = {path: (root / path).read_text() for path in files(root)}
     folders: dict[str, list[tuple[str, int]]] = {}
@@ -229,12 +259,12 @@ def _drawn(
 
 
 def _shares(sizes: dict[str, int], count: int, least: int) -> dict[str, int]:
-    """How many of each folder: by size, largest remainders, each ``least`` at least."""
+    """How many of each folder: ``least``, and what is left goes where its part is missed most."""
     total = sum(sizes.values())
-    exact = {f: max(count * n / total, float(min(least, n))) for f, n in sizes.items()}
-    scale = count / sum(exact.values())
-    out = {f: int(e * scale) for f, e in exact.items()}
-    rest = sorted(exact, key=lambda f: out[f] - exact[f] * scale)
-    for f in rest[: count - sum(out.values())]:
-        out[f] += 1
+    each = min(least, count // len(sizes))
+    out = {f: min(each, n) for f, n in sizes.items()}
+    while sum(out.values()) < min(count, total):
+        room = [f for f in sizes if out[f] < sizes[f]]
+        neediest = max(room, key=lambda f: count * sizes[f] / total - out[f])
+        out[neediest] += 1
     return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import shutil
 from collections import Counter
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 pytest.importorskip("cosmic_ray", reason="comes with the extra `bench`")
 
-from benchmarks.mutation.faults import Fault, draw, faults_on, is_native, operators
+from benchmarks.mutation.faults import Fault, _shares, draw, faults_on, is_native, operators
 from benchmarks.mutation.noticed import figures
 from benchmarks.mutation.reach import Reach, _teller
 from benchmarks.mutation.trial import Trial
@@ -18,18 +19,31 @@ from benchmarks.mutation.trial import Trial
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.fixture(scope="module")
-def drawn() -> list[Fault]:
-    return draw(ROOT, 12, seed=5, least=1)
-
-
-def test_the_same_seed_draws_the_same_faults_and_each_changes_the_code(drawn) -> None:
-    assert draw(ROOT, 12, seed=5, least=1) == drawn
-    assert len(drawn) == 12
+def test_the_same_seed_draws_the_same_faults_and_each_changes_the_code(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "identify/selftest/laws", tmp_path / "identify/selftest/laws")
+    (tmp_path / "twin").mkdir()
+    shutil.copy(ROOT / "twin/curve.py", tmp_path / "twin")
+    drawn = draw(tmp_path, 7, seed=6, least=3)
+    assert draw(tmp_path, 7, seed=6, least=3) == drawn
+    assert len(drawn) == 7
+    assert min(Counter(fault.folder for fault in drawn).values()) >= 3
     for fault in drawn:
-        source = (ROOT / fault.path).read_text()
+        source = (tmp_path / fault.path).read_text()
         altered = fault.applied(source)
         assert ast.dump(ast.parse(altered)) != ast.dump(ast.parse(source)), fault
+
+
+@pytest.mark.parametrize(
+    ("count", "least", "shares"),
+    [
+        (10, 3, {"a": 4, "b": 3, "c": 3}),  # the rest goes to the largest
+        (30, 3, {"a": 23, "b": 4, "c": 3}),  # by their lines, where these ask for more
+        (7, 5, {"a": 3, "b": 2, "c": 2}),  # too few for five of each
+        (500, 5, {"a": 80, "b": 15, "c": 5}),  # no more than there are lines
+    ],
+)
+def test_each_folder_has_its_least_and_the_rest_by_its_lines(count, least, shares) -> None:
+    assert _shares({"a": 80, "b": 15, "c": 5}, count, least) == shares
 
 
 @pytest.mark.parametrize(
@@ -40,6 +54,13 @@ def test_the_same_seed_draws_the_same_faults_and_each_changes_the_code(drawn) ->
         ("y = f(a, a)", "SwapArguments", set()),
         ("y = f(a, key=b)", "SwapArguments", set()),
         ("y = np.maximum(a, b)", "SwapArguments", set()),
+        ("y = np.convolve(a, b, c)", "SwapArguments", {"y = np.convolve(a, c, b)"}),
+        (
+            "x: int | str = f(a | b)",
+            "ReplaceBinaryOperator_BitOr_BitAnd",
+            {"x: int | str = f(a & b)"},
+        ),
+        ("T = TypeVar('T', covariant=True)", "ReplaceTrueWithFalse", set()),
         ("y = zip(a, b, strict=True)", "ReplaceTrueWithFalse", set()),
         ("y = f(a, sure=True)", "ReplaceTrueWithFalse", {"y = f(a, sure=False)"}),
         ("y = a + b - c", "DropTerm", {"y = a - c", "y = a + b"}),

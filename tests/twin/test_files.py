@@ -12,7 +12,14 @@ from pathlib import Path
 import pytest
 
 from twin.errors import InputError
-from twin.files import PART, replacing, require_writable, write_atomically
+from twin.files import (
+    PART,
+    recording,
+    remove_unfinished,
+    replacing,
+    require_writable,
+    write_atomically,
+)
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="links, pipes and rights of POSIX")
 KILLED = """
@@ -91,6 +98,19 @@ def test_a_run_that_was_killed_leaves_nothing_behind_the_next(tmp_path: Path) ->
     assert [p.name.endswith(PART) for p in tmp_path.iterdir()] == [True]
     write_atomically(tmp_path / "b.bin", b"whole")
     assert [p.name for p in tmp_path.iterdir()] == ["b.bin"]
+
+
+@pytest.mark.parametrize("kind", [replacing, recording])
+def test_a_program_that_ends_at_once_leaves_nothing_half_written(kind, tmp_path: Path) -> None:
+    def end_at_once() -> None:
+        with kind(tmp_path / "a.bin") as stream:
+            stream.write(b"half")
+            assert len(list(tmp_path.iterdir())) == 1
+            remove_unfinished()
+            assert list(tmp_path.iterdir()) == []
+
+    with pytest.raises(InputError, match="cannot be written"):
+        end_at_once()
 
 
 def test_a_run_that_lives_keeps_its_part(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from constructed import CATALOGUE, log_of
+from constructed import log_of
 
 from identify.dataset.beginning import FOREIGN, HELD, beginnings
 from identify.dataset.dataset import datasets
@@ -84,15 +84,3 @@ def test_no_beginning_is_left_out_where_the_force_is_ordinary():
     assert not told(0.2)  # not foreign beside the cogging
     assert not told(9.0, hang=3.0)  # no beginning
     assert FOREIGN > 1.0 > HELD
-
-
-def test_several_of_one_effect_have_a_number_each():
-    first, second = CATALOGUE["cogging"], CATALOGUE["cogging_2"]
-    assert second.name == "cogging_2"
-    assert second.law is first.law
-    assert "lugre_2" not in CATALOGUE
-    assert "cogging_1" not in CATALOGUE
-    names = [e.name for e in CATALOGUE.after({"cogging", "cogging_2", "lugre"})]
-    assert "cogging_3" in names
-    assert not {"cogging", "cogging_2", "lugre"} & set(names)
-    assert len(names) == len(CATALOGUE) - 1

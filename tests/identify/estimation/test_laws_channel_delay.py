@@ -7,9 +7,10 @@ import pytest
 from constructed import dataset_of, effect, fit_of, log_of, waves, windowed
 
 from identify.dataset.motion import motion_of
-from identify.estimation.channel_delay import fit_aligned, moved_by, realigned
+from identify.estimation.channel_delay import fit_aligned, misalignment, moved_by, realigned
 from identify.estimation.decision import RULE
 from identify.estimation.fit import fit_axis
+from identify.output.words.estimation import channel_delay_in_words
 from twin.model.machine import AxisModel
 
 RATE, MASS = 1000.0, 1.7
@@ -65,3 +66,37 @@ def test_a_model_with_a_pump_sets_the_clocks_by_it():
     pumped = AxisModel(MASS, effects=(effect("periodic_disturbance", {"f": 23.7, "a": 0.001}),))
     _, fit = fit_aligned(pumped, dataset)
     assert fit.begun is pumped
+
+
+@pytest.mark.parametrize("samples", [0.3, 1.0, 2.4])
+def test_a_force_that_acts_before_its_stamp_is_found_by_so_many_samples(samples):
+    log = aligned(samples)
+    axis = AxisModel(1.7)
+    found = misalignment(fit_of(axis, log), dataset_of(log))
+    assert found == pytest.approx(samples * 1e-3, rel=0.05)
+    dataset = realigned(dataset_of(log, holdout=(log,)), found)
+    assert dataset.channel_delay == found
+    left = [fit_of(axis, *logs).error for logs in ((log,), dataset.fit, dataset.holdout)]
+    assert left[1] < 0.15 * left[0]
+    assert left[1] == left[2]
+    assert dataset.test_function_length == pytest.approx(0.02)
+    back = realigned(dataset, 0.0)
+    assert back.channel_delay == 0.0
+    np.testing.assert_allclose(back.fit[0].command[9:-9], log.command[9:-9], atol=0.1)
+
+
+def test_a_force_that_acts_late_or_hardly_early_is_no_fault_of_the_log():
+    axis = AxisModel(1.7)
+    for samples, told in ((0.0, 0), (-1.0, 0), (0.042, 0), (0.058, 1), (2.7, 1), (3.6, 0)):
+        log = aligned(samples, noise=1e-4)
+        found = misalignment(fit_of(axis, log), dataset_of(log))
+        assert (found > 0.0) == bool(told), samples
+    log = aligned(0.058, noise=3.0)  # lost in the noise
+    assert misalignment(fit_of(axis, log), dataset_of(log)) == 0.0
+
+
+def test_a_shift_is_said_in_samples():
+    log = aligned(0.0)
+    assert channel_delay_in_words(dataset_of(log)) is None
+    said = channel_delay_in_words(dataset_of(log, channel_delay=1.5e-3))
+    assert said.startswith("axis x: the force acts 1500 us (1.50 samples) before")

@@ -1,17 +1,10 @@
-"""Laws of evidence and intervals: each against its definition, written another way."""
-
-from dataclasses import replace
-from itertools import pairwise
-from types import SimpleNamespace
+"""Laws of evidence: each against its definition, written another way."""
 
 import numpy as np
 import pytest
-from constructed import effect, fit_of, moved, windowed
-from scipy.signal import lfilter
+from linear_cases import coloured, cut, linear, without
 from scipy.stats import norm
-from scipy.stats import t as student
 
-from identify.estimation import intervals as uncertainty
 from identify.estimation.evidence import (
     BLOCKS,
     Evidence,
@@ -21,29 +14,8 @@ from identify.estimation.evidence import (
     left_out,
     noise_gain,
 )
-from identify.estimation.force_balance import residual
-from identify.estimation.intervals import (
-    INSEPARABLE,
-    LARGEST_RATIO,
-    ModelWrong,
-    Side,
-    estimates,
-    half_widths,
-    inseparable,
-    open_sides,
-    refusal,
-)
-from identify.estimation.scaling import Scaling
-from identify.output.words.estimation import no_interval_in_words
-from twin.effect import Parameter
-from twin.model.machine import AxisModel
-from twin.model.parameters import ParameterReference, free_parameters, read
 
 RNG = np.random.default_rng(21)
-
-
-def coloured(n: int, pole: float, seed: int) -> np.ndarray:
-    return lfilter([1.0], [1.0, -pole], np.random.default_rng(seed).normal(size=n))
 
 
 # --- evidence -----------------------------------------------------------------------------------
@@ -117,26 +89,6 @@ def test_a_noise_gain_is_that_of_the_normal_likelihood():
     assert noise_gain(r, 0.7, 1.2) == pytest.approx(2.0 * (both[1] - both[0]))
 
 
-def linear(seed: int, n: int = 310, k: int = 3):
-    """A linear problem: columns, data, and the residual at its least squares."""
-    rng = np.random.default_rng(seed)
-    columns = rng.normal(size=(n, k)) * [1.0, 30.0, 0.02]
-    data = coloured(n, 0.5, seed) + columns @ [1.0, 0.2, -9.0]
-    at = np.linalg.lstsq(columns, data, rcond=None)[0]
-    return columns, data, at
-
-
-def without(columns, data, block):
-    keep = np.ones(len(data), bool)
-    keep[block] = False
-    return np.linalg.lstsq(columns[keep], data[keep], rcond=None)[0]
-
-
-def cut(n: int, blocks: int):
-    edges = np.linspace(0, n, blocks + 1).astype(int)
-    return [slice(a, b) for a, b in pairwise(edges)]
-
-
 @pytest.mark.parametrize("blocks", [7, 24])
 def test_a_left_out_residual_is_that_of_a_fit_that_has_not_seen_it(blocks):
     columns, data, at = linear(1)
@@ -155,166 +107,3 @@ def test_priors_count_in_a_left_out_residual():
     for block in cut(len(data), 9):
         again = without(rows, wanted, block)
         np.testing.assert_allclose(found[block], (columns @ again - data)[block], atol=1e-9)
-
-
-# --- intervals ----------------------------------------------------------------------------------
-
-
-def jackknife(columns, data, at) -> np.ndarray:
-    """Half widths of 90 % by leaving one block of 30 out, by refitting."""
-    moves = [without(columns, data, b) - at for b in cut(len(data), 30)]
-    spread = np.sqrt(29.0 / 30.0 * np.sum(np.square(moves), axis=0))
-    return student.ppf(0.95, 29) * spread
-
-
-@pytest.mark.parametrize("seed", [3, 4])
-def test_intervals_are_those_of_the_jackknife(seed):
-    columns, data, at = linear(seed)
-    fit = SimpleNamespace(jacobian=columns, residual=columns @ at - data)
-    np.testing.assert_allclose(half_widths(fit), jackknife(columns, data, at), rtol=1e-6)
-
-
-def test_what_a_prior_or_bound_shifts_is_in_the_interval():
-    """The residual of a fit held off its least squares by c is not orthogonal to the columns."""
-    columns, data, at = linear(5)
-    for off in ([0.7, 0.0, 0.0], [0.1, -0.02, 30.0]):
-        held = at + off
-        fit = SimpleNamespace(jacobian=columns, residual=columns @ held - data)
-        found = half_widths(fit)
-        moves = []
-        for b in cut(len(data), 30):
-            rest = columns.T @ columns - columns[b].T @ columns[b]
-            moves.append(np.linalg.solve(rest, columns[b].T @ fit.residual[b]))
-        spread = student.ppf(0.95, 29) * np.sqrt(29.0 / 30.0 * np.sum(np.square(moves), axis=0))
-        np.testing.assert_allclose(found, spread + np.abs(off), rtol=1e-5)
-        assert (found > np.abs(off)).all()
-
-
-def test_what_a_fit_does_not_see_has_no_interval_and_twins_are_named():
-    columns, data, at = linear(6)
-    seen = half_widths(SimpleNamespace(jacobian=columns, residual=columns @ at - data))
-    wide = np.column_stack([columns[:, 0], np.zeros(len(data)), columns[:, 1:]])
-    some = half_widths(SimpleNamespace(jacobian=wide, residual=columns @ at - data))
-    np.testing.assert_allclose(some[[0, 2, 3]], seen)
-    assert np.isinf(some[1])
-    none = SimpleNamespace(jacobian=0.0 * wide, residual=data)
-    assert np.isinf(half_widths(none)).all()
-    p = Parameter("", "N", 0.0, -1.0, 1.0, "")
-    where = [ParameterReference("e", replace(p, name=n)) for n in "abcde"]
-    a, b, c = np.linalg.qr(np.random.default_rng(7).normal(size=(50, 3)))[0].T
-    for correlation, told in ((INSEPARABLE + 3e-5, True), (INSEPARABLE - 1e-4, False)):
-        near = -7.0 * (correlation * a + np.sqrt(1.0 - correlation**2) * b)
-        jacobian = np.stack([c, 0.0 * a, a, near], axis=1)
-        fit = SimpleNamespace(jacobian=jacobian, scaling=Scaling(tuple(where[:4])))
-        assert inseparable(fit) == ({"e.c": "e.d", "e.d": "e.c"} if told else {})
-
-
-def test_a_wrong_model_has_no_intervals():
-    axis = AxisModel(1.0)
-    fit = SimpleNamespace(residual=np.ones(3), ratio=LARGEST_RATIO, error=0.3, floor=0.1, axis=axis)
-    assert refusal(fit) is None
-    fit.ratio = 1.001 * LARGEST_RATIO
-    assert "0.3 N is 3.0 times the noise floor 0.1 N" in no_interval_in_words(refusal(fit))
-    fit.residual = np.zeros(0)
-    assert "comes to rest within every test function" in no_interval_in_words(refusal(fit))
-
-
-@pytest.mark.parametrize(
-    ("rises", "wanted"),
-    [
-        ((1.0, 1.0), None),
-        ((0.02, 1.0), Side.SMALLER),
-        ((1.0, 0.02), Side.LARGER),
-        ((0.2, 0.2), None),
-    ],
-)
-def test_a_side_is_open_where_the_error_hardly_rises(monkeypatch, rises, wanted):
-    """The error is a parabola of which each side rises by a part of what the slope says."""
-    p = Parameter("a", "N", 0.0, -9.0, 9.0, "")
-    c = ParameterReference("constant_force", p)
-    axis = AxisModel(1.0, effects=(replace(effect("constant_force"), values={"a": 2.0}),))
-    fit = SimpleNamespace(
-        axis=axis, logs=None, scaling=Scaling((c,)), kept=np.array([True, True, False]),
-        residual=np.array([3.0, 0.0]), jacobian=np.array([[0.0], [1.0]]),
-    )  # fmt: skip
-
-    def made(rises):
-        def change(axis, logs, where, steps):
-            assert len(where) == len(steps)
-            return np.array(
-                [[0.0, d * np.sqrt(rises[0] if d < 0 else rises[1]), 55.0] for d in steps]
-            ).reshape(-1, 3)
-
-        return change
-
-    monkeypatch.setattr(uncertainty, "changes", made(rises))
-    assert side_of(fit, c) == wanted
-    # where a bound is in the way nothing can be said
-    monkeypatch.setattr(uncertainty, "changes", made((0.02, 0.02)))
-    for low, high, side in (
-        (1.01, 9.0, Side.LARGER),
-        (-9.0, 2.99, Side.SMALLER),
-        (1.01, 2.99, None),
-    ):
-        near = ParameterReference("constant_force", replace(p, lower=low, upper=high))
-        fit.scaling = Scaling((near,))
-        assert side_of(fit, near) == side
-    lower = ParameterReference("constant_force", replace(p, lower=0.99))
-    fit.scaling = Scaling((lower,))
-    assert side_of(fit, lower) is Side.SMALLER
-
-
-def side_of(fit, c, half=0.5):
-    return open_sides(fit, [c], np.array([half])).get(c.label)
-
-
-def test_the_rise_foreseen_counts_what_a_bound_or_prior_left_of_the_slope(monkeypatch):
-    """With a slope of 0.8 at the end, a step d is foreseen to raise the square by 0.8 d + d^2."""
-    c = ParameterReference("constant_force", Parameter("a", "N", 0.0, -9.0, 9.0, ""))
-    axis = AxisModel(1.0, effects=(replace(effect("constant_force"), values={"a": 2.0}),))
-    fit = SimpleNamespace(
-        axis=axis, logs=None, scaling=Scaling((c,)), kept=np.array([True, True]),
-        residual=np.array([3.0, 0.4]), jacobian=np.array([[0.0], [1.0]]),
-    )  # fmt: skip
-    for rises, wanted in (
-        ((0.13, 0.11), None),
-        ((0.13, 0.09), Side.LARGER),
-        ((0.09, 0.5), Side.SMALLER),
-    ):
-
-        def change(axis, logs, where, steps, rises=rises):
-            after = [np.sqrt(0.16 + rises[int(d > 0)] * (0.8 * d + d * d)) for d in steps]
-            return np.array([[0.0, a - 0.4] for a in after])
-
-        monkeypatch.setattr(uncertainty, "changes", change)
-        assert side_of(fit, c) == wanted
-
-
-def test_estimates_are_the_values_with_their_intervals_within_the_bounds():
-    friction = effect("coulomb_viscous", {"Fc": 0.41, "Fs": 0.41, "sigma2": 0.01})
-    cable = effect("cable_slab", {"offset": -0.3, "k1": 4.0})
-    cable = replace(cable, fixed=cable.fixed | {"k2", "k3"})
-    axis = AxisModel(1.7, effects=(replace(friction, fixed=friction.fixed | {"Fs"}), cable))
-    log = windowed(moved(np.random.default_rng(8), 3.0, 1000.0))
-    noise = np.random.default_rng(9).normal(0.0, 0.3, len(log))
-    log = replace(log, command=log.command - residual(axis, [log]) + noise)
-    fit = fit_of(axis, log)
-    fit.__dict__["floor"] = fit.error
-    found = estimates(fit)
-    half = half_widths(fit)
-    free = [e for e in found if e.free]
-    assert [e.label for e in free] == [c.label for c in free_parameters(axis)]
-    np.testing.assert_array_equal([e.value for e in free], read(axis, free_parameters(axis)))
-    for e, c, width in zip(free, free_parameters(axis), half, strict=True):
-        assert e.unit == c.parameter.unit
-        assert e.reason is None
-        assert e.high == pytest.approx(min(e.value + width, c.parameter.upper))
-        assert e.low == pytest.approx(max(e.value - width, c.parameter.lower))
-    assert next(e for e in free if e.label == "coulomb_viscous.sigma2").low == 0.0
-    held = {e.label: e.value for e in found if not e.free}
-    assert held == {"coulomb_viscous.Fs": 0.41, "cable_slab.k2": 0.0, "cable_slab.k3": 0.0}
-    fit.__dict__["floor"] = fit.error / 3.01
-    assert all(isinstance(e.reason, ModelWrong) for e in estimates(fit) if e.free)
-    assert all(e.low is None and e.high is None for e in estimates(fit))
-    unmoved = fit_of(replace(axis, mass_fixed=True), log)
-    assert next(e.label for e in estimates(unmoved) if not e.free) == "mass"

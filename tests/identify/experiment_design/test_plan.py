@@ -100,7 +100,7 @@ def test_an_experiment_beyond_the_limits_is_caught_by_the_same_law():
 
 
 def test_what_a_weak_motor_cannot_do_is_not_planned():
-    stage = one_axis(STAGES["weak"])
+    stage = replace(one_axis(STAGES["weak"]), sample_rate=RATE)
     arena = Arena(stage, "x", (Explanation("as it is", stage.axes["x"]),))
     trials, not_run = contest(arena, proposals(stage, "x", 20.0)[0])
     assert len(trials) > 5

@@ -27,6 +27,9 @@ from identify.output.report.blocks import Picture
 from identify.output.report.subject import Subject
 from identify.output.report.units import number, title_case
 from identify.output.words.estimation import no_interval_in_words
+from identify.output.words.numbers import Numbers
+from identify.output.words.validation import _place
+from identify.validation.misfit_maps import Region
 
 
 @pytest.fixture(autouse=True)
@@ -232,3 +235,9 @@ def test_values_as_given():
     described = axis_of(fitted("empirical_map"))
     rows = parameters._given(described).rows
     assert len(rows) == 4 + 163 - len(CATALOGUE["empirical_map"].strengths)
+
+
+@pytest.mark.parametrize(("low", "said"), [(0.0, "in motion"), (1.0, "at standstill")])
+def test_standstill_is_told_from_motion(low, said):
+    place = Region("standstill", "1", low, low + 1.0, 0.1, 2.0, 0.5)
+    assert _place(place, Numbers(*(lambda *_: "" for _ in range(3)))) == said

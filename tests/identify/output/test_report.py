@@ -11,7 +11,15 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from report_cases import Case, Outline, cogging_case, figures, pictures_in, without_drawing
+from report_cases import (
+    Case,
+    Outline,
+    cogging_case,
+    figures,
+    pictures_in,
+    readable,
+    without_drawing,
+)
 
 import identify.output.report
 from identify.output.report import residuals
@@ -131,13 +139,15 @@ def unlabelled(figure: Figure) -> list[str]:
     return wrong
 
 
-def test_every_axis_has_quantity_and_unit(case: Case) -> None:
+def test_every_axis_has_quantity_and_unit_and_can_be_read(case: Case) -> None:
     unexplained = Dependence(0.7, "position", 0.025, "m", {"position": 0.7, "time": 0.1})
     other = replace(case.x, verdict=Verdict.UNEXPLAINED, unexplained=unexplained)
     for diagnosis in (case.diagnosis, case.concluding(other)):
         drawn = list(figures(case.subject(diagnosis)))
         assert len(drawn) >= 4
         assert [label for figure in drawn for label in unlabelled(figure)] == []
+        for figure in drawn:
+            readable(figure)
 
 
 def test_an_axis_without_unit_is_caught() -> None:

@@ -71,7 +71,7 @@ def chirp(tmp_path_factory: pytest.TempPathFactory) -> Effect:
 def chirping(chirp: Effect) -> tuple[Logs, Logs]:
     """Two logs of a machine with the chirp, and one held out."""
     machine = with_x(chirp, a=CHIRP)
-    return recorded(machine, (1, 2), 10.0), recorded(machine, (3,), 10.0)
+    return recorded(machine, (1, 2), 8.0), recorded(machine, (3,), 8.0)
 
 
 @pytest.fixture(scope="module")

@@ -58,6 +58,7 @@ def test_without_a_look_ahead_neither_is(case, monkeypatch):
     assert diagnose_axis(*case, FEW).verdict is Verdict.UNEXPLAINED
 
 
+@pytest.mark.slow
 def test_with_one_of_them_unknown_neither_is_named(case):
     alone = Catalogue(e for e in FEW.values() if e.name != "cogging")
     assert diagnose_axis(*case, alone).verdict is Verdict.UNEXPLAINED

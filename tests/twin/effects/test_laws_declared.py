@@ -170,3 +170,27 @@ def test_starts_from_a_log_stay_within_bounds() -> None:
     assert LOG.travel == pytest.approx(0.34)
     assert not effect.is_nonparametric
     assert replace(effect, parts=(Part("p", ("b",), "c", np.eye),)).is_nonparametric
+
+
+def test_several_of_one_effect_have_a_number_each() -> None:
+    first, second = CATALOGUE["cogging"], CATALOGUE["cogging_2"]
+    assert second.name == "cogging_2"
+    assert second.law is first.law
+    assert "lugre_2" not in CATALOGUE
+    assert "cogging_1" not in CATALOGUE
+    names = [e.name for e in CATALOGUE.after({"cogging", "cogging_2", "lugre"})]
+    assert "cogging_3" in names
+    assert not {"cogging", "cogging_2", "lugre"} & set(names)
+    assert len(names) == len(CATALOGUE) - 1
+
+
+def test_of_harmonics_the_first_alone_is_screened() -> None:
+    """A scan tries every shape with the screened strengths; the others come with the best."""
+    numbered = [
+        (f"{e.name}.{p.name}", p.screened, int(p.name[1:]))
+        for e, p in PARAMETERS
+        if not all(q.screened for q in e.strengths) and p in e.strengths
+    ]
+    assert {number for _, _, number in numbered} >= {1, 2}
+    for name, screened, number in numbered:
+        assert screened == (number == 1), name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
 
 import pytest
 from cli_runs import in_small, refusal, twin
@@ -33,8 +34,14 @@ def test_an_experiment_file_says_the_same_when_it_is_read_again(experiment, tmp_
     save_experiment(experiment, tmp_path / "e.toml", "why")
     assert load_experiment(tmp_path / "e.toml") == experiment
     assert [f.name for f in tmp_path.iterdir()] == ["e.toml"]
-    text = format_experiment(experiment)
-    assert all(f"{name} = " in text for name in parameters(experiment))
+    assert (tmp_path / "e.toml").read_text().splitlines()[0] == "# why"
+    text = format_experiment(experiment, "one", "two")
+    assert text.startswith("# one\n# two\n")
+    lines = {line.split(" = ")[0]: line for line in text.splitlines()}
+    assert set(parameters(experiment)) == set(lines) & {f.name for f in fields(experiment)}
+    for f in fields(experiment):
+        if f.name in lines and f.metadata.get("unit"):
+            assert f" # {f.metadata['unit']}, {f.metadata['meaning']}" in lines[f.name]
 
 
 PASSES = '[experiment]\nkind = "passes"\naxis = "x"\nspan = 0.1\nspeed = 0.05\nrepeats = 1\n'

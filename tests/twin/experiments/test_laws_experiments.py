@@ -222,6 +222,13 @@ def test_a_map_runs_the_speeds_that_the_axis_reaches() -> None:
     assert staircase.speeds == tuple(s for s in MAP_SPEEDS if s <= fastest)
     assert len(staircase.speeds) * staircase.longest_plateau * 4.0 == pytest.approx(10.0)
     assert find_experiment("velocity_map", STAGE).axis == "x"
+    counts = {
+        name: [find_experiment(name, STAGE, "x", s) for s in (0.1, 4.5)]
+        for name in ("moves", "reversals", "cable_pass")
+    }  # at least two places, one reversal, one pass; then by the time that each takes
+    assert [e.count for e in counts["moves"]] == [2, 3]
+    assert [e.repeats for e in counts["reversals"]] == [1, 18]
+    assert counts["cable_pass"][0].repeats == 1
     passes = find_experiment("cable_pass", STAGE, "y", 60.0)
     assert passes.span == pytest.approx(0.88 * 0.14)
     assert passes.speed == 0.1

@@ -31,7 +31,9 @@ def model() -> MachineModel:
 # No false alarms
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    "seed", [0, 1, *(pytest.param(s, marks=pytest.mark.slow) for s in range(2, 5))]
+)
 def test_tracking_is_clean(model: MachineModel, seed: int) -> None:
     assert check_log(simulate(model, "tracking", seed=seed, duration=10.0)).findings == ()
 

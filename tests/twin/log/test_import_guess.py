@@ -81,3 +81,20 @@ def test_public_recordings(shared_data, tmp_path):
         "x": {"position": "Position", "velocity": "Velocity", "current": "Iq"}
     }
     assert "resample = 1000 " in laas
+
+
+@pytest.mark.parametrize(("position", "unit"), [("pos [mm]", "N/A"), ("angle [rad]", "N m/A")])
+def test_a_current_alone_asks_for_the_force_constant_in_the_units_of_the_axis(
+    tmp_path, position, unit
+):
+    write_csv(tmp_path / "a.csv", {"t": T, position: Q, "current [A]": F})
+    found = guess_map(tmp_path / "a.csv")
+    assert not found.missing
+    assert f"# force_constant = 1.0 # {unit}: NOT KNOWN" in found.text
+
+
+def test_a_force_asks_for_no_constant_and_what_is_used_is_not_listed(tmp_path):
+    write_csv(tmp_path / "a.csv", {"t": T, "pos [mm]": Q, "force [N]": F})
+    text = guess_map(tmp_path / "a.csv").text
+    assert "NOT KNOWN" not in text
+    assert "not used" not in text

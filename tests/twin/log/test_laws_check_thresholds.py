@@ -9,6 +9,7 @@ from check_drive import drive, findings, report
 
 from twin.log import ROTARY_UNITS
 from twin.log.check import Fault, Severity, check_log
+from twin.log.check.axis import Axis
 
 ALL = (
     "setpoint_position", "setpoint_velocity", "setpoint_acceleration", "position", "velocity",
@@ -233,6 +234,21 @@ def test_a_level_under_noise_is_told_where_it_is_as_long_as_the_low_pass(millise
         length = float(found[0].what.partition(" N for ")[2].split()[0])
         assert start == pytest.approx(1.51, abs=0.003)  # half a low-pass is lost at each end
         assert length == pytest.approx(0.04, abs=0.006)
+
+
+@pytest.mark.parametrize(("noises", "told"), [(3.0, True), (25.0, False)])
+def test_a_level_may_droop_by_ten_times_its_noise(noises, told):
+    """What droops farther is no limit, but a motion with a slow top."""
+    rng = np.random.default_rng(9)
+    smoother = Axis("x", 1000.0, drive().axes["x"]).smoother
+    droop = noises * smoother.held_noise(1e-3)
+
+    def level(columns):
+        force = columns["force"]
+        force[1500:1580] = 30.0 - droop * np.linspace(0.0, 1.0, 80)
+        force += 1e-3 * rng.standard_normal(len(force))
+
+    assert len(findings(drive(change=level), Fault.SATURATION)) == told
 
 
 # What every check needs

@@ -6,6 +6,7 @@ import copy
 import datetime
 import json
 import math
+import runpy
 import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import fields
@@ -181,6 +182,15 @@ def test_the_schemas_that_ship_are_those_of_the_code() -> None:
 
     for path, text in written().items():
         assert path.read_text(encoding="utf-8") == text, f"run python -m twin.schemas ({path})"
+
+
+def test_the_command_writes_every_schema(monkeypatch, tmp_path: Path) -> None:
+    from twin import schemas
+
+    files = {tmp_path / "a.json": "one", tmp_path / "b.json": "two"}
+    monkeypatch.setattr(schemas, "written", lambda: files)
+    runpy.run_module("twin.schemas", run_name="__main__")
+    assert {p: p.read_text() for p in tmp_path.iterdir()} == files
 
 
 def test_the_hardware_entries_are_those_of_the_schema() -> None:

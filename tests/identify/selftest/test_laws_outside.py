@@ -1,0 +1,138 @@
+"""Laws that only the self-test knows: each against its equation, written again in NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from identify.selftest.laws import BUMPS, CABLES, NOISE, OUTSIDE
+from twin.effect import OUT, Effect, Kind
+from twin.laws.motion import Array, Motion
+from twin.laws.stepping import trace
+
+Values = dict[str, float]
+EFFECTS = {e.name: e for e in (*BUMPS, *CABLES, NOISE, *OUTSIDE.values())}
+MOTION = Motion.random(np.random.default_rng(5), samples=300, dt=0.037)
+T = MOTION.dt * np.arange(len(MOTION))
+
+
+def values_of(effect: Effect) -> Values:
+    """Strengths that differ, and shapes off their start."""
+    return {
+        p.name: 0.3 + 0.21 * i if p.strength else p.start * 1.07
+        for i, p in enumerate(effect.parameters)
+    }
+
+
+def from_bump(v: Values, x: Array) -> Array:
+    """Signed distance from the nearest bump, m."""
+    turns = (x - v["phase"]) / v["pitch"]
+    return (turns - np.floor(turns + 0.5)) * v["pitch"]
+
+
+def gaussian(v: Values, m: Motion) -> Array:
+    bump = np.exp(-((from_bump(v, m.x) / (0.3 * v["width"])) ** 2))
+    height = np.where(m.v > 0.0, v["ahead"], v["behind"])
+    return -height * np.tanh(m.v / 2e-4) * bump
+
+
+def bulging(v: Values, m: Motion) -> Array:
+    """The direction follows that of the motion within 60 um, averaged over a whole sample."""
+    direction, followed = 0.0, []
+    for speed in m.v:
+        if speed != 0.0:
+            way = abs(speed) * m.dt
+            direction += (np.sign(speed) - direction) * (1.0 - np.exp(-way / 6e-5))
+        followed.append(direction)
+    d = from_bump(v, m.x)
+    part = np.where(d < 0.0, -d / (0.25 * v["width"]), d / (0.75 * v["width"]))
+    bump = np.where(part < 1.0, np.cos(0.5 * np.pi * part) ** 2, 0.0)
+    both, half = v["ahead"] + v["behind"], v["ahead"] - v["behind"]
+    return -0.5 * (both * np.array(followed) + half) * bump
+
+
+REFERENCES: dict[str, Callable[[Values, Motion], Array]] = {
+    "gaussian_bumps": gaussian,
+    "bulging_bumps": bulging,
+    "folding_cable": lambda v, m: -v["offset"] - v["k1"] * v["fold"] * np.tanh(m.x / v["fold"]),
+    "tightening_cable": lambda v, m: (
+        -v["offset"] - v["k1"] * v["fold"] * (np.exp(m.x / v["fold"]) - 1.0)
+    ),
+    "chirp": lambda v, m: v["a"] * np.sin(2 * np.pi * (v["f"] * T + 0.5 * v["rate"] * T**2)),
+    "cubic_drag": lambda v, m: -v["c"] * m.v**3,
+    "lone_bump": lambda v, m: v["a"] * np.exp(-(((m.x - v["place"]) / v["width"]) ** 2)),
+    "saturating_drag": lambda v, m: -v["c"] * np.tanh(m.v / v["knee"]),
+    "sudden_load": lambda v, m: v["a"] / (1.0 + np.exp(-(T - v["begin"]) / 0.025)),
+}
+
+
+def test_every_law_has_its_equation_here() -> None:
+    assert {*REFERENCES, NOISE.name} == set(EFFECTS)
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_a_law_is_its_equation(name: str) -> None:
+    effect = EFFECTS[name]
+    values = values_of(effect)
+    found = trace(effect, values, MOTION, law=effect.law).after[:, OUT]
+    wanted = REFERENCES[name](values, MOTION)
+    assert np.ptp(wanted) > 0.0
+    np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-12)
+
+
+def test_a_cable_that_tightens_stops_to_tighten_at_ten_folds() -> None:
+    """Beyond any travel; a law must give a number there as well."""
+    effect = EFFECTS["tightening_cable"]
+    values = {"offset": 0.0, "k1": 1.0, "fold": 0.01}
+    far = Motion(1e-3, np.array([0.099, 0.1, 0.2, 1e6]), *np.zeros((2, 4)))
+    found = -trace(effect, values, far, law=effect.law).after[:, OUT]
+    np.testing.assert_allclose(found, 0.01 * np.expm1([9.9, 10.0, 10.0, 10.0]), rtol=1e-9)
+
+
+def test_noise_has_its_size_its_memory_and_four_uniform_numbers_a_sample() -> None:
+    """Park and Miller's numbers: 16807 times the last, modulo 2^31 - 1."""
+    values = {"size": 0.4, "memory": 0.02, "seed": 7.0}
+    count, dt = 20_000, 1e-3
+    still = Motion(dt, *np.zeros((3, count)))
+    found = trace(NOISE, values, still, law=NOISE.law).after[:, OUT]
+    assert np.std(found) == pytest.approx(0.4, rel=0.1)
+    assert abs(np.mean(found)) < 0.1
+    lag = 20
+    alike = np.corrcoef(found[:-lag], found[lag:])[0, 1]
+    assert alike == pytest.approx(np.exp(-lag * dt / 0.02), abs=0.06)
+    draw, total = 7, 0.0
+    for _ in range(4):
+        draw = 16807 * draw % 2147483647
+        total += draw / 2147483647 - 0.5
+    kept = np.exp(-dt / 0.02)
+    assert found[0] == pytest.approx(0.4 * np.sqrt(3.0 * (1.0 - kept**2)) * total)
+    other = trace(NOISE, {**values, "seed": 8.0}, still, law=NOISE.law).after[:, OUT]
+    assert abs(np.corrcoef(found, other)[0, 1]) < 0.1
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_parameters_are_absent_at_the_start_with_round_bounds_of_one_sign_or_both(name) -> None:
+    for p in EFFECTS[name].parameters:
+        for bound in (p.lower, p.upper):
+            assert bound == float(f"{bound:.0e}") or bound == 2147483646.0
+        if p.strength:
+            assert p.start == 0.0
+            assert p.lower in (0.0, -p.upper)
+        elif p.lower < 0.0:
+            assert p.lower == -p.upper
+        else:
+            assert p.lower <= 0.25 * p.start or p.name == "seed"
+            assert p.upper >= 3.0 * p.start
+        assert p.fixed == (p.name in ("pitch", "seed"))
+    assert EFFECTS[name].kind is Kind.FORCE
+
+
+def test_bumps_and_cables_tell_the_curve_that_they_assume() -> None:
+    for effect in BUMPS:
+        (curve,) = effect.curves
+        assert (curve.period, curve.by_direction) == ("pitch", True)
+    for effect in CABLES:
+        (curve,) = effect.curves
+        assert (curve.period, curve.by_direction) == (None, False)

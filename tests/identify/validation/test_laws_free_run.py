@@ -1,0 +1,154 @@
+"""Laws of the free run: a free mass moves as the command says, and a wrong one as far off as that.
+
+Positions are exact: each sample's force is held over it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from constructed import dataset_of, effect, held, log_of, waves, windowed
+
+from identify.dataset.motion import motion_of
+from identify.dataset.noise_floor import noise_of
+from identify.estimation.force_balance import residual
+from identify.estimation.open_loop import START_FIT
+from identify.validation import free_run as module
+from identify.validation.free_run import (
+    HORIZON,
+    FreeRun,
+    _signals,
+    drift_of_noise,
+    errors_of_both,
+    free_run,
+    rms_error,
+)
+from identify.validation.misfit_maps import position_errors
+from identify.validation.side_by_side import side_by_side
+from twin.model.machine import AxisModel, Hardware, MachineModel
+
+RATE, MASS = 1000.0, 1.7
+N = 1730
+T = np.arange(N) / RATE
+FORCE = waves((3.0, 2.3, 0.4), (1.0, 5.1, 1.0))(T)
+X = held(FORCE, MASS, 1.0 / RATE)
+SIDE, COUNT = round(START_FIT * RATE), round(HORIZON * RATE)
+
+
+def prepared(x=X, force=FORCE, name="log"):
+    return windowed(motion_of(log_of(RATE, x, force), "x", name), 0.02)
+
+
+def stage(mass: float = MASS, hardware: Hardware | None = None) -> MachineModel:
+    axis = AxisModel(mass, hardware or Hardware())
+    return MachineModel("free", {"x": axis}, RATE)
+
+
+def test_the_true_mass_moves_as_measured_from_the_first_restart_on():
+    run = free_run(stage(), {"x": prepared()})
+    error = run.error["x"]
+    assert run.horizon == HORIZON
+    assert len(error) == N - 1  # the last force has no motion behind it
+    assert np.isnan(error[:SIDE]).all()
+    assert np.isfinite(error[SIDE:]).all()
+    assert np.abs(error[SIDE:]).max() < 1e-5 * np.ptp(X)
+
+
+@pytest.mark.parametrize("factor", [1.01, 0.98])
+def test_a_wrong_mass_is_off_by_what_the_force_does_since_the_restart(factor):
+    error = free_run(stage(factor * MASS), {"x": prepared()}).error["x"]
+    v = np.concatenate([[0.0], np.cumsum(FORCE)[:-1]]) / RATE / MASS
+    for start in range(SIDE, N - 1 - SIDE, COUNT):
+        span = slice(start, min(start + COUNT, N - 1))
+        exact = held(FORCE[span], factor * MASS, 1.0 / RATE, X[start], v[start])
+        off = exact - X[span]
+        np.testing.assert_allclose(error[span], off, atol=0.01 * np.abs(off).max())
+
+
+def test_the_error_is_the_root_of_its_mean_square_where_it_ran():
+    run = FreeRun({"x": np.array([np.nan, 3.0, -4.0])}, HORIZON)
+    assert rms_error(run, "x") == pytest.approx(12.5**0.5)
+    assert rms_error(FreeRun({"x": np.array([1e200, 1e300])}, HORIZON), "x") == np.inf
+
+
+def test_noise_of_the_logs_own_level_is_added_to_readings_and_commands():
+    rng = np.random.default_rng(3)
+    noisy = prepared(X + 1e-9 * rng.standard_normal(N), FORCE + 0.05 * rng.standard_normal(N))
+    model = stage()
+    position, command = _signals(model, {"x": noisy}, None)
+    np.testing.assert_allclose(position[:, 0], noisy.motion.at_samples(0.0)[0])
+    np.testing.assert_allclose(command[:, 0], noisy.motion.raw[1])
+    more, louder = _signals(model, {"x": noisy}, np.random.default_rng(1))
+    found = noise_of(model.axes["x"], noisy.motion)
+    for one, other, power in ((position, more, found.reading), (command, louder, found.force)):
+        added = np.std(other - one)
+        assert added == pytest.approx(np.sqrt(0.5 * power * RATE), rel=0.1)
+    assert np.std(louder - command) == pytest.approx(0.05, rel=0.3)
+
+
+def test_the_drift_of_noise_is_the_run_with_noise_less_the_run_without(monkeypatch):
+    monkeypatch.setattr(
+        module, "free_run", lambda model, logs, noise: FreeRun({"x": np.array([5.0, 9.0])}, 1.0)
+    )
+    drift = drift_of_noise(stage(), {}, FreeRun({"x": np.array([2.0, 3.0])}, HORIZON))
+    np.testing.assert_array_equal(drift.error["x"], [3.0, 6.0])
+    assert drift.horizon == HORIZON
+
+
+def test_errors_of_both_are_before_after_and_in_mujoco(monkeypatch):
+    def run(model, log, simulator=None):
+        return FreeRun({"x": np.full(2, model.axes["x"].mass + 10.0 * bool(simulator))}, 1.0)
+
+    monkeypatch.setattr(module, "free_run", run)
+    dataset = {"x": dataset_of(prepared())}
+    assert errors_of_both(stage(1.0), stage(2.0), "x", dataset) == ((1.0, 2.0), 12.0)
+    imposed = MachineModel("imposed", {"x": AxisModel(0.0)}, RATE)
+    assert errors_of_both(imposed, imposed, "x", dataset) == (None, None)
+
+
+def test_each_log_has_its_own_error_and_that_of_its_noise(monkeypatch):
+    from identify.validation import misfit_maps
+
+    size = {"one": 1.0, "two": 2.0}
+
+    def name(parts):
+        return parts["x"].motion.name
+
+    monkeypatch.setattr(misfit_maps, "free_run", lambda model, parts: name(parts))
+    monkeypatch.setattr(misfit_maps, "drift_of_noise", lambda model, parts, run: 10 * size[run])
+    monkeypatch.setattr(misfit_maps, "rms_error", lambda run, axis: size.get(run, run))
+    dataset = dataset_of(prepared(name="one"), holdout=(prepared(name="two"),))
+    told = []
+    errors, floors = position_errors(stage(), {"x": dataset}, lambda *at: told.append(at))
+    assert errors["x"] == {k: size[k] for k in errors["x"]}
+    assert floors["x"] == {k: 10 * size[k] for k in floors["x"]}
+    assert "one" in errors["x"]
+    assert [done for done, _ in told] == list(range(len(errors["x"])))
+    assert {whole for _, whole in told} == {len(errors["x"])}
+
+
+def test_measured_is_the_model_and_what_is_left_on_one_clock():
+    axis = AxisModel(1.02 * MASS, effects=(effect("constant_force", {"F0": 0.3}),))
+    model, log = MachineModel("m", {"x": axis}, RATE), prepared()
+    found = side_by_side(model, {"x": log})
+    measured, said, left = (found.topics[f"/{k}/x"] for k in ("measured", "model", "residual"))
+    error = free_run(model, {"x": log}).error["x"]
+    assert found.sample_rate == RATE
+    np.testing.assert_allclose(measured["position"], log.motion.at_samples(0.0)[0][SIDE:])
+    np.testing.assert_allclose(said["position"] - measured["position"], error[SIDE:], atol=1e-15)
+    np.testing.assert_allclose(left["position"], -error[SIDE:])
+    inner = slice(50, -50)
+    np.testing.assert_allclose(
+        (said["force"] + left["force"])[inner], FORCE[SIDE:-1][inner], atol=0.02 * np.ptp(FORCE)
+    )
+    times = np.arange(SIDE, N - 1) / RATE
+    at = log.time - log.motion.time[0]
+    np.testing.assert_allclose(left["force"], np.interp(times, at, residual(axis, [log])))
+    np.testing.assert_allclose(measured["force"], log.motion.at_samples(0.0)[2][SIDE:])
+
+
+def test_the_clock_of_a_log_is_that_of_any_of_its_axes():
+    one, other = prepared(), prepared()
+    later = replace(other, motion=replace(other.motion, time_origin=0.7))
+    assert module._time_origin({"x": one, "y": later}) == 0.7
+    assert module._time_origin({"x": one}) == 0.0

@@ -1,0 +1,118 @@
+"""What a machine would record of a run: each signal in its own column, part by part the same."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from constructed import CATALOGUE, effect
+
+from twin import simulator
+from twin.experiments import follow as module
+from twin.experiments.follow import follow, follow_parts
+from twin.experiments.trajectory import Setpoint
+from twin.log import LINEAR_UNITS, ROTARY_UNITS
+from twin.model.file import parse_model
+from twin.model.machine import AxisModel, Hardware, MachineModel
+from twin.simulator import ReducedSimulator
+
+RATE, N = 1000.0, 250
+QUIET = Hardware(encoder_noise=0.0, current_noise=0.0, force_constant=13.0)
+
+
+def model_of(hardware: Hardware = QUIET) -> MachineModel:
+    effects = {"x": (effect("lugre"),), "y": (effect("cable_slab", {"k1": 30.0}),)}
+    axes = {a: AxisModel(m, hardware, effects[a]) for a, m in (("x", 2.0), ("y", 3.0))}
+    return MachineModel("m", axes, RATE)
+
+
+def setpoint() -> Setpoint:
+    t = np.arange(N)[:, None] / RATE
+    w, size = np.array([[9.0, 23.0]]), np.array([[0.05, 0.02]])
+    x, v, a = size * (1.0 - np.cos(w * t)), size * w * np.sin(w * t), size * w**2 * np.cos(w * t)
+    return Setpoint(x, v, a, np.zeros_like(x), RATE)
+
+
+def noise(seed: int = 3):
+    one, other = np.random.default_rng(seed).spawn(2)
+    return one, other
+
+
+def test_every_column_is_the_signal_that_it_names():
+    model, wanted = model_of(), setpoint()
+    log = follow(model, wanted, noise(), name="n", seed=9, simulator=ReducedSimulator)
+    run = simulator.run(model, wanted, noise()[0], simulator=ReducedSimulator)
+    assert log.sample_rate == RATE
+    for i, (name, axis) in enumerate(log.axes.items()):
+        reading, command, position, velocity = run.signals[:, i].T
+        found = {
+            "position": reading, "force": command, "current": command / 13.0,
+            "setpoint_position": wanted.position[:, i],
+            "setpoint_velocity": wanted.velocity[:, i],
+            "setpoint_acceleration": wanted.acceleration[:, i],
+        }  # fmt: skip
+        assert set(axis.columns) == set(found)
+        for column, values in found.items():
+            np.testing.assert_allclose(axis.columns[column], values, rtol=1e-12, err_msg=column)
+        truth = log.truth[name]
+        np.testing.assert_array_equal(truth["position"], position)
+        np.testing.assert_array_equal(truth["velocity"], velocity)
+        assert axis.force_constant == 13.0
+    for label, forces in zip(run.table.labels, run.forces.T, strict=True):
+        np.testing.assert_array_equal(log.truth[label[0]][label[1]], forces)
+    for (name, state), values in zip(run.state_names, run.states.T, strict=True):
+        np.testing.assert_array_equal(log.truth[name][state], values)
+    assert "cable_slab" not in log.truth["x"]
+    assert "lugre" not in log.truth["y"]
+
+
+def test_what_made_a_log_is_written_into_it():
+    model = model_of()
+    log = follow(model, setpoint(), noise(), name="n", seed=9, simulator=ReducedSimulator)
+    assert log.metadata["source"] == "simulation"
+    assert (log.metadata["experiment"], log.metadata["seed"]) == ("n", "9")
+    assert log.metadata["software"].startswith("proton-twin ")
+    assert set(log.attachments) == {"model.toml"}
+    text = log.attachments["model.toml"].decode()
+    again = parse_model(tomllib.loads(text), CATALOGUE, None, "here")
+    assert again.axes.keys() == model.axes.keys()
+
+
+def test_the_noise_of_a_current_is_its_own_and_rides_on_the_force():
+    loud = replace(QUIET, current_noise=0.02)
+    still = follow(model_of(), setpoint(), noise(), name="n", seed=0, simulator=ReducedSimulator)
+    log = follow(model_of(loud), setpoint(), noise(), name="n", seed=0, simulator=ReducedSimulator)
+    added = [log.axes[a].columns["current"] - still.axes[a].columns["current"] for a in "xy"]
+    for part, axis in zip(added, "xy", strict=True):
+        assert np.std(part) == pytest.approx(0.02, rel=0.2)
+        columns = log.axes[axis].columns
+        np.testing.assert_allclose(columns["force"], 13.0 * columns["current"])
+    assert abs(np.corrcoef(*added)[0, 1]) < 0.25
+    np.testing.assert_array_equal(log.axes["x"].position, still.axes["x"].position)
+
+
+def test_parts_are_the_whole_with_the_noise_of_every_current(monkeypatch):
+    model = model_of(replace(QUIET, current_noise=0.02, encoder_noise=1e-6))
+    monkeypatch.setattr(module, "DRAWN", 70)
+    given = {"name": "n", "seed": 0, "simulator": ReducedSimulator}
+    whole = follow(model, setpoint(), noise(), **given)
+    monkeypatch.setattr(simulator, "CHUNK", 100)
+    parts = list(follow_parts(model, setpoint(), noise(), **given))
+    assert [len(p) for p in parts] == [100, 100, 50]
+    for axis, log in whole.axes.items():
+        for name, column in log.columns.items():
+            joined = np.concatenate([p.axes[axis].columns[name] for p in parts])
+            np.testing.assert_array_equal(joined, column, err_msg=name)
+
+
+@pytest.mark.parametrize(("rotary", "units"), [(False, LINEAR_UNITS), (True, ROTARY_UNITS)])
+def test_a_rotary_axis_is_logged_in_its_units(rotary, units):
+    axis = AxisModel(0.2, QUIET, (), rotary=rotary)
+    model = MachineModel("m", {"x": axis}, RATE)
+    both = setpoint()
+    one = Setpoint(*(c[:, :1] for c in (both.position, both.velocity, both.acceleration,
+                                        both.force)), RATE)  # fmt: skip
+    log = follow(model, one, noise(), name="n", seed=0, simulator=ReducedSimulator)
+    assert log.axes["x"].units == units

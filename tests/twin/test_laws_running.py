@@ -1,0 +1,265 @@
+"""Laws of a run: its parts are its whole, what broke it is named, and what a user gives is read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from constructed import effect
+
+from twin import apart as apart_module
+from twin import breakdown, entries, simulator
+from twin.apart import NoAnswer, apart
+from twin.breakdown import HUGE, require_sound
+from twin.entries import read_toml, shown, toml_document
+from twin.errors import CannotRun, InputError, at
+from twin.experiments.trajectory import Setpoint
+from twin.model.machine import AxisModel, Hardware, MachineModel
+from twin.numbers import is_number
+from twin.simulator import MujocoSimulator, ReducedSimulator, run, run_parts
+
+RATE = 1000.0
+EFFECTS = {
+    "x": (effect("lugre"), effect("cable_slab", {"k1": 30.0})),
+    "y": (effect("gms", {"elements": 9}), effect("actuator_lag"), effect("cogging", {"a1": 0.4})),
+}
+MODEL = MachineModel(
+    "m",
+    {a: AxisModel(m, Hardware(encoder_noise=n), EFFECTS[a])
+     for a, m, n in (("x", 2.0, 1e-6), ("y", 3.0, 5e-6))},
+    RATE,
+)  # fmt: skip
+
+
+def setpoint(n: int) -> Setpoint:
+    t = np.arange(n)[:, None] / RATE
+    w, size = np.array([[9.0, 23.0]]), np.array([[0.05, 0.02]])
+    x, v, a = size * (1.0 - np.cos(w * t)), size * w * np.sin(w * t), size * w**2 * np.cos(w * t)
+    return Setpoint(x, v, a, np.zeros_like(x), RATE)
+
+
+# --- parts and the whole -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("stage", [ReducedSimulator, MujocoSimulator])
+def test_a_run_in_parts_is_the_same_run_and_tells_how_far_it_is(stage, monkeypatch):
+    """The same seed draws the same noise, part by part."""
+    wanted, told = setpoint(250), []
+    whole = run(MODEL, wanted, np.random.default_rng(3), simulator=stage)
+    monkeypatch.setattr(simulator, "CHUNK", 100)
+    again = run(
+        MODEL, wanted, np.random.default_rng(3), simulator=stage,
+        progress=lambda done, of: told.append((done, of)),
+    )  # fmt: skip
+    parts = list(run_parts(MODEL, wanted, np.random.default_rng(3), simulator=stage))
+    assert [len(p) for p in parts] == [100, 100, 50]
+    assert told == [(100, 250), (200, 250), (250, 250)]
+    for name in ("signals", "forces", "states"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(whole, name))
+        joined = np.concatenate([getattr(p, name) for p in parts])
+        np.testing.assert_array_equal(joined, getattr(whole, name))
+
+
+def test_each_axis_has_its_own_encoder_noise():
+    done = run(MODEL, setpoint(2000), np.random.default_rng(1), simulator=ReducedSimulator)
+    noise = done.signals[:, :, 0] - done.signals[:, :, 2]
+    assert np.std(noise, axis=0) == pytest.approx([1e-6, 5e-6], rel=0.1)
+
+
+def test_states_are_logged_under_their_names_where_they_are_few():
+    done = run(MODEL, setpoint(200), np.random.default_rng(1), simulator=ReducedSimulator)
+    states = {f.effect.name: f.effect.states for axis in EFFECTS.values() for f in axis}
+    assert len(states["gms"]) > simulator.WATCHED_STATES
+    wanted = {("x", f"lugre_{s}") for s in states["lugre"]}
+    wanted |= {("y", f"actuator_lag_{s}") for s in states["actuator_lag"]}
+    assert set(done.state_names) == wanted
+    assert done.states.shape == (200, len(wanted))
+    # the deflection of the bristles goes against their force
+    bristle = done.states[:, [a for a, _ in done.state_names].index("x")]
+    force = done.forces[:, done.table.labels.index(("x", "lugre"))]
+    assert np.corrcoef(bristle, force)[0, 1] < -0.9
+
+
+def test_a_setpoint_of_other_axes_is_refused():
+    one = MachineModel("one", {"x": MODEL.axes["x"]}, RATE)
+    with pytest.raises(InputError, match="the setpoint has 2 axes, the model 1"):
+        run(one, setpoint(5), np.random.default_rng(0), simulator=ReducedSimulator)
+
+
+# --- what broke a run ----------------------------------------------------------------------
+
+TABLE = MODEL.table()
+
+
+def broken(sample: int, axis: int, value: float, force: dict | None = None, first: int = 0) -> str:
+    """What is said of a run of 10 samples in which a signal and some forces are bad."""
+    signals, forces = np.zeros((10, 2, 4)), np.zeros((10, len(TABLE.entries)))
+    signals[sample:, axis, 2] = value
+    for (at_sample, label), size in (force or {}).items():
+        forces[at_sample, TABLE.labels.index(label)] = size
+    with pytest.raises(CannotRun) as told:
+        require_sound(signals, forces, MODEL, TABLE, first)
+    return str(told.value)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1.1 * HUGE, -1.1 * HUGE])
+def test_a_signal_that_cannot_be_is_told_with_axis_and_time(value):
+    for axis, name in enumerate(MODEL.axes):
+        said = broken(6, axis, value, first=400)
+        assert said.startswith(f"the simulation became unstable at t = 0.4060 s on axis {name}")
+        assert "lower the bandwidth" in said
+    assert "t = 0.0000 s" in broken(0, 0, value)
+
+
+def test_the_effect_whose_force_cannot_be_is_named_with_it():
+    """The force of a sample moves the next one."""
+    label = ("y", "cogging")
+    said = broken(6, 0, np.nan, {(5, label): 3e11})
+    assert "t = 0.0050 s on axis y: effect cogging gives 3e+11 N; change its values" in said
+    said = broken(6, 0, np.nan, {(6, label): np.nan})  # in the same sample
+    assert "t = 0.0060 s on axis y: effect cogging gives nan N" in said
+
+
+def test_else_the_largest_force_of_the_axis_is_named():
+    forces = {(6, ("x", "lugre")): -7.0, (6, ("x", "cable_slab")): 5.0, (6, ("y", "gms")): 90.0}
+    said = broken(6, 0, np.nan, forces)
+    assert "on axis x (its largest force is that of lugre)" in said
+    said = broken(6, 1, np.nan, forces)
+    assert "on axis y (its largest force is that of gms)" in said
+
+
+def test_what_is_large_and_finite_is_sound():
+    signals = np.full((5, 2, 4), 0.99 * HUGE)
+    require_sound(signals, np.zeros((5, len(TABLE.entries))), MODEL, TABLE)
+    assert not breakdown._bad(np.array([HUGE, -HUGE])).any()
+
+
+# --- what a user gives ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "number"),
+    [
+        (3, True), (-2.5, True), (np.float64(1.5), True), (np.int64(4), True), (0, True),
+        (True, False), (False, False), ("3", False), (None, False), ([1.0], False),
+        (float("nan"), False), (float("inf"), False), (10**400, False), (-(10**400), False),
+        (1.7e308, True),
+    ],
+)  # fmt: skip
+def test_a_number_is_finite_and_no_truth_value(value, number):
+    assert is_number(value) is number
+
+
+@pytest.mark.parametrize("kind", [InputError, CannotRun])
+def test_an_error_says_where_in_one_line_and_stays_of_its_kind(kind):
+    def fail(error):
+        with at("file a"):
+            raise error
+
+    with pytest.raises(kind, match=r"^file a: one two$") as told:
+        fail(kind("one\ntwo"))
+    assert type(told.value) is kind
+    with pytest.raises(KeyError):  # no fault of the input
+        fail(KeyError("x"))
+
+
+def test_a_toml_file_is_read_up_to_its_limit(tmp_path, monkeypatch):
+    path = tmp_path / "a.toml"
+    path.write_text("a = 1\n")
+    assert read_toml(path) == {"a": 1}
+    assert toml_document(path) == ("a = 1\n", {"a": 1})
+    monkeypatch.setattr(entries, "MOST_BYTES", 6)
+    assert read_toml(path) == {"a": 1}
+    path.write_text("a = 11\n")
+    with pytest.raises(InputError, match=rf"^{path}: is larger than 0 MB"):
+        read_toml(path)
+    monkeypatch.undo()
+    path.write_bytes(b"#" * 5_000_000)
+    assert read_toml(path) == {}
+    path.write_bytes(b"#" * 5_000_001)
+    with pytest.raises(InputError, match=r"is larger than 5 MB; give a TOML file$"):
+        read_toml(path)
+    path.write_text("a = ")
+    with pytest.raises(InputError, match="is not a TOML file"):
+        read_toml(path)
+
+
+def test_a_long_value_is_cut_in_a_message():
+    assert shown("a" * 58) == repr("a" * 58)
+    assert shown("a" * 59) == f"'{'a' * 59}..."
+    deep: list = []
+    for _ in range(100_000):
+        deep = [deep]
+    assert shown(deep) == "something too large to be shown"
+    while deep:  # to be freed without recursion
+        deep = deep[0]
+
+
+# --- work apart ----------------------------------------------------------------------------
+
+
+def doubled(value):
+    return 2 * value
+
+
+def refused(value):
+    raise InputError(f"{value} is refused")
+
+
+def endless():
+    while True:
+        pass
+
+
+def exits(code):
+    import os
+
+    os._exit(code)
+
+
+def hungry(size):
+    return len(bytearray(size))
+
+
+def test_work_apart_gives_its_answer_its_refusal_or_none():
+    assert apart(doubled, 21, seconds=20.0) == 42
+    with pytest.raises(InputError, match="7 is refused") as told:
+        apart(refused, 7, seconds=20.0)
+    assert not isinstance(told.value, NoAnswer)
+    with pytest.raises(NoAnswer, match=r"does not come to an end within 0.2 s"):
+        apart(endless, seconds=0.2)
+    with pytest.raises(NoAnswer, match="ended the program"):
+        apart(exits, 0, seconds=20.0)
+    assert apart(hungry, 10**6, seconds=20.0, memory=10**8) == 10**6
+    with pytest.raises(InputError, match="takes more memory"):
+        apart(hungry, 3 * 10**8, seconds=20.0, memory=10**8)
+
+
+def test_a_crash_has_the_name_of_its_signal():
+    assert apart_module._ended(-11) == "crashed while it was loaded (SIGSEGV)"
+    assert "ended the program" in apart_module._ended(0)
+    assert "ended the program" in apart_module._ended(None)
+
+
+def test_a_placed_simulation_begins_there_with_its_states():
+    """A structure's own mass is placed by the states of its effect."""
+    axis = replace(
+        MODEL.axes["x"],
+        effects=(effect("flexible_mode", {"load": 0.3, "frequency": 20.0, "damping": 0.1}),),
+    )
+    model = MachineModel("load", {"x": axis}, RATE)
+    table = model.table()
+    stage = MujocoSimulator(model, table)
+    states = np.arange(1.0, table.n_states + 1) / 100.0
+    stage.place(np.array([0.04]), np.array([0.7]), states, 30, origin=2.0)
+    assert stage.data.time == pytest.approx(2.0 + 30 / RATE)
+    slides = dict(zip(
+        [stage.model.joint(i).name for i in range(stage.model.njnt)],
+        zip(stage.data.qpos, stage.data.qvel, strict=True), strict=True,
+    ))  # fmt: skip
+    assert slides.pop("x") == pytest.approx((0.04, 0.7))
+    first = int(table.entries[0][3])
+    assert list(slides.values()) == [pytest.approx(tuple(states[first : first + 2]))]
+    assert SimpleNamespace(n=stage.model.njnt).n == 2
