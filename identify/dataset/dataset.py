@@ -106,10 +106,11 @@ def datasets(
 ) -> dict[str, Dataset]:
     """A dataset for each axis of the model that the logs hold and in which it moves.
 
-    logs, holdout: by name, for messages. test_function: length in s; where None, chosen from what
+    logs, holdout: by name, for messages; may be read when asked for. test_function: length in s; where None, chosen from what
     the logs hold. Raises InputError where no axis of the model moves in any log, where a signal is
     not a number, and where a held-out log is also one to fit.
     """
+    logs, holdout = dict(logs), dict(holdout)  # each is read once, and let go with this call
     _require_apart(logs, holdout)
     out: dict[str, Dataset] = {}
     for name, axis in model.axes.items():
