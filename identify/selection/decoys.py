@@ -148,11 +148,16 @@ class _Part:
         """Columns (n, k + j) of base and trial, shifted by parts of each log; None: base alone."""
         if shifts is None:
             return self.base
-        moved = [
-            np.roll(c, round(shift * len(c)), axis=0)
-            for c, shift in zip(self.columns, shifts, strict=True)
-        ]
-        return np.hstack([self.base, np.concatenate(moved)[self.kept]])
+        count = self.base.shape[1]
+        out = np.empty((len(self.force), count + self.columns[0].shape[1]))
+        out[:, :count] = self.base
+        ends = np.cumsum([len(c) for c in self.columns])[:-1]
+        row = 0
+        for c, kept, shift in zip(self.columns, np.split(self.kept, ends), shifts, strict=True):
+            moved = np.roll(c, round(shift * len(c)), axis=0)[kept]
+            out[row : row + len(moved), count:] = moved
+            row += len(moved)
+        return out
 
 
 def _ridge(columns: Array) -> Array:

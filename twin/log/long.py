@@ -13,7 +13,7 @@ from twin.log.log import Log, joined
 from twin.log.thin import thinned
 
 # Samples, all axes together. A check takes 90 bytes a sample beside 0.1 GB for the program.
-LARGEST_PART = 5_000_000
+LARGEST_PART = 2_500_000
 # A fit takes some 75 bytes a sample and more for each millisecond of motion, which no rate changes.
 MOST_SAMPLES = 7_500_000
 LONGEST_STEP = 5e-4  # s: two in a block of motion; with one the residual is half as large again
