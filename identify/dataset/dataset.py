@@ -106,7 +106,7 @@ def datasets(
 ) -> dict[str, Dataset]:
     """A dataset for each axis of the model that the logs hold and in which it moves.
 
-    logs, holdout: by name, for messages; may be read when asked for. test_function: length in s; where None, chosen from what
+    logs, holdout: by name, for messages. test_function: length in s; where None, chosen from what
     the logs hold. Raises InputError where no axis of the model moves in any log, where a signal is
     not a number, and where a held-out log is also one to fit.
     """

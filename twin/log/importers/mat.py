@@ -14,7 +14,7 @@ import scipy.io
 from numpy.typing import NDArray
 
 from twin.apart import apart
-from twin.log.container import LARGEST_RATIO
+from twin.log.chunks import LARGEST_RATIO
 from twin.log.importers import hdf5
 from twin.log.importers.mapping import ImportMap
 from twin.log.importers.table import SMALLEST_TABLE, Table, chosen, parsing, split_columns

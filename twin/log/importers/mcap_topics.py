@@ -19,7 +19,8 @@ from mcap.records import Channel, Schema
 from numpy.typing import NDArray
 
 from twin.errors import InputError
-from twin.log.container import Inflation, open_mcap, parse, payloads
+from twin.log.chunks import Inflation, payloads
+from twin.log.container import open_mcap, parse
 from twin.log.decode import message_parts, record_at
 from twin.log.importers.mapping import ImportMap
 from twin.log.importers.table import Table, chosen, extra, parsing, require_columns
