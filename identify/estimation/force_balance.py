@@ -112,7 +112,9 @@ def jacobian(
     """Derivative of the residual by these parameters, (n, n_parameters), N per unit."""
     values = read(axis, where)
     steps = np.array([difference_step(c, v) for c, v in zip(where, values, strict=True)])
-    return (changes(axis, logs, where, steps) / steps[:, None]).T
+    changed = changes(axis, logs, where, steps)
+    changed /= steps[:, None]
+    return changed.T
 
 
 def changes(

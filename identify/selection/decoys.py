@@ -154,9 +154,9 @@ class _Part:
         ends = np.cumsum([len(c) for c in self.columns])[:-1]
         row = 0
         for c, kept, shift in zip(self.columns, np.split(self.kept, ends), shifts, strict=True):
-            moved = np.roll(c, round(shift * len(c)), axis=0)[kept]
-            out[row : row + len(moved), count:] = moved
-            row += len(moved)
+            from_where = (np.flatnonzero(kept) - round(shift * len(c))) % len(c)
+            out[row : row + len(from_where), count:] = c[from_where]
+            row += len(from_where)
         return out
 
 
