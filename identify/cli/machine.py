@@ -128,7 +128,7 @@ def new(
 
     require_folder(out)
     recorded, findings = read_checked(logs)
-    model = first_model(recorded, out.stem, load_catalogue())
+    model = first_model(dict(recorded), out.stem, load_catalogue())
     save_model(model, out)
     text = f"{out}: axes {', '.join(model.axes)}; now `twin fit {out} {logs[0]} -o fitted.toml`"
     say(text, {"model": str(out), "axes": list(model.axes)}, as_json_, findings)

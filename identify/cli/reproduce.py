@@ -58,7 +58,7 @@ def reproduce(
     make_folder(out)
     if log is not None and model is not None:
         machine = machine_model(model, catalogue_with(None))
-        result = reproduce_on_logs(chapter or (), machine, read_measured(log))
+        result = reproduce_on_logs(chapter or (), machine, dict(read_measured(log)))
     else:
         with bars_on_stderr() as bars:
             result = workflow.reproduce(chapter or (), small=small, seed=seed, progress=bars)

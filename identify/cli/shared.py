@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -125,9 +125,29 @@ def with_holdout(
         return job(model, recorded, held, progress=bars), findings
 
 
+class Recordings(Mapping[str, "Log"]):
+    """Logs by name, read from their files each time that one is asked for.
+
+    So nobody holds a log for a command that is done with it: datasets() takes each once.
+    """
+
+    def __init__(self, paths: Sequence[Path], read: Callable[[Path], Log]) -> None:
+        self._paths = {str(path): path for path in paths}
+        self._read = read
+
+    def __getitem__(self, name: str) -> Log:
+        return self._read(self._paths[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._paths)
+
+    def __len__(self) -> int:
+        return len(self._paths)
+
+
 def read_measured(
     paths: Sequence[Path] | None, beside: Sequence[Path] | None = None
-) -> dict[str, Log]:
+) -> Mapping[str, Log]:
     """The logs by name, less what identification does not read: most of their memory.
 
     beside: other logs that are held in memory as well. Where all are too long, they are read at a
@@ -137,23 +157,28 @@ def read_measured(
     from twin.log.long import step_of
 
     every = step_of([*(paths or ()), *(beside or ())]) if paths else 1
-    return {str(path): said(path, read(path, MEASURED, every), every) for path in paths or ()}
+    return Recordings(paths or (), lambda path: said(path, read(path, MEASURED, every), every))
 
 
 def read_checked(
     paths: Sequence[Path] | None, beside: Sequence[Path] | None = None
-) -> tuple[dict[str, Log], list[str]]:
-    """The same, and the findings of the log check on the whole logs, one sentence each."""
+) -> tuple[Mapping[str, Log], list[str]]:
+    """The same, and the findings of the log check on the whole logs, one sentence each.
+
+    They are there when the logs have been read.
+    """
     from twin.log.long import read_checked as read
     from twin.log.long import step_of
 
     every = step_of([*(paths or ()), *(beside or ())]) if paths else 1
-    recorded, findings = {}, []
-    for path in paths or ():
+    findings: list[str] = []
+
+    def checked(path: Path) -> Log:
         log, report = read(path, MEASURED, every)
-        recorded[str(path)] = said(path, log, every)
-        findings += sentences(str(path), report)
-    return recorded, findings
+        findings.extend(sentences(str(path), report))
+        return said(path, log, every)
+
+    return Recordings(paths or (), checked), findings
 
 
 def said(path: Path, log: Log, every: int) -> Log:

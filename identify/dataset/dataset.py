@@ -19,6 +19,7 @@ from twin.effect import Excitation
 from twin.errors import InputError
 from twin.log import Log
 from twin.log.check import moves
+from twin.memory import give_back
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import AxisUnits
 
@@ -118,6 +119,17 @@ def datasets(
     the logs hold. Raises InputError where no axis of the model moves in any log, where a signal is
     not a number, and where a held-out log is also one to fit.
     """
+    out = _prepared(model, dict(logs), dict(holdout), test_function)  # each log is read once
+    give_back()
+    return out
+
+
+def _prepared(
+    model: MachineModel,
+    logs: Mapping[str, Log],
+    holdout: Mapping[str, Log],
+    test_function: float | None,
+) -> dict[str, Dataset]:
     _require_apart(logs, holdout)
     out: dict[str, Dataset] = {}
     for name, axis in model.axes.items():

@@ -139,16 +139,21 @@ class Motion:
 
         instant: where in the sample the position is taken, 0 its start, 1/2 its middle.
         """
-        velocity, command = self.raw
-        travelled = velocity * self.sample_period
-        middle = np.cumsum(travelled) - 0.5 * travelled
+        return np.stack([self.position_at_samples(instant), *self.raw])
+
+    def position_at_samples(self, instant: float) -> Array:
+        """The position alone of these, (n,) m."""
+        travelled = self.raw[0] * self.sample_period
+        middle = np.cumsum(travelled)
+        middle -= 0.5 * travelled
         middle += self.position[0] - middle[: len(middle) // len(self.position)].mean()
-        return np.stack([middle + (instant - 0.5) * travelled, velocity, command])
+        travelled *= instant - 0.5
+        return middle + travelled
 
     @cached_property
     def smoothed_position(self) -> Array:
         """Position (n,) m at the start of each sample, smoothed."""
-        return local_parabola(self.at_samples(0.0)[0], SMOOTHED)
+        return local_parabola(self.position_at_samples(0.0), SMOOTHED)
 
     @cached_property
     def command_noise(self) -> float:

@@ -21,6 +21,8 @@ from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]
 
+AT_ONCE = 500_000  # forces of several sets of parameters that are held until they are averaged
+
 
 def averaged_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
     """The force that the axis' effects add to the command, averaged by test functions (n,) N.
@@ -110,7 +112,9 @@ def jacobian(
     """Derivative of the residual by these parameters, (n, n_parameters), N per unit."""
     values = read(axis, where)
     steps = np.array([difference_step(c, v) for c, v in zip(where, values, strict=True)])
-    return (changes(axis, logs, where, steps) / steps[:, None]).T
+    changed = changes(axis, logs, where, steps)
+    changed /= steps[:, None]
+    return changed.T
 
 
 def changes(
@@ -161,8 +165,12 @@ def _differences(
         row[first : first + len(vector)] = vector
     parts = []
     for log in logs:
-        forces = total_forces(table, sets, _driven(group, log)[0])
-        parts.append(log.test_function.mean(forces if absent else forces[1:] - forces[0]))
+        motion = _driven(group, log)[0]
+        base = 0.0 if absent else total_forces(table, sets[:1], motion)
+        at_once = max(AT_ONCE // motion.signals.shape[1], 1)
+        batches = (sets[i : i + at_once] for i in range(bases, len(sets), at_once))
+        forces = (total_forces(table, batch, motion) - base for batch in batches)
+        parts.append(np.concatenate([log.test_function.mean(force) for force in forces]))
     return np.concatenate(parts, axis=1)
 
 

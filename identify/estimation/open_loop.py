@@ -53,30 +53,31 @@ def states_along(
 
     accelerated: whether a law reads the acceleration of the other axis.
     """
-    middle = 0.5 * (position[1:] + position[:-1]).T
-    velocity = between(position.T, period)
     pair = len(table.axes) == 2  # no law of a larger machine reads the other axis
-    acceleration = np.zeros_like(velocity)
+    smooth = None
     if pair and accelerated:
-        acceleration = _smooth_acceleration(velocity, period)
+        smooth = _smooth_acceleration(between(position.T, period), period)
     states = np.zeros(table.n_states)
     out = np.empty((len(starts), table.n_states))
-    rows = np.empty((len(table.entries), middle.shape[1]))
     begin = 0
-    for i, start in enumerate(starts):
-        span = slice(begin, int(start))
+    for i, start in enumerate(map(int, starts)):
+        span = slice(begin, start)
+        x = position[begin : start + 1].T
+        middle, velocity = 0.5 * (x[:, 1:] + x[:, :-1]), between(x, period)
+        acceleration = np.zeros_like(velocity) if smooth is None else smooth[:, span]
+        rows = np.empty((len(table.entries), start - begin))
         for a, (first, last, at, _, _) in enumerate(table.axes):
-            motion = np.stack([middle[a, span], velocity[a, span], command[span, a]])
+            motion = np.stack([middle[a], velocity[a], command[span, a]])
             others = np.zeros_like(motion)
             if pair:
                 b = 1 - a
-                others = np.stack([middle[b, span], velocity[b, span], acceleration[b, span]])
+                others = np.stack([middle[b], velocity[b], acceleration[b]])
             walk(
                 table.entries, first, last, table.parameters, states, at, motion, others, period,
-                begin, np.ascontiguousarray(rows[:, span]), table.masses[a], origin,
+                begin, rows, table.masses[a], origin,
             )  # fmt: skip
         out[i] = states
-        begin = int(start)
+        begin = start
     return out
 
 

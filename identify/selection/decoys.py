@@ -29,6 +29,7 @@ from twin.model.parameters import ParameterReference
 Array = NDArray[np.float64]
 Columns = Callable[[Sequence[PreparedLog]], list[Array]]
 
+AT_ONCE = 50_000  # rows of columns that are copied at once
 DECOYS = 40
 SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
 SEED = 0  # of the shifts, the same for each effect
@@ -132,7 +133,8 @@ class _Part:
     @classmethod
     def of(cls, base: Fit, logs: Sequence[PreparedLog], size: Array) -> _Part:
         force = residual(base.axis, logs)
-        own = jacobian(base.axis, logs, base.scaling.where) / size
+        own = jacobian(base.axis, logs, base.scaling.where)
+        own /= size
         return cls(logs, force, own, np.ones(len(force), dtype=bool))
 
     def of_power(self) -> _Part:
@@ -148,11 +150,17 @@ class _Part:
         """Columns (n, k + j) of base and trial, shifted by parts of each log; None: base alone."""
         if shifts is None:
             return self.base
-        moved = [
-            np.roll(c, round(shift * len(c)), axis=0)
-            for c, shift in zip(self.columns, shifts, strict=True)
-        ]
-        return np.hstack([self.base, np.concatenate(moved)[self.kept]])
+        count = self.base.shape[1]
+        out = np.empty((len(self.force), count + self.columns[0].shape[1]))
+        out[:, :count] = self.base
+        ends = np.cumsum([len(c) for c in self.columns])[:-1]
+        row = 0
+        for c, kept, shift in zip(self.columns, np.split(self.kept, ends), shifts, strict=True):
+            source = (np.flatnonzero(kept) - round(shift * len(c))) % len(c)
+            for some in np.split(source, range(AT_ONCE, len(source), AT_ONCE)):
+                out[row : row + len(some), count:] = c[some]
+                row += len(some)
+        return out
 
 
 def _ridge(columns: Array) -> Array:

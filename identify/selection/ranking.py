@@ -28,6 +28,7 @@ from identify.selection.candidates import (
 )
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
+from twin.memory import give_back
 from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]
@@ -48,6 +49,7 @@ def rank(
     is refitted from there: a base short of its optimum would give evidence to every candidate.
     """
     candidates = _tried(base, dataset, absent_effects(base.axis, catalogue), progress, workers)
+    give_back()
     supported = [c for c in candidates if c.supported]
     if supported:
         best = max(supported, key=lambda c: c.delta_bic)

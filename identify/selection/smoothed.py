@@ -66,6 +66,8 @@ class Linearised:
 
     def on(self, mask: NDArray[np.bool_]) -> Linearised:
         """The same on some of its test functions, (n,)."""
+        if mask.all():
+            return self
         return replace(self, force=self.force[mask], columns=self.columns[mask])
 
     def less(self, effect: str) -> Linearised:

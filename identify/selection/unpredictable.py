@@ -81,9 +81,16 @@ def _foretells(trial: Trial, columns: Columns, least: float, sticking: bool) -> 
 
 def _kept_small(columns: Columns, dataset: Dataset) -> Columns:
     """The same for strengths with a unit penalty that is weak beside what is often visited."""
-    every = np.linalg.norm(np.concatenate(columns(dataset.fit)), axis=0)
+    every = np.sqrt(sum(np.einsum("ij,ij->j", part, part) for part in columns(dataset.fit)))
     size = RIDGE * np.maximum(every, RIDGE * every.max())
-    return lambda logs: [part / size for part in columns(logs)]
+
+    def small(logs: Sequence[PreparedLog]) -> list[Array]:
+        parts = columns(logs)
+        for part in parts:
+            part /= size
+        return parts
+
+    return small
 
 
 def _predictors(dataset: Dataset) -> Iterator[Columns]:
@@ -108,8 +115,13 @@ class _Hats:
         return [self._of(coordinates_of(log)) for log in logs]
 
     def _of(self, where: dict[str, Array]) -> Array:
-        hats = [np.interp(where[self.name], self.knots, unit) for unit in np.eye(len(self.knots))]
-        return np.stack(hats, axis=1) * (where["direction"][:, None] if self.turned else 1.0)
+        at = where[self.name]
+        hats = np.empty((len(at), len(self.knots)))
+        for k, unit in enumerate(np.eye(len(self.knots))):
+            hats[:, k] = np.interp(at, self.knots, unit)
+        if self.turned:
+            hats *= where["direction"][:, None]
+        return hats
 
 
 def _past(logs: Sequence[PreparedLog]) -> list[Array]:

@@ -146,16 +146,22 @@ def _assumed(axis: AxisModel) -> list[tuple[Fitted, Curve]]:
 def _chosen(fit: Fit, dataset: Dataset, law: Fitted, curve: Curve) -> Shape | None:
     """The smoothing and the form at standstill with the least cross-validated error."""
     forms = (False, True) if curve.by_direction else (False,)
-    best, least = None, np.inf
-    for lets_go in forms:
-        shape = _laid(fit.axis, law, curve, dataset, lets_go)
-        mask = moving(dataset.fit, sticking(fit, shape))[fit.kept]
-        linear = Linearised.about(fit, dataset, shape.empty).on(mask)
-        stiffness = choose_stiffness(linear, COARSELY)
-        error = linear.left_out_error(stiffness)
-        if stiffness and error < least:
-            best, least = replace(shape, stiffness=stiffness), error
+    tried = [_smoothed(fit, dataset, law, curve, lets_go) for lets_go in forms]
+    best, _ = min(tried, key=lambda found: found[1])
     return best if best and (best.turns or not curve.rubs) else None
+
+
+def _smoothed(
+    fit: Fit, dataset: Dataset, law: Fitted, curve: Curve, lets_go: bool
+) -> tuple[Shape | None, float]:
+    """A form with its best smoothing, and its squared cross-validated error; None without any."""
+    shape = _laid(fit.axis, law, curve, dataset, lets_go)
+    mask = moving(dataset.fit, sticking(fit, shape))[fit.kept]
+    linear = Linearised.about(fit, dataset, shape.empty).on(mask)
+    stiffness = choose_stiffness(linear, COARSELY)
+    if not stiffness:
+        return None, np.inf
+    return replace(shape, stiffness=stiffness), linear.left_out_error(stiffness)
 
 
 def _has(axis: AxisModel, shape: Shape) -> bool:

@@ -258,7 +258,7 @@ def _errors(axis: AxisModel, log: PreparedLog, begun: Beginning) -> tuple[Array,
 
 def _trace(log: PreparedLog, first: int, rest: Array, own: Array) -> Trace:
     step = round(SHOWN_EVERY / log.motion.sample_period)
-    measured = log.motion.at_samples(0.0)[0][first:]
+    measured = log.motion.position_at_samples(0.0)[first:]
     time = np.asarray((first + np.arange(len(measured))) * log.motion.sample_period)
     simulated = (np.asarray(measured + error)[::step] for error in (rest, own))
     return Trace(time[::step], measured[::step], *simulated)

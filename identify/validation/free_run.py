@@ -77,7 +77,9 @@ def drift_of_noise(model: MachineModel, logs: Mapping[str, PreparedLog], run: Fr
     error.
     """
     noisy = free_run(model, logs, noise=np.random.default_rng(SEED))
-    return FreeRun({a: noisy.error[a] - run.error[a] for a in run.error}, run.horizon)
+    for axis, error in run.error.items():
+        noisy.error[axis] -= error
+    return noisy
 
 
 def _signals(
@@ -91,7 +93,7 @@ def _signals(
             position[:, i] = next(iter(logs.values())).motion.others[0].mean()
             continue
         motion = logs[axis].motion
-        position[:, i] = motion.at_samples(0.0)[0][:n]
+        position[:, i] = motion.position_at_samples(0.0)[:n]
         command[:, i] = motion.raw[1][:n]
         if noise is not None:
             found = noise_of(model.axes[axis], motion)

@@ -14,9 +14,16 @@ from twin.errors import InputError, at
 from twin.log.container import Damaged, Record
 from twin.log.instants import seconds
 from twin.log.layout import Block
-from twin.log.log import AxisLog, Log
+from twin.log.log import Array, AxisLog, Log
 from twin.log.series import JITTER, Series
-from twin.log.topics import AXIS_PREFIX, Topic, Topics, positive_number
+from twin.log.topics import (
+    AXIS_PREFIX,
+    TRUTH_PREFIX,
+    Topic,
+    Topics,
+    axis_of,
+    positive_number,
+)
 
 METADATA_NAME = "twin"
 CHECKSUM = "checksum"  # entry of the metadata, as their record has none
@@ -31,11 +38,11 @@ class Wanted:
     fields: Sequence[str] | None = None
     truth: bool = True
 
-    def takes(self, topic: Topic) -> bool:
+    def takes(self, topic: str) -> bool:
         """Whether samples of a topic are wanted."""
-        if self.axes is not None and topic.axis not in self.axes:
+        if self.axes is not None and axis_of(topic) not in self.axes:
             return False
-        return self.truth or not topic.is_truth
+        return topic.startswith(AXIS_PREFIX) or (self.truth and topic.startswith(TRUTH_PREFIX))
 
 
 EVERYTHING = Wanted()
@@ -122,7 +129,7 @@ class Run:
 
     def _open(self, channel: int) -> Series | None:
         topic = self._topics.topic(channel, b"")
-        if topic is None or not self._wanted.takes(topic):
+        if topic is None or not self._wanted.takes(topic.name):
             return None
         if any(s.topic.name == topic.name for s in self._opened()):
             raise InputError(f"two channels have the topic {topic.name}; write one a topic")
@@ -131,18 +138,20 @@ class Run:
             return Series(topic, self._capacities.get(channel, 0), fields)
 
     def _opened(self) -> list[Series]:
-        return [s for s in self._series.values() if s is not None]
+        return [s for _, s in sorted(self._series.items()) if s is not None]
 
     @property
     def counts(self) -> dict[int, int]:
         """Samples by channel."""
         return {c: series.count for c, series in self._series.items() if series is not None}
 
-    def holds(self, samples: int) -> bool:
-        """Whether every topic has so many samples or more, all from the same time to the same."""
+    def holds(self, samples: int, topics: int) -> bool:
+        """Whether so many topics have so many samples or more, all from one time to the same."""
         series = self._opened()
         alike = {(s.start, s.count) for s in series}
-        return len(alike) == 1 and series[0].count >= samples and series[0].rate_is_stated
+        if len(series) != topics or len(alike) != 1:
+            return False
+        return series[0].count >= samples and series[0].rate_is_stated
 
     def spans(self) -> dict[str, slice]:
         """Topic -> the samples of it that all topics have in common."""
@@ -154,14 +163,6 @@ class Run:
         begin = max(first)
         end = max(begin, min(f + s.count for f, s in zip(first, series, strict=True)))
         return {s.topic.name: slice(begin - f, end - f) for f, s in zip(first, series, strict=True)}
-
-    def start(self) -> int:
-        """Time in ns of the first sample that all topics have in common."""
-        return max((s.start for s in self._opened()), default=0)
-
-    def common_count(self) -> int:
-        """Number of samples that all topics have in common."""
-        return next((s.stop - s.start for s in self.spans().values()), 0)
 
     def require_behind(self, before: Run) -> None:
         """Raise InputError where this does not begin where the run before ended."""
@@ -190,7 +191,7 @@ class Run:
     def log(self, extras: Extras) -> Log:
         """The log; raises InputError where topics differ in time or something is missing."""
         self._check_axes()
-        self._sample_rate(extras)
+        common_rate(self._opened(), extras)
         spans = self.spans()
         for series in self._opened():
             if spans[series.topic.name] != slice(0, series.count):
@@ -205,32 +206,10 @@ class Run:
     def trimmed_log(self, extras: Extras) -> Log:
         """The log of the samples all topics have in common; raises InputError."""
         self._check_axes()
-        rate = self._sample_rate(extras)
+        rate = common_rate(self._opened(), extras)
         spans = self.spans()
-        axes, truth = {}, {}
-        for series in self._opened():
-            topic = series.topic
-            columns = series.columns(spans[topic.name])
-            if topic.is_truth:
-                truth[topic.axis] = columns
-                continue
-            with at(topic.name):
-                axes[topic.axis] = AxisLog(columns, topic.units, topic.force_constant)
-        return Log(rate, axes, extras.metadata, truth, extras.attachments)
-
-    def _sample_rate(self, extras: Extras) -> float:
-        rates = {s.topic.name: s.sample_rate() for s in self._opened()}
-        stated = positive_number(extras.metadata, "sample_rate_hz")
-        if stated is not None:
-            rates["the metadata"] = stated
-        rate = next(iter(rates.values()))
-        for name, other in rates.items():
-            if abs(other - rate) > 1e-9 * rate:
-                raise InputError(
-                    f"{next(iter(rates))} is sampled at {rate:.9g} Hz, {name} says {other:.9g} Hz; "
-                    "write all axes at one rate, or convert with: twin import"
-                )
-        return rate
+        columns = ((s.topic, s.columns(spans[s.topic.name])) for s in self._opened())
+        return assembled(columns, rate, extras)
 
     def _check_axes(self) -> None:
         axes = [s for s in self._opened() if not s.topic.is_truth and s.count]
@@ -245,15 +224,7 @@ class Run:
                 "rename them, or convert the log with: twin import"
             )
         for series in axes:
-            fields = series.topic.fields
-            if "position" in fields and ("current" in fields or "force" in fields):
-                continue
-            missing = "position" if "position" not in fields else "current or force"
-            raise InputError(
-                f"{series.topic.name} has no {missing}; fields in its messages: "
-                f"{', '.join(series.topic.codec.fields) or 'none'}; rename or add the field, "
-                "or convert the log with: twin import"
-            )
+            require_fields(series.topic)
 
     def _refuse_axis(self, wanted: str) -> None:
         topics = sorted(c.topic for c in self._topics.channels.values())
@@ -262,3 +233,46 @@ class Run:
             f"no samples on topic {AXIS_PREFIX}{wanted}; topics in the file: "
             f"{', '.join(topics) or 'none'}; name an axis of these: {', '.join(axes) or 'none'}"
         )
+
+
+def require_fields(topic: Topic) -> None:
+    """Raise InputError where an axis has no position, or neither current nor force."""
+    fields = topic.fields
+    if "position" in fields and ("current" in fields or "force" in fields):
+        return
+    missing = "position" if "position" not in fields else "current or force"
+    raise InputError(
+        f"{topic.name} has no {missing}; fields in its messages: "
+        f"{', '.join(topic.codec.fields) or 'none'}; rename or add the field, "
+        "or convert the log with: twin import"
+    )
+
+
+def common_rate(series: Sequence[Series], extras: Extras) -> float:
+    """The sample rate of all series, Hz; raises InputError where they or the metadata differ."""
+    rates = {s.topic.name: s.sample_rate() for s in series}
+    stated = positive_number(extras.metadata, "sample_rate_hz")
+    if stated is not None:
+        rates["the metadata"] = stated
+    rate = next(iter(rates.values()))
+    for name, other in rates.items():
+        if abs(other - rate) > 1e-9 * rate:
+            raise InputError(
+                f"{next(iter(rates))} is sampled at {rate:.9g} Hz, {name} says {other:.9g} Hz; "
+                "write all axes at one rate, or convert with: twin import"
+            )
+    return rate
+
+
+def assembled(
+    columns: Iterable[tuple[Topic, dict[str, Array]]], rate: float, extras: Extras
+) -> Log:
+    """The log of topics with their columns, sampled at ``rate`` (Hz); raises InputError."""
+    axes, truth = {}, {}
+    for topic, own in columns:
+        if topic.is_truth:
+            truth[topic.axis] = own
+            continue
+        with at(topic.name):
+            axes[topic.axis] = AxisLog(own, topic.units, topic.force_constant)
+    return Log(rate, axes, extras.metadata, truth, extras.attachments)

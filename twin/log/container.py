@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
+import math
 import os
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
-import lz4.frame
-import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Footer, Statistics
+from mcap.records import Channel, ChunkIndex, DataEnd, Footer, Statistics
 
 from twin.errors import InputError, at
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
-LOOSE_BYTES = 1 << 20  # messages outside chunks are decoded in batches of this size
-SMALLEST_INFLATION = 1 << 24  # bytes, whatever the size of the file
-LARGEST_RATIO = 256
-LARGEST_BOMB = 1 << 27  # bytes of a chunk that shrank by more than is usual
-USUAL_RATIO = 16
-_SIZE_INSIDE, _CHECKSUM = slice(16, 24), slice(24, 28)  # of the content of a chunk
 _FOOTER_SIZE = RECORD_HEAD.size + 20
 IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
@@ -55,14 +49,6 @@ class Record:
     def parsed(self, kind: type[T]) -> T:
         """The content as a record class of ``mcap.records``; raises Damaged."""
         return parse(kind, self.content, f"{kind.__name__} record at byte {self.offset}")
-
-
-@dataclass(frozen=True)
-class Payload:
-    """Schema, channel and message records as they stand in a chunk, decompressed."""
-
-    place: str
-    data: bytes
 
 
 def parse(kind: type[T], content: bytes, place: str) -> T:
@@ -134,23 +120,41 @@ class McapFile:
         """The channels, as the summary lists them."""
         return self._summarised(Opcode.CHANNEL, Channel)
 
-    def records_between(self, start: float, stop: float) -> Iterator[Record]:
-        """Records before the first chunk, and the chunks with messages from ``start`` on, ns.
+    def definitions(self) -> list[Record]:
+        """The schemas and channels, as the summary lists them."""
+        return [r for r in self._summary if r.opcode in (Opcode.SCHEMA, Opcode.CHANNEL)]
 
-        All records where the summary has no index of the chunks.
+    @cached_property
+    def _chunks(self) -> list[ChunkIndex]:
+        return self._summarised(Opcode.CHUNK_INDEX, ChunkIndex)
+
+    def selected(
+        self, channels: Container[int], start: float = -math.inf, stop: float = math.inf
+    ) -> Iterator[Record]:
+        """Records before the first chunk, and the chunks with messages of some channels and times.
+
+        start, stop: ns. All records where the summary has no index of the chunks.
         """
-        chunks = self._summarised(Opcode.CHUNK_INDEX, ChunkIndex)
-        if not chunks:
+        if not self._chunks:
             yield from self.records()
             return
-        first = min(c.chunk_start_offset for c in chunks)
+        first = min(c.chunk_start_offset for c in self._chunks)
         for record in self.records():
             if record.offset >= first:
                 break
             yield record
-        for chunk in sorted(chunks, key=lambda c: c.message_start_time):
-            if chunk.message_end_time >= start and chunk.message_start_time < stop:
+        for chunk in sorted(self._chunks, key=lambda c: c.message_start_time):
+            between = chunk.message_end_time >= start and chunk.message_start_time < stop
+            if between and _holds(chunk, channels):
                 yield self._record(chunk.chunk_start_offset, self._data_end)
+
+    def records_with(self, channels: Container[int]) -> Iterator[Record]:
+        """All records but the chunks that hold messages of other channels alone.
+
+        Those are read as well, so that the checksum of the data section covers them.
+        """
+        held = {c.chunk_start_offset: _holds(c, channels) for c in self._chunks}
+        return (record for record in self.records() if held.get(record.offset, True))
 
     def _record(self, offset: int, end: int) -> Record:
         head = self._read_at(offset, RECORD_HEAD.size)
@@ -183,6 +187,12 @@ class McapFile:
             )
 
 
+def _holds(chunk: ChunkIndex, channels: Container[int]) -> bool:
+    """Whether a chunk may have messages of these channels; an index may leave out its channels."""
+    held = chunk.message_index_offsets
+    return not held or any(channel in channels for channel in held)
+
+
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
     """Name the file in every failure of reading it, and make each an InputError."""
@@ -202,91 +212,3 @@ def open_mcap(path: Path) -> Iterator[McapFile]:
     """Open ``path``; every failure is an InputError that names the file."""
     with reading(path), open(path, "rb") as stream:
         yield McapFile(stream, os.fstat(stream.fileno()).st_size)
-
-
-class Inflation:
-    """How many bytes the chunks of one file may decompress to, told from the file's own size.
-
-    Samples at rest shrink to a fiftieth, others to a half: a file of kB that announces GB has none.
-    """
-
-    def __init__(self, file_size: int) -> None:
-        self._most = self._left = SMALLEST_INFLATION + LARGEST_RATIO * file_size
-
-    def take(self, size: int, stored: int) -> None:
-        """Take the bytes of a chunk that is stored in so many; raises Damaged."""
-        if size > max(LARGEST_BOMB, USUAL_RATIO * stored):
-            raise Damaged(f"announces {size} bytes, but has {stored}")
-        if size > self._left:
-            raise Damaged(
-                f"announces {size} bytes; the chunks of a file of this size decompress to at most "
-                f"{self._most}"
-            )
-        self._left -= size
-
-
-def open_chunk(record: Record, budget: Inflation) -> Payload:
-    """Decompress a chunk and verify its size and checksum; raises Damaged."""
-    place = f"chunk at byte {record.offset}"
-    chunk = record.parsed(Chunk)
-    with at(place):
-        return Payload(place, decompressed(chunk, budget))
-
-
-def has_checksum(record: Record) -> bool:
-    """Whether a chunk states the checksum of its samples; that of no samples is 0."""
-    return any(record.content[_CHECKSUM]) or not any(record.content[_SIZE_INSIDE])
-
-
-def decompressed(chunk: Chunk, budget: Inflation) -> bytes:
-    """The records in a chunk, of the size it states and with the checksum; raises Damaged."""
-    budget.take(chunk.uncompressed_size, len(chunk.data))
-    data = _decompress(chunk)
-    if len(data) != chunk.uncompressed_size:
-        raise Damaged(f"{len(data)} bytes where {chunk.uncompressed_size} are announced")
-    if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-        raise Damaged("wrong checksum")
-    return data
-
-
-def _decompress(chunk: Chunk) -> bytes:
-    size = chunk.uncompressed_size
-    try:
-        match chunk.compression:
-            case "":
-                return chunk.data
-            case "zstd":
-                if zstandard.frame_content_size(chunk.data) not in (-1, size):
-                    raise Damaged("its size and that of its zstd frame differ")
-                return zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
-            case "lz4":
-                return lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size)
-    except (zstandard.ZstdError, RuntimeError, EOFError) as error:
-        raise Damaged(f"the {chunk.compression} data cannot be decompressed") from error
-    raise Damaged(f"compression {chunk.compression!r} is not one of zstd, lz4 or none")
-
-
-def payloads(
-    records: Iterator[Record], other: Callable[[Record], None], budget: Inflation
-) -> Iterator[Payload]:
-    """Chunks, and messages outside chunks joined to batches; the rest goes to ``other``."""
-    batch, start = bytearray(), 0
-    checked: set[bool] = set()  # a writer gives every chunk its checksum, or none
-    for record in records:
-        if record.opcode in IN_CHUNKS:
-            start = start if batch else record.offset
-            batch += RECORD_HEAD.pack(record.opcode, len(record.content)) + record.content
-        if batch and (record.opcode == Opcode.CHUNK or len(batch) >= LOOSE_BYTES):
-            yield Payload(f"messages from byte {start}", bytes(batch))
-            batch.clear()
-        if record.opcode == Opcode.CHUNK:
-            checked.add(has_checksum(record))
-            if len(checked) > 1:
-                raise Damaged(
-                    f"chunk at byte {record.offset}: some chunks have a checksum and some have none"
-                )
-            yield open_chunk(record, budget)
-        elif record.opcode not in IN_CHUNKS:
-            other(record)
-    if batch:
-        yield Payload(f"messages from byte {start}", bytes(batch))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,15 +14,8 @@ from mcap.opcode import Opcode
 
 from twin.errors import InputError, at
 from twin.log.assemble import EVERYTHING, Extras, Run, Wanted
-from twin.log.container import (
-    IN_CHUNKS,
-    RECORD_HEAD,
-    Damaged,
-    Inflation,
-    McapFile,
-    open_mcap,
-    payloads,
-)
+from twin.log.chunks import Inflation, payloads
+from twin.log.container import IN_CHUNKS, RECORD_HEAD, Damaged, McapFile, Record, open_mcap
 from twin.log.layout import Block, MessageLayout, RowLayout
 from twin.log.log import Log
 from twin.log.topics import AXIS_PREFIX, Topics
@@ -44,9 +37,9 @@ def read_log(
 
     axes, fields: by name, None for all. truth: whether the simulator's truth is read too, which
     takes more than half of the memory. start, stop: times in s of the log; the first sample is the
-    first from ``start`` on. Of a log with an index only the chunks between them are read.
+    first from ``start`` on. Of a log with an index only the chunks with what is asked for are read.
 
-    Every checksum is verified, and the samples must be complete, evenly spaced and finite.
+    Every checksum of these is verified, and the samples must be complete, evenly spaced and finite.
     Raises InputError otherwise, and where no axis has position and one of current and force.
     """
     wanted = Wanted(axes, fields, truth)
@@ -62,16 +55,20 @@ def read_parts(
     """The same log without truth in parts of ``samples`` or a few more, one after the other.
 
     So that a long one need not be held in memory; the whole is verified when the last part was
-    taken. Raises InputError as read_log does. A log that does not state its sample rate, or whose
-    topics do not lie side by side, is one part.
+    taken. Raises InputError as read_log does. A log that does not state its sample rate, that has
+    no statistics, or whose topics do not lie side by side, is one part.
     """
-    with _remedied(path):
-        yield from _parts(Path(path), Wanted(None, fields, truth=False), samples)
+    wanted = Wanted(None, fields, truth=False)
+    with _remedied(path), open_mcap(Path(path)) as file:
+        yield from _parts(file, file.records_with(_channels(file, wanted)), wanted, samples)
 
 
 def read_strictly(path: Path, wanted: Wanted = EVERYTHING) -> Log:
     """``read_log`` without the remedy in its messages."""
-    return next(_parts(path, wanted, None))
+    with open_mcap(path) as file:
+        everything = wanted == EVERYTHING
+        records = file.records() if everything else file.selected(_channels(file, wanted))
+        return next(_parts(file, records, wanted, None))
 
 
 def samples_by_axis(path: str | Path) -> dict[str, int]:
@@ -95,25 +92,25 @@ def _remedied(path: str | Path) -> Iterator[None]:
         ) from error
 
 
-def _parts(path: Path, wanted: Wanted, samples: int | None) -> Iterator[Log]:
+def _parts(
+    file: McapFile, records: Iterator[Record], wanted: Wanted, samples: int | None
+) -> Iterator[Log]:
     """The log in parts of ``samples`` or a few more; whole where None."""
-    with open_mcap(path) as file:
-        topics, extras, counts = Topics(), Extras(), Counter[int]()
-        decoder = Decoder(topics)
-        room = _capacities(file, samples)
-        run = before = Run(topics, wanted, room)
-        for payload in payloads(file.records(), extras.add, Inflation(file.size)):
-            if samples is not None and run.holds(samples):
-                run.require_behind(before)
-                counts.update(run.counts)
-                yield run.log(extras)
-                run, before = Run(topics, wanted, room), run
-            with at(payload.place):
-                run.extend(decoder.blocks(payload.data))
-        counts.update(run.counts)
-        _check_counts(file, topics, counts)
-        run.require_behind(before)
-        yield run.log(extras)
+    topics, extras, counts = _topics(file), Extras(), Counter[int]()
+    decoder, room, every = Decoder(topics), _capacities(file, samples), _with_samples(file, wanted)
+    run = before = Run(topics, wanted, room)
+    for payload in payloads(records, extras.add, Inflation(file.size)):
+        if samples is not None and run.holds(samples, every):
+            run.require_behind(before)
+            counts.update(run.counts)
+            yield run.log(extras)
+            run, before = Run(topics, wanted, room), run
+        with at(payload.place):
+            run.extend(decoder.blocks(payload.data))
+    counts.update(run.counts)
+    _check_counts(file, topics, counts)
+    run.require_behind(before)
+    yield run.log(extras)
 
 
 def read_between(path: Path, wanted: Wanted, start: float, stop: float) -> Log:
@@ -121,13 +118,34 @@ def read_between(path: Path, wanted: Wanted, start: float, stop: float) -> Log:
     if not start < stop:
         raise InputError(f"{path}: start = {start:g} s is not before stop = {stop:g} s")
     with open_mcap(path) as file:
-        topics, extras = Topics(), Extras()
+        topics, extras = _topics(file), Extras()
         decoder, run = Decoder(topics), Run(topics, wanted)
-        records = file.records_between(round(start * 1e9), min(stop * 1e9, 2.0**63))
+        span = round(start * 1e9), min(stop * 1e9, 2.0**63)
+        records = file.selected(_channels(file, wanted), *span)
         for payload in payloads(records, extras.add, Inflation(file.size)):
             with at(payload.place):
                 run.extend(decoder.blocks(payload.data))
         return run.between(extras, start, stop)
+
+
+def _topics(file: McapFile) -> Topics:
+    """The topics as the summary lists them, whose chunks may never be read."""
+    topics = Topics()
+    for record in file.definitions():
+        topics.register(record.opcode, record.content)
+    return topics
+
+
+def _channels(file: McapFile, wanted: Wanted) -> Container[int]:
+    """The channels that are wanted; all where the summary lists none."""
+    listed = file.channels()
+    return {c.id for c in listed if wanted.takes(c.topic)} if listed else range(1 << 16)
+
+
+def _with_samples(file: McapFile, wanted: Wanted) -> int:
+    """How many wanted topics have samples, as the statistics announce them; 0 where unknown."""
+    counts = file.statistics.channel_message_counts if file.statistics else {}
+    return sum(counts.get(c.id, 0) > 0 for c in file.channels() if wanted.takes(c.topic))
 
 
 def _check_counts(file: McapFile, topics: Topics, counts: Mapping[int, int]) -> None:
@@ -155,7 +173,7 @@ class Decoder:
 
     def __init__(self, topics: Topics) -> None:
         self._topics = topics
-        self._layout: RowLayout | None = None
+        self._layouts: dict[int, RowLayout] = {}  # by the channel of their first message
         self._registered = 0  # schemas and channels in the present chunk
 
     def blocks(self, data: bytes) -> Iterator[Block]:
@@ -165,19 +183,21 @@ class Decoder:
         """
         self._registered = 0
         offset = self._register_leading(data)
-        for layout in self._layouts(data, offset):
+        for layout in self._likely(data, offset):
             rows = layout.rows(data, offset)
             if rows is not None:
                 yield from layout.blocks(rows)
                 offset += rows.nbytes
-                self._layout = layout
+                self._layouts[layout.messages[0].channel] = layout
                 break
         yield from self._message_blocks(data, offset)
 
-    def _layouts(self, data: bytes, offset: int) -> Iterator[RowLayout]:
-        """Layouts to try: the one of the chunk before, and what the first messages look like."""
-        if self._layout is not None:
-            yield self._layout
+    def _likely(self, data: bytes, offset: int) -> Iterator[RowLayout]:
+        """Layouts to try: that of the chunk that began alike, what the first messages look like."""
+        if len(data) - offset >= RECORD_HEAD.size + _MESSAGE_HEAD.size:
+            channel = _MESSAGE_HEAD.unpack_from(data, offset + RECORD_HEAD.size)[0]
+            if channel in self._layouts:
+                yield self._layouts[channel]
         inferred = self._infer(data, offset)
         if inferred is not None:
             yield inferred

@@ -10,13 +10,19 @@ from pathlib import Path
 from typing import BinaryIO, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.files import recording, replacing
 from twin.log.assemble import CHECKSUM, METADATA_NAME, checksum
 from twin.log.layout import sample_times
 from twin.log.log import Array, Log
-from twin.log.outline import Outline, Samples, outline, outline_of_topics, samples_of
+from twin.log.outline import (
+    Outline,
+    Planned,
+    Samples,
+    outline,
+    outline_of_topics,
+    samples_of,
+)
 from twin.log.writer import McapWriter, PackedChunk, encoded, pack
 
 CHUNK_BYTES = 1 << 20
@@ -89,29 +95,35 @@ def _written(
     sample_rate: float,
     attachments: Mapping[str, bytes],
 ) -> Iterator[int]:
-    """Write a whole file; yields the number of samples written after each chunk.
+    """Write a whole file; yields the number of samples written after each stretch of them.
 
-    Every chunk begins with all schemas and channels: any one of them can be read alone.
+    Of a stretch every topic has a chunk of its own, so that one can be read without the others.
+    Every chunk begins with its schema and channel: any one of them can be read alone.
     """
     writer = McapWriter(stream)
     proof = {CHECKSUM: checksum(plan.metadata)}
     writer.add_metadata(METADATA_NAME, {**plan.metadata, **proof})
     for name, data in attachments.items():
         writer.add_attachment(name, data)
-    head = encoded([*plan.schemas, *plan.channels])
-    most = max(1, CHUNK_BYTES // plan.layout.dtype.itemsize)
+    most = max(1, CHUNK_BYTES // plan.row_bytes)
+    stretches = _in_chunks(parts, most)
+    # The axes come last, so that what a killed run leaves of a stretch is seldom some axes alone.
+    chunks = (
+        (topic, first, columns)
+        for first, samples in stretches
+        for topic, columns in reversed(list(zip(plan.topics, samples, strict=True)))
+    )
 
-    def chunk(item: tuple[int, Samples]) -> PackedChunk:
-        first, samples = item
-        times = sample_times(first, _count(samples), sample_rate)
-        return _pack_rows(plan, head, first, times, samples)
+    def chunk(item: tuple[Planned, int, Mapping[str, Array]]) -> PackedChunk:
+        return _packed(*item, sample_rate)
 
     written = 0
-    for packed in _ordered(chunk, _in_chunks(parts, most)):
+    for packed in _ordered(chunk, chunks):
         writer.add_chunk(packed)
-        written += len(packed.times)
-        yield written
-    writer.finish(plan.schemas, plan.channels)
+        if packed.channel == plan.topics[0].channel.id:
+            written += len(packed.times)
+            yield written
+    writer.finish(plan.schemas, [topic.channel for topic in plan.topics])
 
 
 def _in_chunks(parts: Iterable[Samples], most: int) -> Iterator[tuple[int, Samples]]:
@@ -143,22 +155,23 @@ def _behind(before: Samples, after: Samples) -> Samples:
     )
 
 
-def _pack_rows(
-    plan: Outline, head: bytes, first: int, times: NDArray[np.int64], samples: Samples
+def _packed(
+    topic: Planned, first: int, columns: Mapping[str, Array], sample_rate: float
 ) -> PackedChunk:
-    size = plan.layout.dtype.itemsize
+    """The chunk of a topic's samples from number ``first`` on."""
+    head, layout = encoded([topic.schema, topic.channel]), topic.layout
+    times = sample_times(first, len(next(iter(columns.values()))), sample_rate)
+    size = layout.dtype.itemsize
     buffer = np.empty(len(head) + len(times) * size, np.uint8)
     buffer[: len(head)] = np.frombuffer(head, np.uint8)
-    rows = buffer[len(head) :].view(plan.layout.dtype)
-    plan.layout.fill_constants(rows)
-    for (_, records), columns in zip(plan.layout.parts(rows), samples, strict=True):
-        records[".sequence"] = np.arange(first, first + len(rows))
-        records[".log_time"] = records[".publish_time"] = times
-        for name, column in columns.items():
-            records[name] = column
-    row_starts = len(head) + size * np.arange(len(times))
-    offsets = {m.channel: row_starts + o for m, o in plan.layout.offsets()}
-    return pack(buffer.data, times, offsets)
+    messages = buffer[len(head) :].view(layout.dtype)
+    messages[:] = layout.template
+    messages[".sequence"] = np.arange(first, first + len(messages))
+    messages[".log_time"] = messages[".publish_time"] = times
+    for name, column in columns.items():
+        messages[name] = column
+    offsets = len(head) + size * np.arange(len(times))
+    return pack(buffer.data, times, topic.channel.id, offsets)
 
 
 def _ordered(function: Callable[[S], T], items: Iterable[S]) -> Iterator[T]:

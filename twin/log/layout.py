@@ -1,8 +1,8 @@
-"""How samples lie in a chunk: rows of fixed size, one message a channel, the same every sample.
+"""How samples lie in a chunk: messages of fixed size, or rows of them, one of each channel.
 
 A message record is opcode u1, length u8, channel u2, sequence u4, log_time u8, publish_time u8
 (little-endian), then the payload: literal bytes and 8-byte values in turn. One packed NumPy
-structure describes a whole row, so a chunk is written and read column by column.
+structure describes a message or a row, so a chunk is written and read column by column.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import accumulate
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -103,19 +102,9 @@ class RowLayout:
         """Packed structure of a row; its fields are the message records "0", "1", ..."""
         return np.dtype([(str(i), m.dtype) for i, m in enumerate(self.messages)])
 
-    def offsets(self) -> Iterator[tuple[MessageLayout, int]]:
-        """Each message layout with the byte of a row where its records begin."""
-        sizes = (m.dtype.itemsize for m in self.messages)
-        return zip(self.messages, accumulate(sizes, initial=0), strict=False)
-
     def parts(self, rows: np.ndarray) -> Iterator[tuple[MessageLayout, np.ndarray]]:
         """Each message layout with its records, a view into ``rows``."""
         return ((m, rows[str(i)]) for i, m in enumerate(self.messages))
-
-    def fill_constants(self, rows: np.ndarray) -> None:
-        """Write what is the same in every row."""
-        for message, records in self.parts(rows):
-            records[:] = message.template
 
     def rows(self, data: bytes, offset: int) -> np.ndarray | None:
         """As many whole rows as ``data`` holds from ``offset``, or None where they differ."""

@@ -11,9 +11,10 @@ from twin.log.check.report import CheckReport
 from twin.log.decode import read_parts, samples_by_axis
 from twin.log.log import Log, joined
 from twin.log.thin import thinned
+from twin.memory import give_back
 
 # Samples, all axes together. A check takes 90 bytes a sample beside 0.1 GB for the program.
-LARGEST_PART = 5_000_000
+LARGEST_PART = 2_500_000
 # A fit takes some 75 bytes a sample and more for each millisecond of motion, which no rate changes.
 MOST_SAMPLES = 7_500_000
 LONGEST_STEP = 5e-4  # s: two in a block of motion; with one the residual is half as large again
@@ -62,6 +63,7 @@ def _checked(parts: Iterable[Log], reports: list[Part]) -> Iterator[Log]:
     for part in parts:
         stop = start + len(part) * part.period
         reports.append(Part(start, stop, check_log(part)))
+        give_back()
         yield part
         start = stop
 

@@ -13,7 +13,7 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from twin.errors import InputError, at
 from twin.log.assemble import CHECKSUM, SCHEMA_VERSION
 from twin.log.instants import seconds
-from twin.log.layout import MessageLayout, RowLayout
+from twin.log.layout import MessageLayout
 from twin.log.log import Array, AxisLog, Log
 from twin.log.schema import (
     AXIS_SAMPLE,
@@ -44,13 +44,30 @@ Samples = tuple[Mapping[str, Array], ...]
 
 
 @dataclass(frozen=True)
+class Planned:
+    """One topic of a file: its schema, channel and the layout of its messages."""
+
+    schema: Schema
+    channel: Channel
+    layout: MessageLayout
+
+
+@dataclass(frozen=True)
 class Outline:
     """Everything but the samples."""
 
     metadata: dict[str, str]
-    schemas: tuple[Schema, ...]
-    channels: tuple[Channel, ...]
-    layout: RowLayout
+    topics: tuple[Planned, ...]
+
+    @property
+    def schemas(self) -> tuple[Schema, ...]:
+        """Each once."""
+        return tuple({topic.schema.id: topic.schema for topic in self.topics}.values())
+
+    @property
+    def row_bytes(self) -> int:
+        """Size of one message of every topic."""
+        return sum(topic.layout.dtype.itemsize for topic in self.topics)
 
 
 def outline(log: Log) -> Outline:
@@ -97,27 +114,17 @@ def _checked(topics: Sequence[Signals], count: int, sample_rate: float, first: i
 
 def _planned(topics: Sequence[Signals], metadata: dict[str, str]) -> Outline:
     schemas: dict[bytes, Schema] = {}
-    channels, messages = [], []
+    planned = []
     for number, signals in enumerate(topics, 1):
         data = file_descriptor_set(signals.message, signals.numbers)
         new = Schema(len(schemas) + 1, data, SchemaEncoding.Protobuf, signals.message)
         schema = schemas.setdefault(data, new)
-        channels.append(
-            Channel(
-                number,
-                signals.topic,
-                MessageEncoding.Protobuf,
-                dict(signals.metadata),
-                schema.id,
-            )
+        channel = Channel(
+            number, signals.topic, MessageEncoding.Protobuf, dict(signals.metadata), schema.id
         )
-        messages.append(MessageLayout(number, protobuf_segments(signals.numbers)))
-    return Outline(
-        metadata=metadata,
-        schemas=tuple(schemas.values()),
-        channels=tuple(channels),
-        layout=RowLayout(tuple(messages)),
-    )
+        layout = MessageLayout(number, protobuf_segments(signals.numbers))
+        planned.append(Planned(schema, channel, layout))
+    return Outline(metadata, tuple(planned))
 
 
 def _axis_signals(log: Log) -> Iterator[Signals]:

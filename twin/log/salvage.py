@@ -10,9 +10,10 @@ from mcap.opcode import Opcode
 from mcap.records import ChunkIndex, Footer
 
 from twin.errors import InputError, at
-from twin.log import container
+from twin.log import chunks
 from twin.log.assemble import Extras
-from twin.log.container import IN_CHUNKS, MAGIC, RECORD_HEAD, Inflation, Record, open_chunk
+from twin.log.chunks import Inflation, open_chunk
+from twin.log.container import IN_CHUNKS, MAGIC, RECORD_HEAD, Record
 from twin.log.decode import Decoder
 from twin.log.layout import Block
 from twin.log.scan import FoundChunk, FoundChunks
@@ -139,7 +140,7 @@ class Salvage:
 
     def _add_loose(self, record: Record) -> None:
         batch = next(reversed(self._loose.values()), None)
-        if batch is None or len(batch) >= container.LOOSE_BYTES:
+        if batch is None or len(batch) >= chunks.LOOSE_BYTES:
             batch = self._loose[record.offset] = bytearray()
         batch += RECORD_HEAD.pack(record.opcode, len(record.content)) + record.content
 

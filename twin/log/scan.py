@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 from mcap.records import Chunk
 
-from twin.log.container import RECORD_HEAD, Damaged, Inflation, decompressed
+from twin.log.chunks import Inflation, decompressed
+from twin.log.container import RECORD_HEAD, Damaged
 
 _HEAD = struct.Struct("<BQQQQII")  # up to the length of the compression's name
 _SIZE = struct.Struct("<Q")

@@ -79,6 +79,10 @@ class Series:
             out[name] = part if len(part) == len(column) else part.copy()
         return out
 
+    def part(self, span: slice) -> dict[str, Array]:
+        """A copy of the samples in ``span`` of every field."""
+        return {name: self._columns[name][span].copy() for name in self._fields}
+
     def require_behind(self, before: Series) -> None:
         """Raise InputError where there is a gap behind the samples of the part before."""
         rate = before.sample_rate()

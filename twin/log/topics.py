@@ -33,7 +33,7 @@ class Topic:
     @property
     def axis(self) -> str:
         """Name of the axis."""
-        return self.name.rpartition("/")[2]
+        return axis_of(self.name)
 
     @property
     def is_truth(self) -> bool:
@@ -55,6 +55,11 @@ class Topic:
         """Unit of every field; raises InputError for a unit that is not SI."""
         stated = {f: u for f in FIELDS if (u := self.metadata.get(f"unit.{f}")) is not None}
         return complete_units(stated)
+
+
+def axis_of(topic: str) -> str:
+    """Name of the axis of a topic of samples."""
+    return topic.rpartition("/")[2]
 
 
 def complete_units(stated: Mapping[str, str]) -> dict[str, str]:

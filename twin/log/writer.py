@@ -57,16 +57,17 @@ def encoded(records: Iterable[McapRecord]) -> bytes:
 class PackedChunk:
     """A chunk ready to be written.
 
-    times: (n,) in ns; offsets: channel -> (n,) byte of each of its messages in the chunk.
+    times: (n,) in ns; channel: of all its messages; offsets: (n,) byte of each in the chunk.
     """
 
     chunk: Chunk
     times: NDArray[np.int64]
-    offsets: Mapping[int, NDArray]
+    channel: int
+    offsets: NDArray
 
 
 def pack(
-    payload: memoryview, times: NDArray[np.int64], offsets: Mapping[int, NDArray]
+    payload: memoryview, times: NDArray[np.int64], channel: int, offsets: NDArray
 ) -> PackedChunk:
     """Compress a chunk; takes most of the time of writing, and may run on any thread."""
     chunk = Chunk(
@@ -77,7 +78,7 @@ def pack(
         uncompressed_crc=zlib.crc32(payload),
         uncompressed_size=len(payload),
     )
-    return PackedChunk(chunk, times, offsets)
+    return PackedChunk(chunk, times, channel, offsets)
 
 
 class McapWriter:
@@ -106,14 +107,11 @@ class McapWriter:
         self._attachments.append(AttachmentIndex(offset, length, 0, 0, len(data), name, media_type))
 
     def add_chunk(self, packed: PackedChunk) -> None:
-        """Write a chunk and its message indexes."""
+        """Write a chunk and its message index."""
         chunk = packed.chunk
         start, length = self._write(encoded([chunk]))
         index_start = self._offset
-        index_offsets = {
-            channel: self._write_index(channel, packed.times, offsets)
-            for channel, offsets in packed.offsets.items()
-        }
+        index_offset = self._write_index(packed.channel, packed.times, packed.offsets)
         self._chunks.append(
             ChunkIndex(
                 chunk_length=length,
@@ -122,7 +120,7 @@ class McapWriter:
                 compressed_size=len(chunk.data),
                 message_end_time=chunk.message_end_time,
                 message_index_length=self._offset - index_start,
-                message_index_offsets=index_offsets,
+                message_index_offsets={packed.channel: index_offset},
                 message_start_time=chunk.message_start_time,
                 uncompressed_size=chunk.uncompressed_size,
             )

@@ -8,10 +8,11 @@ from struct import pack
 
 import numpy as np
 import pytest
+import scipy.io
 from import_cases import mapping
 
 from twin.errors import InputError
-from twin.log.importers import import_log
+from twin.log.importers import import_log, mat
 
 MAP = """
 sample_rate = 1000.0
@@ -53,9 +54,20 @@ def write_mat(path: Path) -> None:
 )
 def test_a_bomb_is_one_line(tmp_path, monkeypatch, ending, write):
     monkeypatch.setattr("twin.log.importers.table.SMALLEST_TABLE", 1 << 20)
-    monkeypatch.setattr("twin.log.importers.mat.SMALLEST_TABLE", 1 << 24)
     path = tmp_path / f"a.{ending}"
     write(path)
     assert path.stat().st_size < 1 << 19
     with pytest.raises(InputError, match="export it again"):
         import_log(path, mapping(tmp_path, MAP))
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_memory_is_granted_for_what_a_mat_file_holds(tmp_path, compressed):
+    """As many bytes as its arrays have, beside names and sizes, however they are packed."""
+    path, arrays = tmp_path / "a.mat", {"q": np.zeros(300_000), "s": {"r": np.arange(70_000.0)}}
+    scipy.io.savemat(path, arrays, do_compression=compressed)
+    assert mat.content_bytes(path) == pytest.approx(370_000 * 8, abs=1000)
+    scipy.io.savemat(path, {"q": np.zeros(1000)}, format="4")
+    assert mat.content_bytes(path) == path.stat().st_size
+    path.write_bytes(path.read_bytes()[:50])
+    assert mat.content_bytes(path) == 50

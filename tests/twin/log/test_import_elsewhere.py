@@ -5,8 +5,14 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import mcap_protobuf.writer
 import numpy as np
 import pytest
+from google.protobuf import timestamp_pb2
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto as Kind
+from google.protobuf.descriptor_pb2 import FileDescriptorProto
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.message_factory import GetMessageClass
 from import_cases import mapping
 
 from twin.errors import InputError
@@ -131,6 +137,72 @@ force = {{column = "/joint_states.effort{entry}", unit = "Nm"}}
     assert_signals(log, "elbow")
     with pytest.raises(InputError, match=r"did you mean '/joint_states.position"):
         imported(tmp_path, "a.mcap", text.replace("states.position", "states.positin"))
+
+
+def protobuf_state() -> type:
+    """A message of another program: a time stamp, a list of joints with names, numbers, an enum."""
+    message, text, double = Kind.TYPE_MESSAGE, Kind.TYPE_STRING, Kind.TYPE_DOUBLE
+    file = FileDescriptorProto(
+        name="drive.proto", package="acme", syntax="proto3",
+        dependency=["google/protobuf/timestamp.proto"],
+    )  # fmt: skip
+    mode = file.enum_type.add(name="Mode")
+    mode.value.add(name="OFF", number=0)
+    for name, fields in {
+        "Joint": [
+            ("name", text, "", 1), ("position", double, "", 1), ("effort", Kind.TYPE_FLOAT, "", 1),
+        ],
+        "State": [
+            ("stamp", message, ".google.protobuf.Timestamp", 1),
+            ("joints", message, ".acme.Joint", 3), ("values", double, "", 3),
+            ("mode", Kind.TYPE_ENUM, ".acme.Mode", 1), ("raw", Kind.TYPE_BYTES, "", 1),
+        ],
+    }.items():  # fmt: skip
+        made = file.message_type.add(name=name)
+        for n, (field, kind, named, label) in enumerate(fields, 1):
+            made.field.add(name=field, number=n, type=kind, type_name=named or None, label=label)
+    pool = DescriptorPool()
+    pool.AddSerializedFile(timestamp_pb2.DESCRIPTOR.serialized_pb)
+    pool.AddSerializedFile(file.SerializeToString())
+    return GetMessageClass(pool.FindMessageTypeByName("acme.State"))
+
+
+@pytest.mark.parametrize("column", ["joints[2].{}", "joints.elbow.{}", "values[{}]"])
+def test_protobuf_of_other_programs(tmp_path, column):
+    state = protobuf_state()
+    with open(tmp_path / "a.mcap", "wb") as stream:
+        writer = mcap_protobuf.writer.Writer(stream)
+        for k in range(COUNT):
+            joints = [{"name": "wrist"}, {"name": "elbow", "position": Q[k], "effort": F[k]}]
+            at = {"seconds": EPOCH, "nanos": k * 10**6}
+            message = state(stamp=at, joints=joints, values=[Q[k], F[k]], raw=b"ab")
+            writer.write_message("/state", message, log_time=k * 10**6)
+        writer.finish()
+    q, f = ("1", "2") if "values" in column else ("position", "effort")
+    log = imported(
+        tmp_path,
+        "a.mcap",
+        f"""
+time = {{column = "/state.stamp", unit = "s"}}
+[axes.x]
+position = {{column = "/state.{column.format(q)}", unit = "mm"}}
+force = {{column = "/state.{column.format(f)}", unit = "N"}}
+""",
+    )
+    assert log.metadata["start_time_unix_ns"] == str(EPOCH * 10**9)
+    np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(log.axes["x"].force, F, rtol=1e-6)  # effort is a float of 32 bits
+    with pytest.raises(InputError, match=r"no column '/state.jaw'; .*/state.joints.elbow.effort"):
+        imported(
+            tmp_path,
+            "a.mcap",
+            """
+sample_rate = 1000.0
+[axes.x]
+position = {column = "/state.jaw", unit = "mm"}
+force = {column = "/state.jaw", unit = "N"}
+""",
+        )
 
 
 def test_json_in_mcap_and_a_damaged_one(tmp_path):

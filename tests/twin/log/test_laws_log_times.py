@@ -8,7 +8,7 @@ from mcap.records import Metadata
 from mcap_bytes import json_channel, json_schema
 from plain_cases import HEAD, MS, accepted, refused, sample
 
-from twin.log import container
+from twin.log import chunks
 
 RATED = [json_schema(1), json_channel(1, "/axis/x", {"sample_rate_hz": "1000"}, 1)]
 
@@ -42,7 +42,7 @@ def test_a_gap_and_a_step_back_are_called_so(tmp_path, monkeypatch, head, k):
     assert f"{(4 + k) / 1e3:g} s is followed by {(6 + k) / 1e3:g} s" in text
     assert "expected a sample every 0.001 s (1000 Hz)" in text
     refused(tmp_path / "a.mcap", at_times(head, {k: -1.0}), f"not increase: .* at sample {k},")
-    monkeypatch.setattr(container, "LOOSE_BYTES", 1)  # likewise where every message comes alone
+    monkeypatch.setattr(chunks, "LOOSE_BYTES", 1)  # likewise where every message comes alone
     text = refused(tmp_path / "a.mcap", at_times(head, late), f"gap: .* at sample {k},")
     assert "expected a sample every 0.001 s (1000 Hz)" in text
 

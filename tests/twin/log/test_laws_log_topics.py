@@ -16,7 +16,7 @@ from mcap_bytes import MAGIC, joined, json_channel, json_message, json_schema, p
 from plain_cases import HEAD, MS, SAMPLES, accepted, refused, sample
 
 from twin.errors import InputError
-from twin.log import FIELDS, container, read_log, recover_log
+from twin.log import FIELDS, chunks, read_log, recover_log
 from twin.log.importers.units import field_unit
 from twin.log.log import LINEAR_UNITS, ROTARY_UNITS
 from twin.log.topics import complete_units
@@ -161,7 +161,7 @@ def test_a_sample_that_is_no_number_is_named_with_its_number_and_time(tmp_path, 
     refused(tmp_path / "a.mcap", [*HEAD, *items], message)
     rows = [*HEAD, *SAMPLES[:2]]  # likewise in the second of two batches
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(container, "LOOSE_BYTES", len(joined(rows)))
+        patch.setattr(chunks, "LOOSE_BYTES", len(joined(rows)))
         refused(tmp_path / "a.mcap", [*HEAD, *items], message)
 
 
@@ -210,7 +210,7 @@ def test_two_gaps_without_a_summary_are_two_losses(tmp_path):
     items = [*HEAD, *(sample(k, sequence=k + 1) for k in range(40) if k not in gone)]
     for record_bytes in (1, 200):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(container, "LOOSE_BYTES", record_bytes)
+            patch.setattr(chunks, "LOOSE_BYTES", record_bytes)
             (tmp_path / "a.mcap").write_bytes(plain_file(items))
             log, recovery = recover_log(tmp_path / "a.mcap", unproved=True)
         told = " ".join(recovery.lost)
@@ -228,7 +228,7 @@ def test_messages_outside_chunks_are_read_in_order_with_those_inside(tmp_path, m
     items = [*HEAD, *(sample(k) for k in range(3)), chunk, sample(5), sample(6), sample(7)]
     size = len(joined([sample(0)]))
     for limit in (1, 2 * size, 1 << 20):
-        monkeypatch.setattr(container, "LOOSE_BYTES", limit)
+        monkeypatch.setattr(chunks, "LOOSE_BYTES", limit)
         log = accepted(tmp_path / "a.mcap", items)
         assert log.axes["x"].position.tolist() == [10.0 + k for k in range(8)]
     bad = [*items[:-1], json_message(1, 7 * MS, {"position": 1})]

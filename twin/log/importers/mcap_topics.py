@@ -1,8 +1,9 @@
 """MCAP of other writers: protobuf, JSON and ROS 2 messages, one column a number in a message.
 
 A column is ``topic.field``, ``topic.field.inner``, or ``topic.field[1]`` for the first of an array;
-where a message names the entries of its arrays, as sensor_msgs/JointState does, also
-``topic.field.name``. ``topic.log_time`` and time stamps in a message are times since 1970.
+where a message names the entries of its arrays, as sensor_msgs/JointState does, or an entry has a
+name of its own, also ``topic.field.name``. ``topic.log_time`` and time stamps in a message are
+times since 1970.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from mcap.records import Channel, Schema
 from numpy.typing import NDArray
 
 from twin.errors import InputError
-from twin.log.container import Inflation, open_mcap, parse, payloads
+from twin.log.chunks import Inflation, payloads
+from twin.log.container import open_mcap, parse
 from twin.log.decode import message_parts, record_at
 from twin.log.importers.mapping import ImportMap
 from twin.log.importers.table import Table, chosen, extra, parsing, require_columns
@@ -121,30 +123,44 @@ def _decoder_for(encoding: str, schema: Schema | None) -> Decode | None:
 def _flat(prefix: str, message: Any) -> dict[str, Any]:
     """The numbers and time stamps of a message by name."""
     fields = _fields(message)
-    out: dict[str, Any] = {}
     names = _names_of_entries(fields)
+    out: dict[str, Any] = {}
     for name, value in fields.items():
-        if isinstance(value, bool | int | float | np.number):
-            out[f"{prefix}{name}"] = float(value)
-        elif (
-            isinstance(value, Mapping)
-            or hasattr(value, "__slots__")
-            or hasattr(value, "DESCRIPTOR")
-        ):
-            stamp = _stamp(_fields(value))
-            out |= (
-                {f"{prefix}{name}": stamp}
-                if stamp is not None
-                else _flat(f"{prefix}{name}.", value)
-            )
-        elif not isinstance(value, str | bytes) and hasattr(value, "__len__"):
-            for k, entry in enumerate(value):
-                keys = [f"{prefix}{name}[{k + 1}]"]
-                if len(names) == len(value):
-                    keys.append(f"{prefix}{name}.{names[k]}")
-                if isinstance(entry, bool | int | float | np.number):
-                    out |= dict.fromkeys(keys, float(entry))
+        out |= _values(f"{prefix}{name}", value, names)
     return out
+
+
+def _values(name: str, value: Any, names: Sequence[str]) -> dict[str, Any]:
+    """The numbers and time stamps in a field; names: of its entries, where it has as many."""
+    if isinstance(value, bool | int | float | np.number):
+        return {name: float(value)}
+    if _is_message(value):
+        stamp = _stamp(_fields(value))
+        return _flat(f"{name}.", value) if stamp is None else {name: stamp}
+    if isinstance(value, str | bytes) or not hasattr(value, "__len__"):
+        return {}
+    out: dict[str, Any] = {}
+    for k, entry in enumerate(value):
+        called = names[k] if len(names) == len(value) else _name_of(entry)
+        for key in (f"{name}[{k + 1}]", *((f"{name}.{called}",) if called else ())):
+            out |= _values(key, entry, ())
+    return out
+
+
+def _is_message(value: Any) -> bool:
+    if isinstance(value, Mapping):
+        return True
+    return not hasattr(value, "__len__") and (
+        hasattr(value, "__slots__") or hasattr(value, "DESCRIPTOR")
+    )
+
+
+def _name_of(entry: Any) -> str | None:
+    """The one text in a message of a list, such as the name of a joint."""
+    if not _is_message(entry):
+        return None
+    texts = [value for value in _fields(entry).values() if isinstance(value, str)]
+    return texts[0] if len(texts) == 1 and texts[0] else None
 
 
 def _fields(message: Any) -> Mapping[str, Any]:

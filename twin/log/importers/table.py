@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
-from twin.log.container import LARGEST_RATIO
+from twin.log.chunks import LARGEST_RATIO
 from twin.log.log import Array
 
 _MOST_NAMES = 40  # columns listed in a message
