@@ -37,6 +37,11 @@ def law_address(effect: Effect) -> int:
         ) from error
 
 
+def address_of(law: Law) -> int:
+    """Address of a function with the signature of a law; compiles as ``law_address`` does."""
+    return int(_compile(law).address)
+
+
 @cache  # the native code must live as long as its address
 def _compile(law: Law) -> Any:
     return callback(law, LAW_SIGNATURE)
