@@ -246,10 +246,15 @@ class Effect:
         """Whether any strength of the effect is not zero."""
         return any(values[p.name] != 0.0 for p in self.strengths)
 
+    @cached_property
+    def _names(self) -> frozenset[str]:
+        """What the law, or a function that it calls, names: a walk asks for it each time."""
+        written: list[Any] = [self.law, *own_functions(self.law)]
+        return frozenset(name for function in written for name in function.__code__.co_names)
+
     def reads(self, slot: str) -> bool:
         """Whether the law, or a function that it calls, names that slot of ``io``, such as "U"."""
-        written: list[Any] = [self.law, *own_functions(self.law)]
-        return any(slot in function.__code__.co_names for function in written)
+        return slot in self._names
 
     @property
     def reads_other_axis(self) -> bool:
