@@ -21,7 +21,6 @@ LAW_SIGNATURE = types.void(DOUBLES, DOUBLES, DOUBLES)
 ADDRESS, KIND, P_AT, S_AT = range(4)
 
 
-@cache
 def law_address(effect: Effect) -> int:
     """Address of the effect's compiled law; compiles at the first use on this machine.
 
