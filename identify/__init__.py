@@ -35,9 +35,13 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """The calls, loaded with the first of them: `twin --help` needs none."""
+    """The calls, loaded with the first of them: `twin --help` needs none.
+
+    Each with one BLAS thread, as NumPy has been loaded already by the script that calls it.
+    """
     if name not in __all__:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     from identify import workflow
+    from twin.threads import one_for_matrices
 
-    return getattr(workflow, name)
+    return one_for_matrices(getattr(workflow, name))

@@ -51,6 +51,7 @@ MOVED = 18  # kg, moved mass of the axis
 NET = 19  # m/s^2, all forces on the axis but those of structure, over its moved mass
 ACC = 20  # m/s^2, absolute acceleration of the bodies on the axis
 IO_SIZE = 21
+COLUMNS = IO_SIZE  # how many strengths act at a sample; then the number and the weight of each
 
 Law = Callable[[Any, Any, Any], None]
 
@@ -165,8 +166,10 @@ class Effect:
     sticks: whether it is a friction that holds the axis at rest with any force up to a level.
     simplest: the same force with simpler values, such as a shorter pitch where only harmonics were
     used. parts: the curves of a nonparametric effect, whose force is linear in its strengths; such
-    an effect is never the answer of a diagnosis. free_shape: of one that stands in the place of a
-    law, and stays where other nonparametric effects are set aside. curves: those which the law
+    an effect is never the answer of a diagnosis. columns: for one of many strengths, of which few
+    act at a time, a function as the law is that writes these to ``io`` from COLUMNS on, so that
+    all columns take one walk; the law is their sum. free_shape: of one that stands in the place of
+    a law, and stays where other nonparametric effects are set aside. curves: those which the law
     assumes, where a diagnosis may ask whether a free curve does better. several: whether an axis
     may have the effect more than once, as cogging of poles and of slots; number: which of these it
     is. is_itself: (values by name, the motion covered) -> whether the law with these values is the
@@ -188,6 +191,7 @@ class Effect:
     sticks: bool = False
     simplest: Callable[[Mapping[str, float]], dict[str, float]] | None = None
     parts: tuple[Part, ...] = ()
+    columns: Law | None = None
     free_shape: FreeShape | None = None
     curves: tuple[Curve, ...] = ()
     several: bool = False
@@ -244,10 +248,15 @@ class Effect:
         """Whether any strength of the effect is not zero."""
         return any(values[p.name] != 0.0 for p in self.strengths)
 
+    @cached_property
+    def _names(self) -> frozenset[str]:
+        """What the law, or a function that it calls, names: a walk asks for it each time."""
+        written: list[Any] = [self.law, *own_functions(self.law)]
+        return frozenset(name for function in written for name in function.__code__.co_names)
+
     def reads(self, slot: str) -> bool:
         """Whether the law, or a function that it calls, names that slot of ``io``, such as "U"."""
-        written: list[Any] = [self.law, *own_functions(self.law)]
-        return any(slot in function.__code__.co_names for function in written)
+        return slot in self._names
 
     @property
     def reads_other_axis(self) -> bool:

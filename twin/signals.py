@@ -3,8 +3,7 @@
 ``between`` is exact: over a sample the mean velocity is the difference of the positions at its
 ends. ``rate`` keeps the instants. Local polynomials are for signals whose noise both would blow up.
 The weak form (identify.dataset.test_function) differentiates its weight, not the signal.
-scipy is imported where it is used, as checking a log, which needs none of it, starts without;
-scipy.signal and scipy.stats nowhere, as they take longer to load than a fit takes.
+Without scipy: its parts take longer to load than a short fit takes, and no fit needs them.
 """
 
 from __future__ import annotations
@@ -38,14 +37,12 @@ def local_parabola(
     samples: odd, at most n; 1 takes each value as it is. At the ends it is the parabola through the
     first, or the last, ``samples`` (A. Savitzky, M. J. E. Golay, 1964).
     """
-    from scipy.ndimage import correlate1d
-
     weights = _local_fit(samples, min(2, samples - 1), derivative) / period**derivative
     half = samples // 2
-    out = correlate1d(signal, weights[half], axis=-1)
-    out[..., :half] = signal[..., :samples] @ weights[:half].T
-    out[..., signal.shape[-1] - half :] = signal[..., -samples:] @ weights[half + 1 :].T
-    return np.asarray(out)
+    inner = np.apply_along_axis(np.convolve, -1, signal, weights[half, ::-1], "valid")
+    first = signal[..., :samples] @ weights[:half].T
+    last = signal[..., -samples:] @ weights[half + 1 :].T
+    return np.concatenate([first, inner, last], axis=-1)
 
 
 def local_cubic(signal: Array, period: float) -> tuple[Array, Array, Array]:

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 
 from identify.cli import agree, loop, machine, plan, reproduce, selftest
 from identify.cli.shared import app
 from twin.errors import InputError
+from twin.threads import VARIABLES
 
 __all__ = ["agree", "loop", "machine", "main", "plan", "reproduce", "selftest"]
 
+OBJECTS = 100_000  # that may be made before cycles among them are sought
 INTERRUPTED = 130  # exit code that typer makes of Ctrl-C, without a word
 
 
 def main() -> None:
     """Entry point of `twin`: errors are one line, exit code 2."""
-    # Candidates go side by side, one a core; the matrices of each are too small to share out, and
-    # threads that wait for work cost CPU time. Read once, as NumPy is imported by a command.
-    for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    # One thread for matrices (twin.threads). Read once, as NumPy is imported by a command.
+    for threads in VARIABLES:
         os.environ.setdefault(threads, "1")
+    # Modules are a million objects that stay: to seek cycles among them, again and again while
+    # they load, is a fifth of the start.
+    gc.set_threshold(OBJECTS)
     try:
         code = app(standalone_mode=False)
         if code == INTERRUPTED:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
+from numpy.lib.stride_tricks import sliding_window_view
 
 from identify.dataset.motion import Motion
 from identify.dataset.time_scale import regressors
@@ -49,7 +49,9 @@ def beginnings(motions: Sequence[Motion]) -> Mapping[str, float]:
 def _first_usual(left: Array, time: Array, usual: float) -> float:
     """Time s from which the force left (n,) N is usual; 0 where it is from the start."""
     step = float(time[1] - time[0]) if len(time) > 1 else 1.0
-    about = maximum_filter1d(left, max(round(2.0 * LOOK / step), 1), origin=0)
+    width = max(round(2.0 * LOOK / step), 1)
+    padded = np.pad(left, (width // 2, (width - 1) // 2), mode="symmetric")
+    about = sliding_window_view(padded, width).max(axis=1)
     ordinary = np.flatnonzero(about <= FOREIGN * usual)
     if not len(ordinary):
         return 0.0

@@ -74,11 +74,10 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
 
     The error is sampled at the log's own rate.
     """
-    sensing = parts_of(axis, Kind.SENSING)
-    part = replace(sensing, effects=tuple(f for f in sensing.effects if not is_noise(f.effect)))
-    if not part.effects:
-        return motion, np.zeros(motion.raw.shape[1])
-    error, rate = reading_error(part, motion)
+    sensing = [f for f in axis.effects if f.effect.kind is Kind.SENSING and not is_noise(f.effect)]
+    if not sensing:
+        return motion, np.broadcast_to(0.0, motion.raw.shape[1])
+    error, rate = reading_error(replace(axis, effects=tuple(sensing)), motion)
     blocks = motion.signals.copy()
     blocks[:2] -= np.stack([error, rate]).reshape(2, blocks.shape[1], -1).mean(axis=2)
     raw = np.stack([motion.raw[0] - rate, motion.raw[1]])

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import exp, lgamma, log, log1p
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betainc
 
 from identify.dataset.spectrum import EMPTY, WIDTH, Grid, Record, level
 
@@ -118,10 +118,15 @@ def _false_alarm(height: float, records: int, tried: int) -> float:
     """Probability that noise is as high at any of the frequencies tried.
 
     height: power over the level around, summed over records; as both are estimated, it follows the
-    F distribution.
+    F distribution, whose tail is a finite sum where one of its freedoms is even.
     """
     freedom = LEVEL_FREEDOM * records
-    alone = betainc(freedom, records, freedom / (freedom + height))
+    part = max(height / (freedom + height), np.finfo(float).tiny)
+    logs = (
+        lgamma(freedom + i) - lgamma(freedom) - lgamma(i + 1) + i * log(part)
+        for i in range(records)
+    )
+    alone = sum(exp(freedom * log1p(-part) + term) for term in logs)
     return float(-np.expm1(tried * np.log1p(-min(alone, 1.0 - 1e-12))))
 
 

@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
-from scipy.ndimage import median_filter
 
 Array = NDArray[np.float64]
 
@@ -63,7 +61,7 @@ class Grid:
         highest = min(highest, FINEST_CYCLES / span)
         spacing = _common_spacing(records)
         cell = spacing or 1.0 / (CELLS_A_PERIOD * highest)
-        cells = next_fast_len(int(np.ceil(span / cell)) + 1, real=True)
+        cells = _fast_length(int(np.ceil(span / cell)) + 1)
         along = [(r.coordinate - r.coordinate.min()) / r.span for r in records]
         return cls(
             np.asarray(np.fft.rfftfreq(cells, cell)[WIDTH:], dtype=float),
@@ -126,12 +124,25 @@ def level(powers: Array, empty: Array) -> Array:
     m = powers.shape[1]
     padded = np.pad(powers, [(0, 0), (0, -m % BAND)], mode="reflect" if m > BAND else "edge")
     near = np.median(padded.reshape(len(powers), -1, BAND), axis=2)
-    far = median_filter(near, (1, BANDS_AROUND), mode="reflect")
+    far = _medians(near, BANDS_AROUND)
     out = np.repeat(np.maximum(near, far), BAND, axis=1)[:, :m]
-    low = median_filter(powers[:, : 5 * BAND], (1, BAND + 1), mode="reflect")[:, : 4 * BAND]
+    low = _medians(powers[:, : 5 * BAND], BAND + 1)[:, : 4 * BAND]
     out[:, : low.shape[1]] = np.maximum(out[:, : low.shape[1]], low)
     out /= np.log(2.0)
     return np.maximum(out, np.maximum(empty, np.finfo(float).tiny))
+
+
+def _medians(rows: Array, width: int) -> Array:
+    """Medians (..., m) of an odd number of values about each of rows (..., m), mirrored at ends."""
+    ends = [(0, 0)] * (rows.ndim - 1) + [(width // 2, width // 2)]
+    padded = np.pad(rows, ends, mode="symmetric")
+    return np.asarray(np.median(sliding_window_view(padded, width, axis=-1), axis=-1))
+
+
+def _fast_length(least: int) -> int:
+    """The smallest length from ``least`` on whose only prime factors are 2, 3 and 5."""
+    odd = (3**a * 5**b for a in range(16) for b in range(12))
+    return min(n << (-(-least // n) - 1).bit_length() for n in odd)
 
 
 def _sparseness(along: Array) -> Array:

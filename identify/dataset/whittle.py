@@ -2,14 +2,13 @@
 
 P. Whittle, "Estimation and information in stationary time series", Ark. Mat. 2 (1953): the errors
 of an estimated power are in proportion to it, so that relative errors are fitted.
+Without SciPy, which takes longer to load than a short fit takes.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
-from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
 
@@ -19,21 +18,33 @@ SMOOTHED = 9  # frequencies
 
 
 def fitted_levels(shapes: Array, power: Array) -> Array:
-    """Non-negative levels (k,) of shapes (m, k) in a power (m,), by repeated least squares.
+    """Non-negative levels (2,) of shapes (m, 2) in a power (m,), by repeated least squares.
 
     A frequency above the fit, such as a resonance, has the less weight the higher it is.
     """
     model = _underneath(power)
-    levels = np.zeros(shapes.shape[1])
+    levels = np.zeros(2)
     for _ in range(ROUNDS):
         above = np.maximum(np.log(power / model), 0.0) / TOLERATED
         weight = 1.0 / (1.0 + above**2)
-        levels, _ = nnls(shapes * (weight / model)[:, None], power / model * weight)
+        levels = _not_negative(shapes * (weight / model)[:, None], power / model * weight)
         model = np.maximum(shapes @ levels, 1e-12 * power.max())
     return levels
 
 
 def _underneath(power: Array) -> Array:
     """The smallest power at this or any higher frequency: noise of such shapes never falls."""
-    smooth = uniform_filter1d(power, SMOOTHED, mode="nearest")
+    smooth = np.convolve(np.pad(power, SMOOTHED // 2, mode="edge"), np.ones(SMOOTHED), "valid")
+    smooth /= SMOOTHED
     return np.maximum(np.minimum.accumulate(smooth[::-1])[::-1], 1e-300)
+
+
+def _not_negative(columns: Array, wanted: Array) -> Array:
+    """Gains (2,) of least squares that are not negative: of both, or of the one that takes more."""
+    size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    columns = columns / size
+    pull = columns.T @ wanted
+    gains = np.linalg.lstsq(columns.T @ columns, pull, rcond=1e-14)[0]
+    if gains.min() < 0.0:
+        gains = np.where(np.arange(2) == np.argmax(pull), np.maximum(pull, 0.0), 0.0)
+    return np.asarray(gains / size)

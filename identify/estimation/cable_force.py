@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.intervals import CONFIDENCE
@@ -58,6 +57,8 @@ def cable_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> CableForce:
     kept = np.ones(len(found.position), dtype=bool)
     for spike in spikes:
         kept &= np.abs(found.position - spike.centre) > (0.5 + MARGIN) * spike.width
+    from scipy.special import stdtrit  # no fit needs it
+
     smoothed = found.alike @ smoother(found.position, kept).T
     count = len(smoothed)
     quantile = stdtrit(count - 1, 0.5 + CONFIDENCE / 2.0)

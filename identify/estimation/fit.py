@@ -112,10 +112,8 @@ class Fit:
                 strict=True,
             )
         )
-        alike = np.ones(len(place))
-        plain, thrust = (
-            pitches(place, self.residual, weight, self.jacobian) for weight in (alike, command)
-        )
+        weights = np.ones(len(place)), command
+        plain, thrust = (pitches(place, self.residual, w, self.jacobian) for w in weights)
         return plain, thrust
 
     @cached_property
@@ -163,9 +161,13 @@ def _is_added(axis: AxisModel, c: ParameterReference) -> bool:
     return effect.kind is not Kind.FRICTION and not effect.is_nonparametric
 
 
-def _is_nonparametric(axis: AxisModel, c: ParameterReference) -> bool:
-    """Whether it is a strength of a nonparametric effect."""
-    return bool(c.effect) and c.parameter.strength and axis[c.effect].effect.is_nonparametric
+def _is_constant(axis: AxisModel, c: ParameterReference) -> bool:
+    """Whether it is a strength whose column no free parameter changes: of a force with no other."""
+    if not (c.effect and c.parameter.strength):
+        return False
+    own, sensed = axis[c.effect], any(f.effect.kind is Kind.SENSING for f in axis.effects)
+    alone = all(p.strength or p.name in own.fixed for p in own.effect.parameters)
+    return own.effect.is_nonparametric or (own.effect.kind is Kind.FORCE and alone and not sensed)
 
 
 def rms(values: Array) -> float:
@@ -195,10 +197,8 @@ class _Problem:
         self.centre = np.where(self.added & (not has_nonparametric(axis)), 0.0, self.start)
         self.pull = np.zeros(len(self.start))
         self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
-        # A nonparametric effect is linear in its strengths, so their columns are computed once.
-        self.constant = np.array(
-            [_is_nonparametric(axis, c) for c in self.scaling.where], dtype=bool
-        )
+        # A force is linear in its strengths, so their columns are computed once.
+        self.constant = np.array([_is_constant(axis, c) for c in self.scaling.where], dtype=bool)
         self.constant_columns = jacobian(axis, logs, self._where(self.constant))
         self._last: tuple[bytes, Array] = b"", np.zeros((0, 0))
 
@@ -244,8 +244,7 @@ class _Problem:
 
     def rows(self, internal: Array) -> Array:
         force = residual(self.scaling.outside(self.axis, internal), self.logs)[self.kept]
-        pulled = self.pull * (internal - self.centre)
-        return np.concatenate([force, pulled, self.smooth @ internal])
+        return np.concatenate([force, self.pull * (internal - self.centre), self.smooth @ internal])
 
     def slopes(self, internal: Array) -> Array:
         return np.vstack([self.columns(internal), np.diag(self.pull), self.smooth])

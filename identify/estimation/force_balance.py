@@ -13,6 +13,7 @@ from identify.dataset.drive import actual_force, parts_of, reading_error, true_m
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, moving, sticks, total_force, total_forces
 from twin.core.calling import P_AT
+from twin.core.columns import averaged_columns
 from twin.core.native import Table
 from twin.effect import Kind
 from twin.errors import InputError
@@ -135,10 +136,39 @@ def changes(
         if not effect:
             out[index] = steps[index, None] * _by_mass(axis, logs)
             continue
+        if _has_columns(axis, [where[j] for j in index]):
+            out[index] = steps[index, None] * _columns(axis, [where[j] for j in index], logs)
+            continue
         group = group_of(axis, effect)
         moved = [write(group, [where[j]], read(group, [where[j]]) + steps[j]) for j in index]
         out[index] = _differences(group, moved, effect, logs)
     return out
+
+
+def _has_columns(axis: AxisModel, where: Sequence[ParameterReference]) -> bool:
+    """Whether these parameters of one effect are strengths whose columns it gives in one walk."""
+    return axis[where[0].effect].effect.columns is not None and all(
+        c.parameter.strength for c in where
+    )
+
+
+def _columns(
+    axis: AxisModel, where: Sequence[ParameterReference], logs: Sequence[PreparedLog]
+) -> Array:
+    """Averaged force (m, n) per unit of these strengths of one effect that has columns."""
+    own = axis[where[0].effect]
+    names = [p.name for p in own.effect.strengths]
+    rows = [names.index(c.parameter.name) for c in where]
+    motions = [(true_motion(axis, log.motion)[0], log.test_function) for log in logs]
+    return np.concatenate(
+        [
+            averaged_columns(
+                own.effect, own.vector(), m.signals, m.period, m.time_origin, t.weights, t.stride
+            )[rows]
+            for m, t in motions
+        ],
+        axis=1,
+    )
 
 
 def _differences(

@@ -15,7 +15,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from identify.estimation.evidence import left_out
 from identify.estimation.fit import Fit
@@ -29,6 +28,7 @@ BLOCKS = 30
 RIDGE = 1e-6  # keeps a fit without one block finite
 INSEPARABLE = 0.9999  # correlation of two estimates from which the data cannot separate them
 CONFIDENCE = 0.90
+QUANTILE = 1.6991270265334972  # of Student's t for it, with BLOCKS - 1 degrees of freedom
 FAR = 4.0  # half widths to either side at which the error must have risen
 LEAST_RISE = 0.1  # of the rise that the linearised residual predicts
 LARGEST_RATIO = 3.0  # of error to noise floor; above it the model is wrong, intervals mean nothing
@@ -214,9 +214,8 @@ def half_widths(fit: Fit) -> Array:
     covariance = inverse @ (scores.T @ scores * (BLOCKS - 1) / BLOCKS) @ inverse
     # A prior or a bound shifts the estimate from the least-squares solution by this much.
     shift = np.abs(inverse @ (columns.T @ fit.residual))
-    quantile = stdtrit(BLOCKS - 1, 0.5 + CONFIDENCE / 2.0)
     spread_of = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    out[excited] = (quantile * spread_of + shift) / norms[excited]
+    out[excited] = (QUANTILE * spread_of + shift) / norms[excited]
     return out
 
 

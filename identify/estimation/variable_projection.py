@@ -13,7 +13,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
@@ -270,6 +269,8 @@ def _bounded_step(
     if ((step < low) | (step > high)).any():
         if len(step) == 1:
             return np.clip(step, low, high) / norms
+        from scipy.optimize import lsq_linear  # longer to load than most fits take
+
         factor = np.linalg.cholesky(normal)
         bounds = (low, np.maximum(high, low + 1e-12))
         step = lsq_linear(factor.T, np.linalg.solve(factor, wanted), bounds=bounds).x

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise, reading_error
@@ -144,6 +143,8 @@ def _scale(size: Callable[[float], float], wanted: float) -> float:
             high, risen = middle, True
     if not risen or error(low) >= 0.0:
         return float(np.exp(low))
+    from scipy.optimize import brentq  # a fit and most diagnoses plant nothing
+
     return float(np.exp(brentq(error, low, high, xtol=1e-12)))
 
 

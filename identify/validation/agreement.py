@@ -13,12 +13,11 @@ from math import hypot, inf
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from identify.dataset.dataset import datasets
 from identify.estimation.fit import Fit, Outcome, finished, rms
 from identify.estimation.force_balance import residual
-from identify.estimation.intervals import BLOCKS, CONFIDENCE, LARGEST_RATIO
+from identify.estimation.intervals import BLOCKS, LARGEST_RATIO, QUANTILE
 from identify.estimation.subspace import orthonormal, unabsorbed
 from identify.selection.candidates import usable
 from identify.selection.confounded import linear_bases
@@ -186,14 +185,13 @@ def _numbers(model: MachineModel, axis: str) -> dict[str, _Number]:
     """All parameters of an axis by label, the mass too."""
     stage, intervals = model.axes[axis], model.intervals[axis].ends
     free = {c.label for c in free_parameters(stage)}
-    quantile = float(stdtrit(BLOCKS - 1, 0.5 + CONFIDENCE / 2.0))
     out = {}
     for reference, value in _values(stage):
         label = reference.label
         error: float | None = None if label in free else 0.0
         if label in intervals:
             low, high = intervals[label]
-            error = max(high - value, value - low) / quantile
+            error = max(high - value, value - low) / QUANTILE
         out[label] = _Number(value, error, reference)
     return out
 
@@ -209,6 +207,8 @@ def _values(axis: AxisModel) -> list[tuple[ParameterReference, float]]:
 
 def _limit(count: int) -> float:
     """Quantile of t that none of so many comparisons exceeds, but for FALSE_ALARM."""
+    from scipy.special import stdtrit  # no fit needs it
+
     each = 1.0 - (1.0 - FALSE_ALARM) ** (1.0 / max(count, 1))
     return float(stdtrit(2 * (BLOCKS - 1), 1.0 - each / 2.0))
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.noise_floor import floor_of
@@ -270,6 +269,8 @@ def worst_regions(maps: Sequence[MisfitMap], samples: float, count: int = 3) -> 
     samples: effective sample size of the residual. A region counts only where it exceeds the noise
     floor by more than the largest of as many regions of pure noise would.
     """
+    from scipy.special import chdtri  # no fit needs it
+
     tried = sum(int(np.count_nonzero(m.visited)) for m in maps)
     found = []
     for m in maps:

@@ -11,14 +11,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from identify.dataset.prepared_log import PreparedLog
 
 Array = NDArray[np.float64]
+NORMAL = NormalDist()
 
 WITHIN = 0.90  # part of a white residual's correlations within the bounds
 SURE = 0.99  # part of white residuals whose every correlation is within the wider limit
@@ -116,7 +117,7 @@ def residual_tests(
         floor=floor,
         edges=edges,
         density=count / (len(left) * np.diff(edges)),
-        within=float(np.mean(np.abs(left) < ndtri(0.5 + WITHIN / 2.0) * floor)),
+        within=float(np.mean(np.abs(left) < NORMAL.inv_cdf(0.5 + WITHIN / 2.0) * floor)),
         correlations=tuple(
             correlation(name, residual, [s[name] for s in series], spacing, loop)
             for name in ("residual", "command", "velocity")
@@ -163,8 +164,8 @@ def correlation(
         lag=np.asarray(spacing * lags),
         value=products / max(power, 1e-300),
         tested=tested,
-        bound=float(ndtri(0.5 + WITHIN / 2.0) / root),
-        limit=float(ndtri(1.0 - (1.0 - SURE) / 2.0 / count) / root),
+        bound=float(NORMAL.inv_cdf(0.5 + WITHIN / 2.0) / root),
+        limit=float(NORMAL.inv_cdf(1.0 - (1.0 - SURE) / 2.0 / count) / root),
     )
 
 

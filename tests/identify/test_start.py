@@ -10,11 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from twin.log import AxisLog, Log, write_log
+from twin.threads import VARIABLES, one_for_matrices
 
+SLOW_PARTS = ("signal", "stats", "special", "optimize", "ndimage", "fft")
 HEAVY = {"scipy", "numba", "mujoco", "matplotlib", "jinja2", "rich", "ruckig"}
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 SCRIPT = """
 import contextlib, io, json, os, sys
 from identify.cli import main
@@ -30,7 +32,7 @@ print(json.dumps({
 
 def started(*arguments: object, folder: Path, **environment: str) -> dict:
     """What a process of its own had loaded when `twin` ended."""
-    kept = {k: v for k, v in os.environ.items() if k not in THREADS}
+    kept = {k: v for k, v in os.environ.items() if k not in VARIABLES}
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, *map(str, arguments)],
         cwd=folder, env={**kept, **environment}, capture_output=True, text=True, check=True,
@@ -57,7 +59,7 @@ def test_a_short_command_loads_nothing_that_it_does_not_need(command: str, tmp_p
 def test_matrices_are_not_shared_out_unless_the_user_says_so(tmp_path: Path) -> None:
     found = started("--help", folder=tmp_path)
     assert not found["early"]  # read once, when NumPy is imported
-    assert found["threads"] == dict.fromkeys(THREADS, "1")
+    assert found["threads"] == dict.fromkeys(VARIABLES, "1")
     chosen = started("--help", folder=tmp_path, OMP_NUM_THREADS="3")
     assert chosen["threads"]["OMP_NUM_THREADS"] == "3"
 
@@ -66,15 +68,14 @@ def test_the_package_gives_its_calls_by_name() -> None:
     import identify
     from identify import workflow
 
-    assert [getattr(identify, n) for n in identify.__all__] == [
-        getattr(workflow, n) for n in identify.__all__
-    ]
+    for name in identify.__all__:
+        assert getattr(identify, name).__wrapped__ is getattr(workflow, name)
     with pytest.raises(AttributeError, match="no attribute 'guess'"):
         _ = identify.guess
 
 
 def test_a_fit_is_not_slower_to_load_than_to_run(tmp_path: Path) -> None:
-    """scipy.signal and scipy.stats take a second to load; SciPy's smaller parts hold what is used.
+    """SciPy's larger parts take a second to load, the smaller ones half of one, as a fit runs.
 
     Drawing takes another, and only a report draws; only `twin simulate` and `add` run MuJoCo.
     """
@@ -84,4 +85,19 @@ def test_a_fit_is_not_slower_to_load_than_to_run(tmp_path: Path) -> None:
     )
     loaded = set(json.loads(done.stdout))
     assert "identify.workflow" in loaded
-    assert not {"scipy.signal", "scipy.stats", "matplotlib", "jinja2", "mujoco"} & loaded
+    assert not {"matplotlib", "jinja2", "mujoco"} & loaded
+    assert not {f"scipy.{part}" for part in SLOW_PARTS} & loaded
+
+
+def blas_threads() -> set[int]:
+    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+
+def test_a_call_from_python_has_one_thread_for_matrices_and_leaves_them(monkeypatch) -> None:
+    for name in VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+    with threadpool_limits(2, user_api="blas"):
+        assert one_for_matrices(blas_threads)() == {1}
+        assert blas_threads() == {2}
+        monkeypatch.setenv(VARIABLES[0], "2")
+        assert one_for_matrices(blas_threads)() == {2}

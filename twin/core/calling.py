@@ -21,7 +21,6 @@ LAW_SIGNATURE = types.void(DOUBLES, DOUBLES, DOUBLES)
 ADDRESS, KIND, P_AT, S_AT = range(4)
 
 
-@cache
 def law_address(effect: Effect) -> int:
     """Address of the effect's compiled law; compiles at the first use on this machine.
 
@@ -35,6 +34,11 @@ def law_address(effect: Effect) -> int:
             f"effect '{effect.name}': its law cannot be compiled: {reason.strip()}; use only "
             "numbers, math functions and the arrays p, s, io"
         ) from error
+
+
+def address_of(law: Law) -> int:
+    """Address of a function with the signature of a law; compiles as ``law_address`` does."""
+    return int(_compile(law).address)
 
 
 @cache  # the native code must live as long as its address

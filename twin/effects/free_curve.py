@@ -21,13 +21,14 @@ from math import copysign, expm1, floor, sqrt
 from typing import Any
 
 from twin.curve import Coordinate, Curve, FreeShape, Part
-from twin.effect import DT, OUT, WHEN, Effect, Excitation, Kind, Parameter, V, X
+from twin.effect import COLUMNS, DT, OUT, WHEN, Effect, Excitation, Kind, Parameter, V, X
 
 KNOTS = 9  # where the knots' parameters begin
 TURNED = 1e-12  # less of a turn than this is left when it is over
 
 
-def law(p, s, io):
+def place(p, s, io):
+    """Knots to the left and right, part of the way between, direction, and w; s advances."""
     count = int(p[0])
     closed = p[4] > 0.5
     speed = abs(io[V])
@@ -42,13 +43,27 @@ def law(p, s, io):
     q = q - floor(q) if closed else min(max(q, 0.0), 1.0)
     left = min(int(q * count), count - 1)
     right = 0 if closed and left == count - 1 else left + 1
-    part = q * count - left
-    even, odd = KNOTS, KNOTS + count + 1
+    share = speed / p[6] if speed < p[6] else 1.0
+    return left, right, q * count - left, direction, share
+
+
+def law(p, s, io):
+    left, right, part, direction, share = place(p, s, io)
+    even, odd = KNOTS, KNOTS + int(p[0]) + 1
     force = (1.0 - part) * p[even + left] + part * p[even + right]
     force += direction * ((1.0 - part) * p[odd + left] + part * p[odd + right])
-    if speed < p[6]:
-        force *= speed / p[6]
-    io[OUT] = force
+    io[OUT] = share * force
+
+
+def columns(p, s, io):
+    left, right, part, direction, share = place(p, s, io)
+    odd = int(p[0]) + 1
+    io[COLUMNS] = 4
+    at = COLUMNS + 1
+    for knot, weight in ((left, 1.0 - part), (right, part)):
+        io[at], io[at + 1] = knot, share * weight
+        io[at + 2], io[at + 3] = odd + knot, share * weight * direction
+        at += 4
 
 
 LETS_GO = 1e-3  # of the highest speed, below which a curve that lets go does
@@ -131,6 +146,7 @@ def of_size(elements: int) -> Effect:
         states=("direction",),
         several=True,
         law=law,
+        columns=columns,
         fingerprint="what a law leaves whose shape differs from that of the machine's force",
         excited_by="passes over the whole range of the coordinate in both directions",
         of_size=of_size,

@@ -148,8 +148,7 @@ class AxisModel:
 
         A law that reads the motor's force would read there what it is to explain.
         """
-        own = effect.kind in OF_IMPOSED_MOTION and not effect.reads("U")
-        return own or not self.is_imposed
+        return not self.is_imposed or (effect.kind in OF_IMPOSED_MOTION and not effect.reads("U"))
 
     @property
     def units(self) -> AxisUnits:

@@ -42,6 +42,23 @@ def test_linear_problems_within_bounds_are_solved_as_scipy_solves_them(seed):
     assert np.sum((a @ found.x - b) ** 2) <= 2.0 * wanted.cost * (1.0 + 1e-7)
 
 
+def test_a_search_ends_where_its_columns_promise_no_more():
+    """At an optimum where rounding makes every step a little worse, nothing else is tried."""
+    asked = []
+
+    def left(x):
+        asked.append(x[0])
+        return np.array([1.0 + 1e-9 * (x[0] != 1e-6), x[0]])
+
+    found = minimise(
+        left, lambda x: np.array([[0.0], [1.0]]), np.array([1e-6]), (-WIDE[1][:1], WIDE[1][:1]),
+        tolerance=1e-8, most_evaluations=40,
+    )  # fmt: skip
+    assert found.converged
+    assert found.x == 1e-6
+    assert len(asked) == 2
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_curved_problems_within_bounds_are_solved_as_scipy_solves_them(seed):
     rng = np.random.default_rng(seed)
