@@ -7,6 +7,7 @@ from typing import Any
 
 from identify.estimation.cable_force import CableForce
 from identify.output.agreement import agree_json
+from identify.output.reproduction_future import future_json, recovered_json
 from identify.output.words.reproduction import (
     cable_in_words,
     cable_of_logs_in_words,
@@ -19,9 +20,7 @@ from identify.output.words.reproduction import (
 from identify.output.words.thesis_dynamic import dynamic_in_words
 from identify.output.words.thesis_future import future_in_words
 from identify.output.words.thesis_models import models_in_words
-from identify.thesis.aging import Drift
 from identify.thesis.cable import CableOfLogs, CableResult
-from identify.thesis.chapter import Recovered
 from identify.thesis.chapters import Reproduction
 from identify.thesis.dynamic import DynamicResult
 from identify.thesis.future import FutureResult
@@ -52,13 +51,6 @@ def reproduction_text(result: Reproduction) -> str:
     return "\n".join(lines)
 
 
-def _recovered(r: Recovered) -> dict[str, Any]:
-    return {
-        "true": r.true, "mean": r.mean, "sd": r.sd, "printed": r.printed, "unit": r.unit,
-        "error": r.error, "rms_error": r.rms_error,
-    }  # fmt: skip
-
-
 def _models(result: ModelsResult) -> dict[str, Any]:
     return {
         "laws": list(result.laws),
@@ -86,9 +78,9 @@ def _simulation(result: SimulationResult) -> dict[str, Any]:
     return {
         "snr_db": result.snr,
         "trials": result.trials,
-        "parameters": {k: _recovered(r) for k, r in result.parameters.items()},
+        "parameters": {k: recovered_json(r) for k, r in result.parameters.items()},
         "by_snr_db": {
-            f"{snr:g}": {k: _recovered(r) for k, r in found.items()}
+            f"{snr:g}": {k: recovered_json(r) for k, r in found.items()}
             for snr, found in result.by_snr.items()
         },
         "sensitivity": {
@@ -109,7 +101,7 @@ def _cable(result: CableResult) -> dict[str, Any]:
         "repeats": result.repeats,
         "pitch": result.pitch
         and {
-            **_recovered(result.pitch),
+            **recovered_json(result.pitch),
             "standard_error": found.pitch and found.pitch.standard_error,
         },
         **_of_passes(found),
@@ -187,8 +179,8 @@ def _dynamic(result: DynamicResult) -> dict[str, Any]:
             }
             for name, r in records.items()
         },
-        "simplex": {k: _recovered(r) for k, r in result.simplex.items()},
-        "parameters": {k: _recovered(r) for k, r in result.fitted.items()},
+        "simplex": {k: recovered_json(r) for k, r in result.simplex.items()},
+        "parameters": {k: recovered_json(r) for k, r in result.fitted.items()},
         "seconds_at_a_place": dict(zip(("simplex", "fit"), result.seconds, strict=True)),
         "position_error": {
             part: dict(zip(("from_rest", "beginning_estimated"), e.T.tolist(), strict=True))
@@ -217,45 +209,8 @@ def _residuals(result: ResidualResult) -> dict[str, Any]:
         "outside_90_bounds": {
             name: {c.signal: c.outside for c in t.correlations} for name, t in tests.items()
         },
-        "parameters": {k: _recovered(r) for k, r in result.values.items()},
+        "parameters": {k: recovered_json(r) for k, r in result.values.items()},
     }
-
-
-def _future(result: FutureResult) -> dict[str, Any]:
-    slow, aging = result.slow, result.aging
-    return {
-        "elements": {
-            "planted": result.planted, "found": result.chosen.count,
-            "tried": [
-                {"elements": e.count, "delta_bic": e.delta_bic, "error_over_noise_floor":
-                 e.over_floor} for e in result.elements
-            ],
-        },
-        "residuals": [
-            {"model": b.name, "parameters_added": b.parameters, "holdout_error": b.held_out,
-             "test_error": b.test} for b in result.beside
-        ],
-        "noise_floor": result.floor,
-        "near_zero_speed": {
-            "velocity": slow.speed.tolist(), "velocity_unit": "m/s", "true": slow.planted.tolist(),
-            "map": slow.mapped.tolist(), "found": slow.fitted.tolist(), "printed": None,
-        },
-        "unit": "N",
-        "long_run": {
-            **{n: _drift(d) for n, d in (("aging", aging.level), ("without", aging.steady))},
-            "parameters": {k: _recovered(r) for k, r in aging.planted.items()},
-        },
-    }  # fmt: skip
-
-
-def _drift(drift: Drift) -> dict[str, Any]:
-    slope, error = drift.slope
-    return {
-        "distance": drift.distance.tolist(), "distance_unit": "m", "true": drift.truth.tolist(),
-        "found": drift.found.tolist(), "half_width_90": drift.half.tolist(), "unit": drift.unit,
-        "slope": slope, "slope_standard_error": error, "slope_unit": f"{drift.unit}/m",
-        "detected": drift.detected, "printed": None,
-    }  # fmt: skip
 
 
 def _twin(result: TwinResult) -> dict[str, Any]:
@@ -274,7 +229,7 @@ JSON: Mapping[type, Callable[[Any], dict[str, Any]]] = {
     TrackResult: _track,
     DynamicResult: _dynamic,
     ResidualResult: _residuals,
-    FutureResult: _future,
+    FutureResult: future_json,
     TwinResult: _twin,
 }
 TEXT: Mapping[type, Callable[[Any], list[str]]] = {

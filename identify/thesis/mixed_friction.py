@@ -9,12 +9,21 @@ The catalogue does not hold it: it contains two frictions that are there, so a d
 tell it from either.
 """
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 from twin.curve import FRICTION_CURVES
 from twin.effect import OUT, Effect, Kind, Parameter
+from twin.effects.lugre import EFFECT as FORGETS
 from twin.effects.lugre import law as lugre
 from twin.effects.modified_leuven import EFFECT as REMEMBERS
 from twin.effects.modified_leuven import SHARES
 from twin.effects.modified_leuven import law as modified_leuven
+from twin.model.machine import Fitted
+
+PARTS = FORGETS, REMEMBERS
+WEIGHT = "weight"
+OWN = {"sigma0": "sigma0_bristle", "sigma1": "sigma1_bristle"}  # of the bristle without memory
 
 
 def law(p, s, io):
@@ -28,6 +37,21 @@ def law(p, s, io):
     io[OUT] = p[own] * io[OUT] + (1.0 - p[own]) * remembers
 
 
+def mixed(remembers: Mapping[str, float], forgets: Mapping[str, float], weight: float) -> Fitted:
+    """The mixture with the values of two frictions, as far as it knows their names.
+
+    What both have by one name is taken of the first.
+    """
+    own = {ours: forgets[theirs] for theirs, ours in OWN.items()}
+    known = {p.name for p in REMEMBERS.parameters if not p.fixed}
+    shared = {n: v for n, v in {**forgets, **remembers}.items() if n in known}
+    return Fitted.at_start(EFFECT, {**shared, **own, WEIGHT: weight})
+
+
+def _weights(_: object) -> tuple[float, ...]:
+    return 0.25, 0.5, 0.75
+
+
 EFFECT = Effect(
     kind=Kind.FRICTION,
     summary="mixture of a bristle friction and one with memory, by weight",
@@ -35,12 +59,10 @@ EFFECT = Effect(
     source="L. Jia 2023, future work; the form is this project's choice",
     parameters=(
         *REMEMBERS.parameters,
-        Parameter("weight", "1", 0.5, 0.0, 1.0, "part of the friction without memory"),
         Parameter(
-            "sigma0_bristle", "N/m", 300.0, 1.0, 1e9, "stiffness without memory",
-            start_rule=lambda e: 1e3 * e.dry_level,
+            WEIGHT, "1", 0.5, 0.0, 1.0, "part of the friction without memory", scan=_weights
         ),
-        Parameter("sigma1_bristle", "N s/m", 0.5, 1e-6, 1e8, "damping without memory"),
+        *(replace(FORGETS.parameter(theirs), name=ours) for theirs, ours in OWN.items()),
     ),
     states=(*REMEMBERS.states, "z"),
     law=law,
