@@ -19,11 +19,13 @@ from identify.output.words.reproduction import (
 )
 from identify.output.words.thesis_dynamic import dynamic_in_words
 from identify.output.words.thesis_future import future_in_words
+from identify.output.words.thesis_maps import UNITS, map_in_words, track_of_logs_in_words
 from identify.output.words.thesis_models import models_in_words
 from identify.thesis.cable import CableOfLogs, CableResult
 from identify.thesis.chapters import Reproduction
 from identify.thesis.dynamic import DynamicResult
 from identify.thesis.future import FutureResult
+from identify.thesis.maps_of_logs import MapOfLogs, TrackOfLogs
 from identify.thesis.models import ModelsResult
 from identify.thesis.printed import ROLLER_PITCH
 from identify.thesis.residuals import ResidualResult
@@ -39,6 +41,7 @@ def reproduction_json(result: Reproduction) -> dict[str, Any]:
         "small": result.small,
         "seconds": sum(result.seconds.values()),
         "seconds_by_chapter": dict(result.seconds),
+        "left_out": dict(result.left_out),
     }
 
 
@@ -48,6 +51,7 @@ def reproduction_text(result: Reproduction) -> str:
     for name, found in result.chapters.items():
         lines.append(f"{name} ({result.seconds[name]:.0f} s)")
         lines += [f"  {line}" for line in TEXT[type(found)](found)]
+    lines += [f"{name}: left out, {why}" for name, why in result.left_out.items()]
     return "\n".join(lines)
 
 
@@ -157,6 +161,34 @@ def _track(result: TrackResult) -> dict[str, Any]:
     }
 
 
+def _map_of_logs(result: MapOfLogs) -> dict[str, Any]:
+    found = result.map
+    return {
+        "map": {
+            "velocity": found.velocity.tolist(), "velocity_unit": result.units.velocity,
+            "friction": found.friction.tolist(), "friction_unit": result.units("N"),
+            "position": found.position.tolist(), "position_unit": result.units.position,
+        },
+        "parameters": {
+            DIRECTIONS[way]: {
+                n: {"true": None, "found": v, "half_width_90": curve.half[n],
+                    "unit": result.units(UNITS[n]), "printed": None}
+                for n, v in curve.values.items()
+            }
+            for way, curve in result.curves.items()
+        },
+        "mean": result.both,
+    }  # fmt: skip
+
+
+def _track_of_logs(result: TrackOfLogs) -> dict[str, Any]:
+    return {
+        "position": result.places.tolist(),
+        "position_unit": result.maps[0].units.position,
+        "maps": [_map_of_logs(m) for m in result.maps],
+    }
+
+
 DIRECTIONS = {1.0: "forwards", -1.0: "backwards"}
 
 
@@ -227,6 +259,8 @@ JSON: Mapping[type, Callable[[Any], dict[str, Any]]] = {
     CableResult: _cable,
     CableOfLogs: _cable_of_logs,
     TrackResult: _track,
+    MapOfLogs: _map_of_logs,
+    TrackOfLogs: _track_of_logs,
     DynamicResult: _dynamic,
     ResidualResult: _residuals,
     FutureResult: future_json,
@@ -241,6 +275,8 @@ TEXT: Mapping[type, Callable[[Any], list[str]]] = {
     CableResult: cable_in_words,
     CableOfLogs: cable_of_logs_in_words,
     TrackResult: track_in_words,
+    MapOfLogs: map_in_words,
+    TrackOfLogs: track_of_logs_in_words,
     DynamicResult: dynamic_in_words,
     ResidualResult: residuals_in_words,
     FutureResult: future_in_words,

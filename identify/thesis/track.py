@@ -14,15 +14,16 @@ from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
 from identify.estimation.fit import Fit, fit_axis
-from identify.estimation.intervals import CONFIDENCE, half_widths
+from identify.estimation.intervals import half_widths
+from identify.estimation.map_curve import NAMES, stribeck_through
 from identify.estimation.stribeck_curve import fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
 from identify.thesis.chapter import Chapter, Progress
+from identify.thesis.maps_of_logs import track_of_logs
 from identify.thesis.prescribed import force_along
 from twin.effect import Kind
 from twin.effects import Catalogue
@@ -35,7 +36,6 @@ from twin.simulator import MujocoSimulator, ReducedSimulator
 
 Array = NDArray[np.float64]
 
-NAMES = ("Fc", "Fs", "v0", "sigma2")
 SPAN = 0.01  # m
 FIRST, APART = -0.136, 34e-3  # m, of the thesis's places
 DIRECTIONS = (1.0, -1.0)
@@ -161,14 +161,8 @@ def _logs(
 
 def _through(one_way: VelocityMap) -> Found:
     """The curve through a map."""
-    speed, weight = np.abs(one_way.velocity), np.sqrt(one_way.samples)
-    curve = fit_stribeck(speed, one_way.friction, weight)
-    left = weight * (curve(speed) - one_way.friction)
-    columns = weight[:, None] * curve.slopes(speed)
-    freedom = len(speed) - len(NAMES)
-    covariance = np.linalg.pinv(columns.T @ columns) * float(left @ left) / freedom
-    quantile = stdtrit(freedom, 0.5 + CONFIDENCE / 2.0)
-    return np.array(astuple(curve)[: len(NAMES)]), quantile * np.sqrt(np.diag(covariance))
+    found = stribeck_through(one_way)
+    return np.array([found.values[n] for n in NAMES]), np.array([found.half[n] for n in NAMES])
 
 
 def _local_fit(model: MachineModel, name: str, logs: Mapping[str, Log], found: VelocityMap) -> Fit:
@@ -225,4 +219,4 @@ def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
     return float(-np.sign(velocity) * force[-1])
 
 
-CHAPTER = Chapter(("thesis_track",), FULL, SMALL, run)
+CHAPTER = Chapter(("thesis_track",), FULL, SMALL, run, track_of_logs)
