@@ -199,9 +199,18 @@ def refusal(fit: Fit) -> NoInterval | None:
 
 def half_widths(fit: Fit) -> Array:
     """Half widths (k,) of the 90 % intervals, in the parameters' units; inf where not excited."""
+    return half_widths_of(fit, np.eye(fit.jacobian.shape[1]))
+
+
+def half_widths_of(fit: Fit, weights: Array) -> Array:
+    """The same of m sums of the parameters with these weights (k, m), by their covariance.
+
+    inf where a parameter that is not excited takes part.
+    """
     norms = np.linalg.norm(fit.jacobian, axis=0)
     excited = norms > 0
-    out = np.full(len(norms), np.inf)
+    out = np.full(weights.shape[1], np.inf)
+    known = ~(weights[~excited] != 0.0).any(axis=0)
     if not excited.any():
         return out
     columns = fit.jacobian[:, excited] / norms[excited]
@@ -212,11 +221,12 @@ def half_widths(fit: Fit) -> Array:
     honest = left_out(fit.residual, columns, np.full(columns.shape[1], RIDGE), BLOCKS)
     scores = np.stack([columns[a:b].T @ honest[a:b] for a, b in pairwise(edges)])
     covariance = inverse @ (scores.T @ scores * (BLOCKS - 1) / BLOCKS) @ inverse
+    own = weights[excited][:, known] / norms[excited][:, None]
     # A prior or a bound shifts the estimate from the least-squares solution by this much.
-    shift = np.abs(inverse @ (columns.T @ fit.residual))
+    shift = np.abs(own.T @ inverse @ (columns.T @ fit.residual))
     quantile = stdtrit(BLOCKS - 1, 0.5 + CONFIDENCE / 2.0)
-    spread_of = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    out[excited] = (quantile * spread_of + shift) / norms[excited]
+    variance = np.einsum("ij,ik,kj->j", own, covariance, own)
+    out[known] = quantile * np.sqrt(np.maximum(variance, 0.0)) + shift
     return out
 
 

@@ -124,7 +124,11 @@ def track_in_words(result: TrackResult) -> list[str]:
         slopes = [trend(result.places, found[name]) for found in result.fits.values()]
         seen = any(abs(slope) > TREND * error for slope, error in slopes)
         said.append(f"along the track {name} shows {'a' if seen else 'no'} trend")
-    return [*said, "where a level varies within a move, its interval is too narrow"]
+    return [
+        *said,
+        "the map's own intervals hold its scatter, not that bristles which have not settled brake "
+        "less",
+    ]
 
 
 LEVELS = ("Fc", "Fs")
