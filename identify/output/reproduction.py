@@ -8,6 +8,13 @@ from typing import Any
 from identify.estimation.cable_force import CableForce
 from identify.output.agreement import agree_json
 from identify.output.reproduction_future import future_json, recovered_json
+from identify.output.reproduction_of_logs import (
+    DIRECTIONS,
+    closed_loop_json,
+    map_of_logs_json,
+    track_of_logs_json,
+    twin_of_logs_json,
+)
 from identify.output.words.reproduction import (
     cable_in_words,
     cable_of_logs_in_words,
@@ -15,12 +22,12 @@ from identify.output.words.reproduction import (
     residuals_in_words,
     simulation_in_words,
     track_in_words,
-    twin_in_words,
 )
 from identify.output.words.thesis_dynamic import dynamic_in_words
 from identify.output.words.thesis_future import future_in_words
-from identify.output.words.thesis_maps import UNITS, map_in_words, track_of_logs_in_words
+from identify.output.words.thesis_maps import map_in_words, track_of_logs_in_words
 from identify.output.words.thesis_models import models_in_words
+from identify.output.words.thesis_twin import twin_in_words, twin_of_logs_in_words
 from identify.thesis.cable import CableOfLogs, CableResult
 from identify.thesis.chapters import Reproduction
 from identify.thesis.dynamic import DynamicResult
@@ -31,7 +38,7 @@ from identify.thesis.printed import ROLLER_PITCH
 from identify.thesis.residuals import ResidualResult
 from identify.thesis.simulation import SimulationResult
 from identify.thesis.track import Along, TrackResult
-from identify.thesis.twin import TwinResult
+from identify.thesis.twin import TwinOfLogs, TwinResult
 
 
 def reproduction_json(result: Reproduction) -> dict[str, Any]:
@@ -161,37 +168,6 @@ def _track(result: TrackResult) -> dict[str, Any]:
     }
 
 
-def _map_of_logs(result: MapOfLogs) -> dict[str, Any]:
-    found = result.map
-    return {
-        "map": {
-            "velocity": found.velocity.tolist(), "velocity_unit": result.units.velocity,
-            "friction": found.friction.tolist(), "friction_unit": result.units("N"),
-            "position": found.position.tolist(), "position_unit": result.units.position,
-        },
-        "parameters": {
-            DIRECTIONS[way]: {
-                n: {"true": None, "found": v, "half_width_90": curve.half[n],
-                    "unit": result.units(UNITS[n]), "printed": None}
-                for n, v in curve.values.items()
-            }
-            for way, curve in result.curves.items()
-        },
-        "mean": result.both,
-    }  # fmt: skip
-
-
-def _track_of_logs(result: TrackOfLogs) -> dict[str, Any]:
-    return {
-        "position": result.places.tolist(),
-        "position_unit": result.maps[0].units.position,
-        "maps": [_map_of_logs(m) for m in result.maps],
-    }
-
-
-DIRECTIONS = {1.0: "forwards", -1.0: "backwards"}
-
-
 def _along(a: Along) -> dict[str, Any]:
     return {
         "true": a.planted.tolist(), "found": a.found.tolist(), "half_width_90": a.half.tolist(),
@@ -249,7 +225,7 @@ def _twin(result: TwinResult) -> dict[str, Any]:
     return {
         "alike": agree_json(result.alike),
         "changed": {**agree_json(result.changed), "added_mass": result.added, "unit": "kg"},
-        "closed_loop_error": {k: {"found": v, "unit": "1"} for k, v in result.errors.items()},
+        "closed_loop_error": closed_loop_json(result.errors),
     }
 
 
@@ -259,12 +235,13 @@ JSON: Mapping[type, Callable[[Any], dict[str, Any]]] = {
     CableResult: _cable,
     CableOfLogs: _cable_of_logs,
     TrackResult: _track,
-    MapOfLogs: _map_of_logs,
-    TrackOfLogs: _track_of_logs,
+    MapOfLogs: map_of_logs_json,
+    TrackOfLogs: track_of_logs_json,
     DynamicResult: _dynamic,
     ResidualResult: _residuals,
     FutureResult: future_json,
     TwinResult: _twin,
+    TwinOfLogs: twin_of_logs_json,
 }
 TEXT: Mapping[type, Callable[[Any], list[str]]] = {
     ModelsResult: models_in_words,
@@ -281,4 +258,5 @@ TEXT: Mapping[type, Callable[[Any], list[str]]] = {
     ResidualResult: residuals_in_words,
     FutureResult: future_in_words,
     TwinResult: twin_in_words,
+    TwinOfLogs: twin_of_logs_in_words,
 }

@@ -50,25 +50,31 @@ class Reproduction:
 
 
 def reproduce_on_logs(
-    chapters: Sequence[str], model: MachineModel, logs: Mapping[str, Log]
+    chapters: Sequence[str],
+    model: MachineModel,
+    logs: Mapping[str, Log],
+    *,
+    axis: str | None = None,
 ) -> Reproduction:
     """Chapters on logs of a real machine; where none is named, those that the logs allow.
 
-    Raises InputError for a named one that needs the twin or other logs, and where none is possible.
+    axis: the only one that moves where None. Raises InputError for a named chapter that needs the
+    twin or other logs, and where none is possible.
     """
     _require_known(chapters)
-    possible = [name for name, chapter in CHAPTERS.items() if chapter.on_logs is not None]
-    results, seconds, left_out = {}, {}, {}
-    for name in chapters or possible:
-        on_logs = CHAPTERS[name].on_logs
-        if on_logs is None:
+    possible = {n: c.on_logs for n, c in CHAPTERS.items() if c.on_logs is not None}
+    for name in chapters:
+        if name not in possible:
             raise InputError(
                 f"chapter '{name}' needs the twin, which knows what is planted; on logs there is "
                 f"{', '.join(possible)}"
             )
+    model = model if axis is None else _alone(model, axis)
+    results, seconds, left_out = {}, {}, {}
+    for name in chapters or possible:
         start = time.monotonic()
         try:
-            results[name] = on_logs(model, logs)
+            results[name] = possible[name](model, logs)
         except InputError as error:
             if chapters:
                 raise
@@ -78,6 +84,12 @@ def reproduce_on_logs(
     if not results:
         raise InputError("; ".join(f"chapter '{n}': {reason}" for n, reason in left_out.items()))
     return Reproduction(results, seconds, small=False, logs=tuple(logs), left_out=left_out)
+
+
+def _alone(model: MachineModel, axis: str) -> MachineModel:
+    if axis not in model.axes:
+        raise InputError(f"no axis '{axis}' in {model.name}; there is {', '.join(model.axes)}")
+    return MachineModel(model.name, {axis: model.axes[axis]}, model.sample_rate)
 
 
 def _require_known(chapters: Sequence[str]) -> None:

@@ -35,6 +35,7 @@ SECTIONS: Mapping[type, Callable[[Any], Section]] = {
     residuals.ResidualResult: residuals.section,
     future.FutureResult: future.section,
     twin.TwinResult: twin.section,
+    twin.TwinOfLogs: twin.section_of_logs,
 }
 TITLE = "Friction identification on the gantry stage, reproduced on its twin"
 TITLE_OF_LOGS = "Friction identification as on the gantry stage, on logs of a machine"
