@@ -82,6 +82,13 @@ def _models(result: ModelsResult) -> dict[str, Any]:
             }
             for i, law in enumerate(result.laws)
         },
+        "traits": {
+            law: {
+                "fall": t.fall, "lag": t.lag, "slow_push": t.slow, "fast_push": t.fast, "unit": "N",
+                "drift": t.drift, "drift_unit": "m/s", "printed": None,
+            }
+            for law, t in zip(result.laws, result.traits, strict=False)
+        },
     }  # fmt: skip
 
 

@@ -42,7 +42,10 @@ def future_json(result: FutureResult) -> dict[str, Any]:
         "unit": "N",
         "long_run": {
             **{n: _drift(d) for n, d in (("aging", aging.level), ("without", aging.steady))},
-            "parameters": {k: recovered_json(r) for k, r in aging.planted.items()},
+            "parameters": {
+                k: {**recovered_json(r), "half_width_90": aging.half.get(k)}
+                for k, r in aging.planted.items()
+            },
         },
         "mixtures": [_mixture(m, [e.count for e in result.elements]) for m in result.mixtures],
     }  # fmt: skip

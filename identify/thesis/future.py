@@ -100,7 +100,7 @@ class FutureResult:
     floor: float
     slow: Slow
     aging: Aging
-    mixtures: Sequence[Mixture]
+    mixtures: Sequence[Mixture] = ()
 
     @property
     def chosen(self) -> Elements:

@@ -17,7 +17,7 @@ from identify.output.report.blocks import (
     Tone,
 )
 from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
-from identify.output.report.units import number, percent, pretty, quantity, spaced
+from identify.output.report.units import NOTHING, number, percent, pretty, quantity, spaced
 from identify.output.words.numbers import capitalised
 from identify.output.words.thesis_future import future_headline, future_in_words
 from identify.thesis.future import FutureResult
@@ -29,8 +29,7 @@ def section(result: FutureResult) -> Section:
         _answer(result),
         Heading("How many elements"),
         _elements(result),
-        Heading("Two frictions at once"),
-        _mixtures(result),
+        *([Heading("Two frictions at once"), _mixtures(result)] if result.mixtures else []),
         Heading("A data-driven residual against physics"),
         _beside(result),
         Heading("Near zero speed"),
@@ -158,10 +157,17 @@ def _run(result: FutureResult) -> Figure:
 
 
 def _aging(result: FutureResult) -> Table:
-    columns = (Column("Parameter"), Column("Planted", numeric=True), Column("Found", numeric=True))
+    columns = (
+        Column("Parameter"), Column("Planted", numeric=True), Column("Found", numeric=True),
+        Column("90 % interval", numeric=True),
+    )  # fmt: skip
+    half = result.aging.half
     rows = [
-        Row((f"{name} ({pretty(r.unit) or '1'})", f"{r.true:g}", f"{r.mean:.4g}"))
+        Row((
+            f"{name} ({pretty(r.unit) or '1'})", f"{r.true:g}", f"{r.mean:.4g}",
+            f"\u00b1 {half[name]:.2g}" if name in half else NOTHING,
+        ))
         for name, r in result.aging.planted.items()
-    ]
+    ]  # fmt: skip
     return Table(columns, rows, "The effects that made the drift, fitted to the whole run as one "
                  f"log: error {number(result.aging.ratio)} times the noise floor.")  # fmt: skip
