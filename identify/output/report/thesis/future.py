@@ -29,7 +29,7 @@ def section(result: FutureResult) -> Section:
         _answer(result),
         Heading("How many elements"),
         _elements(result),
-        *([Heading("Two frictions at once"), _mixtures(result)] if result.mixtures else []),
+        *_both_at_once(result),
         Heading("A data-driven residual against physics"),
         _beside(result),
         Heading("Near zero speed"),
@@ -70,6 +70,12 @@ def _elements(result: FutureResult) -> Table:
     ]  # fmt: skip
     return Table(columns, rows, "The number with the largest evidence is chosen; the test log took "
                  "no part in it.")  # fmt: skip
+
+
+def _both_at_once(result: FutureResult) -> list[Block]:
+    if not result.mixtures:
+        return []
+    return [Heading("Two frictions at once"), _mixtures(result)]
 
 
 def _mixtures(result: FutureResult) -> Table:
