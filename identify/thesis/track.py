@@ -59,7 +59,7 @@ SPEEDS = (
     *(k / 1e3 for k in range(15, 250, 10)),
 )  # fmt: skip
 FULL = Size(9, SPEEDS, 6, MujocoSimulator)
-SMALL = Size(2, (0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.03, 0.06), 2, ReducedSimulator)
+SMALL = Size(2, (0.001, 0.003, 0.006, 0.01, 0.02, 0.06), 2, ReducedSimulator)
 
 
 @dataclass(frozen=True, eq=False)
