@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-POPULATION = 12  # for each variable
+POPULATION, MOST = 12, 72  # for each variable, and of all
 GENERATIONS = 60  # at most
 ALIKE = 1e-3  # scatter of the population's errors, in parts of their mean, at which it ends
 REACH = 5.0  # standard deviations of the population, beyond which nothing is tried
-SIMPLEX_EVALUATIONS = 100  # for each variable
+SIMPLEX_EVALUATIONS = 600  # at most
 
 
 def rough_minimum(
@@ -42,14 +42,14 @@ def rough_minimum(
 
     low = np.maximum(bounds[0], start - REACH * spread)
     high = np.minimum(bounds[1], start + REACH * spread)
-    size = (POPULATION * len(start), len(start))
+    size = (min(POPULATION * len(start), MOST), len(start))
     first = np.clip(start + spread * rng.standard_normal(size), low, high)
     first[0] = start
     found = differential_evolution(
         finite, list(zip(low, high, strict=True)), init=first, maxiter=GENERATIONS, tol=ALIKE,
         polish=False, rng=rng,
     ).x  # fmt: skip
-    options = {"maxfev": SIMPLEX_EVALUATIONS * len(start)}
+    options = {"maxfev": SIMPLEX_EVALUATIONS}
     polished = minimize(
         finite, found, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)),
         options=options,
