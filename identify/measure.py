@@ -34,7 +34,7 @@ def velocity_map(
     The forces of the model's other effects are taken off. axis: the only one that moves where None.
     Raises InputError where no log holds a constant speed.
     """
-    name, dataset = _only(datasets(model, logs, {}), axis)
+    name, dataset = only_axis(datasets(model, logs, {}), axis)
     return VelocityMap.joined([of_velocity(model.axes[name], log.motion) for log in dataset.fit])
 
 
@@ -50,7 +50,7 @@ def cable_force(
     Only the mass of the model is used. test_function: s, the finest detail. Raises InputError where
     the logs hold fewer than two passes each way.
     """
-    name, dataset = _only(datasets(model, logs, {}, test_function), axis)
+    name, dataset = only_axis(datasets(model, logs, {}, test_function), axis)
     return of_cable(model.axes[name], dataset.fit)
 
 
@@ -116,7 +116,7 @@ def _simplest_friction(catalogue: Catalogue) -> Effect:
     return min(frictions, key=lambda e: (len(e.parameters), len(e.states)))
 
 
-def _only(found: Mapping[str, Dataset], axis: str | None) -> tuple[str, Dataset]:
+def only_axis(found: Mapping[str, Dataset], axis: str | None) -> tuple[str, Dataset]:
     """The axis of that name, or the only one that moves; InputError where it is not clear."""
     if axis is None and len(found) > 1:
         raise InputError(f"{', '.join(found)} move in the logs; give the axis")

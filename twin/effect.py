@@ -59,15 +59,14 @@ ELEMENTS = "elements"  # the parameter that counts the elements of an effect wit
 
 
 def own_functions(function: Callable[..., Any]) -> tuple[FunctionType, ...]:
-    """The plain functions of the same file that a function calls, directly or not."""
+    """The plain functions that a function calls, of its own file or imported, directly or not."""
     found: list[FunctionType] = []
     waiting: list[Any] = [function]
     while waiting:
         caller = waiting.pop()
         for name in caller.__code__.co_names:
             called = caller.__globals__.get(name)
-            own = isinstance(called, FunctionType) and called.__module__ == function.__module__
-            if own and called not in found:
+            if isinstance(called, FunctionType) and called not in found:
                 found.append(called)
                 waiting.append(called)
     return tuple(found)

@@ -40,6 +40,7 @@ def reproduce(
     model: Annotated[
         str | None, typer.Option("--model", help="Machine model (.toml) that goes with --log.")
     ] = None,
+    axis: Annotated[str | None, typer.Option(help="Axis of --log, where several move.")] = None,
     seed: Annotated[int, typer.Option(help="Draws the noise.")] = 1,
     as_json_: Json = False,
 ) -> None:
@@ -58,7 +59,7 @@ def reproduce(
     make_folder(out)
     if log is not None and model is not None:
         machine = machine_model(model, catalogue_with(None))
-        result = reproduce_on_logs(chapter or (), machine, dict(read_measured(log)))
+        result = reproduce_on_logs(chapter or (), machine, dict(read_measured(log)), axis=axis)
     else:
         with bars_on_stderr() as bars:
             result = workflow.reproduce(chapter or (), small=small, seed=seed, progress=bars)

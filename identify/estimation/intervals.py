@@ -199,9 +199,18 @@ def refusal(fit: Fit) -> NoInterval | None:
 
 def half_widths(fit: Fit) -> Array:
     """Half widths (k,) of the 90 % intervals, in the parameters' units; inf where not excited."""
+    return half_widths_of(fit, np.eye(fit.jacobian.shape[1]))
+
+
+def half_widths_of(fit: Fit, weights: Array) -> Array:
+    """The same of m sums of the parameters with these weights (k, m), by their covariance.
+
+    inf where a parameter that is not excited takes part.
+    """
     norms = np.linalg.norm(fit.jacobian, axis=0)
     excited = norms > 0
-    out = np.full(len(norms), np.inf)
+    out = np.full(weights.shape[1], np.inf)
+    known = ~(weights[~excited] != 0.0).any(axis=0)
     if not excited.any():
         return out
     columns = fit.jacobian[:, excited] / norms[excited]
@@ -212,10 +221,11 @@ def half_widths(fit: Fit) -> Array:
     honest = left_out(fit.residual, columns, np.full(columns.shape[1], RIDGE), BLOCKS)
     scores = np.stack([columns[a:b].T @ honest[a:b] for a, b in pairwise(edges)])
     covariance = inverse @ (scores.T @ scores * (BLOCKS - 1) / BLOCKS) @ inverse
+    own = weights[excited][:, known] / norms[excited][:, None]
     # A prior or a bound shifts the estimate from the least-squares solution by this much.
-    shift = np.abs(inverse @ (columns.T @ fit.residual))
-    spread_of = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    out[excited] = (QUANTILE * spread_of + shift) / norms[excited]
+    shift = np.abs(own.T @ inverse @ (columns.T @ fit.residual))
+    variance = np.einsum("ij,ik,kj->j", own, covariance, own)
+    out[known] = QUANTILE * np.sqrt(np.maximum(variance, 0.0)) + shift
     return out
 
 

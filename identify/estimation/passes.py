@@ -51,7 +51,7 @@ class Passes:
 def passes(axis: AxisModel, logs: Sequence[PreparedLog]) -> Passes:
     """The passes of some logs, on the stretch that all of them cover.
 
-    Raises InputError where there are not at least two in each direction.
+    Raises InputError where there are not at least two in each direction, or nothing in common.
     """
     bare = replace(axis, effects=())
     ways: dict[bool, list[tuple[Array, Array]]] = {True: [], False: []}
@@ -72,6 +72,11 @@ def passes(axis: AxisModel, logs: Sequence[PreparedLog]) -> Passes:
         )
     every = [*forwards, *backwards]
     low, high = max(x[0] for x, _ in every), min(x[-1] for x, _ in every)
+    if high <= low:
+        raise InputError(
+            f"the {len(every)} passes at constant speed have no stretch of the track in common; "
+            "give logs of passes over the same stretch (`twin simulate cable_pass`)"
+        )
     cut = UNSETTLED * (high - low)
     grid = np.linspace(low + cut, high - cut, GRID)
     on_grid = [

@@ -2,9 +2,10 @@
 
 L. Ljung, System Identification (1999), section 4.3: least squares on simulated less measured
 position, without a restart. An integrating axis sums every force error up, so the search begins at
-a fit of the force residual, and again from places around it. Where each log begins (position,
-velocity, states of the friction) is estimated as well, with its first readings as a prior: left
-free altogether, it would take over what the model lacks.
+a fit of the force residual, and again from places around it. Where the model lacks something, that
+error is rough, and a population goes on from there (identify.estimation.rough_search). Where each
+log begins (position, velocity, states of the friction) is estimated as well, with its first
+readings as a prior: left free altogether, it would take over what the model lacks.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from identify.estimation.replay import (
     motion_error,
     simulated_error,
 )
+from identify.estimation.rough_search import rough_minimum
 from identify.estimation.scaling import Scaling
 from twin.errors import InputError
 from twin.model.machine import AxisModel
@@ -46,6 +48,7 @@ PROBE = 1e-2  # of the error, by which a difference step should change the posit
 TURNS = 4  # tries to find such a step
 FIRST_STEP = 1e-4  # of a value
 TOLERANCE = 1e-6  # relative fall of the squared error, below which the search ends
+ROUGH = 100.0  # times the noise of the readings, above which the error is the model's, and rough
 AT_BOUND = 2.0  # from a bound a logarithm this near is not taken as a start
 SEED = 0  # of the places around
 OF_OTHER_AXIS = ("X_OTHER", "V_OTHER", "A_OTHER")
@@ -102,8 +105,12 @@ def fit_simulated_motion(axis: AxisModel, logs: Sequence[PreparedLog]) -> Motion
             f"axis {logs[0].motion.axis}: the motion that the model makes of the command alone is "
             "not finite; fit the force residual first (--objective force)"
         )
-    found = tried[int(np.nanargmin(costs))]
-    found = problem.settled(found.x)
+    found = problem.settled(tried[int(np.nanargmin(costs))].x)
+    if problem.is_rough(found.x):
+        found = min(
+            (found, problem.settled(problem.searched(found.x, rng))),
+            key=lambda solution: problem.error(solution.x),
+        )
     return MotionFit(
         axis=problem.axis_at(found.x),
         begun=axis,
@@ -178,6 +185,20 @@ class _Problem:
         moved = self.start.copy()
         moved[: self.parameters] += AROUND * self.sizes * rng.standard_normal(self.parameters)
         return np.clip(moved, *self.bounds)
+
+    def is_rough(self, internal: Array) -> bool:
+        """Whether the error is far above what the noise of the readings makes."""
+        readings = [max(log.motion.position_noise, LEAST_READING) for log in self.logs]
+        return self.error(internal) > ROUGH * max(readings)
+
+    def searched(self, internal: Array, rng: np.random.Generator) -> Array:
+        """The same with the parameters of the least error around, the beginnings as they are."""
+        own, rest = internal[: self.parameters], internal[self.parameters :]
+        low, high = (bound[: self.parameters] for bound in self.bounds)
+        found = rough_minimum(
+            lambda x: self.error(np.r_[x, rest]), own, AROUND * self.sizes, (low, high), rng
+        )
+        return np.r_[found, rest]
 
     def axis_at(self, internal: Array) -> AxisModel:
         return self.scaling.outside(self.axis, internal[: self.parameters])

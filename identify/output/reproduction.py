@@ -7,6 +7,14 @@ from typing import Any
 
 from identify.estimation.cable_force import CableForce
 from identify.output.agreement import agree_json
+from identify.output.reproduction_future import future_json, recovered_json
+from identify.output.reproduction_of_logs import (
+    DIRECTIONS,
+    closed_loop_json,
+    map_of_logs_json,
+    track_of_logs_json,
+    twin_of_logs_json,
+)
 from identify.output.words.reproduction import (
     cable_in_words,
     cable_of_logs_in_words,
@@ -14,23 +22,23 @@ from identify.output.words.reproduction import (
     residuals_in_words,
     simulation_in_words,
     track_in_words,
-    twin_in_words,
 )
 from identify.output.words.thesis_dynamic import dynamic_in_words
 from identify.output.words.thesis_future import future_in_words
+from identify.output.words.thesis_maps import map_in_words, track_of_logs_in_words
 from identify.output.words.thesis_models import models_in_words
-from identify.thesis.aging import Drift
+from identify.output.words.thesis_twin import twin_in_words, twin_of_logs_in_words
 from identify.thesis.cable import CableOfLogs, CableResult
-from identify.thesis.chapter import Recovered
 from identify.thesis.chapters import Reproduction
 from identify.thesis.dynamic import DynamicResult
 from identify.thesis.future import FutureResult
+from identify.thesis.maps_of_logs import MapOfLogs, TrackOfLogs
 from identify.thesis.models import ModelsResult
 from identify.thesis.printed import ROLLER_PITCH
 from identify.thesis.residuals import ResidualResult
 from identify.thesis.simulation import SimulationResult
 from identify.thesis.track import Along, TrackResult
-from identify.thesis.twin import TwinResult
+from identify.thesis.twin import TwinOfLogs, TwinResult
 
 
 def reproduction_json(result: Reproduction) -> dict[str, Any]:
@@ -40,6 +48,7 @@ def reproduction_json(result: Reproduction) -> dict[str, Any]:
         "small": result.small,
         "seconds": sum(result.seconds.values()),
         "seconds_by_chapter": dict(result.seconds),
+        "left_out": dict(result.left_out),
     }
 
 
@@ -49,14 +58,8 @@ def reproduction_text(result: Reproduction) -> str:
     for name, found in result.chapters.items():
         lines.append(f"{name} ({result.seconds[name]:.0f} s)")
         lines += [f"  {line}" for line in TEXT[type(found)](found)]
+    lines += [f"{name}: left out, {why}" for name, why in result.left_out.items()]
     return "\n".join(lines)
-
-
-def _recovered(r: Recovered) -> dict[str, Any]:
-    return {
-        "true": r.true, "mean": r.mean, "sd": r.sd, "printed": r.printed, "unit": r.unit,
-        "error": r.error, "rms_error": r.rms_error,
-    }  # fmt: skip
 
 
 def _models(result: ModelsResult) -> dict[str, Any]:
@@ -79,6 +82,13 @@ def _models(result: ModelsResult) -> dict[str, Any]:
             }
             for i, law in enumerate(result.laws)
         },
+        "traits": {
+            law: {
+                "fall": t.fall, "lag": t.lag, "slow_push": t.slow, "fast_push": t.fast, "unit": "N",
+                "drift": t.drift, "drift_unit": "m/s", "printed": None,
+            }
+            for law, t in zip(result.laws, result.traits, strict=False)
+        },
     }  # fmt: skip
 
 
@@ -86,9 +96,9 @@ def _simulation(result: SimulationResult) -> dict[str, Any]:
     return {
         "snr_db": result.snr,
         "trials": result.trials,
-        "parameters": {k: _recovered(r) for k, r in result.parameters.items()},
+        "parameters": {k: recovered_json(r) for k, r in result.parameters.items()},
         "by_snr_db": {
-            f"{snr:g}": {k: _recovered(r) for k, r in found.items()}
+            f"{snr:g}": {k: recovered_json(r) for k, r in found.items()}
             for snr, found in result.by_snr.items()
         },
         "sensitivity": {
@@ -109,7 +119,7 @@ def _cable(result: CableResult) -> dict[str, Any]:
         "repeats": result.repeats,
         "pitch": result.pitch
         and {
-            **_recovered(result.pitch),
+            **recovered_json(result.pitch),
             "standard_error": found.pitch and found.pitch.standard_error,
         },
         **_of_passes(found),
@@ -165,9 +175,6 @@ def _track(result: TrackResult) -> dict[str, Any]:
     }
 
 
-DIRECTIONS = {1.0: "forwards", -1.0: "backwards"}
-
-
 def _along(a: Along) -> dict[str, Any]:
     return {
         "true": a.planted.tolist(), "found": a.found.tolist(), "half_width_90": a.half.tolist(),
@@ -187,8 +194,8 @@ def _dynamic(result: DynamicResult) -> dict[str, Any]:
             }
             for name, r in records.items()
         },
-        "simplex": {k: _recovered(r) for k, r in result.simplex.items()},
-        "parameters": {k: _recovered(r) for k, r in result.fitted.items()},
+        "simplex": {k: recovered_json(r) for k, r in result.simplex.items()},
+        "parameters": {k: recovered_json(r) for k, r in result.fitted.items()},
         "seconds_at_a_place": dict(zip(("simplex", "fit"), result.seconds, strict=True)),
         "position_error": {
             part: dict(zip(("from_rest", "beginning_estimated"), e.T.tolist(), strict=True))
@@ -217,52 +224,15 @@ def _residuals(result: ResidualResult) -> dict[str, Any]:
         "outside_90_bounds": {
             name: {c.signal: c.outside for c in t.correlations} for name, t in tests.items()
         },
-        "parameters": {k: _recovered(r) for k, r in result.values.items()},
+        "parameters": {k: recovered_json(r) for k, r in result.values.items()},
     }
-
-
-def _future(result: FutureResult) -> dict[str, Any]:
-    slow, aging = result.slow, result.aging
-    return {
-        "elements": {
-            "planted": result.planted, "found": result.chosen.count,
-            "tried": [
-                {"elements": e.count, "delta_bic": e.delta_bic, "error_over_noise_floor":
-                 e.over_floor} for e in result.elements
-            ],
-        },
-        "residuals": [
-            {"model": b.name, "parameters_added": b.parameters, "holdout_error": b.held_out,
-             "test_error": b.test} for b in result.beside
-        ],
-        "noise_floor": result.floor,
-        "near_zero_speed": {
-            "velocity": slow.speed.tolist(), "velocity_unit": "m/s", "true": slow.planted.tolist(),
-            "map": slow.mapped.tolist(), "found": slow.fitted.tolist(), "printed": None,
-        },
-        "unit": "N",
-        "long_run": {
-            **{n: _drift(d) for n, d in (("aging", aging.level), ("without", aging.steady))},
-            "parameters": {k: _recovered(r) for k, r in aging.planted.items()},
-        },
-    }  # fmt: skip
-
-
-def _drift(drift: Drift) -> dict[str, Any]:
-    slope, error = drift.slope
-    return {
-        "distance": drift.distance.tolist(), "distance_unit": "m", "true": drift.truth.tolist(),
-        "found": drift.found.tolist(), "half_width_90": drift.half.tolist(), "unit": drift.unit,
-        "slope": slope, "slope_standard_error": error, "slope_unit": f"{drift.unit}/m",
-        "detected": drift.detected, "printed": None,
-    }  # fmt: skip
 
 
 def _twin(result: TwinResult) -> dict[str, Any]:
     return {
         "alike": agree_json(result.alike),
         "changed": {**agree_json(result.changed), "added_mass": result.added, "unit": "kg"},
-        "closed_loop_error": {k: {"found": v, "unit": "1"} for k, v in result.errors.items()},
+        "closed_loop_error": closed_loop_json(result.errors),
     }
 
 
@@ -272,10 +242,13 @@ JSON: Mapping[type, Callable[[Any], dict[str, Any]]] = {
     CableResult: _cable,
     CableOfLogs: _cable_of_logs,
     TrackResult: _track,
+    MapOfLogs: map_of_logs_json,
+    TrackOfLogs: track_of_logs_json,
     DynamicResult: _dynamic,
     ResidualResult: _residuals,
-    FutureResult: _future,
+    FutureResult: future_json,
     TwinResult: _twin,
+    TwinOfLogs: twin_of_logs_json,
 }
 TEXT: Mapping[type, Callable[[Any], list[str]]] = {
     ModelsResult: models_in_words,
@@ -286,8 +259,11 @@ TEXT: Mapping[type, Callable[[Any], list[str]]] = {
     CableResult: cable_in_words,
     CableOfLogs: cable_of_logs_in_words,
     TrackResult: track_in_words,
+    MapOfLogs: map_in_words,
+    TrackOfLogs: track_of_logs_in_words,
     DynamicResult: dynamic_in_words,
     ResidualResult: residuals_in_words,
     FutureResult: future_in_words,
     TwinResult: twin_in_words,
+    TwinOfLogs: twin_of_logs_in_words,
 }

@@ -43,6 +43,12 @@ def behaviours(model: MachineModel, rng: np.random.Generator) -> dict[str, Log]:
     return {"velocity map": mapped, **closed, **opened}
 
 
+def drifting(model: MachineModel, rng: np.random.Generator, duration: float) -> Log:
+    """A longer log of the steady force with a small oscillation alone."""
+    (name,) = model.axes
+    return _follow(model, _pushed(_oscillation(duration)), rng, {name: Controller()})
+
+
 def _follow(
     model: MachineModel,
     setpoint: Setpoint,
@@ -98,8 +104,8 @@ def _pushes() -> Array:
     return np.concatenate(parts)
 
 
-def _oscillation() -> Array:
+def _oscillation(duration: float = DRIFT_TIME) -> Array:
     """A steady force (n,) N with a small oscillation, both rising within a second."""
     steady, amplitude, hertz = DRIFT
-    t = seconds(DRIFT_TIME)
+    t = seconds(duration)
     return np.asarray(np.minimum(t, 1.0) * (steady + amplitude * np.sin(2.0 * np.pi * hertz * t)))

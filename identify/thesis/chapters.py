@@ -6,7 +6,7 @@ import difflib
 import time
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -33,34 +33,63 @@ CHAPTERS: Mapping[str, Chapter[Any, Any]] = {
 
 @dataclass(frozen=True, eq=False)
 class Reproduction:
-    """Results of the chapters that were run, and the seconds that each took."""
+    """Results of the chapters that were run, and the seconds that each took.
+
+    logs: names of those of a real machine; none where the twin was used. left_out: why a chapter
+    could not be run on them, where none was asked for by name.
+    """
 
     chapters: Mapping[str, Any]
     seconds: Mapping[str, float]
     small: bool
+    logs: tuple[str, ...] = ()
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"<Reproduction of {', '.join(self.chapters)}>"
 
 
 def reproduce_on_logs(
-    chapters: Sequence[str], model: MachineModel, logs: Mapping[str, Log]
+    chapters: Sequence[str],
+    model: MachineModel,
+    logs: Mapping[str, Log],
+    *,
+    axis: str | None = None,
 ) -> Reproduction:
-    """Chapters on logs of a real machine. Raises InputError for one that needs the twin."""
+    """Chapters on logs of a real machine; where none is named, those that the logs allow.
+
+    axis: the only one that moves where None. Raises InputError for a named chapter that needs the
+    twin or other logs, and where none is possible.
+    """
     _require_known(chapters)
-    possible = [name for name, chapter in CHAPTERS.items() if chapter.on_logs is not None]
-    results, seconds = {}, {}
-    for name in chapters or possible:
-        on_logs = CHAPTERS[name].on_logs
-        if on_logs is None:
+    possible = {n: c.on_logs for n, c in CHAPTERS.items() if c.on_logs is not None}
+    for name in chapters:
+        if name not in possible:
             raise InputError(
                 f"chapter '{name}' needs the twin, which knows what is planted; on logs there is "
                 f"{', '.join(possible)}"
             )
+    model = model if axis is None else _alone(model, axis)
+    results, seconds, left_out = {}, {}, {}
+    for name in chapters or possible:
         start = time.monotonic()
-        results[name] = on_logs(model, logs)
+        try:
+            results[name] = possible[name](model, logs)
+        except InputError as error:
+            if chapters:
+                raise
+            left_out[name] = str(error)
+            continue
         seconds[name] = time.monotonic() - start
-    return Reproduction(results, seconds, small=False)
+    if not results:
+        raise InputError("; ".join(f"chapter '{n}': {reason}" for n, reason in left_out.items()))
+    return Reproduction(results, seconds, small=False, logs=tuple(logs), left_out=left_out)
+
+
+def _alone(model: MachineModel, axis: str) -> MachineModel:
+    if axis not in model.axes:
+        raise InputError(f"no axis '{axis}' in {model.name}; there is {', '.join(model.axes)}")
+    return MachineModel(model.name, {axis: model.axes[axis]}, model.sample_rate)
 
 
 def _require_known(chapters: Sequence[str]) -> None:

@@ -3,8 +3,8 @@
 The number of elements of a friction with memory is chosen by the data. Nonparametric forces beside
 LuGre are judged against physics on a log on which nothing was decided. Friction near zero speed is
 read from moves that end before the bristles settle, and from the whole law. A long run warms and
-wears the machine (identify.thesis.aging). A mixture of two frictions on one axis is left out: an
-axis of the product has one.
+wears the machine (identify.thesis.aging). Mixtures of two frictions are fitted to that machine, and
+to one whose friction is a mixture (identify.thesis.mixtures).
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from identify.estimation.velocity_map import velocity_map
 from identify.selection.nonparametric import fit_nonparametric
 from identify.thesis.aging import Aging, aging
 from identify.thesis.chapter import Chapter, Progress
+from identify.thesis.mixed_friction import mixed
+from identify.thesis.mixtures import EQUAL, Mixture, mixture
 from identify.thesis.residuals import friction_of
 from identify.thesis.track import steady_friction
 from twin.effect import ELEMENTS
@@ -87,7 +89,10 @@ class Slow:
 
 @dataclass(frozen=True, eq=False)
 class FutureResult:
-    """The chapter's results. planted: elements of the machine. floor: N, of the test log."""
+    """The chapter's results. planted: elements of the machine. floor: N, of the test log.
+
+    mixtures: on the machine with elements, and on one whose friction is a mixture.
+    """
 
     elements: Sequence[Elements]
     planted: int
@@ -95,6 +100,7 @@ class FutureResult:
     floor: float
     slow: Slow
     aging: Aging
+    mixtures: Sequence[Mixture] = ()
 
     @property
     def chosen(self) -> Elements:
@@ -114,7 +120,8 @@ def run(
     memory = replace(memory, sample_rate=RATE)
     name, axis = next(iter(memory.axes.items()))
     dataset, test = _recorded(memory, name, size, rng, progress)
-    elements, physics = _elements(axis, dataset, test, size, progress)
+    counted = _elements(axis, dataset, size, progress)
+    elements, physics = _compared(size.elements, counted, test)
     first = friction_of(next(iter(stage.axes.values())))
     base = fit_axis(axis.with_effect(first), dataset.fit)
     tried = [(first.effect.name, base, 0)]
@@ -133,6 +140,10 @@ def run(
         floor=physics.floor,
         slow=_slow(slow, size, rng, progress),
         aging=aging(old, size.run, rng, progress),
+        mixtures=[
+            mixture(axis, dataset, test, counted),
+            _of_a_mixture(memory, name, first, size, rng, progress),
+        ],
     )
 
 
@@ -153,10 +164,8 @@ def _recorded(
     return dataset, datasets(machine, apart, {}, dataset.test_function_length)[name]
 
 
-def _elements(
-    axis: AxisModel, dataset: Dataset, test: Dataset, size: Size, progress: Progress
-) -> tuple[list[Elements], Fit]:
-    """Each number of elements, and the fit with the one that the evidence chooses."""
+def _elements(axis: AxisModel, dataset: Dataset, size: Size, progress: Progress) -> list[Fit]:
+    """A fit with each number of elements."""
     effect, fits = friction_of(axis).effect, []
     for i, count in enumerate(size.elements):
         progress("numbers of elements", i, len(size.elements))
@@ -164,19 +173,42 @@ def _elements(
         known = {p.name for p in effect.of_size(count).parameters} if effect.of_size else set()
         own = {k: v for k, v in start.items() if k in known}
         fits.append(fit_axis(axis.with_effect(Fitted.at_start(effect, own)), dataset.fit))
+    return fits
+
+
+def _compared(
+    counts: Sequence[int], fits: Sequence[Fit], test: Dataset
+) -> tuple[list[Elements], Fit]:
+    """Each number of elements, and the fit with the one that the evidence chooses."""
     first = fits[0]
     found = [
         Elements(
             count,
-            evidence(
-                first.residual, fit.residual, ELEMENT_COST * (count - size.elements[0])
-            ).delta_bic,
+            evidence(first.residual, fit.residual, ELEMENT_COST * (count - counts[0])).delta_bic,
             rms(error_on(fit.axis, test.fit)) / fit.floor,
         )
-        for count, fit in zip(size.elements, fits, strict=True)
+        for count, fit in zip(counts, fits, strict=True)
     ]
     best = max(range(len(found)), key=lambda i: found[i].delta_bic)
     return found, fits[best]
+
+
+def _of_a_mixture(
+    machine: MachineModel,
+    name: str,
+    other: Fitted,
+    size: Size,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> Mixture:
+    """The machine with its friction and another in equal parts."""
+    axis = machine.axes[name]
+    own = friction_of(axis)
+    made = axis.with_effect(mixed(own.values, other.values, EQUAL))
+    dataset, test = _recorded(machine.with_axis(name, made), name, size, rng, progress)
+    counted = _elements(axis, dataset, size, progress)
+    progress("mixtures", 1, 2)
+    return mixture(made, dataset, test, counted)
 
 
 def _slow(model: MachineModel, size: Size, rng: np.random.Generator, progress: Progress) -> Slow:

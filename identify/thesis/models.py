@@ -23,6 +23,7 @@ from identify.thesis.behaviours import LEG, LOOP, RATE, behaviours, turning
 from identify.thesis.chapter import Chapter, Progress
 from identify.thesis.prescribed import force_along
 from identify.thesis.residuals import friction_of, frictions
+from identify.thesis.traits import Traits, traits
 from twin.effect import Effect, Excitation, Kind
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -65,7 +66,7 @@ class ModelsResult:
     ratios (k, k, b): error over noise floor, by machine, fitted law and behaviour; not a number
     where the machine stands still. right (k,): share of random starts that end right on the law's
     own data. seconds (k,): of a fit, CPU time, the mean over the machines. step (k,): of a law, s.
-    loops, nested: by law.
+    loops, nested: by law. traits (k): of each law, as in the thesis's Table 2.1.
     """
 
     laws: tuple[str, ...]
@@ -77,6 +78,7 @@ class ModelsResult:
     starts: int
     loops: Mapping[str, Drawn]
     nested: Mapping[str, Drawn]
+    traits: Sequence[Traits] = ()
 
     @property
     def overall(self) -> Array:
@@ -114,11 +116,13 @@ def run(
     laws = list(frictions(catalogue).values())[: size.laws]
     known = friction_of(axis).values
     machines = [replace(axis, effects=(_like(effect, known),)) for effect in laws]
-    ratios, seconds, right = [], [], []
+    ratios, seconds, right, shown = [], [], [], []
     for i, machine in enumerate(machines):
         progress("frictions fitted to each other", i, len(laws))
-        logs = behaviours(_noisy(model, name, machine), rng)
-        dataset = datasets(_noisy(model, name, machine), logs, {}, TEST_FUNCTION)[name]
+        stage = _noisy(model, name, machine)
+        logs = behaviours(stage, rng)
+        shown.append(traits(stage, logs, rng))
+        dataset = datasets(stage, logs, {}, TEST_FUNCTION)[name]
         row = [_timed(machine, effect, dataset) for effect in laws]
         fits = [fit for fit, _ in row]
         ratios.append([_by_log(fit, tuple(logs)) for fit in fits])
@@ -134,6 +138,7 @@ def run(
         starts=size.starts,
         loops={e.name: _drawn(m, LOOP) for e, m in zip(laws, machines, strict=True)},
         nested={e.name: _drawn(m, NESTED) for e, m in zip(laws, machines, strict=True)},
+        traits=shown,
     )
 
 

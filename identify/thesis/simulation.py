@@ -25,6 +25,7 @@ from identify.estimation.presliding import Presliding
 from identify.estimation.stribeck_curve import StribeckCurve, fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
 from identify.thesis.chapter import Chapter, Progress, Recovered
+from identify.thesis.maps_of_logs import map_of_logs
 from identify.thesis.printed import SIMULATION
 from twin.effect import Kind
 from twin.effects import Catalogue
@@ -232,4 +233,4 @@ def _sensitivity(
     return Sensitivity(FACTORS, force)
 
 
-CHAPTER = Chapter(("thesis_simulation",), FULL, SMALL, run)
+CHAPTER = Chapter(("thesis_simulation",), FULL, SMALL, run, map_of_logs)

@@ -14,15 +14,16 @@ from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
 from identify.estimation.fit import Fit, fit_axis
-from identify.estimation.intervals import CONFIDENCE, half_widths
+from identify.estimation.intervals import half_widths, half_widths_of
+from identify.estimation.map_curve import NAMES, stribeck_through
 from identify.estimation.stribeck_curve import fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
 from identify.thesis.chapter import Chapter, Progress
+from identify.thesis.maps_of_logs import track_of_logs
 from identify.thesis.prescribed import force_along
 from twin.effect import Kind
 from twin.effects import Catalogue
@@ -35,7 +36,6 @@ from twin.simulator import MujocoSimulator, ReducedSimulator
 
 Array = NDArray[np.float64]
 
-NAMES = ("Fc", "Fs", "v0", "sigma2")
 SPAN = 0.01  # m
 FIRST, APART = -0.136, 34e-3  # m, of the thesis's places
 DIRECTIONS = (1.0, -1.0)
@@ -59,7 +59,7 @@ SPEEDS = (
     *(k / 1e3 for k in range(15, 250, 10)),
 )  # fmt: skip
 FULL = Size(9, SPEEDS, 6, MujocoSimulator)
-SMALL = Size(2, (0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.03, 0.06), 2, ReducedSimulator)
+SMALL = Size(2, (0.001, 0.003, 0.006, 0.01, 0.02, 0.06), 2, ReducedSimulator)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,22 +161,16 @@ def _logs(
 
 def _through(one_way: VelocityMap) -> Found:
     """The curve through a map."""
-    speed, weight = np.abs(one_way.velocity), np.sqrt(one_way.samples)
-    curve = fit_stribeck(speed, one_way.friction, weight)
-    left = weight * (curve(speed) - one_way.friction)
-    columns = weight[:, None] * curve.slopes(speed)
-    freedom = len(speed) - len(NAMES)
-    covariance = np.linalg.pinv(columns.T @ columns) * float(left @ left) / freedom
-    quantile = stdtrit(freedom, 0.5 + CONFIDENCE / 2.0)
-    return np.array(astuple(curve)[: len(NAMES)]), quantile * np.sqrt(np.diag(covariance))
+    found = stribeck_through(one_way)
+    return np.array([found.values[n] for n in NAMES]), np.array([found.half[n] for n in NAMES])
 
 
 def _local_fit(model: MachineModel, name: str, logs: Mapping[str, Log], found: VelocityMap) -> Fit:
     """Friction and its modifiers fitted to the logs of one place, from the curve through its map.
 
-    What varies along the track is left out, as it is one number here.
+    Of what varies along the track the first term alone is free: over one place it is a slope.
     """
-    axis = model.axes[name]
+    axis, prepared = model.axes[name], datasets(model, logs, {})[name]
     start = dict(
         zip(NAMES, _through(replace(found, velocity=np.abs(found.velocity)))[0], strict=True)
     )
@@ -186,23 +180,26 @@ def _local_fit(model: MachineModel, name: str, logs: Mapping[str, Log], found: V
             known = {p.name: float(start[p.name]) for p in f.effect.parameters if p.name in start}
             begun = Fitted.at_start(f.effect, {**f.effect.starts(), **known})
             effects.append(replace(begun, fixed=f.fixed))
-        elif f.effect.kind is Kind.MODIFIER and not f.effect.reads("X"):
-            effects.append(Fitted.at_start(f.effect))
+        elif f.effect.kind is Kind.MODIFIER:
+            begun = Fitted.at_start(f.effect, f.effect.starts(prepared.excitation))
+            rest = {p.name for p in f.effect.strengths[1:]} if f.effect.reads("X") else set()
+            effects.append(replace(begun, fixed=begun.fixed | rest))
         elif f.effect.kind is not Kind.MODIFIER and not any(p.period for p in f.effect.parameters):
             effects.append(replace(f, fixed=frozenset(f.values)))
     axis = replace(axis, effects=tuple(effects), mass_fixed=True)
-    return fit_axis(axis, datasets(model, logs, {})[name].fit)
+    return fit_axis(axis, prepared.fit)
 
 
 def _of_law(fit: Fit, place: float, velocity: Array) -> Found:
     """The curve of a fitted law in one direction, at these velocities (k,) m/s."""
     where, half = fit.scaling.where, half_widths(fit)
     centre, values = _curve(fit.axis, place, velocity), read(fit.axis, where)
-    spread = np.zeros(len(NAMES))
-    for c, value, width in zip(where, values, half, strict=True):
-        moved = _curve(write(fit.axis, [c], [value + PART * width]), place, velocity)
-        spread += ((moved - centre) / PART) ** 2
-    return centre, np.sqrt(spread)
+    slopes = np.zeros((len(where), len(NAMES)))
+    for i in np.flatnonzero(np.isfinite(half)):
+        step = PART * half[i]
+        moved = _curve(write(fit.axis, [where[i]], [values[i] + step]), place, velocity)
+        slopes[i] = (moved - centre) / step
+    return centre, half_widths_of(fit, slopes)
 
 
 def _curve(axis: AxisModel, place: float, velocity: Array) -> Array:
@@ -225,4 +222,4 @@ def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
     return float(-np.sign(velocity) * force[-1])
 
 
-CHAPTER = Chapter(("thesis_track",), FULL, SMALL, run)
+CHAPTER = Chapter(("thesis_track",), FULL, SMALL, run, track_of_logs)

@@ -17,11 +17,12 @@ from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.intervals import estimates, intervals_to_keep
+from identify.measure import only_axis
 from identify.thesis.chapter import Chapter, Progress
 from identify.validation.agreement import Agreement, agreement
 from twin.core.control import Controller
 from twin.effect import Kind
-from twin.effects import Catalogue
+from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
 from twin.experiments.replay import replay
 from twin.experiments.trajectory.setpoint import Setpoint
@@ -60,6 +61,30 @@ class TwinResult:
     changed: Agreement
     added: float
     errors: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class TwinOfLogs:
+    """By log: the fit of the machine beside that of its twin, and the errors of the closed loop."""
+
+    alike: Mapping[str, Agreement]
+    errors: Mapping[str, Mapping[str, float]]
+
+
+def of_logs(model: MachineModel, logs: Mapping[str, Log]) -> TwinOfLogs:
+    """The chapter on logs that hold a reference; the twin has the controller of the model.
+
+    Raises InputError where a log has no reference, or where more than one axis moves.
+    """
+    name, _ = only_axis(datasets(model, logs, {}), None)
+    model = MachineModel(model.name, {name: model.axes[name]}, model.sample_rate)
+    alike, errors, catalogue = {}, {}, load_catalogue()
+    for label, log in logs.items():
+        fitted = identified(model, log)
+        follower = twin_of(fitted, log)
+        alike[label] = agreement(fitted, identified(model, follower), catalogue)
+        errors[label] = closed_loop_errors(log, follower, name)
+    return TwinOfLogs(alike, errors)
 
 
 def run(
@@ -164,4 +189,4 @@ def _signals(log: Log, axis: str) -> dict[str, Array]:
     }
 
 
-CHAPTER = Chapter(("proton_xy",), FULL, SMALL, run)
+CHAPTER = Chapter(("proton_xy",), FULL, SMALL, run, of_logs)

@@ -52,7 +52,7 @@ def compiled(*, inline: bool = False, nogil: bool = False) -> Callable[[Any], An
 def callback(function: Any, signature: Any) -> Any:
     """The function compiled now as a C function, from disk where it was compiled before.
 
-    It may call plain functions of its own file, so that a file of laws needs no numba to be read.
+    It may call plain functions, also other laws, so that a file of laws needs no numba to be read.
     Raises numba.core.errors.NumbaError where it cannot be compiled.
     """
     for called in own_functions(function):

@@ -5,18 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.output.words.agreement import (
-    agreement_in_words,
-    causes_in_words,
-    difference_in_words,
-)
 from identify.thesis.cable import CableOfLogs, CableResult
 from identify.thesis.chapter import Recovered
 from identify.thesis.printed import ROLLER_PITCH
 from identify.thesis.residuals import ResidualResult
 from identify.thesis.simulation import STATIC, SimulationResult
 from identify.thesis.track import Along, TrackResult
-from identify.thesis.twin import TwinResult
 
 Array = NDArray[np.float64]
 
@@ -124,7 +118,11 @@ def track_in_words(result: TrackResult) -> list[str]:
         slopes = [trend(result.places, found[name]) for found in result.fits.values()]
         seen = any(abs(slope) > TREND * error for slope, error in slopes)
         said.append(f"along the track {name} shows {'a' if seen else 'no'} trend")
-    return [*said, "where a level varies within a move, its interval is too narrow"]
+    return [
+        *said,
+        "the map's own intervals hold its scatter, not that bristles which have not settled brake "
+        "less",
+    ]
 
 
 LEVELS = ("Fc", "Fs")
@@ -152,17 +150,3 @@ def residuals_in_words(result: ResidualResult) -> list[str]:
         f"{result.error_after / result.floor:.2f} times the noise floor, and the residual is "
         f"{white[result.after.passes]}",
     ]
-
-
-def twin_in_words(result: TwinResult) -> list[str]:
-    """Whether machine and twin agree, and what is said of a machine that was changed."""
-    said = [f"machine and twin: {agreement_in_words(*item)}" for item in result.alike.axes.items()]
-    errors = ", ".join(f"{signal} {100.0 * e:.2g} %" for signal, e in result.errors.items())
-    said.append(f"closed-loop errors of the twin on the machine's reference: {errors}")
-    for axis, found in result.changed.axes.items():
-        said.append(
-            f"the machine with {result.added:.3g} kg more: {agreement_in_words(axis, found)}"
-        )
-        said += [difference_in_words(d) for d in found.differing]
-        said += causes_in_words(found)
-    return said

@@ -5,6 +5,8 @@ from __future__ import annotations
 from identify.thesis.dynamic import DynamicResult
 from identify.thesis.informed import Informed
 
+EXPLAINED = 0.1  # of the misfit, that may be left where it is explained
+
 
 def dynamic_in_words(result: DynamicResult) -> list[str]:
     """Why closed-loop reversals fail, what both searches find, and what the beginning explains."""
@@ -31,3 +33,11 @@ def dynamic_in_words(result: DynamicResult) -> list[str]:
 
 def _intervals(record: Informed) -> str:
     return ", ".join(f"{n} +- {100.0 * half:.3g} %" for n, half in record.half_widths.items())
+
+
+def dynamic_headline(result: DynamicResult) -> str:
+    """Whether the estimated beginning explains the misfit of the first period."""
+    rest, own = result.first_period.max(axis=0)
+    if own < EXPLAINED * rest:
+        return "The misfit of the first period is where the record begins"
+    return "The beginning does not explain the misfit of the first period"

@@ -7,6 +7,7 @@ import numpy as np
 from identify.output.report.units import spaced
 from identify.thesis.aging import Drift
 from identify.thesis.future import FutureResult
+from identify.thesis.mixtures import Mixture
 
 
 def future_in_words(result: FutureResult) -> list[str]:
@@ -26,8 +27,32 @@ def future_in_words(result: FutureResult) -> list[str]:
         f"over {result.aging.level.distance.max():.3g} m the dry friction of the machine that ages "
         f"{_drift_in_words(result.aging.level)}; without aging it "
         f"{_drift_in_words(result.aging.steady)}",
-        "a mixture of two frictions was not tried: an axis has one",
+        *(_mixture_in_words(m) for m in result.mixtures),
     ]
+
+
+def future_headline(result: FutureResult) -> str:
+    """Whether the law of the machine leaves less on the test log than data-driven residuals."""
+    *others, physics = result.beside
+    if physics.test < min(b.test for b in others):
+        return "Physics beats the data-driven residual"
+    return "A data-driven residual leaves no more than physics"
+
+
+def _mixture_in_words(found: Mixture) -> str:
+    first, second = found.alone
+    best = min(found.elements, key=lambda t: t.over_floor)
+    said = (
+        f"on a machine with {spaced(found.machine)} a mixture of {spaced(first.name)} and "
+        f"{spaced(second.name)} leaves {found.both.over_floor:.3g} times the noise floor of the "
+        f"test log, {spaced(first.name)} alone {first.over_floor:.3g}, {spaced(second.name)} alone "
+        f"{second.over_floor:.3g}, elements at best {best.over_floor:.3g}"
+    )
+    if found.planted is None or found.half is None:
+        return said
+    return (
+        f"{said}; weight {found.weight:.3f} +- {found.half:.1g} (90 %), planted {found.planted:g}"
+    )
 
 
 def _drift_in_words(drift: Drift) -> str:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from identify.output.report.units import spaced
 from identify.thesis.models import RIGHT, ModelsResult
 
+CREEPS = 1e-5  # m/s, from which an axis is said to drift
 OPEN = 1e-3  # N, from which a loop is said to stay open
 
 
@@ -30,6 +33,7 @@ def models_in_words(result: ModelsResult) -> list[str]:
     within = [f"{spaced(a)} is contained in {spaced(b)}" for a, b in contained(result)]
     forget = [spaced(law) for law, loop in result.loops.items() if loop.gap > OPEN]
     fails = [spaced(law) for law, right in zip(result.laws, result.right, strict=True) if right < 1]
+    creep = {law: abs(t.drift) for law, t in zip(result.laws, result.traits, strict=False)}
     return [
         f"each friction fits its own data to {result.own.max():.2g} times the noise floor or "
         f"better; the nearest other is {spaced(result.laws[j])} for a machine with "
@@ -37,9 +41,20 @@ def models_in_words(result: ModelsResult) -> list[str]:
         + (f"; {' and '.join(within)}, which fits as well" if within else ""),
         f"an inner loop stays open with {', '.join(forget) or 'none'}, so these forget; it closes "
         "with the others",
+        *([_creep_in_words(creep)] if creep else []),
         f"of random starts up to three times off {100.0 * result.right.mean():.0f} % end within "
         f"{RIGHT:g} times the noise floor"
         + (f"; not all do with {', '.join(fails)}" if fails else ""),
         f"a fit takes {result.seconds.min():.2g} to {result.seconds.max():.2g} s of CPU time, a "
         f"step of a law {1e9 * result.step.min():.0f} to {1e9 * result.step.max():.0f} ns",
     ]
+
+
+def _creep_in_words(creep: Mapping[str, float]) -> str:
+    moving = [spaced(law) for law, speed in creep.items() if speed > CREEPS]
+    still = max((speed for speed in creep.values() if speed <= CREEPS), default=0.0)
+    return (
+        f"under a small oscillation below the break-away {' and '.join(moving) or 'none'} "
+        f"drift{'s' if len(moving) < 2 else ''}, by up to {max(creep.values()):.2g} m/s; the "
+        f"others by {still:.2g} m/s at most"
+    )

@@ -11,6 +11,7 @@ from built_fits import CATALOGUE, axis_of, built_fit, fitted
 from constructed import log_of
 from scipy.stats import t as student
 
+from identify.estimation.intervals import half_widths, half_widths_of
 from identify.estimation.stribeck_curve import StribeckCurve
 from identify.estimation.velocity_map import VelocityMap
 from identify.thesis import chapters, future, residuals, track, twin
@@ -44,20 +45,29 @@ def test_signals_of_a_log_are_those_of_its_motion():
         )
 
 
-# --- track ----------------------------------------------------------------------------------
-
-
-def test_the_band_of_a_curve_adds_what_each_parameter_does_to_it(monkeypatch):
+def test_the_band_of_a_curve_follows_from_what_each_parameter_does_to_it(monkeypatch):
     fit = built_fit(0.1)
     count = len(fit.scaling.where)
     slopes = np.random.default_rng(3).standard_normal((count, 4))
+
     monkeypatch.setattr(
         track, "_curve", lambda axis, place, velocity: read(axis, fit.scaling.where) @ slopes
     )
-    half = np.linspace(0.01, 0.02, count)
-    monkeypatch.setattr(track, "half_widths", lambda _: half)
-    _, band = track._of_law(fit, 0.0, np.ones(3))
-    np.testing.assert_allclose(band, np.linalg.norm(half[:, None] * slopes, axis=0), rtol=1e-6)
+    monkeypatch.setattr(track, "half_widths", lambda _: np.linspace(0.01, 0.02, count))
+    monkeypatch.setattr(track, "half_widths_of", lambda _, found: found)
+    _, found = track._of_law(fit, 0.0, np.ones(3))
+    np.testing.assert_allclose(found, slopes, rtol=1e-6)
+
+
+def test_what_two_estimates_have_in_common_is_surer_than_either():
+    """Two columns that are nearly one: their sum is known where neither of them is."""
+    rng = np.random.default_rng(5)
+    one = rng.standard_normal(600)
+    columns = np.stack([one, one + 1e-3 * rng.standard_normal(600)], axis=1)
+    fit = SimpleNamespace(jacobian=columns, residual=rng.standard_normal(600))
+    alone, (both,) = half_widths(fit), half_widths_of(fit, np.ones((2, 1)))
+    assert both < 0.01 * alone.min()
+    assert both == pytest.approx(1.7 / np.sqrt(600), rel=0.5)
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])

@@ -39,7 +39,7 @@ def test_passes_of_a_machine_give_its_cable_and_its_pitch(done, tmp_path: Path) 
 
 
 def test_a_chapter_that_needs_the_twin_says_so() -> None:
-    with pytest.raises(InputError, match=r"chapter 'models' needs the twin.* there is cable"):
+    with pytest.raises(InputError, match=r"'models' needs the twin.* there is simulation, cable"):
         reproduce_on_logs(["models"], MODEL, {})
 
 

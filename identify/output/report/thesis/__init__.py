@@ -13,6 +13,7 @@ from identify.output.report.thesis import (
     cable,
     dynamic,
     future,
+    maps,
     models,
     residuals,
     simulation,
@@ -27,13 +28,17 @@ SECTIONS: Mapping[type, Callable[[Any], Section]] = {
     simulation.SimulationResult: simulation.section,
     cable.CableResult: cable.section,
     cable.CableOfLogs: cable.section_of_logs,
+    maps.MapOfLogs: maps.section_of_map,
+    maps.TrackOfLogs: maps.section_of_track,
     track.TrackResult: track.section,
     dynamic.DynamicResult: dynamic.section,
     residuals.ResidualResult: residuals.section,
     future.FutureResult: future.section,
     twin.TwinResult: twin.section,
+    twin.TwinOfLogs: twin.section_of_logs,
 }
 TITLE = "Friction identification on the gantry stage, reproduced on its twin"
+TITLE_OF_LOGS = "Friction identification as on the gantry stage, on logs of a machine"
 
 
 def write_reproduction(path: Path, result: Reproduction) -> None:
@@ -44,7 +49,10 @@ def write_reproduction(path: Path, result: Reproduction) -> None:
     ]
     if result.small:
         facts.append(("Size", "small: fewer speeds, trials and passes"))
+    if result.logs:
+        facts.append(("Logs", ", ".join(result.logs)))
+    facts += [(f"Chapter {name}", f"left out: {why}") for name, why in result.left_out.items()]
     with drawing_style():
         shown = [SECTIONS[type(found)](found) for found in result.chapters.values()]
-        text = page(TITLE, facts, shown)
+        text = page(TITLE_OF_LOGS if result.logs else TITLE, facts, shown)
     write_atomically(path, text.encode("utf-8"))

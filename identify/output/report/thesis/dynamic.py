@@ -19,7 +19,7 @@ from identify.output.report.blocks import (
 from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
 from identify.output.report.units import number, percent, pretty, quantity, with_minus
 from identify.output.words.numbers import capitalised
-from identify.output.words.thesis_dynamic import dynamic_in_words
+from identify.output.words.thesis_dynamic import dynamic_headline, dynamic_in_words
 from identify.thesis.chapter import Recovered
 from identify.thesis.dynamic import PERIOD, DynamicResult
 
@@ -51,8 +51,7 @@ def _answer(result: DynamicResult) -> Answer:
         ),
     ]
     first, *others = [capitalised(said) for said in dynamic_in_words(result)]
-    headline = "The misfit of the first period is where the record begins"
-    return Answer(headline, first, tiles, others, Tone.STRONG)
+    return Answer(dynamic_headline(result), first, tiles, others, Tone.STRONG)
 
 
 def _information(result: DynamicResult) -> Table:

@@ -1,4 +1,4 @@
-"""Chapter "future": number of elements, data-driven residuals, slow moves, a long run."""
+"""Chapter "future": number of elements, mixtures, data-driven residuals, slow moves, a long run."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from identify.output.report.blocks import (
     Tone,
 )
 from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
-from identify.output.report.units import number, percent, pretty, quantity, spaced
+from identify.output.report.units import NOTHING, number, percent, pretty, quantity, spaced
 from identify.output.words.numbers import capitalised
-from identify.output.words.thesis_future import future_in_words
+from identify.output.words.thesis_future import future_headline, future_in_words
 from identify.thesis.future import FutureResult
 
 
@@ -29,6 +29,7 @@ def section(result: FutureResult) -> Section:
         _answer(result),
         Heading("How many elements"),
         _elements(result),
+        *_both_at_once(result),
         Heading("A data-driven residual against physics"),
         _beside(result),
         Heading("Near zero speed"),
@@ -53,7 +54,7 @@ def _answer(result: FutureResult) -> Answer:
         Tile("drift", quantity(slope, "N") + "/m", f"± {quantity(error, 'N')}/m, warm"),
     ]
     first, *others = [capitalised(said) for said in future_in_words(result)]
-    return Answer("Physics beats the data-driven residual", first, tiles, others, Tone.STRONG)
+    return Answer(future_headline(result), first, tiles, others, Tone.STRONG)
 
 
 def _elements(result: FutureResult) -> Table:
@@ -69,6 +70,33 @@ def _elements(result: FutureResult) -> Table:
     ]  # fmt: skip
     return Table(columns, rows, "The number with the largest evidence is chosen; the test log took "
                  "no part in it.")  # fmt: skip
+
+
+def _both_at_once(result: FutureResult) -> list[Block]:
+    if not result.mixtures:
+        return []
+    return [Heading("Two frictions at once"), _mixtures(result)]
+
+
+def _mixtures(result: FutureResult) -> Table:
+    columns = (
+        Column("Fitted"),
+        Column("Free parameters", numeric=True),
+        *(Column(f"Machine with {spaced(m.machine)}", numeric=True) for m in result.mixtures),
+    )
+    by_machine = [(*m.alone, m.both, *m.elements) for m in result.mixtures]
+    names = [spaced(t.name) for t in by_machine[0]]
+    for i, e in enumerate(result.elements, len(names) - len(result.elements)):
+        names[i] += f", {e.count} element" + ("s" if e.count > 1 else "")
+    rows = [
+        Row((name, str(fits[0].parameters), *(number(t.over_floor) for t in fits)),
+            Tone.STRONG if fits[0] is by_machine[0][2] else Tone.PLAIN)
+        for name, fits in zip(names, zip(*by_machine, strict=True), strict=True)
+    ]  # fmt: skip
+    weights = ", ".join(f"{m.weight:.3f} on {spaced(m.machine)}" for m in result.mixtures)
+    return Table(columns, rows, "Test error over noise floor. The mixture is a weight times the "
+                 "first friction and the rest of the second, with one Stribeck curve and a "
+                 f"stiffness and damping each; weight found: {weights}.")  # fmt: skip
 
 
 def _beside(result: FutureResult) -> Table:
@@ -135,10 +163,17 @@ def _run(result: FutureResult) -> Figure:
 
 
 def _aging(result: FutureResult) -> Table:
-    columns = (Column("Parameter"), Column("Planted", numeric=True), Column("Found", numeric=True))
+    columns = (
+        Column("Parameter"), Column("Planted", numeric=True), Column("Found", numeric=True),
+        Column("90 % interval", numeric=True),
+    )  # fmt: skip
+    half = result.aging.half
     rows = [
-        Row((f"{name} ({pretty(r.unit) or '1'})", f"{r.true:g}", f"{r.mean:.4g}"))
+        Row((
+            f"{name} ({pretty(r.unit) or '1'})", f"{r.true:g}", f"{r.mean:.4g}",
+            f"\u00b1 {half[name]:.2g}" if name in half else NOTHING,
+        ))
         for name, r in result.aging.planted.items()
-    ]
+    ]  # fmt: skip
     return Table(columns, rows, "The effects that made the drift, fitted to the whole run as one "
                  f"log: error {number(result.aging.ratio)} times the noise floor.")  # fmt: skip

@@ -32,6 +32,7 @@ def section(result: ModelsResult) -> Section:
         _answer(result),
         _pairs(result),
         _by_behaviour(result),
+        *([_traits(result)] if result.traits else []),
         _cost(result),
         Picture(
             _loops(result.loops),
@@ -101,6 +102,29 @@ def _cost(result: ModelsResult) -> Table:
     ]  # fmt: skip
     return Table(columns, rows, f"{result.starts} random starts of each law on its own data, each "
                  "value up to three times too small or too large.")  # fmt: skip
+
+
+def _traits(result: ModelsResult) -> Table:
+    columns = (
+        Column("Friction"),
+        Column("Falls with speed by", numeric=True),
+        Column("Lag", numeric=True),
+        Column("Slow push", numeric=True),
+        Column("Fast push", numeric=True),
+        Column("Drift", numeric=True),
+        Column("Inner loop open by", numeric=True),
+    )
+    rows = [
+        Row((
+            spaced(law), *(quantity(x, "N") for x in (t.fall, t.lag, t.slow, t.fast)),
+            f"{1e6 * t.drift:.1f} \u00b5m/s", quantity(result.loops[law].gap, "N"),
+        ))
+        for law, t in zip(result.laws, result.traits, strict=True)
+    ]  # fmt: skip
+    return Table(columns, rows, "The plus and minus of the thesis's Table 2.1, measured. Lag: "
+                 "friction where the speed rises less where it falls, at the same speed. Push: "
+                 "largest friction under a triangle of force of 4 s and of 0.5 s. Drift: creep "
+                 "under a steady force with a small oscillation, below break-away.")  # fmt: skip
 
 
 def _loops(drawn: Mapping[str, Drawn]) -> Figure:

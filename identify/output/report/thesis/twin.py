@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -21,8 +23,9 @@ from identify.output.report.blocks import (
 from identify.output.report.drawing import BLUE, FLOOR, INK, ORANGE, new_figure
 from identify.output.report.units import number, pretty
 from identify.output.words.numbers import capitalised
-from identify.output.words.reproduction import twin_in_words
-from identify.thesis.twin import TwinResult
+from identify.output.words.thesis_twin import twin_in_words, twin_of_logs_in_words
+from identify.thesis.printed import EMPS_CLOSED_LOOP
+from identify.thesis.twin import TwinOfLogs, TwinResult
 from identify.validation.agreement import Agreement, Difference
 
 REACH = 8.0  # joint standard errors that the picture shows
@@ -38,10 +41,42 @@ def section(result: TwinResult) -> Section:
             "uncertainties of all comparisons together allow; a parameter beyond the picture is "
             "drawn at its edge.",
         ),
-        _table(result),
+        _table(result.alike),
+        _closed_loop({"Twin less machine": result.errors}),
         Listing([capitalised(said) for said in twin_in_words(result)]),
     ]
     return Section("twin", "Twin against machine", blocks)
+
+
+def section_of_logs(result: TwinOfLogs) -> Section:
+    """The chapter on logs of a machine."""
+    agrees = all(alike.agrees for alike in result.alike.values())
+    headline = "Machine and twin agree" if agrees else "Machine and twin differ"
+    first, *others = [capitalised(said) for said in twin_of_logs_in_words(result)]
+    blocks: list[Block] = [
+        Answer(headline, first, [], others, Tone.STRONG),
+        *(_table(alike, f"Fits of {log} and of its twin.") for log, alike in result.alike.items()),
+        _closed_loop(result.errors),
+    ]
+    return Section("twin", "Twin against machine", blocks)
+
+
+def _closed_loop(errors: Mapping[str, Mapping[str, float]]) -> Table:
+    columns = (
+        Column("Closed loop"),
+        *(Column(name, numeric=True) for name in errors),
+        Column("Published for EMPS", numeric=True),
+        Column("with pulses", numeric=True),
+    )
+    rows = [
+        Row((
+            signal, *(f"{number(100.0 * own[signal])} %" for own in errors.values()),
+            *(f"{number(100.0 * e)} %" for e in published),
+        ))
+        for signal, published in EMPS_CLOSED_LOOP.items()
+    ]  # fmt: skip
+    return Table(columns, rows, "RMS of twin less machine over that of the machine. Published: "
+                 "another machine, a ball-screw drive, by its authors' own model.")  # fmt: skip
 
 
 def _answer(result: TwinResult) -> Answer:
@@ -84,7 +119,7 @@ def _draw(axes: Axes, found: list[Difference], title: str, color: str) -> None:
     axes.set_xlabel("Difference (joint standard errors)")
 
 
-def _table(result: TwinResult) -> Table:
+def _table(alike: Agreement, caption: str = "") -> Table:
     columns = (
         Column("Parameter"),
         Column("Machine", numeric=True),
@@ -94,6 +129,6 @@ def _table(result: TwinResult) -> Table:
     )
     rows = [
         Row((d.label, f"{d.a:.6g}", f"{d.b:.6g}", number(d.standard_error), pretty(d.unit)))
-        for d in _differences(result.alike)
+        for d in _differences(alike)
     ]
-    return Table(columns, rows)
+    return Table(columns, rows, caption)
