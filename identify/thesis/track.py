@@ -184,7 +184,7 @@ def _local_fit(model: MachineModel, name: str, logs: Mapping[str, Log], found: V
             begun = Fitted.at_start(f.effect, f.effect.starts(prepared.excitation))
             rest = {p.name for p in f.effect.strengths[1:]} if f.effect.reads("X") else set()
             effects.append(replace(begun, fixed=begun.fixed | rest))
-        elif f.effect.kind is not Kind.MODIFIER and not any(p.period for p in f.effect.parameters):
+        elif not any(p.period for p in f.effect.parameters):
             effects.append(replace(f, fixed=frozenset(f.values)))
     axis = replace(axis, effects=tuple(effects), mass_fixed=True)
     return fit_axis(axis, prepared.fit)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from built_fits import CATALOGUE, axis_of, built_fit, fitted
-from constructed import log_of
+from constructed import COVERED, log_of
 from scipy.stats import t as student
 
 from identify.estimation.intervals import half_widths, half_widths_of
@@ -117,9 +117,11 @@ def test_brisk_moves_are_repeated_and_too_fast_ones_left_out(monkeypatch):
 
 
 def test_at_one_place_friction_and_its_direction_are_fitted_and_the_rest_is_known(monkeypatch):
-    """What varies along the track is one number there; spikes repeat and are not at the places."""
+    """What varies along the track is a slope there; spikes repeat and are not at the places."""
     monkeypatch.setattr(track, "fit_axis", lambda axis, logs: (axis, logs))
-    monkeypatch.setattr(track, "datasets", lambda *_: {"x": SimpleNamespace(fit="logs")})
+    monkeypatch.setattr(
+        track, "datasets", lambda *_: {"x": SimpleNamespace(fit="logs", excitation=COVERED)}
+    )
     both = VelocityMap(
         *(
             np.r_[a, b]
@@ -133,7 +135,11 @@ def test_at_one_place_friction_and_its_direction_are_fitted_and_the_rest_is_know
     )
     axis, logs = track._local_fit(TRACK, "x", {}, both)
     assert logs == "logs"
-    assert axis.names == ("lugre", "cable_slab", "asymmetric_friction")
+    local = axis["position_dependent_friction"]
+    assert set(axis.names) == {"lugre", "cable_slab", local.effect.name, "asymmetric_friction"}
+    first, *others = (p.name for p in local.effect.strengths)
+    assert first not in local.fixed
+    assert local.fixed.issuperset(others)
     assert axis.mass_fixed
     begun = axis["lugre"].values
     assert [begun[n] for n in track.NAMES] == pytest.approx(astuple(CURVE)[:4], rel=1e-4)
