@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -31,6 +32,7 @@ from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.log import Log
+from twin.memory import give_back
 from twin.model.machine import HistoryStep, MachineModel
 
 if TYPE_CHECKING:
@@ -63,11 +65,13 @@ def fit(
     found, given = datasets(model, logs, holdout or {}, test_function), model
     fits: dict[str, Fit] = {}
     for i, (axis, dataset) in enumerate(list(found.items())):
+        fits = {a: replace(f) for a, f in fits.items()}  # less the matrices that they computed
         require_residual(model.axes[axis], dataset)
         dataset, fitted = fit_aligned(model.axes[axis], dataset)
         found[axis], fits[axis] = with_own_noise(fitted, dataset)
         require_residual(fits[axis].axis, found[axis])
         progress("fitting", i + 1, len(found))
+        give_back()
     held = {a: holdout_error(f, found[a]) for a, f in fits.items()}
     known = Catalogue([]) if catalogue is None else usable(catalogue, given)
     intervals = {a: estimates(f) for a, f in fits.items()}

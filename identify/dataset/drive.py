@@ -80,7 +80,8 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
         return motion, np.zeros(motion.raw.shape[1])
     error, rate = reading_error(part, motion)
     blocks = motion.signals.copy()
-    blocks[:2] -= np.stack([error, rate]).reshape(2, blocks.shape[1], -1).mean(axis=2)
+    for block, at_samples in zip(blocks, (error, rate), strict=False):
+        block -= at_samples.reshape(blocks.shape[1], -1).mean(axis=1)
     raw = np.stack([motion.raw[0] - rate, motion.raw[1]])
     return replace(motion, signals=blocks, raw=raw), rate
 
