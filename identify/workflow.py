@@ -71,13 +71,13 @@ def fit(
         found[axis], fits[axis] = with_own_noise(fitted, dataset)
         require_residual(fits[axis].axis, found[axis])
         progress("fitting", i + 1, len(found))
-        give_back()
     held = {a: holdout_error(f, found[a]) for a, f in fits.items()}
     known = Catalogue([]) if catalogue is None else usable(catalogue, given)
     intervals = {a: estimates(f) for a, f in fits.items()}
     for axis, result in fits.items():
         model = model.with_axis(axis, result.axis)
         model = model.with_intervals(axis, intervals_to_keep(result, intervals[axis]))
+    give_back()
     return FitResult(model, found, fits, intervals, held, given, known)
 
 

@@ -96,7 +96,7 @@ def reading_error(sensing: AxisModel, motion: Motion, passes: int = PASSES) -> t
     table = axis_table({motion.axis: sensing})
     _, _, _, first, last = table.axes[0]
     path = motion.smoothed_position
-    true, reading = np.stack([path, *motion.raw]), np.empty(len(path))
+    true, reading = np.stack([path, motion.raw[0]]), np.empty(len(path))
     for _ in range(passes):
         walk_sensing(
             table.entries, first, last, table.parameters, np.zeros(table.n_states), true,
