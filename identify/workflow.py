@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -31,6 +32,7 @@ from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.log import Log
+from twin.memory import give_back
 from twin.model.machine import HistoryStep, MachineModel
 
 if TYPE_CHECKING:
@@ -63,6 +65,7 @@ def fit(
     found, given = datasets(model, logs, holdout or {}, test_function), model
     fits: dict[str, Fit] = {}
     for i, (axis, dataset) in enumerate(list(found.items())):
+        fits = {a: replace(f) for a, f in fits.items()}  # less the matrices that they computed
         require_residual(model.axes[axis], dataset)
         dataset, fitted = fit_aligned(model.axes[axis], dataset)
         found[axis], fits[axis] = with_own_noise(fitted, dataset)
@@ -74,6 +77,7 @@ def fit(
     for axis, result in fits.items():
         model = model.with_axis(axis, result.axis)
         model = model.with_intervals(axis, intervals_to_keep(result, intervals[axis]))
+    give_back()
     return FitResult(model, found, fits, intervals, held, given, known)
 
 

@@ -79,7 +79,8 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
         return motion, np.broadcast_to(0.0, motion.raw.shape[1])
     error, rate = reading_error(replace(axis, effects=tuple(sensing)), motion)
     blocks = motion.signals.copy()
-    blocks[:2] -= np.stack([error, rate]).reshape(2, blocks.shape[1], -1).mean(axis=2)
+    for block, at_samples in zip(blocks, (error, rate), strict=False):
+        block -= at_samples.reshape(blocks.shape[1], -1).mean(axis=1)
     raw = np.stack([motion.raw[0] - rate, motion.raw[1]])
     return replace(motion, signals=blocks, raw=raw), rate
 
@@ -94,7 +95,7 @@ def reading_error(sensing: AxisModel, motion: Motion, passes: int = PASSES) -> t
     table = axis_table({motion.axis: sensing})
     _, _, _, first, last = table.axes[0]
     path = motion.smoothed_position
-    true, reading = np.stack([path, *motion.raw]), np.empty(len(path))
+    true, reading = np.stack([path, motion.raw[0]]), np.empty(len(path))
     for _ in range(passes):
         walk_sensing(
             table.entries, first, last, table.parameters, np.zeros(table.n_states), true,

@@ -66,8 +66,8 @@ def minimise(
         moved = np.clip(x + step, low, high)
         trial = residual(moved)
         trial_cost = float(trial @ trial)
-        expected = _cost(force + columns @ (moved - x))
         if trial_cost <= cost:
+            expected = _cost(force + columns @ (moved - x))
             fall = 1.0 - trial_cost / cost if cost > 0.0 else 0.0
             least = max(ROUNDING * cost, np.finfo(float).tiny)
             kept = (cost - trial_cost) / max(cost - expected, least)
@@ -82,8 +82,8 @@ def minimise(
             damping = max(damping * (0.1 if kept > POOR else 1.0), LEAST_DAMPING)
         elif not exact:
             columns, exact = jacobian(x), True
-        elif damping <= FIRST_DAMPING and cost - expected < tolerance * cost:
-            return Solution(x, True)  # nearly undamped, it promises no more
+        elif damping <= FIRST_DAMPING and _cost(force + columns @ step) > (1.0 - tolerance) * cost:
+            return Solution(x, True)  # nearly undamped and not cut at bounds, it promises no more
         else:
             damping *= 10.0
             if damping > MOST_DAMPING or not np.any(moved != x):

@@ -90,12 +90,18 @@ class ModelsResult:
         """Median over the other machines of the ratios of a law (k, b), by law and behaviour."""
         k = len(self.laws)
         others = [self.ratios[np.arange(k) != i, i] for i in range(k)]
-        return np.array([np.nanmedian(ratios, axis=0) for ratios in others])
+        return np.array([[_median(column) for column in ratios.T] for ratios in others])
 
     @property
     def own(self) -> Array:
         """Overall ratio (k,) of each law on its own machine."""
         return np.diag(self.overall)
+
+
+def _median(values: Array) -> float:
+    """Of those that are numbers; not a number where none is."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else float("nan")
 
 
 def overall(ratios: Array) -> Array:

@@ -239,7 +239,7 @@ def sense(entries, first, last, parameters, states, io, position):
 
 @compiled(nogil=True)
 def walk_sensing(entries, first, last, parameters, states, motion, dt, readings):
-    """Encoder readings (n,) m along a motion (3, n): position m, velocity m/s, command N."""
+    """Encoder readings (n,) m along a motion (2 or more, n): position m, velocity m/s."""
     io = np.zeros(IO_SIZE)
     io[DT] = dt
     for k in range(motion.shape[1]):

@@ -13,7 +13,7 @@ from twin.log.log import Log, joined
 from twin.log.thin import thinned
 from twin.memory import give_back
 
-# Samples, all axes together. A check takes 90 bytes a sample beside 0.1 GB for the program.
+# Samples, all axes together. A check takes 130 bytes a sample beside 0.1 GB for the program.
 LARGEST_PART = 2_500_000
 # A fit takes some 75 bytes a sample and more for each millisecond of motion, which no rate changes.
 MOST_SAMPLES = 7_500_000

@@ -11,7 +11,7 @@ from built_fits import CATALOGUE
 
 from identify.estimation.stribeck_curve import StribeckCurve
 from identify.estimation.velocity_map import VelocityMap
-from identify.thesis import simulation
+from identify.thesis import cable, dynamic, simulation, track
 from identify.thesis.residuals import friction_of
 from twin.model.file import load_model
 
@@ -116,3 +116,16 @@ def test_each_noise_is_tried_as_often_and_what_is_found_stands_under_its_name(mo
     true, signals = found.sensitivity
     assert true is found.true
     np.testing.assert_array_equal(signals, (n, 2 * n))  # without noise
+
+
+def test_a_whole_study_has_the_sizes_of_the_thesis():
+    """100 trials at 80 dB, 50 speeds, 20 reversals; 10 passes; nine places; sines of 30 s."""
+    study = simulation.FULL
+    assert (study.trials, study.snr[0], len(study.speeds), study.repeats) == (100, 80.0, 50, 20)
+    assert (min(study.speeds), max(study.speeds), study.span) == (0.001, 0.41, 0.2)
+    assert len(set(study.speeds)) == 50
+    assert cable.FULL.repeats == 10
+    assert (cable.SPEED, cable.SPAN) == (0.1, 0.3)
+    assert (track.FULL.places, dynamic.FULL.places, dynamic.FULL.duration) == (9, 9, 30.0)
+    assert (dynamic.AMPLITUDE, dynamic.PERIOD) == (0.21, 3.0)
+    assert (track.FIRST, track.APART, track.SPAN) == (-0.136, 0.034, 0.01)

@@ -171,7 +171,7 @@ def _aging(result: FutureResult) -> Table:
     rows = [
         Row((
             f"{name} ({pretty(r.unit) or '1'})", f"{r.true:g}", f"{r.mean:.4g}",
-            f"\u00b1 {half[name]:.2g}" if name in half else NOTHING,
+            f"\u00b1 {number(half[name])}" if name in half else NOTHING,
         ))
         for name, r in result.aging.planted.items()
     ]  # fmt: skip

@@ -112,12 +112,11 @@ def _traits(result: ModelsResult) -> Table:
         Column("Slow push", numeric=True),
         Column("Fast push", numeric=True),
         Column("Drift", numeric=True),
-        Column("Inner loop open by", numeric=True),
     )
     rows = [
         Row((
             spaced(law), *(quantity(x, "N") for x in (t.fall, t.lag, t.slow, t.fast)),
-            f"{1e6 * t.drift:.1f} \u00b5m/s", quantity(result.loops[law].gap, "N"),
+            f"{1e6 * t.drift:.1f} \u00b5m/s",
         ))
         for law, t in zip(result.laws, result.traits, strict=True)
     ]  # fmt: skip
