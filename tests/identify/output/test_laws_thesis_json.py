@@ -157,4 +157,6 @@ def test_the_twin_in_json(told) -> None:
     assert (found["alike"]["agree"], found["changed"]["agree"]) == (True, False)
     assert found["changed"]["added_mass"] == 0.153
     assert found["changed"]["axes"]["x"]["differing"] == ["p0", "p2"]
-    assert found["closed_loop_error"]["velocity"] == {"found": 4.1e-3, "unit": "1"}
+    assert found["closed_loop_error"]["velocity"] == {
+        "found": 4.1e-3, "unit": "1", "published_emps": {"run": 2.29e-3, "pulses": 4.79e-3}
+    }  # fmt: skip

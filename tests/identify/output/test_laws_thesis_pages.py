@@ -143,7 +143,8 @@ def test_the_numbers_of_future_work(pages) -> None:
         for v, t, m, f in zip(s.speed, s.planted, s.mapped, s.fitted, strict=True)
     ]  # fmt: skip
     assert page.cells(3) == [
-        ("wear.rate (1/m)", "0.002", "0.00206"), ("thermal_drift.share (1)", "0.25", "0.24"),
+        ("wear.rate (1/m)", "0.002", "0.00206", "± 0.000130"),
+        ("thermal_drift.share (1)", "0.25", "0.24", "–"),
     ]  # fmt: skip
     assert "1.17 times the noise floor" in page.tables[3].caption
 

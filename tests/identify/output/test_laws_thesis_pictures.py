@@ -108,7 +108,8 @@ def test_machine_and_twin_side_by_side(pages) -> None:
     page, result = pages["twin"], made.TWIN
     assert page.answer.headline == "Machine and twin agree"
     assert page.tiles == {
-        "closed loop, position": "0.00230 %", "closed loop, velocity": "0.410 %"
+        "closed loop, position": "0.00230 %", "closed loop, velocity": "0.410 %",
+        "closed loop, acceleration": "11.7 %", "closed loop, force": "5.30 %",
     }  # fmt: skip
     assert page.answer.remarks == ["Of a machine with 0.153 kg more these differ: p0, p2."]
     same = result.alike.axes["x"].differences

@@ -12,6 +12,7 @@ from identify.output.words import reproduction as words
 from identify.output.words.thesis_dynamic import dynamic_in_words
 from identify.output.words.thesis_future import future_in_words
 from identify.output.words.thesis_models import contained, models_in_words
+from identify.output.words.thesis_twin import twin_in_words
 
 
 def test_one_parameter_in_words() -> None:
@@ -102,10 +103,11 @@ def test_what_the_residual_tests_say_in_words() -> None:
 
 
 def test_the_twin_in_words() -> None:
-    alike, errors, heavier, first, second, force, cause = words.twin_in_words(made.TWIN)
+    alike, errors, published, heavier, first, second, force, cause = twin_in_words(made.TWIN)
     assert alike == "machine and twin: axis x: the fits agree in all 3 parameters that can be " \
                     "compared"  # fmt: skip
-    assert errors.endswith("position 0.0023 %, velocity 0.41 %")
+    assert errors.endswith("position 0.0023 %, velocity 0.41 %, acceleration 11.7 %, force 5.3 %")
+    assert published.startswith("published for the EMPS drive: position 0.01")
     assert heavier.startswith("the machine with 0.153 kg more: axis x: the fits differ in 2 of 3")
     assert first.startswith("p0 differs by 1.1 kg (2 and 3.1 kg), 11.0 joint standard errors")
     assert second.startswith("p2 differs by -0.564 N s/m")
@@ -131,7 +133,7 @@ def test_the_dynamic_part_in_words() -> None:
 
 
 def test_future_work_in_words() -> None:
-    elements, beside, slow, run, _ = future_in_words(made.FUTURE)
+    elements, beside, slow, run = future_in_words(made.FUTURE)
     assert elements.startswith("the data choose 4 elements, the machine has 4; ")
     assert elements.endswith("1.07 times the noise floor")
     assert beside == (

@@ -106,10 +106,19 @@ def test_both_machines_run_alike_and_the_aging_alone_is_fitted_to_the_whole(monk
         axis = machine.axes[name]
         doubled = [replace(f, values={k: 2.0 * v for k, v in f.values.items()}) for f in
                    axis.effects]  # fmt: skip
-        return SimpleNamespace(axis=replace(axis, effects=tuple(doubled)), ratio=1.3)
+        scaling = SimpleNamespace(
+            where=[
+                SimpleNamespace(effect=n, parameter=SimpleNamespace(name=p))
+                for n, p in (("lugre", "Fc"), ("wear", "rate"), ("thermal_drift", "tau"))
+            ]
+        )
+        return SimpleNamespace(
+            axis=replace(axis, effects=tuple(doubled)), ratio=1.3, scaling=scaling
+        )
 
     for name, stub in (("simulate", simulate), ("_drift", drift), ("_whole", whole)):
         monkeypatch.setattr(aging, name, stub)
+    monkeypatch.setattr(aging, "half_widths", lambda fit: np.array([9.0, 0.1, 0.2]))
     found = aging.aging(AGING, 40.0, np.random.default_rng(1), lambda *_: None)
     assert (found.level, found.steady, found.ratio) == ("drift 1", "drift 2", 1.3)
     (old, one, _), (young, two, _) = runs
@@ -119,6 +128,7 @@ def test_both_machines_run_alike_and_the_aging_alone_is_fitted_to_the_whole(monk
     assert [d[3] for d in drifts] == ["log 1", "log 2"]
     assert all(d[2].names == ("lugre",) for d in drifts)
     assert [log for _, log in wholes] == ["log 1"]
+    assert found.half == {"wear.rate": 0.1, "thermal_drift.tau": 0.2}
     planted = {k: (r.true, r.mean, r.unit) for k, r in found.planted.items()}
     assert planted == {
         "wear.rate": (0.002, 0.004, "1/m"), "thermal_drift.dry": (0.05, 0.1, "1/J"),

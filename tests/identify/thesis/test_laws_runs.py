@@ -55,7 +55,7 @@ def test_a_record_begins_a_quarter_of_a_period_late_in_all_its_columns():
 
 def test_motions_of_the_picture_are_measured_plus_error_from_where_the_record_begins():
     measured = 0.01 * np.arange(100.0)
-    motion = SimpleNamespace(sample_period=2e-3, at_samples=lambda shift: (measured + shift, None))
+    motion = SimpleNamespace(sample_period=2e-3, position_at_samples=lambda shift: measured + shift)
     rest, own = np.arange(90.0) ** 2, -np.arange(90.0)
     found = dynamic._trace(SimpleNamespace(motion=motion), 10, rest, own)
     shown = slice(None, None, 5)  # every 10 ms
@@ -182,7 +182,8 @@ def test_the_number_of_elements_with_the_largest_evidence_is_chosen(monkeypatch)
     excitation = Excitation(-0.1, 0.1, 0.2, 1.0, 5.0, 1e-3)
     dataset = SimpleNamespace(excitation=excitation, fit="fit logs")
     size = replace(future.SMALL, elements=(1, 3, 4, 6))
-    found, best = future._elements(memory, dataset, SimpleNamespace(fit="test"), size, silent)
+    fits = future._elements(memory, dataset, size, silent)
+    found, best = future._compared(size.elements, fits, SimpleNamespace(fit="test"))
     assert tried == [1, 3, 4, 6]
     assert [astuple(e) for e in found] == [
         (1, 0.0, 5.0), (3, 50.0, 15.0), (4, 80.0, 20.0), (6, 70.0, 30.0)
@@ -260,6 +261,7 @@ def test_each_law_is_fitted_to_the_logs_of_every_machine(monkeypatch):
 
     for name, stub in (
         ("behaviours", lambda model, rng: {"map": planted(model), "loop": planted(model)}),
+        ("traits", lambda stage, logs, rng: ("traits", planted(stage))),
         ("datasets", datasets), ("_timed", timed),
         ("_by_log", lambda fit, names: [100.0 * fit[0] + 10.0 * fit[1] + i
                                         for i in range(len(names))]),
@@ -276,6 +278,7 @@ def test_each_law_is_fitted_to_the_logs_of_every_machine(monkeypatch):
     np.testing.assert_allclose(found.right, [1.1, 2.2, 3.3])
     np.testing.assert_allclose(found.seconds, 2.0)  # of each law, the mean over the machines
     np.testing.assert_allclose(found.step, [1e-9, 2e-9, 3e-9])
+    assert found.traits == [("traits", i) for i in (1, 2, 3)]
     assert (found.starts, found.behaviours) == (5, ("map", "loop"))
     assert found.loops == {name: (i, len(models.LOOP)) for name, i in number.items()}
     assert found.nested == {name: (i, len(models.NESTED)) for name, i in number.items()}

@@ -88,7 +88,7 @@ def test_noise_of_the_logs_own_level_is_added_to_readings_and_commands():
 
 def test_the_drift_of_noise_is_the_run_with_noise_less_the_run_without(monkeypatch):
     monkeypatch.setattr(
-        module, "free_run", lambda model, logs, noise: FreeRun({"x": np.array([5.0, 9.0])}, 1.0)
+        module, "free_run", lambda model, logs, noise: FreeRun({"x": np.array([5.0, 9.0])}, HORIZON)
     )
     drift = drift_of_noise(stage(), {}, FreeRun({"x": np.array([2.0, 3.0])}, HORIZON))
     np.testing.assert_array_equal(drift.error["x"], [3.0, 6.0])
