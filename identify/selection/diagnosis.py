@@ -11,7 +11,15 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
 from identify.selection.candidates import Candidate
-from identify.selection.findings import Finding, found, found_wrong, left, with_shape
+from identify.selection.findings import (
+    Finding,
+    FindingKind,
+    found,
+    found_wrong,
+    left,
+    with_shape,
+)
+from identify.selection.ranking import less
 from identify.selection.repeating_force import Repeat, not_general
 from identify.selection.reshaping import Reshaped
 from identify.selection.residual_dependence import Dependence
@@ -112,28 +120,22 @@ class AxisDiagnosis:
     def with_findings(self) -> AxisDiagnosis:
         """The same with what each named effect explains, and with laws of the wrong shape.
 
-        It takes a refit for each. A free curve of a law that is there competes with what is named:
-        it is the answer where it leaves clearly less error by itself, and told as well where it
-        leaves about as little. Where error remains beside what is named, it is asked about there.
+        It takes a refit for each. Where error remains beside what is named, a law of the wrong
+        shape is sought there.
         """
         findings = tuple(map(self._found, self._proved if self.named else ()))
         for curve in self.curves:
             wrong = found_wrong(curve.shape, self.base, curve.before, self.dataset)
             findings = with_shape(findings, wrong)
-        instead = self._wrong_instead() if self.named and not self.curves else None
-        if instead and (RULE.near * left(instead) <= min(map(left, findings))):
-            if left(instead) < RULE.beside_decoys * min(map(left, findings)):
-                return replace(self, findings=(instead,), verdict=Verdict.WRONG_SHAPE)
-            rivals = tuple(replace(f, tied=(*f.tied, instead.effect)) for f in findings)
-            return replace(self, findings=(*rivals, instead))
+        for finding in findings:
+            findings = self._against_shapes(finding, findings)
         shape = None if self.unexplained is None else wrong_shape(self.told, self.dataset)
         if shape is not None:
             wrong = found_wrong(shape, self.base, self.told, self.dataset)
             findings = with_shape(findings, wrong)
-        alone = findings and self.verdict is Verdict.UNEXPLAINED
-        return replace(
-            self, findings=findings, verdict=Verdict.WRONG_SHAPE if alone else self.verdict
-        )
+        shapes = bool(findings) and all(f.kind is FindingKind.WRONG_SHAPE for f in findings)
+        verdict = Verdict.WRONG_SHAPE if shapes else self.verdict
+        return replace(self, findings=findings, verdict=verdict)
 
     def beside(self, base: Fit, curves: tuple[Reshaped, ...]) -> AxisDiagnosis:
         """The same of a base before some of its laws were given free curves."""
@@ -151,12 +153,31 @@ class AxisDiagnosis:
         own = (c.before for c in self.curves if c.shape.effect == effect.name)
         return found(effect, step.tied, self.base, next(own, self.told), self.dataset)
 
-    def _wrong_instead(self) -> Finding | None:
-        """A free curve beside the base alone; not of friction, whose curves hold its modifiers."""
-        shape = wrong_shape(self.base, self.dataset)
+    def _against_shapes(
+        self, finding: Finding, findings: tuple[Finding, ...]
+    ) -> tuple[Finding, ...]:
+        """The findings after a free curve of a law that is there competed with one of them.
+
+        It is told in its place where it leaves clearly less error, and as well where it leaves
+        about as little. Not of friction, whose curves hold its modifiers.
+        """
+        if finding.kind is not FindingKind.MISSING:
+            return findings
+        effect = next(
+            s.candidate.effect for s in self._proved if s.candidate.effect.name == finding.effect
+        )
+        without = less(effect, self.told, self.base, self.dataset)
+        shape = wrong_shape(without, self.dataset)
         if shape is None or shape.shape.curve.rubs:
-            return None
-        return found_wrong(shape, self.base, self.base, self.dataset)
+            return findings
+        wrong = found_wrong(shape, self.base, without, self.dataset)
+        if RULE.near * left(wrong) > left(finding):
+            return findings
+        others = tuple(f for f in findings if f is not finding)
+        if left(wrong) < RULE.beside_decoys * left(finding):
+            return with_shape(others, wrong)
+        tied = replace(finding, tied=(*finding.tied, wrong.effect))
+        return with_shape((*others, tied), wrong)
 
     @property
     def _proved(self) -> list[Step]:

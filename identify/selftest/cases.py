@@ -211,12 +211,14 @@ def _with_planted(
         values = drawn_values(effect, trial.dataset.excitation, rng)
         fitted = _scaled(effect, values, strength, trial, rng)
         if hidden_part(fitted, trial.base, trial.dataset) > HIDDEN:
-            own = replace(trial.base.axis, mass_fixed=True, mass=drawn.true.axes[AXIS].mass)
-            held = replace(trial, base=fit_axis(own, trial.dataset.fit))
+            weighed = replace(trial.base.axis, mass_fixed=True, mass=drawn.true.axes[AXIS].mass)
+            held = replace(trial, base=fit_axis(weighed, trial.dataset.fit))
             fitted = _scaled(effect, values, strength, held, rng)
         else:
             held = trial
-        if visible_force(fitted, held.base, trial.dataset) >= REACHED * strength * trial.floor:
+        reached = visible_force(fitted, held.base, trial.dataset)
+        own = effect.is_itself is None or effect.is_itself(fitted.values, trial.dataset.excitation)
+        if own and reached >= REACHED * strength * trial.floor:
             break
     else:
         raise NotShown(effect.name)

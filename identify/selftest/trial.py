@@ -145,6 +145,7 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
     match finding.kind:
         case FindingKind.MISSING:
             right = not {*case.effects, *built.right}.isdisjoint(names)
+            right |= not {*built.reshaped}.isdisjoint(finding.tied)
         case FindingKind.WRONG_SHAPE:
             right = not {*built.reshaped}.isdisjoint(names)
         case FindingKind.RESEMBLES:

@@ -7,12 +7,24 @@ to (implicit Euler with the axis' mass), so that any stiffness is stable; along 
 which no force changes, the law is as printed.
 """
 
-from twin.effect import DT, MASS, OUT, Effect, Kind, Parameter, V, X
+from collections.abc import Mapping
+
+from twin.effect import DT, MASS, OUT, Effect, Excitation, Kind, Parameter, V, X
 
 # Places tried, parts of the travel from its ends; soft stops a tenth off pass for a cable.
 STOPS = (0.005, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4)
 
-LEAST_FREE = 0.5  # part of the travel between the stops; nearer ones imitate any force of position
+# What is less than that imitates any force of position: a stop ends a travel, and stops what moves.
+LEAST_FREE = 0.5  # part of the travel between the stops
+LEAST_PUSH = 0.25  # of the dry friction, where the travel reaches deepest
+
+
+def is_itself(values: Mapping[str, float], covered: Excitation) -> bool:
+    """Whether stops end the travel, and push."""
+    free = values["high"] - values["low"]
+    deepest = max(covered.position_high - values["high"], values["low"] - covered.position_low)
+    push = values["stiffness"] * deepest
+    return free > LEAST_FREE * covered.travel and push > LEAST_PUSH * covered.dry_level
 
 
 def law(p, s, io):
@@ -51,5 +63,5 @@ EFFECT = Effect(
     law=law,
     fingerprint="residual pushes inwards at the ends of the travel and is zero between",
     excited_by="slow moves to both ends of the travel",
-    is_itself=lambda v, e: v["high"] - v["low"] > LEAST_FREE * e.travel,
+    is_itself=is_itself,
 )  # fmt: skip
