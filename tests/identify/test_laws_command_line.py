@@ -42,7 +42,9 @@ def printed(monkeypatch, name: str) -> None:
     """Both forms of a result are a mark of the form and the result."""
     monkeypatch.setattr(as_text, f"{name}_text", lambda r: f"text of {name}", raising=False)
     told = diagnosis_json if name == "diagnose" else as_json
-    monkeypatch.setattr(told, f"{name}_json", lambda r: {"json of": name, "bad": float("nan")})
+    monkeypatch.setattr(
+        told, f"{name}_json", lambda r, *findings: {"json of": name, "bad": float("nan")}
+    )
 
 
 def refuse(constant: str) -> None:
