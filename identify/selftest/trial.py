@@ -147,7 +147,9 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
             right = not {*case.effects, *built.right}.isdisjoint(names)
             right |= not {*built.reshaped}.isdisjoint(finding.tied)
         case FindingKind.WRONG_SHAPE:
+            over = {c.over for e in case.effects if e in OUTSIDE for c in OUTSIDE[e].curves}
             right = not {*built.reshaped}.isdisjoint(names)
+            right |= finding.shape is not None and finding.shape.over in over
         case FindingKind.RESEMBLES:
             right = any(e in OUTSIDE for e in case.effects)
     return Answer(

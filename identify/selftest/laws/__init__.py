@@ -22,7 +22,8 @@ from identify.selftest.laws import (
 BUMPS = (gaussian_bumps.EFFECT, bulging_bumps.EFFECT)
 CABLES = (folding_cable.EFFECT, tightening_cable.EFFECT)
 NOISE = coloured_force.EFFECT
-# Nothing in the catalogue is one of these.
+# Nothing in the catalogue is one of these. No motion parts one that is a force over position or
+# speed from another shape of a law over the same coordinate, which is as right an answer.
 OUTSIDE = {
     e.name: e
     for e in (

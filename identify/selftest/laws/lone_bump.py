@@ -2,6 +2,7 @@
 
 from math import exp
 
+from twin.curve import Coordinate, Curve
 from twin.effect import OUT, Effect, Kind, Parameter, X
 
 
@@ -21,6 +22,7 @@ EFFECT = Effect(
         Parameter("width", "m", 0.012, 1e-3, 0.1, "half width at 1/e"),
     ),
     law=law,
+    curves=(Curve(Coordinate.POSITION),),
     fingerprint="none",
     excited_by="any motion",
 )

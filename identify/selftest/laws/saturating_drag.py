@@ -2,6 +2,7 @@
 
 from math import tanh
 
+from twin.curve import Coordinate, Curve
 from twin.effect import OUT, Effect, Kind, Parameter, V
 
 
@@ -19,6 +20,7 @@ EFFECT = Effect(
         Parameter("knee", "m/s", 0.06, 1e-3, 1.0, "speed where it levels off"),
     ),
     law=law,
+    curves=(Curve(Coordinate.SPEED, by_direction=True),),
     fingerprint="none",
     excited_by="any motion",
 )
