@@ -156,7 +156,7 @@ class AxisDiagnosis:
     def _against_shapes(
         self, finding: Finding, findings: tuple[Finding, ...]
     ) -> tuple[Finding, ...]:
-        """The findings after a free curve of a law that is there competed with one of them.
+        """The findings after a free curve of a law that the model has competed with one of them.
 
         It is told in its place where it leaves clearly less error, and as well where it leaves
         about as little. Not of friction, whose curves hold its modifiers.
@@ -168,7 +168,7 @@ class AxisDiagnosis:
         )
         without = less(effect, self.told, self.base, self.dataset)
         shape = wrong_shape(without, self.dataset)
-        if shape is None or shape.shape.curve.rubs:
+        if shape is None or shape.shape.curve.rubs or shape.effect not in self.base.axis.names:
             return findings
         wrong = found_wrong(shape, self.base, without, self.dataset)
         if RULE.near * left(wrong) > left(finding):

@@ -47,15 +47,16 @@ def diagnose_axis(
     final, found = base, ranking
     curves: list[Reshaped] = []
     while len(steps) < RULE.most_steps:
-        while curve := curve_in_place(final, dataset, found):
+        while curve := curve_in_place(final, dataset, found, base.axis.names):
             curves.append(curve)
-            steps, final = _needed_beside(curve, steps, base, dataset)
+            steps, final = _needed_beside(curves, steps, base, dataset)
             final, found = ranked(final, dataset)
             states[-1] = SelectionState(tuple(steps), final)
         if not (more := _next(final, dataset, found, ranked)):
             break
-        earlier = [s.candidate for s in kept(steps)]
-        final, dropped = _eliminated_backwards(base, more[-1].candidate.fit, dataset, earlier)
+        final, dropped = _eliminated_backwards(
+            base, more[-1].candidate.fit, dataset, _earlier(steps, curves)
+        )
         steps += [*more[:-1], replace(more[-1], dropped=dropped)]
         states.append(SelectionState(tuple(steps), final))
         if final.at_floor and RULE.floor_sure[0] < final.ratio < RULE.floor_sure[1]:
@@ -71,12 +72,18 @@ def diagnose_axis(
     return _decided(dataset, ranking, states).beside(base, tuple(curves))
 
 
+def _earlier(steps: Sequence[Step], curves: Sequence[Reshaped]) -> list[Candidate]:
+    """The candidates that were added; not those of which a curve is the shape."""
+    own = {c.shape.effect for c in curves}
+    return [s.candidate for s in kept(steps) if s.candidate.effect.name not in own]
+
+
 def _needed_beside(
-    curve: Reshaped, steps: Sequence[Step], base: Fit, dataset: Dataset
+    curves: Sequence[Reshaped], steps: Sequence[Step], base: Fit, dataset: Dataset
 ) -> tuple[list[Step], Fit]:
-    """The steps without effects that had imitated what a free curve now explains, and the fit."""
-    earlier = [s.candidate for s in kept(steps) if s.candidate.effect.name != curve.shape.effect]
-    fit, dropped = _eliminated_backwards(base, curve.fit, dataset, earlier)
+    """The steps without effects that had imitated what the last curve explains, and the fit."""
+    earlier = _earlier(steps, curves)
+    fit, dropped = _eliminated_backwards(base, curves[-1].fit, dataset, earlier)
     if not dropped:
         return list(steps), fit
     return [*steps[:-1], replace(steps[-1], dropped=(*steps[-1].dropped, *dropped))], fit

@@ -8,7 +8,7 @@ contain what modifies friction.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from identify.dataset.dataset import Dataset
@@ -34,17 +34,21 @@ class Reshaped:
     fit: Fit
 
 
-def curve_in_place(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:
+def curve_in_place(
+    fit: Fit, dataset: Dataset, ranking: Sequence[Candidate], given: Collection[str]
+) -> Reshaped | None:
     """The free curve that the selection should go on beside; None where there is none.
 
-    Also where the fit is at the noise floor, or has as many as MOST_CURVES.
+    Also where the fit is at the noise floor, or has as many as MOST_CURVES. given: names of the
+    effects that the model had before the selection. The law of one that it added is asked about
+    where no other is supported: a curve over one pitch can hold the force of many.
     """
-    if (
-        fit.at_floor
-        or sum(f.effect.free_shape is not None for f in fit.axis.effects) >= MOST_CURVES
-    ):
+    curves = [f for f in fit.axis.effects if f.effect.free_shape]
+    if fit.at_floor or len(curves) >= MOST_CURVES:
         return None
     alone = _reshaped(fit, dataset, ranking)
+    if alone and alone.shape.effect not in given and any(c.supported for c in ranking):
+        return None
     if alone or any(c.supported for c in ranking) or is_unpredictable(fit, dataset):
         return alone
     return _beside_an_effect(fit, dataset, ranking)

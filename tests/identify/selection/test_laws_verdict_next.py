@@ -107,7 +107,7 @@ def looped(monkeypatch, errors, *, moved=(), shifts=2):
         return SimpleNamespace(beside=lambda base, curve: (base, curve))
 
     monkeypatch.setattr(module, "rank", lambda base, dataset, **_: (base, (built("wear"),)))
-    monkeypatch.setattr(module, "curve_in_place", lambda fit, dataset, ranking: None)
+    monkeypatch.setattr(module, "curve_in_place", lambda fit, dataset, ranking, given: None)
     monkeypatch.setattr(module, "_next", following)
     monkeypatch.setattr(module, "_eliminated_backwards", back)
     monkeypatch.setattr(module, "_decided", decide)

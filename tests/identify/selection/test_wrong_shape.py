@@ -28,6 +28,7 @@ CATALOGUE = load_catalogue()
 CABLE = fitted("cable_slab", k1=1.5)
 MODEL = axis_of(CABLE, fitted("cogging", p=0.017, a1=0.1))
 NOISE = 1e-3  # N
+OWN = MODEL.names
 
 
 def machine(dataset, force, model=MODEL):
@@ -159,28 +160,28 @@ def test_what_has_no_shape_to_give_is_one_line(effect, model, message) -> None:
 def test_a_curve_takes_part_in_the_selection_where_no_effect_leaves_as_little(dataset) -> None:
     there = machine(dataset, step)
     base = base_of(there)
-    found = curve_in_place(base, there, ())
+    found = curve_in_place(base, there, (), OWN)
     assert found is not None
     assert found.shape.effect == "cable_slab"
     assert found.fit.error < 0.3 * base.error
     before = float(np.sqrt(np.mean(residual(base.axis, there.holdout or there.fit) ** 2)))
     better = built(before=before, after=1e-4 * before)
-    assert curve_in_place(base, there, (better,)) is None
-    assert curve_in_place(found.fit, there, ()) is None  # has it already
+    assert curve_in_place(base, there, (better,), OWN) is None
+    assert curve_in_place(found.fit, there, (), OWN) is None  # has it already
     nothing = machine(dataset, lambda x, _: 0.0 * x)
-    assert curve_in_place(base_of(nothing), nothing, ()) is None
+    assert curve_in_place(base_of(nothing), nothing, (), OWN) is None
 
 
 def test_each_law_of_a_wrong_shape_gets_a_curve_of_its_own(dataset) -> None:
     there = machine(dataset, lambda x, d: step(x, d) + 9.0 * bump(x, d))
-    first = curve_in_place(base_of(there), there, ())
+    first = curve_in_place(base_of(there), there, (), OWN)
     assert first is not None
-    second = curve_in_place(first.fit, there, ())
+    second = curve_in_place(first.fit, there, (), OWN)
     assert second is not None
     assert {first.shape.effect, second.shape.effect} == {"cable_slab", "cogging"}
     assert {"free_curve", "free_curve_2"} <= set(second.fit.axis.names)
     assert second.fit.ratio < 0.5 * first.fit.ratio
-    assert curve_in_place(second.fit, there, ()) is None
+    assert curve_in_place(second.fit, there, (), OWN) is None
 
 
 def test_a_missing_effect_of_another_shape_is_resembled(dataset) -> None:
@@ -189,7 +190,7 @@ def test_a_missing_effect_of_another_shape_is_resembled(dataset) -> None:
     lacking = axis_of(CABLE)
     base = finished(lacking, lacking, there.fit, Outcome.CONVERGED)
     candidate = built("cogging", fit=base_of(there))
-    curve = curve_in_place(candidate.fit, there, ())
+    curve = curve_in_place(candidate.fit, there, (), OWN)
     assert curve is not None
     steps = (Step(candidate, (), proved=False),)
     done = AxisDiagnosis(there, base, (), steps, curve.fit, Verdict.UNEXPLAINED, None)
@@ -207,7 +208,7 @@ def test_a_missing_effect_of_another_shape_is_resembled(dataset) -> None:
 def test_what_is_found_beside_a_curve_is_told_with_it(dataset) -> None:
     there = machine(dataset, step)
     base = base_of(there)
-    curve = curve_in_place(base, there, ())
+    curve = curve_in_place(base, there, (), OWN)
     assert curve is not None
     alone = AxisDiagnosis(there, curve.fit, (), (), curve.fit, Verdict.NOTHING_MISSING, None)
     told = alone.beside(base, (curve,)).with_findings()
