@@ -61,7 +61,11 @@ def test_law(law: Law, effect: Effect) -> None:
 
 def test_some_forces_depend_on_position_alone() -> None:
     rng = np.random.default_rng(31)
-    assert any(physics.depends_on_position_alone(e, moderate(e, rng)) for e in CATALOGUE.values())
+    alone = [
+        e for e in CATALOGUE.values() if physics.depends_on_position_alone(e, moderate(e, rng))
+    ]
+    assert alone
+    assert all(e.kind is Kind.FORCE and not e.states for e in alone)
 
 
 def with_x(fitted: Fitted) -> MachineModel:

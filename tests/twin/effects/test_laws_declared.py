@@ -24,6 +24,17 @@ EVERY = pytest.mark.parametrize(
 
 PLACES_AND_TIMES = ("start", "low", "high", "phase", "tau", "relaxation", "b", "n")
 
+
+@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))
+def test_only_a_friction_holds_an_axis_at_rest(effect: Effect) -> None:
+    assert not effect.sticks or effect.kind is Kind.FRICTION
+    assert not effect.several or effect.numbered(2).name == f"{effect.name}_2"
+
+
+def test_some_friction_holds_an_axis_at_rest() -> None:
+    assert any(e.sticks for e in CATALOGUE.values())
+
+
 # --- bounds ---------------------------------------------------------------------------------------
 
 

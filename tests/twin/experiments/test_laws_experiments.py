@@ -200,6 +200,21 @@ def test_every_number_of_an_experiment_has_its_unit_and_one_is_the_least_count()
     assert [axis_name(i) for i in range(5)] == ["x", "y", "z", "3", "4"]
 
 
+def test_a_number_that_is_refused_says_what_is_allowed() -> None:
+    """Zero where a number may be zero, and nowhere else."""
+    from twin.experiments.experiment import _require
+
+    for value, zero, allowed in (
+        (0.0, False, "give a number above 0 m"),
+        (-1.0, True, "0 or more"),
+    ):
+        with pytest.raises(InputError, match=allowed):
+            _require("span", value, "m", zero)
+    _require("span", 0.0, "m", zero=True)
+    with pytest.raises(InputError, match=r"span: is empty; give at least one number in m"):
+        _require("span", (), "m", zero=True)
+
+
 # --- named experiments ----------------------------------------------------------------------------
 
 

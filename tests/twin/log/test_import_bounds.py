@@ -12,7 +12,7 @@ import scipy.io
 from import_cases import mapping
 
 from twin.errors import InputError
-from twin.log.importers import import_log, mat
+from twin.log.importers import import_log, mat, table
 
 MAP = """
 sample_rate = 1000.0
@@ -59,6 +59,23 @@ def test_a_bomb_is_one_line(tmp_path, monkeypatch, ending, write):
     assert path.stat().st_size < 1 << 19
     with pytest.raises(InputError, match="export it again"):
         import_log(path, mapping(tmp_path, MAP))
+
+
+def test_what_a_file_announces_counts_in_bytes(tmp_path, monkeypatch):
+    """Zeros in one chunk, of 8 bytes each, against the most that such a file may hold."""
+    h5py = pytest.importorskip("h5py")
+    path, count = tmp_path / "a.h5", 100_000
+    with h5py.File(path, "w") as file:
+        file.create_dataset("q", data=np.zeros(count), compression="gzip")
+    size = 8 * count
+    for least, allowed in ((0.9 * size, False), (1.1 * size, True)):
+        own = table.LARGEST_RATIO * path.stat().st_size
+        monkeypatch.setattr(table, "SMALLEST_TABLE", least - own)
+        if allowed:
+            assert len(import_log(path, mapping(tmp_path, MAP))) == count
+        else:
+            with pytest.raises(InputError, match="export it again"):
+                import_log(path, mapping(tmp_path, MAP))
 
 
 @pytest.mark.parametrize("compressed", [False, True])

@@ -49,6 +49,7 @@ def test_names_and_numbers_tell_the_signals(tmp_path, columns, expected, rate):
     found = guess_map(tmp_path / "a.csv")
     assert not found.missing
     assert columns_of(tmp_path, found.text) == expected
+    assert "resample" not in found.text  # the steps are even
     log = import_log(tmp_path / "a.csv", mapping(tmp_path, found.text))
     assert log.sample_rate == rate
     np.testing.assert_allclose(log.axes["x"].position, Q, atol=1e-9)
