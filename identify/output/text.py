@@ -17,6 +17,7 @@ from identify.output.words.estimation import (
 from identify.output.words.experiment_design import gap_in_words, not_run_in_words
 from identify.output.words.selection import (
     advice,
+    as_told,
     dependence_in_words,
     finding_in_words,
     nonparametric_in_words,
@@ -117,7 +118,7 @@ def diagnose_text(result: Diagnosis) -> str:
     lines = []
     for axis, d in result.axes.items():
         unit, words = d.base.axis.units.force, d.base.axis.units.words
-        named = f" {d.best.effect.name}." if d.best else ""
+        named = f" {as_told(d, d.best.effect.name)}." if d.best else ""
         lines.append(f"axis {axis}: {words(verdict_in_words(d))}{named}")
         lines.append(
             f"  {words('force error')} {d.base.error:.4g} {unit}, noise floor "

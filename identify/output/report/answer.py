@@ -12,6 +12,7 @@ from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import (
     advice,
+    as_told,
     dependence_in_words,
     finding_in_words,
     refit_in_words,
@@ -21,7 +22,6 @@ from identify.output.words.selection import (
 from identify.output.words.validation import region_in_words
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.findings import FindingKind
 from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
 from twin.model.units import AxisUnits
@@ -77,9 +77,7 @@ def _diagnosed(
 
 
 def _headline(found: AxisDiagnosis) -> str:
-    alike = {f.effect for f in found.findings if f.kind is FindingKind.RESEMBLES}
-    like = {name: "something like " if name in alike else "" for name in found.named}
-    first, *more = [f"{like[name]}{spaced(name)}" for name in found.named] or [""]
+    first, *more = [spaced(as_told(found, name)) for name in found.named] or [""]
     either = " or ".join([first, *map(spaced, found.ambiguous_with)])
     match found.verdict:
         case Verdict.MISSING_EFFECTS:

@@ -40,6 +40,12 @@ def verdict_in_words(found: AxisDiagnosis) -> str:
     return SEVERAL if several else VERDICTS[found.verdict]
 
 
+def as_told(found: AxisDiagnosis, effect: str) -> str:
+    """A named effect: "cogging", or "something like cogging" where the missing one resembles it."""
+    alike = {f.effect for f in found.findings if f.kind is FindingKind.RESEMBLES}
+    return f"something like {effect}" if effect in alike else effect
+
+
 def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     """E.g. "cogging explains 93 % of the squared error above the noise floor: ..."."""
     unit = finding.unit
