@@ -21,6 +21,7 @@ from twin.signals import Array
 BAND = 1.645  # standard deviations, 90 %
 UNITS = {Coordinate.POSITION: LINEAR.position, Coordinate.SPEED: LINEAR.velocity}
 BOTH, AHEAD, BEHIND = "both directions", "forwards", "backwards"
+SELDOM = 0.02  # of the most visited knot's weight, below which a knot is not drawn
 WEAK = 1e-6  # of the data's weight: smoothing under which a law's own force is read off
 
 
@@ -38,7 +39,8 @@ class FoundShape:
     """A law's curve as it is assumed and as it is found.
 
     over: its coordinate (k,) in ``unit``, within one period (m) where it has one. lets_go: whether
-    the force is gone at standstill. curves: by direction of motion.
+    the force is gone at standstill. curves: by direction of motion; not a number where the fit logs
+    have not been.
     """
 
     over: Coordinate
@@ -60,17 +62,20 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
     linear = Linearised.about(fit, dataset, shape.empty).on(mask).less(shape.effect)
     law = averaged_force(fit.axis, dataset.fit) - averaged_force(without, dataset.fit)
     own = np.array([c.effect == shape.empty.effect.name for c in linear.where])
-    assumed = _read_off(linear.columns[:, own], law[fit.kept][mask])
+    hats = linear.columns[:, own]
+    assumed = _read_off(hats, law[fit.kept][mask])
     correction, spread = _corrected(linear, shape.stiffness)
     coordinate, index = _knots(shape)
     curves = {}
     for name, weights in _directions(shape, index, len(assumed)).items():
         full = np.zeros((len(weights), len(own)))
         full[:, own] = weights
+        visits = np.linalg.norm(hats @ weights.T, axis=0)
+        been = np.where(visits > SELDOM * visits.max(), 1.0, np.nan)
         curves[name] = Drawn(
-            assumed=weights @ assumed,
-            found=weights @ (assumed + correction[own]),
-            band=BAND * np.sqrt(np.einsum("ki,ij,kj->k", full, spread, full)),
+            assumed=been * (weights @ assumed),
+            found=been * (weights @ (assumed + correction[own])),
+            band=been * BAND * np.sqrt(np.einsum("ki,ij,kj->k", full, spread, full)),
         )
     unit = fit.axis.units(UNITS[shape.curve.over])
     force = fit.axis.units.force

@@ -9,7 +9,7 @@ from identify.output.report.blocks import Block, Heading, Picture, Section
 from identify.output.report.drawing import BLUE, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import SCALED, Scale, spaced
-from identify.output.words.selection import shape_in_words
+from identify.output.words.selection import advice, shape_in_words
 from identify.selection.findings import Finding
 from identify.selection.found_shape import BEHIND, FoundShape
 from twin.model.units import units_of
@@ -31,8 +31,7 @@ def _picture(finding: Finding, shape: FoundShape) -> Picture:
     words = units_of(finding.unit).words
     caption = (
         f"{shape_in_words(finding.effect, shape, SCALED)} Where the band holds the dashed line, "
-        f"these logs do not tell the two apart. twin add --shape {finding.effect} gives the model "
-        "the curve that is found."
+        f"these logs do not tell the two apart. {advice([finding])}."
     )
     return Picture(_figure(shape), words(caption))
 
@@ -40,7 +39,7 @@ def _picture(finding: Finding, shape: FoundShape) -> Picture:
 def _figure(shape: FoundShape) -> Figure:
     figure = new_figure(3.0)
     every = figure.subplots(1, len(shape.curves), sharey=True, squeeze=False)[0]
-    scale = Scale.of(shape.force_unit, [np.abs(c.found).max() for c in shape.curves.values()])
+    scale = Scale.of(shape.force_unit, [np.nanmax(np.abs(c.found)) for c in shape.curves.values()])
     along = Scale.of(shape.unit, shape.coordinate)
     x = along(shape.coordinate)
     words = units_of(shape.force_unit).words

@@ -72,9 +72,9 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
 def shape_in_words(effect: str, shape: FoundShape, numbers: Numbers = PLAIN) -> str:
     """Where a law differs most from the curve found, and what that does at standstill."""
     direction, curve = max(
-        shape.curves.items(), key=lambda c: np.abs(c[1].found - c[1].assumed).max()
+        shape.curves.items(), key=lambda c: np.nanmax(np.abs(c[1].found - c[1].assumed))
     )
-    at = int(np.argmax(np.abs(curve.found - curve.assumed)))
+    at = int(np.nanargmax(np.abs(curve.found - curve.assumed)))
     assumed, found, band = (
         numbers.amount(float(values[at]), shape.force_unit)
         for values in (curve.assumed, curve.found, curve.band)

@@ -215,3 +215,21 @@ def test_what_is_found_beside_a_curve_is_told_with_it(dataset) -> None:
     assert (told.base, told.verdict) == (base, Verdict.WRONG_SHAPE)
     assert [f.effect for f in told.findings] == ["cable_slab"]
     assert alone.beside(base, ()) is alone
+
+
+def test_a_curve_is_drawn_where_the_logs_have_been(dataset) -> None:
+    there = machine(dataset, step)
+    base = base_of(there)
+    found = best_shape(base, there, "cable_slab")
+    assert found is not None
+    drawn = found_shape(found.shape, base, there)
+    been = np.concatenate([log.motion.position for log in there.fit])
+    low, high = been.min(), been.max()
+    apart = np.diff(drawn.coordinate)[0]
+    beyond = (drawn.coordinate < low - apart) | (drawn.coordinate > high + apart)
+    within = (drawn.coordinate > low + apart) & (drawn.coordinate < high - apart)
+    for curve in (drawn.curves[BOTH].assumed, drawn.curves[BOTH].found, drawn.curves[BOTH].band):
+        assert beyond.any()
+        assert np.isnan(curve[beyond]).all()
+        assert np.isfinite(curve[within]).all()
+    assert "The law of cable_slab is off most at position" in shape_in_words("cable_slab", drawn)
