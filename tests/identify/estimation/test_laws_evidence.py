@@ -8,6 +8,7 @@ from scipy.stats import norm
 from identify.estimation.evidence import (
     BLOCKS,
     Evidence,
+    Gain,
     effective_samples,
     evidence,
     held_out_gain,
@@ -107,3 +108,7 @@ def test_priors_count_in_a_left_out_residual():
     for block in cut(len(data), 9):
         again = without(rows, wanted, block)
         np.testing.assert_allclose(found[block], (columns @ again - data)[block], atol=1e-9)
+
+
+def test_an_error_falls_where_less_is_left() -> None:
+    assert [Gain(2.0, after, 9.0).falls for after in (1.9, 2.0, 2.1)] == [True, False, False]

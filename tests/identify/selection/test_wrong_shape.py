@@ -233,3 +233,6 @@ def test_a_curve_is_drawn_where_the_logs_have_been(dataset) -> None:
         assert np.isnan(curve[beyond]).all()
         assert np.isfinite(curve[within]).all()
     assert "The law of cable_slab is off most at position" in shape_in_words("cable_slab", drawn)
+    gone = "The force is gone at standstill."
+    assert gone in shape_in_words("a", replace(drawn, lets_go=True))
+    assert gone not in shape_in_words("a", replace(drawn, lets_go=False))
