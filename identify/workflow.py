@@ -145,7 +145,9 @@ def diagnose(
         for axis, fitted in result.fits.items()
     }
     plans, not_planned = _next_experiments(axes, result.model, test_function)
-    regions = {axis: worst_region(d.told, d.dataset) for axis, d in axes.items() if d.unexplained}
+    regions = {
+        axis: worst_region(d.with_named, d.dataset) for axis, d in axes.items() if d.unexplained
+    }
     return Diagnosis(
         result.model, axes, _compared(result.model, result.datasets, progress), plans,
         result.refits, tuple(name for name in catalogue if name not in known), not_planned,

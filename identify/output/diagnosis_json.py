@@ -113,7 +113,7 @@ def _remainder(d: AxisDiagnosis, region: Region | None) -> dict[str, Any] | None
     left = d.unexplained
     if left is None:
         return None
-    fit = d.told
+    fit = d.with_named
     return {
         "error": fit.error,
         "over_noise_floor": fit.ratio,

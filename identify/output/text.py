@@ -17,8 +17,8 @@ from identify.output.words.estimation import (
 from identify.output.words.experiment_design import gap_in_words, not_run_in_words
 from identify.output.words.selection import (
     advice,
-    as_told,
     dependence_in_words,
+    effect_in_words,
     finding_in_words,
     nonparametric_in_words,
     refit_in_words,
@@ -118,7 +118,7 @@ def diagnose_text(result: Diagnosis) -> str:
     lines = []
     for axis, d in result.axes.items():
         unit, words = d.base.axis.units.force, d.base.axis.units.words
-        named = f" {as_told(d, d.best.effect.name)}." if d.best else ""
+        named = f" {effect_in_words(d, d.best.effect.name)}." if d.best else ""
         lines.append(f"axis {axis}: {words(verdict_in_words(d))}{named}")
         lines.append(
             f"  {words('force error')} {d.base.error:.4g} {unit}, noise floor "

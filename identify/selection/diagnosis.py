@@ -103,7 +103,7 @@ class AxisDiagnosis:
         return tuple((s.candidate.effect.name, *s.tied) for s in self._proved)
 
     @property
-    def told(self) -> Fit:
+    def with_named(self) -> Fit:
         """The fit with what is named, beside which a remainder is left."""
         return self.final if self.named or self.curves else self.base
 
@@ -123,15 +123,17 @@ class AxisDiagnosis:
         It takes a refit for each. Where error remains beside what is named, a law of the wrong
         shape is sought there.
         """
-        findings = tuple(map(self._found, self._proved if self.named else ()))
+        each = [self._found(step) for step in (self._proved if self.named else ())]
+        findings = tuple(finding for finding, _ in each)
         for curve in self.curves:
             wrong = found_wrong(curve.shape, self.base, curve.before, self.dataset)
             findings = with_shape(findings, wrong)
-        for finding in findings:
-            findings = self._against_shapes(finding, findings)
-        shape = None if self.unexplained is None else wrong_shape(self.told, self.dataset)
+        for finding, without in each:
+            if finding in findings:  # not one that a missing effect resembles
+                findings = self._against_shapes(finding, without, findings)
+        shape = None if self.unexplained is None else wrong_shape(self.with_named, self.dataset)
         if shape is not None:
-            wrong = found_wrong(shape, self.base, self.told, self.dataset)
+            wrong = found_wrong(shape, self.base, self.with_named, self.dataset)
             findings = with_shape(findings, wrong)
         shapes = bool(findings) and all(f.kind is FindingKind.WRONG_SHAPE for f in findings)
         verdict = Verdict.WRONG_SHAPE if shapes else self.verdict
@@ -147,26 +149,26 @@ class AxisDiagnosis:
         verdict = Verdict.MISSING_EFFECTS if beside._proved else Verdict.WRONG_SHAPE
         return replace(beside, verdict=verdict)
 
-    def _found(self, step: Step) -> Finding:
-        """What an effect explains; one whose law has a free curve now, before it had that."""
+    def _found(self, step: Step) -> tuple[Finding, Fit]:
+        """What an effect explains, and the fit without it.
+
+        Of one whose law has a free curve now, before it had that.
+        """
         effect = step.candidate.effect
         own = (c.before for c in self.curves if c.shape.effect == effect.name)
-        return found(effect, step.tied, self.base, next(own, self.told), self.dataset)
+        final = next(own, self.with_named)
+        without = less(effect, final, self.base, self.dataset)
+        return found(effect, step.tied, self.base, final, without, self.dataset), without
 
     def _against_shapes(
-        self, finding: Finding, findings: tuple[Finding, ...]
+        self, finding: Finding, without: Fit, findings: tuple[Finding, ...]
     ) -> tuple[Finding, ...]:
         """The findings after a free curve of a law that the model has competed with one of them.
 
-        It is told in its place where it leaves clearly less error, and as well where it leaves
-        about as little. Not of friction, whose curves hold its modifiers.
+        It is the answer in its place where it leaves clearly less error, and beside it where it
+        leaves about as little. Not of friction, whose curves hold its modifiers. without: the fit
+        without what was found.
         """
-        if finding.kind is not FindingKind.MISSING:
-            return findings
-        effect = next(
-            s.candidate.effect for s in self._proved if s.candidate.effect.name == finding.effect
-        )
-        without = less(effect, self.told, self.base, self.dataset)
         shape = wrong_shape(without, self.dataset)
         if shape is None or shape.shape.curve.rubs or shape.effect not in self.base.axis.names:
             return findings

@@ -12,7 +12,6 @@ from identify.estimation.fit import Fit, holdout_error
 from identify.selection.confidence import confidence
 from identify.selection.decoys import Proof, proof
 from identify.selection.found_shape import FoundShape, found_shape
-from identify.selection.ranking import less
 from identify.selection.wrong_shape import WrongShape
 from twin.effect import Effect
 
@@ -69,10 +68,9 @@ class Finding:
 
 
 def found(
-    effect: Effect, tied: tuple[str, ...], base: Fit, final: Fit, dataset: Dataset
+    effect: Effect, tied: tuple[str, ...], base: Fit, final: Fit, without: Fit, dataset: Dataset
 ) -> Finding:
-    """The finding of one effect of a final fit, all others left in it."""
-    without = less(effect, final, base, dataset)
+    """The finding of one effect of a final fit; without: the same fit less this effect alone."""
     before, after = (unseen_error(f, dataset) for f in (without, final))
     fitted = final.axis[effect.name]
     return Finding(
@@ -107,12 +105,11 @@ def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> F
 
 def with_shape(findings: Sequence[Finding], wrong: Finding) -> tuple[Finding, ...]:
     """The findings with a wrong shape: that of a missing effect says what it resembles."""
-    same = [f for f in findings if f.effect == wrong.effect]
-    if not same:
+    if wrong.effect not in [f.effect for f in findings]:
         return (*findings, wrong)
     return tuple(
         replace(f, kind=FindingKind.RESEMBLES, shape=wrong.shape)
-        if f in same and f.kind is FindingKind.MISSING
+        if (f.effect, f.kind) == (wrong.effect, FindingKind.MISSING)
         else f
         for f in findings
     )

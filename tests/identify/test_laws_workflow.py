@@ -187,7 +187,7 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
         progress(1, 2)
         told = SimpleNamespace(
             axis=dataset.axis, fit=fit, catalogue=catalogue, dataset=dataset,
-            told=f"fit of {dataset.axis}", unexplained=dataset.axis == "y",
+            with_named=f"fit of {dataset.axis}", unexplained=dataset.axis == "y",
         )  # fmt: skip
         return SimpleNamespace(with_findings=lambda: told)
 

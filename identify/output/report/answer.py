@@ -12,8 +12,8 @@ from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import (
     advice,
-    as_told,
     dependence_in_words,
+    effect_in_words,
     finding_in_words,
     refit_in_words,
     remainder_in_words,
@@ -77,7 +77,7 @@ def _diagnosed(
 
 
 def _headline(found: AxisDiagnosis) -> str:
-    first, *more = [spaced(as_told(found, name)) for name in found.named] or [""]
+    first, *more = [spaced(effect_in_words(found, name)) for name in found.named] or [""]
     either = " or ".join([first, *map(spaced, found.ambiguous_with)])
     match found.verdict:
         case Verdict.MISSING_EFFECTS:

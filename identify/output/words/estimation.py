@@ -15,7 +15,7 @@ from identify.estimation.intervals import (
 from identify.estimation.simulated_motion import MotionFit
 from twin.model.units import units_of
 
-TOLD = 0.05  # part of a held-out log beyond the fit logs that a reader should know of
+WORTH_SAYING = 0.05  # part of a held-out log beyond the fit logs that a reader should know of
 OUTCOMES = {
     Outcome.CONVERGED: "The fit converged: no parameter change lowers the force error further.",
     Outcome.NOT_CONVERGED: (
@@ -107,7 +107,7 @@ def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
             f"{log}: held out, but {100 * part:.0f} % of it lies at positions of axis "
             f"{dataset.axis} where no fit log has been; there it tests nothing and is left out"
             for log, part in dataset.beyond.items()
-            if part > TOLD
+            if part > WORTH_SAYING
         ),
     )
 

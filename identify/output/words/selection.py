@@ -40,7 +40,7 @@ def verdict_in_words(found: AxisDiagnosis) -> str:
     return SEVERAL if several else VERDICTS[found.verdict]
 
 
-def as_told(found: AxisDiagnosis, effect: str) -> str:
+def effect_in_words(found: AxisDiagnosis, effect: str) -> str:
     """A named effect: "cogging", or "something like cogging" where the missing one resembles it."""
     alike = {f.effect for f in found.findings if f.kind is FindingKind.RESEMBLES}
     return f"something like {effect}" if effect in alike else effect
@@ -92,7 +92,7 @@ def remainder_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str | 
     """How large the error is that remains beside what was named, or None where it is noise."""
     if not found.findings or found.unexplained is None:
         return None
-    fit = found.told
+    fit = found.with_named
     error = numbers.amount(fit.error, fit.axis.units.force)
     beside = " beside the named effects" if found.named else ""
     return f"what remains{beside} is {error}, {fit.ratio:.1f} times the noise floor"

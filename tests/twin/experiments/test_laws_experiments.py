@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from twin.errors import InputError
-from twin.experiments.experiment import gentle, machine_limits
+from twin.experiments.experiment import _require, gentle, machine_limits
 from twin.experiments.kinds import (
     KINDS,
     Moves,
@@ -202,8 +202,6 @@ def test_every_number_of_an_experiment_has_its_unit_and_one_is_the_least_count()
 
 def test_a_number_that_is_refused_says_what_is_allowed() -> None:
     """Zero where a number may be zero, and nowhere else."""
-    from twin.experiments.experiment import _require
-
     for value, zero, allowed in (
         (0.0, False, "give a number above 0 m"),
         (-1.0, True, "0 or more"),
