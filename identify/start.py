@@ -6,10 +6,11 @@ import os
 import signal
 import sys
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
 SECONDS = 2.0  # for what runs to be left in order; then the program ends where it is
 AGAIN = 0.05  # s after which a signal is raised again that a library has swallowed
+IMPORTS = "<frozen importlib._bootstrap>"  # as its code names itself
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -40,8 +41,19 @@ def main() -> None:
 
 def _end(number: int, frame: FrameType | None) -> None:
     """Leave what runs in order. Threads that are waited for may hold that up."""
+    if _loads(frame):  # a library may turn what is raised there into an error of its own
+        _end_at_once(number)
     _alarm(SECONDS, lambda *_: _end_at_once(number))
     raise Ended(number)
+
+
+def _loads(frame: FrameType | None) -> bool:
+    """Whether a module is being loaded."""
+    while frame is not None:
+        if frame.f_code.co_filename == IMPORTS:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _swallowed(fault: Any) -> None:
@@ -59,7 +71,7 @@ def _alarm(seconds: float, action: Any) -> None:
         signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
-def _end_at_once(number: int) -> None:
+def _end_at_once(number: int) -> NoReturn:
     files = sys.modules.get("twin.files")
     if files is not None:
         files.remove_unfinished()

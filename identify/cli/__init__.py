@@ -37,10 +37,7 @@ def main() -> None:
     except OSError as error:
         code = fail(f"{error.filename}: {error.strerror}; check the name and the permissions")
     except Exception as error:
-        if _was_interrupted(error):
-            fail("interrupted")
-            code = INTERRUPTED
-        elif hasattr(error, "format_message"):  # a usage error; its class moves between versions
+        if hasattr(error, "format_message"):  # a usage error; its class moves between versions
             code = fail(f"{error.format_message()} See `twin --help`.")
         elif "TWIN_TRACEBACK" in os.environ:
             raise
@@ -50,15 +47,6 @@ def main() -> None:
                 "it with the command and what TWIN_TRACEBACK=1 adds"
             )
     sys.exit(code if isinstance(code, int) else 0)
-
-
-def _was_interrupted(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: one that comes while a module loads is told as its own."""
-    while error is not None:
-        if isinstance(error, KeyboardInterrupt):
-            return True
-        error = error.__cause__ or error.__context__
-    return False
 
 
 def fail(message: str) -> int:

@@ -32,3 +32,36 @@ def test_a_signal_is_one_line(
     out, err = run.communicate()
     assert (run.returncode, out, err) == (code, "", f"twin: {word}\n")
     assert list(tmp_path.iterdir()) == []
+
+
+DEAF = """
+import os, time
+try:
+    os.kill(os.getpid(), {number})
+    time.sleep(1.0)
+except BaseException as error:
+    raise ImportError("initialization failed") from None
+"""
+LOADS = """
+import sys, types
+def load(): import deaf
+sys.modules["identify.cli"] = types.SimpleNamespace(main=load)
+from identify.start import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_a_library_that_is_being_loaded_cannot_make_an_error_of_a_signal(
+    number: signal.Signals, code: int, word: str, tmp_path: Path
+) -> None:
+    (tmp_path / "deaf.py").write_text(DEAF.format(number=int(number)))
+    path = os.pathsep.join([str(Path(__file__).parents[2]), str(tmp_path)])
+    run = subprocess.run(
+        [sys.executable, "-c", LOADS], capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": path},
+    )  # fmt: skip
+    assert (run.returncode, run.stdout, run.stderr) == (code, "", f"twin: {word}\n")

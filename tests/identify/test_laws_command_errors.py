@@ -11,7 +11,7 @@ import pytest
 from stubbed_cli import stubbed
 
 from identify import workflow
-from identify.cli import _was_interrupted, machine, main
+from identify.cli import machine, main
 from identify.cli.shared import (
     catalogue_with,
     machine_model,
@@ -123,26 +123,3 @@ def test_identification_holds_no_more_of_a_log_than_it_reads(tmp_path):
         assert (log.metadata["a"], log.axes["x"].force_constant) == ("b", 1.0)
     assert findings == sentences(str(path), check_log(whole))
     assert any("velocity" in f for f in findings)
-
-
-def behind(first: BaseException, *, explicit: bool) -> Exception:
-    """An error that came while another was handled, or was made of it."""
-    try:
-        try:
-            raise first
-        except BaseException as error:
-            if explicit:
-                raise ImportError("half loaded") from error
-            raise ImportError("half loaded")  # noqa: B904
-    except ImportError as error:
-        return error
-
-
-@pytest.mark.parametrize("explicit", [True, False])
-def test_ctrl_c_is_found_behind_any_error_that_it_caused(explicit):
-    once = behind(KeyboardInterrupt(), explicit=explicit)
-    assert _was_interrupted(once)
-    assert _was_interrupted(behind(once, explicit=explicit))
-    assert not _was_interrupted(behind(ValueError("x"), explicit=explicit))
-    assert not _was_interrupted(ValueError("x"))
-    assert not _was_interrupted(None)
