@@ -116,12 +116,17 @@ def left_out(residual: Array, jacobian: Array, scale: Array, blocks: int = BLOCK
     weight of the priors in units of the columns, which keeps the inverse finite.
     """
     information = jacobian.T @ jacobian + np.diag(scale**2)
-    edges = np.linspace(0, len(residual), min(blocks, len(residual)) + 1).astype(int)
     out = residual.copy()
-    for a, b in pairwise(edges):
-        block = jacobian[a:b]
-        gradient = block.T @ residual[a:b]
+    for span in blocks_of(len(residual), blocks):
+        block = jacobian[span]
+        gradient = block.T @ residual[span]
         without = information - block.T @ block
         move = np.linalg.lstsq(without, gradient, rcond=1e-12)[0]
-        out[a:b] = residual[a:b] + block @ move
+        out[span] = residual[span] + block @ move
     return out
+
+
+def blocks_of(count: int, blocks: int = BLOCKS) -> list[slice]:
+    """Samples of each of some blocks of about equal length, fewer where there are fewer samples."""
+    edges = np.linspace(0, count, min(blocks, count) + 1).astype(int)
+    return [slice(a, b) for a, b in pairwise(edges)]

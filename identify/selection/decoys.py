@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.decision import RULE
-from identify.estimation.evidence import left_out
+from identify.estimation.evidence import blocks_of
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.time_origin import depends_on_time_origin
@@ -29,7 +30,6 @@ from twin.model.parameters import ParameterReference
 Array = NDArray[np.float64]
 Columns = Callable[[Sequence[PreparedLog]], list[Array]]
 
-AT_ONCE = 50_000  # rows of columns that are copied at once
 DECOYS = 40
 SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
 SEED = 0  # of the shifts, the same for each effect
@@ -146,21 +146,41 @@ class _Part:
         kept = moving(self.logs, sticking)
         return _Part(self.logs, self.force[kept], self.base[kept], kept, columns(self.logs))
 
-    def shifted(self, shifts: Array | None) -> Array:
-        """Columns (n, k + j) of base and trial, shifted by parts of each log; None: base alone."""
+    def products(self, shifts: Array | None) -> Array:
+        """Inner products (b, p, p), by blocks, of force, base's columns and those that are tried.
+
+        The latter are shifted by parts of each log; None: they are left out.
+        """
+        _, own = self._own
         if shifts is None:
-            return self.base
-        count = self.base.shape[1]
-        out = np.empty((len(self.force), count + self.columns[0].shape[1]))
-        out[:, :count] = self.base
-        ends = np.cumsum([len(c) for c in self.columns])[:-1]
-        row = 0
-        for c, kept, shift in zip(self.columns, np.split(self.kept, ends), shifts, strict=True):
-            source = (np.flatnonzero(kept) - round(shift * len(c))) % len(c)
-            for some in np.split(source, range(AT_ONCE, len(source), AT_ONCE)):
-                out[row : row + len(some), count:] = c[some]
-                row += len(some)
+            return own
+        tried = self._shifted(shifts)
+        spans, _ = self._own
+        first = own.shape[1]
+        both = first + tried.shape[1]
+        out = np.empty((len(own), both, both))
+        out[:, :first, :first] = own
+        for i, span in enumerate(spans):
+            out[i, first:, first:] = tried[span].T @ tried[span]
+            out[i, first:, 0] = tried[span].T @ self.force[span]
+            out[i, first:, 1:first] = tried[span].T @ self.base[span]
+        out[:, :first, first:] = out[:, first:, :first].swapaxes(1, 2)
         return out
+
+    @cached_property
+    def _own(self) -> tuple[list[slice], Array]:
+        """Samples of each block, and the products of force and base's columns, force first."""
+        spans = blocks_of(len(self.force))
+        both = [np.column_stack([self.force[s], self.base[s]]) for s in spans]
+        return spans, np.stack([b.T @ b for b in both])
+
+    def _shifted(self, shifts: Array) -> Array:
+        """The columns that are tried (n, j), shifted by parts of each log."""
+        ends = np.cumsum([len(c) for c in self.columns])[:-1]
+        pairs = zip(self.columns, np.split(self.kept, ends), shifts, strict=True)
+        return np.concatenate(
+            [c[(np.flatnonzero(kept) - round(shift * len(c))) % len(c)] for c, kept, shift in pairs]
+        )
 
 
 def _ridge(columns: Array) -> Array:
@@ -169,13 +189,24 @@ def _ridge(columns: Array) -> Array:
 
 
 def _left(fit: _Part, held: _Part | None, shifts: Array | None) -> float:
-    """Mean squared test error N^2 after a linear step with columns so shifted."""
+    """Mean squared test error N^2 after a linear step with columns so shifted.
+
+    Products of columns tell it all: force is F, a column X, a step s, and what is left |F - X s|^2.
+    """
     first = len(fit.columns)
-    columns = fit.shifted(None if shifts is None else shifts[:first])
-    normal = columns.T @ columns + np.eye(columns.shape[1])
-    step = np.linalg.solve(normal, columns.T @ fit.force)
-    if held is None:
-        solved = fit.force - columns @ step
-        return float(np.mean(left_out(solved, columns, np.ones(len(step))) ** 2))
-    there = held.shifted(None if shifts is None else shifts[first:])
-    return float(np.mean((held.force - there @ step) ** 2))
+    blocks = fit.products(None if shifts is None else shifts[:first])
+    whole = blocks.sum(axis=0)
+    penalty = np.eye(len(whole) - 1)
+    if held is None:  # each block by the step of the others
+        others = whole - blocks
+        steps = np.linalg.solve(others[:, 1:, 1:] + penalty, others[:, 1:, :1])[..., 0]
+        return float(_squares(blocks, steps).sum() / len(fit.force))
+    step = np.linalg.solve(whole[1:, 1:] + penalty, whole[1:, 0])
+    there = held.products(None if shifts is None else shifts[first:])
+    return float(_squares(there.sum(axis=0)[None], step[None]).sum() / len(held.force))
+
+
+def _squares(products: Array, steps: Array) -> Array:
+    """What steps (b, p - 1) leave of the squared force, (b,) N^2, by products (b, p, p)."""
+    change = np.column_stack([np.ones(len(steps)), -steps])
+    return np.einsum("bi,bij,bj->b", change, products, change)

@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.evidence import BLOCKS
+from identify.estimation.evidence import blocks_of
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian
 from identify.estimation.smoothing import part_rows, smoothing
@@ -100,8 +99,7 @@ class Linearised:
     @cached_property
     def blocks(self) -> tuple[list[slice], Array, Array]:
         """Samples of each block, its Gram matrix (b, k, k), and columns times force (b, k)."""
-        edges = np.linspace(0, len(self.force), BLOCKS + 1).astype(int)
-        spans = [slice(a, b) for a, b in pairwise(edges)]
+        spans = blocks_of(len(self.force))
         columns = [self.columns[span] for span in spans]
         grams = np.stack([c.T @ c for c in columns])
         pulls = np.stack([c.T @ self.force[s] for s, c in zip(spans, columns, strict=True)])
