@@ -129,19 +129,28 @@ def changes(
     Those of one effect go along the motion in one walk; a parameter may be given several times.
     """
     out = np.empty((len(where), sum(map(len, logs))))
+    ends = np.cumsum([len(log) for log in logs])
+    spans = [slice(end - len(log), end) for end, log in zip(ends, logs, strict=True)]
     by_effect: dict[str, list[int]] = {}
     for j, c in enumerate(where):
         by_effect.setdefault(c.effect, []).append(j)
     for effect, index in by_effect.items():
+        own = [where[j] for j in index]
         if not effect:
             out[index] = steps[index, None] * _by_mass(axis, logs)
-            continue
-        if _has_columns(axis, [where[j] for j in index]):
-            out[index] = steps[index, None] * _columns(axis, [where[j] for j in index], logs)
-            continue
-        group = group_of(axis, effect)
-        moved = [write(group, [where[j]], read(group, [where[j]]) + steps[j]) for j in index]
-        out[index] = _differences(group, moved, effect, logs)
+        elif _has_columns(axis, own):
+            for log, span in zip(logs, spans, strict=True):
+                out[index, span] = _columns(axis, own, log)
+            out[index] *= steps[index, None]
+        else:
+            group = group_of(axis, effect)
+            values = read(group, own)
+            moved = [
+                write(group, [c], [v + step])
+                for c, v, step in zip(own, values, steps[index], strict=True)
+            ]
+            for log, span in zip(logs, spans, strict=True):
+                out[index, span] = _differences(group, moved, effect, log)
     return out
 
 
@@ -152,27 +161,20 @@ def _has_columns(axis: AxisModel, where: Sequence[ParameterReference]) -> bool:
     )
 
 
-def _columns(
-    axis: AxisModel, where: Sequence[ParameterReference], logs: Sequence[PreparedLog]
-) -> Array:
+def _columns(axis: AxisModel, where: Sequence[ParameterReference], log: PreparedLog) -> Array:
     """Averaged force (m, n) per unit of these strengths of one effect that has columns."""
     own = axis[where[0].effect]
     names = [p.name for p in own.effect.strengths]
     rows = [names.index(c.parameter.name) for c in where]
-    motions = [(true_motion(axis, log.motion)[0], log.test_function) for log in logs]
-    return np.concatenate(
-        [
-            averaged_columns(
-                own.effect, own.vector(), m.signals, m.period, m.time_origin, t.weights, t.stride
-            )[rows]
-            for m, t in motions
-        ],
-        axis=1,
-    )
+    motion, test = true_motion(axis, log.motion)[0], log.test_function
+    return averaged_columns(
+        own.effect, own.vector(), motion.signals, motion.period, motion.time_origin, test.weights,
+        test.stride,
+    )[rows]  # fmt: skip
 
 
 def _differences(
-    group: AxisModel, moved: Sequence[AxisModel], effect: str, logs: Sequence[PreparedLog]
+    group: AxisModel, moved: Sequence[AxisModel], effect: str, log: PreparedLog
 ) -> Array:
     """Change (m, n) N of the averaged force when one effect's values move from those of a group."""
     kind = group[effect].effect.kind
@@ -180,10 +182,10 @@ def _differences(
     strengths = [group[effect].values[p.name] for p in group[effect].effect.strengths]
     absent = len(group.effects) == 1 and bool(strengths) and not any(strengths)
     if kind is Kind.SENSING and absent:
-        return np.stack([_apparent_force(axis, logs) for axis in moved])
+        return _apparent_forces(moved, log)
     if kind is Kind.SENSING or (kind is Kind.ACTUATION and _is_stepped_finely(group)):
-        base = 0.0 if absent else averaged_force(group, logs)
-        return np.stack([averaged_force(axis, logs) - base for axis in moved])
+        base = 0.0 if absent else averaged_force(group, [log])
+        return np.stack([averaged_force(axis, [log]) - base for axis in moved])
     # The motion and the force behind it stay; all sets of values go along it in one walk.
     table = _between(group)
     at = table.labels.index(("", effect))
@@ -193,22 +195,20 @@ def _differences(
     for row, axis in zip(sets[bases:], moved, strict=True):
         vector = axis[effect].vector()
         row[first : first + len(vector)] = vector
-    parts = []
-    for log in logs:
-        motion = _driven(group, log)[0]
-        base = 0.0 if absent else total_forces(table, sets[:1], motion)
-        at_once = max(AT_ONCE // motion.signals.shape[1], 1)
-        batches = (sets[i : i + at_once] for i in range(bases, len(sets), at_once))
-        forces = (total_forces(table, batch, motion) - base for batch in batches)
-        parts.append(np.concatenate([log.test_function.mean(force) for force in forces]))
-    return np.concatenate(parts, axis=1)
+    motion = _driven(group, log)[0]
+    nothing = 0.0 if absent else total_forces(table, sets[:1], motion)
+    at_once = max(AT_ONCE // motion.signals.shape[1], 1)
+    batches = (sets[i : i + at_once] for i in range(bases, len(sets), at_once))
+    forces = (total_forces(table, batch, motion) - nothing for batch in batches)
+    return np.concatenate([log.test_function.mean(force) for force in forces])
 
 
-def _apparent_force(sensing: AxisModel, logs: Sequence[PreparedLog]) -> Array:
-    """Force (n,) N that sensing effects alone seem to add, to first order in their error."""
-    rates = (reading_error(sensing, log.motion, passes=1)[1] for log in logs)
-    pairs = zip(rates, logs, strict=True)
-    return sensing.mass * np.concatenate([log.fine.acceleration(rate) for rate, log in pairs])
+def _apparent_forces(sensing: Sequence[AxisModel], log: PreparedLog) -> Array:
+    """Force (m, n) N that sensing effects alone seem to add, to first order in their error."""
+    path = log.motion.smoothed_position
+    rates = (reading_error(axis, log.motion, path, passes=1)[1] for axis in sensing)
+    forces = zip(sensing, rates, strict=True)
+    return np.stack([axis.mass * log.fine.acceleration(rate) for axis, rate in forces])
 
 
 def _by_mass(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:

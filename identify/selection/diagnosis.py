@@ -24,6 +24,7 @@ from identify.selection.repeating_force import Repeat, not_general
 from identify.selection.reshaping import Reshaped
 from identify.selection.residual_dependence import Dependence
 from identify.selection.wrong_shape import wrong_shape
+from twin.effect import Kind
 
 
 class Verdict(Enum):
@@ -157,7 +158,9 @@ class AxisDiagnosis:
         effect = step.candidate.effect
         own = (c.before for c in self.curves if c.shape.effect == effect.name)
         final = next(own, self.with_named)
-        without = less(effect, final, self.base, self.dataset)
+        rest = {*final.axis.names} - {effect.name}
+        alone = effect.kind is not Kind.FRICTION and rest == {*self.base.axis.names}
+        without = self.base if alone else less(effect, final, self.base, self.dataset)
         return found(effect, step.tied, self.base, final, without, self.dataset), without
 
     def _against_shapes(

@@ -59,7 +59,7 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
     """
     mask = moving(dataset.fit, sticking(fit, shape))[fit.kept]
     without = fit.axis.without(shape.effect)
-    linear = Linearised.about(fit, dataset, shape.empty).on(mask).less(shape.effect)
+    linear = Linearised.about(fit, dataset, shape.empty, mask).less(shape.effect)
     law = averaged_force(fit.axis, dataset.fit) - averaged_force(without, dataset.fit)
     own = np.array([c.effect == shape.empty.effect.name for c in linear.where])
     hats = linear.columns[:, own]

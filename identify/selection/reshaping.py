@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
@@ -23,6 +25,9 @@ from identify.selection.wrong_shape import WrongShape, wrong_shape
 
 MOST_TRIED = 3  # effects beside which a curve is sought
 MOST_CURVES = 3  # on one axis
+BY_REFIT = (
+    0.3  # of the squared error after a linear step with a curve, that a refit leaves at least
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +64,12 @@ def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Resha
     shape = wrong_shape(fit, dataset)
     if shape is None or shape.shape.curve.rubs:
         return None
-    curve = fit_in_place(fit, dataset, shape.shape)
     supported = [c.gain.after for c in ranking if c.supported]
-    if supported and curve.gain.after**2 > RULE.beside_decoys * min(supported) ** 2:
+    most = RULE.beside_decoys * min(supported, default=np.inf) ** 2
+    if BY_REFIT * (1.0 - shape.proof.gain) * unseen_error(fit, dataset) ** 2 > most:
         return None
-    return Reshaped(shape, fit, curve.fit)
+    curve = fit_in_place(fit, dataset, shape.shape)
+    return None if curve.gain.after**2 > most else Reshaped(shape, fit, curve.fit)
 
 
 def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:

@@ -45,29 +45,28 @@ class Linearised:
     parts: Mapping[str, tuple[Array, NDArray[np.bool_]]]
 
     @classmethod
-    def about(cls, base: Fit, dataset: Dataset, fitted: Fitted) -> Linearised:
+    def about(
+        cls, base: Fit, dataset: Dataset, fitted: Fitted, among: NDArray[np.bool_] | None = None
+    ) -> Linearised:
+        """The base's residual, or some of its test functions (n,), with an effect's columns."""
+        rows = np.flatnonzero(base.kept)
+        some = slice(None) if among is None or among.all() else np.flatnonzero(among)
         effect = fitted.effect
         free = [p for p in effect.strengths if p.name not in fitted.fixed]
         own = [ParameterReference(effect.name, p) for p in free]
         where = [*base.scaling.where, *own]
         alone = replace(base.axis, effects=(fitted,))
-        new = jacobian(alone, dataset.fit, own)[base.kept]
+        new = jacobian(alone, dataset.fit, own)[rows[some]]
         norms = np.linalg.norm(base.jacobian, axis=0)
-        rows = smoothing(base.axis, where, len(base.residual))
-        physics = rows.T @ rows + np.diag([*(RIDGE * norms) ** 2, *np.zeros(len(own))])
+        bends = smoothing(base.axis, where, len(base.residual))
+        physics = bends.T @ bends + np.diag([*(RIDGE * norms) ** 2, *np.zeros(len(own))])
         return cls(
-            where, base.residual, np.hstack([base.jacobian, new]), physics,
+            where, base.residual[some], np.hstack([base.jacobian[some], new]), physics,
             {
                 part.name: _penalty(part, effect.name, where)
                 for part in effect.parts if not fitted.fixed.issuperset(part.strengths)
             },
         )  # fmt: skip
-
-    def on(self, mask: NDArray[np.bool_]) -> Linearised:
-        """The same on some of its test functions, (n,)."""
-        if mask.all():
-            return self
-        return replace(self, force=self.force[mask], columns=self.columns[mask])
 
     def less(self, effect: str) -> Linearised:
         """The same without the columns of one effect of the base."""

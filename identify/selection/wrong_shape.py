@@ -157,7 +157,7 @@ def _smoothed(
     """A form with its best smoothing, and its squared cross-validated error; None without any."""
     shape = _laid(fit.axis, law, curve, dataset, lets_go)
     mask = moving(dataset.fit, sticking(fit, shape))[fit.kept]
-    linear = Linearised.about(fit, dataset, shape.empty).on(mask)
+    linear = Linearised.about(fit, dataset, shape.empty, mask)
     stiffness = choose_stiffness(linear, COARSELY)
     if not stiffness:
         return None, np.inf
