@@ -34,7 +34,7 @@ DECOYS = 40
 SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
 SEED = 0  # of the shifts, the same for each effect
 RIDGE = 1e-4  # of a column's length, which keeps what the motion does not excite finite
-TINY = 1e-300  # N, of a column that is nothing
+TINY = 1e-100  # N per unit, length of a column that is nothing, where the motion excites none
 
 
 @dataclass(frozen=True)
@@ -184,8 +184,12 @@ class _Part:
 
 
 def _ridge(columns: Array) -> Array:
-    """The size (k,) of columns (n, k), N per unit, by which a weak penalty on them is one."""
-    return RIDGE * np.maximum(np.linalg.norm(columns, axis=0), TINY)
+    """The size (k,) of columns (n, k), N per unit, by which a weak penalty on them is one.
+
+    Infinite where the fit logs do not excite a strength: it stays, whatever it does in others.
+    """
+    norms = np.linalg.norm(columns, axis=0)
+    return np.where(norms > TINY, RIDGE * norms, np.inf)
 
 
 def _left(fit: _Part, held: _Part | None, shifts: Array | None) -> float:

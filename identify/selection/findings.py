@@ -35,7 +35,7 @@ class Finding:
     """A missing effect, or one whose law has the wrong shape, that the data prove.
 
     tied: effects that these data cannot separate from it. explains: part of the squared test error
-    above the noise floor that comes back when it alone is taken out, about 0..1. error_before,
+    above the noise floor that comes back when it alone is taken out, at most 1. error_before,
     error_after: RMS test error in ``unit`` without it and with it; of a wrong shape with the law
     and with a free curve beside it, as one linear step predicts. parameters: of its law. proof:
     beside decoys; None where a shift in time makes none. shape: the curve that is assumed and the
@@ -76,7 +76,7 @@ def found(
     return Finding(
         effect=effect.name,
         tied=tied,
-        explains=_share(before**2 - after**2, base, dataset),
+        explains=_share(before, before**2 - after**2, base, dataset),
         error_before=before,
         error_after=after,
         unit=final.axis.units.force,
@@ -92,7 +92,7 @@ def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> F
     return Finding(
         effect=shape.effect,
         tied=(),
-        explains=_share(taken, base, dataset),
+        explains=_share(before, taken, base, dataset),
         error_before=before,
         error_after=(before**2 - taken) ** 0.5,
         unit=final.axis.units.force,
@@ -120,10 +120,13 @@ def left(finding: Finding) -> float:
     return finding.error_after**2
 
 
-def _share(taken: float, base: Fit, dataset: Dataset) -> float:
-    """Part of the base's squared test error above the noise floor that this much (N^2) is."""
-    above = unseen_error(base, dataset) ** 2 - base.floor**2
-    return taken / above if above > 0.0 else 0.0
+def _share(before: float, taken: float, base: Fit, dataset: Dataset) -> float:
+    """Part of the squared test error above the noise floor that is ``taken`` (N^2).
+
+    Of the base's, or of the error ``before`` (N) where the fit without one finding leaves more.
+    """
+    above = max(unseen_error(base, dataset), before) ** 2 - base.floor**2
+    return min(taken / above, 1.0) if above > 0.0 else 0.0
 
 
 def unseen_error(fit: Fit, dataset: Dataset) -> float:

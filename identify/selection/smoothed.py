@@ -96,36 +96,29 @@ class Linearised:
         return used, penalty
 
     @cached_property
-    def blocks(self) -> tuple[list[slice], Array, Array]:
-        """Samples of each block, its Gram matrix (b, k, k), and columns times force (b, k)."""
-        spans = blocks_of(len(self.force))
-        columns = [self.columns[span] for span in spans]
-        grams = np.stack([c.T @ c for c in columns])
-        pulls = np.stack([c.T @ self.force[s] for s, c in zip(spans, columns, strict=True)])
-        return spans, grams, pulls
+    def _rest(self) -> _Rest:
+        """What the parts meet when each block is left out."""
+        own = np.any([mask for _, mask in self.parts.values()], axis=0)
+        return _Rest.of(self.columns, self.force, self.physics, own)
 
     def _without(self, stiffness: Mapping[str, float]) -> tuple[NDArray[np.bool_], Array]:
-        """Which columns take part, and the changes (b, k_used) when each block is left out."""
+        """Which of the parts' columns take part, and their changes (b, k) without each block."""
         used, penalty = self._chosen(stiffness)
-        _, grams, pulls = self.blocks
-        rest = (grams.sum(axis=0) + penalty - grams)[:, used][:, :, used]
-        return used, solve(rest, (pulls.sum(axis=0) - pulls)[:, used, None])[..., 0]
+        own = self._rest.own
+        return used[own], self._rest.changes(used[own], penalty[np.ix_(own, own)])
 
     def left_out(self, stiffness: Mapping[str, float]) -> Array:
         """Cross-validated residual (n,) N: each block predicted by a fit to the others."""
         used, changes = self._without(stiffness)
+        every = self._rest.of_all(used, changes)
         out = self.force.copy()
-        for span, change in zip(self.blocks[0], changes, strict=True):
-            out[span] -= self.columns[span][:, used] @ change
+        for span, change in zip(self._rest.spans, every, strict=True):
+            out[span] -= self.columns[span] @ change
         return out
 
     def left_out_error(self, stiffness: Mapping[str, float]) -> float:
         """Sum of its squares, N^2."""
-        used, changes = self._without(stiffness)
-        _, grams, pulls = self.blocks
-        square = np.einsum("bi,bij,bj->", changes, grams[:, used][:, :, used], changes)
-        crossed = np.einsum("bi,bi->", changes, pulls[:, used])
-        return float(self.force @ self.force - 2.0 * crossed + square)
+        return self._rest.squared_error(*self._without(stiffness))
 
     def solution(self, stiffness: Mapping[str, float]) -> tuple[Array, float]:
         """Change (k,) of all parameters that fits best, and its effective degrees of freedom."""
@@ -136,6 +129,78 @@ class Linearised:
         out = np.zeros(len(self.where))
         out[used] = -solve(full, (columns.T @ self.force)[:, None])[:, 0]
         return out, float(np.trace(solve(full, gram)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Rest:
+    """What the columns of parts meet when each block is left out, the physics having followed.
+
+    The penalty of the physics does not change with the stiffness of the parts, so it is eliminated
+    once (the Schur complement), and each stiffness solves for the parts alone. spans: samples of
+    each of b blocks. own (k,): which columns are the parts'. follows (b, k_physics, k_own) and
+    alone (b, k_physics): the physics' change is alone - follows x that of the parts. normal (b,
+    k_own, k_own), wanted (b, k_own): of the other blocks. gram (b, k_own, k_own), pull (b, k_own),
+    square N^2: of the block that is left out.
+    """
+
+    spans: list[slice]
+    own: NDArray[np.bool_]
+    follows: Array
+    alone: Array
+    normal: Array
+    wanted: Array
+    gram: Array
+    pull: Array
+    square: float
+
+    @classmethod
+    def of(cls, columns: Array, force: Array, physics: Array, own: NDArray[np.bool_]) -> _Rest:
+        spans = blocks_of(len(force))
+        parts = [columns[span] for span in spans]
+        grams = np.stack([c.T @ c for c in parts])
+        pulls = np.stack([c.T @ force[s] for s, c in zip(spans, parts, strict=True)])
+        others, aims = grams.sum(axis=0) - grams, pulls.sum(axis=0) - pulls
+        base = others[:, ~own][:, :, ~own] + physics[np.ix_(~own, ~own)]
+        across = others[:, ~own][:, :, own]
+        solved = solve(base, np.concatenate([across, aims[:, ~own, None]], axis=2))
+        follows, alone = solved[..., :-1], solved[..., -1]
+        back = across.swapaxes(1, 2)
+        # The block's own products, with the physics taken out of force and columns.
+        out = np.zeros((len(spans), len(own), int(own.sum())))
+        out[:, ~own], out[:, own] = -follows, np.eye(int(own.sum()))
+        held = np.zeros((len(spans), len(own)))
+        held[:, ~own] = alone
+        seen = (grams @ held[..., None])[..., 0]
+        square = force @ force - 2.0 * np.sum(held * pulls) + np.sum(held * seen)
+        return cls(
+            spans, own, follows, alone,
+            normal=others[:, own][:, :, own] - back @ follows,
+            wanted=aims[:, own] - (back @ alone[..., None])[..., 0],
+            gram=out.swapaxes(1, 2) @ grams @ out,
+            pull=(out.swapaxes(1, 2) @ (pulls - seen)[..., None])[..., 0],
+            square=float(square),
+        )  # fmt: skip
+
+    def changes(self, used: NDArray[np.bool_], penalty: Array) -> Array:
+        """Changes (b, k_used) of the parts' columns that are used, under a penalty (k_own, k_own).
+
+        Each by the other blocks.
+        """
+        normal = (self.normal + penalty)[:, used][:, :, used]
+        return solve(normal, self.wanted[:, used, None])[..., 0]
+
+    def of_all(self, used: NDArray[np.bool_], changes: Array) -> Array:
+        """Changes (b, k) of all columns, with these of the parts."""
+        out = np.zeros((len(self.spans), len(self.own)))
+        out[:, np.flatnonzero(self.own)[used]] = changes
+        followed = (self.follows[..., used] @ changes[..., None])[..., 0]
+        out[:, ~self.own] = self.alone - followed
+        return out
+
+    def squared_error(self, used: NDArray[np.bool_], changes: Array) -> float:
+        """What is left of the blocks' squared force, N^2."""
+        square = np.einsum("bi,bij,bj->", changes, self.gram[:, used][:, :, used], changes)
+        return float(self.square - 2.0 * np.sum(changes * self.pull[:, used]) + square)
 
 
 def _penalty(

@@ -10,7 +10,7 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, fitted
 
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import averaged_force
-from identify.selection.decoys import DECOYS, Proof, proof
+from identify.selection.decoys import DECOYS, Proof, _left, _Part, _ridge, proof
 from twin.model.machine import AxisModel
 
 BESIDE_DECOYS = 0.8  # the rule as it was decided
@@ -80,3 +80,43 @@ def test_a_shift_in_time_makes_no_decoy_for_a_friction_or_for_what_repeats_in_ti
     assert proof(base, held, dataset) is None
     assert axis_of(COGGING).names
     assert CATALOGUE["cogging"] is COGGING.effect
+
+
+def parts_of_two(rng: np.random.Generator) -> _Part:
+    """Two logs of 60 and 90 test functions, three columns of a base and two that are tried."""
+    columns = [rng.standard_normal((n, 2)) for n in (60, 90)]
+    return _Part(
+        (), rng.standard_normal(150), rng.standard_normal((150, 3)), rng.random(150) < 2.0, columns
+    )
+
+
+def all_columns(part: _Part, shifts) -> np.ndarray:
+    moved = [np.roll(c, round(s * len(c)), axis=0) for c, s in zip(part.columns, shifts)]
+    return np.hstack([part.base, np.concatenate(moved)])
+
+
+def step_of(columns: np.ndarray, force: np.ndarray) -> np.ndarray:
+    rows = np.vstack([columns, np.eye(columns.shape[1])])  # a unit penalty
+    return np.linalg.lstsq(rows, np.concatenate([force, np.zeros(columns.shape[1])]))[0]
+
+
+def test_what_is_left_is_that_of_fits_to_the_other_blocks_and_on_other_logs() -> None:
+    part, held = (parts_of_two(np.random.default_rng(seed)) for seed in (5, 6))
+    there = np.array([0.25, 0.4])
+    columns = all_columns(part, there)
+    edges = np.linspace(0, 150, 25).astype(int)
+    squares = 0.0
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        others = np.r_[0:a, b:150]
+        step = step_of(columns[others], part.force[others])
+        squares += np.sum((part.force[a:b] - columns[a:b] @ step) ** 2)
+    assert _left(part, None, there) == pytest.approx(squares / 150, rel=1e-9)
+
+    both = np.array([*there, 0.1, 0.9])
+    left = held.force - all_columns(held, both[2:]) @ step_of(columns, part.force)
+    assert _left(part, held, both) == pytest.approx(np.mean(left**2), rel=1e-9)
+
+
+def test_a_strength_that_the_fit_logs_do_not_excite_stays_whatever_it_does_in_others() -> None:
+    columns = np.column_stack([np.ones(4), np.zeros(4)])
+    np.testing.assert_allclose(_ridge(columns), [2e-4, np.inf])
