@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -91,7 +92,9 @@ def parts_of_two(rng: np.random.Generator) -> _Part:
 
 
 def all_columns(part: _Part, shifts) -> np.ndarray:
-    moved = [np.roll(c, round(s * len(c)), axis=0) for c, s in zip(part.columns, shifts)]
+    moved = [
+        np.roll(c, round(s * len(c)), axis=0) for c, s in zip(part.columns, shifts, strict=True)
+    ]
     return np.hstack([part.base, np.concatenate(moved)])
 
 
@@ -106,7 +109,7 @@ def test_what_is_left_is_that_of_fits_to_the_other_blocks_and_on_other_logs() ->
     columns = all_columns(part, there)
     edges = np.linspace(0, 150, 25).astype(int)
     squares = 0.0
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         others = np.r_[0:a, b:150]
         step = step_of(columns[others], part.force[others])
         squares += np.sum((part.force[a:b] - columns[a:b] @ step) ** 2)
