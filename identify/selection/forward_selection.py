@@ -50,6 +50,7 @@ def diagnose_axis(
         while curve := curve_in_place(final, dataset, found, base.axis.names):
             curves.append(curve)
             steps, final = _needed_beside(curves, steps, base, dataset)
+            dataset, final = synchronised(final, dataset)  # what repeats in time shows only now
             final, found = ranked(final, dataset)
             states[-1] = SelectionState(tuple(steps), final)
         if not (more := _next(final, dataset, found, ranked)):

@@ -149,3 +149,19 @@ def test_all_begins_anew_after_a_shift_as_often_as_allowed(monkeypatch):
 
 def test_a_stage_knows_the_fit_it_led_to():
     assert SelectionState((), HIGH).fit is HIGH
+
+
+def test_clocks_are_set_beside_a_curve_before_effects_are_ranked_there(monkeypatch):
+    clocked, curves, ranked = dataset_stub(fit=()), iter(["a curve"]), []
+
+    def rank(base, dataset, **_):
+        ranked.append(dataset)
+        return base, (built("wear"),)
+
+    monkeypatch.setattr(module, "_needed_beside", lambda curves, steps, base, dataset: ([], HIGH))
+    looped(monkeypatch, [])
+    monkeypatch.setattr(module, "rank", rank)
+    monkeypatch.setattr(module, "curve_in_place", lambda *_: next(curves, None))
+    monkeypatch.setattr(module, "synchronised", lambda fit, dataset: (clocked, fit))
+    diagnose_axis(HIGH, DATASET, Catalogue([]))
+    assert ranked == [DATASET, clocked]
