@@ -75,21 +75,21 @@ def machine(
     """
     drawn = _about(stage, rng)
     drawn = VARIATIONS[variation](drawn, AXIS, rng)
-    seeds = [int(s) for s in rng.integers(1, 1 << 31, size=5)]
+    runs = (*TRAINING, SELECTION, TEST)
+    seeds = [int(s) for s in rng.integers(1, 1 << 31, size=len(runs))]
     planted: list[Fitted] = []
     # Friction first, as its level is found with a model that lacks nothing else.
     for effect in sorted(effects, key=lambda e: e.kind is not Kind.FRICTION):
         put = _with_friction if effect.kind is Kind.FRICTION else _with_planted
-        drawn, fitted = put(drawn, effect, strength, seeds[-1], rng)
+        drawn, fitted = put(drawn, effect, strength, seeds, rng)
         planted.append(fitted)
     held = drawn.model.axes[AXIS].mass_fixed
     if held:  # a mass that is not fitted was weighed
         own = replace(drawn.model.axes[AXIS], mass=drawn.true.axes[AXIS].mass)
         drawn = replace(drawn, model=drawn.model.with_axis(AXIS, own))
-    runs = (*TRAINING, SELECTION, TEST)
     logs = {
         f"log {i}": _logged(drawn.true, run, seed, FineSimulator)
-        for i, (run, seed) in enumerate(zip(runs, seeds, strict=False), start=1)
+        for i, (run, seed) in enumerate(zip(runs, seeds, strict=True), start=1)
     }
     test, selection = dict([logs.popitem()]), dict([logs.popitem()])
     return Machine(
@@ -140,8 +140,10 @@ class _Trial:
     floor: float
 
     @classmethod
-    def of(cls, drawn: Drawn, seed: int) -> _Trial:
-        logs = {run: _logged(drawn.true, run, seed, ReducedSimulator) for run in TRAINING}
+    def of(cls, drawn: Drawn, seeds: Sequence[int]) -> _Trial:
+        """On the motions of the training logs, by their seeds: an end may be met in some alone."""
+        pairs = zip(TRAINING, seeds, strict=False)
+        logs = {run: _logged(drawn.true, run, seed, ReducedSimulator) for run, seed in pairs}
         dataset = datasets(drawn.model, logs, {})[AXIS]
         base = fit_axis(drawn.model.axes[AXIS], dataset.fit)
         return cls(dataset, base, own_error(drawn.true.axes[AXIS], dataset))
@@ -163,7 +165,7 @@ def plain_friction(stage: MachineModel, other: Effect) -> Fitted:
 
 
 def _with_friction(
-    drawn: Drawn, effect: Effect, strength: float, seed: int, rng: np.random.Generator
+    drawn: Drawn, effect: Effect, strength: float, seeds: Sequence[int], rng: np.random.Generator
 ) -> tuple[Drawn, Fitted]:
     """A machine with another friction, scaled until the model falls short by that strength.
 
@@ -179,7 +181,7 @@ def _with_friction(
     )
     free = {p.name for p in effect.parameters if not p.fixed}
     shared = {name: own.values[name] for name in free if name in own.values}
-    seen = _Trial.of(drawn, seed).dataset.excitation
+    seen = _Trial.of(drawn, seeds).dataset.excitation
     fitted = Fitted.at_start(effect, {**drawn_values(effect, seen, rng), **shared})
     fitted = other_exponents(fitted, rng)
 
@@ -188,7 +190,7 @@ def _with_friction(
 
     def left(new: Fitted) -> float:
         """Error of the model beyond that of one with the right friction, in noise floors."""
-        trial = _Trial.of(having(new), seed)
+        trial = _Trial.of(having(new), seeds)
         best = fit_axis(trial.base.axis.with_effect(new), trial.dataset.fit).error
         beyond = max(trial.base.error**2 - max(best, trial.floor) ** 2, 1e-4 * trial.floor**2)
         return float(np.sqrt(beyond) / trial.floor)
@@ -203,10 +205,10 @@ def _with_friction(
 
 
 def _with_planted(
-    drawn: Drawn, effect: Effect, strength: float, seed: int, rng: np.random.Generator
+    drawn: Drawn, effect: Effect, strength: float, seeds: Sequence[int], rng: np.random.Generator
 ) -> tuple[Drawn, Fitted]:
     """The machine with one more effect; its mass is held where a fit would absorb the effect."""
-    trial = _Trial.of(drawn, seed)
+    trial = _Trial.of(drawn, seeds)
     for _ in range(TRIES):
         values = drawn_values(effect, trial.dataset.excitation, rng)
         fitted = _scaled(effect, values, strength, trial, rng)
