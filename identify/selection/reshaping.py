@@ -75,15 +75,23 @@ def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Resha
 def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:
     """The free curve that a fit needs together with an absent effect; its fit is without that.
 
-    Each distorts what the other leaves, so that neither has evidence alone.
+    Each distorts what the other leaves, so that neither has evidence alone: what a shape of force
+    leaves is smooth, and a smooth residual has few effective samples. An effect counts by what it
+    takes of the test error; both together must take nearly all.
     """
-    likely = [c for c in ranking if c.plausible and c.delta_bic > RULE.least_bic]
-    for candidate in sorted(likely, key=lambda c: -c.delta_bic)[:MOST_TRIED]:
+    likely = [c for c in ranking if c.plausible and _may_help(c)]
+    for candidate in sorted(likely, key=lambda c: c.gain.after / c.gain.before)[:MOST_TRIED]:
         found = _reshaped(candidate.fit, dataset, ())
         if found is not None and _lessened(fit, found.fit, dataset) > RULE.nearly_all:
             without = less(candidate.effect, found.fit, fit, dataset)
             return Reshaped(found.shape, candidate.fit, without)
     return None
+
+
+def _may_help(candidate: Candidate) -> bool:
+    """Whether an effect has evidence, or clearly lowers the test error without it."""
+    gain = candidate.gain
+    return candidate.delta_bic > RULE.least_bic or (gain.falls and gain.t > RULE.least_t)
 
 
 def _lessened(before: Fit, after: Fit, dataset: Dataset) -> float:
