@@ -26,8 +26,9 @@ from twin.model.units import AxisUnits
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FitResult:
-    """A fitted machine: by axis the fit, the estimates and the held-out force error (RMS) if any.
+    """A fitted machine: by axis the fit, the estimates, and the RMS force errors on other logs.
 
+    holdout_error, test_error: on the selection and on the test logs; None where there are none.
     given: the model before the fit. catalogue: absent effects that a parameter may be confounded
     with.
     """
@@ -37,6 +38,7 @@ class FitResult:
     fits: Mapping[str, Fit]
     estimates: Mapping[str, tuple[Estimate, ...]]
     holdout_error: Mapping[str, float | None]
+    test_error: Mapping[str, float | None]
     given: MachineModel
     catalogue: Catalogue
 
@@ -66,8 +68,8 @@ class FitResult:
 class SimulationFit:
     """A machine fitted to the motion of whole logs, by axis, from a fit of the force residual.
 
-    holdout_error: by axis, RMS position error over the held-out logs before and after, begun as
-    measured; None where there are none.
+    holdout_error: by axis, RMS position error over the test logs, else the held-out logs, before
+    and after, begun as measured; None where there are none.
     """
 
     model: MachineModel

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
+from identify.estimation.errors import Errors
 from identify.estimation.fit import Fit
 from identify.selection.candidates import Candidate
-from identify.selection.findings import unseen_error
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.ranking import less
 from identify.selection.unpredictable import is_unpredictable
@@ -82,6 +82,6 @@ def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) 
 
 def _lessened(before: Fit, after: Fit, dataset: Dataset) -> float:
     """Part of the squared test error above the noise floor that is gone, at most 1."""
-    was, left = (unseen_error(f, dataset) for f in (before, after))
-    above = was**2 - before.floor**2
-    return 1.0 - (left**2 - after.floor**2) / above if above > 0.0 else 0.0
+    chosen = Errors.of(before, after, dataset, dataset.chosen_on)
+    above = chosen.before**2 - before.floor**2
+    return 1.0 - (chosen.after**2 - after.floor**2) / above if above > 0.0 else 0.0
