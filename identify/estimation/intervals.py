@@ -40,8 +40,8 @@ GROUPS_QUANTILE = 1.8331129326562374  # of Student's t for GROUPS - 1
 TINY = 1e-12  # of the squared influence, which may lie in one group
 FAR = 4.0  # half widths to either side at which the error must have risen
 LEAST_RISE = 0.1  # of the rise that the linearised residual predicts
-# Of error to noise floor. Above it three quarters of the squared error are no noise: what parameters
-# have taken over of a missing effect, which no residual shows, is as large as their intervals.
+# Of error to noise floor. Above it more than three quarters of the squared error are no noise; what
+# parameters took over of a missing effect, which no residual shows, exceeds their intervals.
 LARGEST_RATIO = 2.0
 
 
