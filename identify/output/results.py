@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.given_logs import Role
 from identify.estimation.fit import Fit
 from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
 from identify.output.simulation_fit import simulation_fit_text
 from identify.output.text import add_text, compare_text, diagnose_text, fit_text
-from identify.output.words.selection import addition_notes
+from identify.output.words.selection import addition_notes, also_chose_in_words
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import MovedParameter, Refit, refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
@@ -166,7 +167,16 @@ class Addition:
     def notes(self) -> tuple[str, ...]:
         """What a reader should know beside the errors, one sentence each."""
         reshaped = self.step.effect if self.step.action == "shape" else None
-        return addition_notes(self.candidate, self.moved, self.set_aside, reshaped)
+        notes = addition_notes(self.candidate, self.moved, self.set_aside, reshaped)
+        return notes if self.also_chose is None else (*notes, self.also_chose)
+
+    @property
+    def also_chose(self) -> str | None:
+        """That the errors are of logs that took part in the choice; None where a log tests."""
+        if self.step.test_error_after is not None:
+            return None
+        held = self.step.holdout_error_after is not None
+        return also_chose_in_words(Role.SELECTION if held else Role.TRAINING)
 
     @property
     def units(self) -> AxisUnits:

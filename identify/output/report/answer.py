@@ -246,6 +246,6 @@ def _added(addition: Addition) -> Answer:
         headline=f"Axis {step.axis}: {spaced(step.effect)} {outcome}",
         sentence=sentence,
         tiles=tiles,
-        remarks=[],
+        remarks=[] if addition.also_chose is None else [capitalised(addition.also_chose)],
         tone=Tone.STRONG if addition.kept else Tone.PLAIN,
     )

@@ -88,7 +88,7 @@ def also_chose_in_words(on: Role) -> str | None:
     if on is Role.TEST:
         return None
     return (
-        f"the errors told are of the {on.value} logs, which also chose what is named, and so "
+        f"the errors told are of the {on.value} logs, which took part in the choice, and so "
         "flatter it; give --test a log of another run, on which nothing is decided"
     )
 

@@ -187,7 +187,7 @@ def test_what_decided_nothing_is_told_apart_from_what_also_chose():
     for on, d in (("test", tested), ("selection", told)):
         errors = f"force error on the {on} logs {d.tested.before:.3g} N, with what is named"
         assert named_errors_in_words(d).startswith(errors)
-        flatters = [r for r in remarks(d, None) if "which also chose what is named" in r]
+        flatters = [r for r in remarks(d, None) if "which took part in the choice" in r]
         assert [f"are of the {on} logs" in r for r in flatters] == [True] * (on != "test")
     assert diagnose_json(made.diagnosed(tested))["axes"]["x"]["test_error_on"] == "test"
 
@@ -299,8 +299,12 @@ def test_an_addition(kept):
         "free-running position error 3.71e-06 -> 1.93e-06 m (MuJoCo: 1.97e-06 m)",
         moved_in_words(made.MOVED),
     ]  # fmt: skip
+    assert "are of the selection logs, which took part in the choice" in lines[5]
     assert ("do not support" in lines[-1]) is not kept
-    assert len(lines) == (5 if kept else 6)
+    assert len(lines) == (6 if kept else 7)
+    tested = replace(made.addition(kept), step=made.STEPS[1])
+    assert "force error on the test logs      5.03 -> 2.83 N" in add_text(tested)
+    assert "took part in the choice" not in add_text(tested)
     unheld = add_text(replace(made.addition(), step=made.STEPS[2]))
     assert "held-out" not in unheld
     assert "added wear to axis y" in unheld
