@@ -109,12 +109,9 @@ class TrialResult:
 def run(case: Case) -> TrialResult:
     """Make the machine, diagnose it with one thread, and compare with what was planted."""
     catalogue = load_catalogue()
-    stage = load_model(STAGE, catalogue)
-    rng = np.random.default_rng([case.seed, *(zlib.crc32(e.encode()) for e in case.effects)])
-    effects = [OUTSIDE[e] if e in OUTSIDE else catalogue[e] for e in case.effects]
     begun = process_time()
     try:
-        built = machine(stage, effects, case.strength, case.variation, rng)
+        built = _built(case, catalogue)
     except NotShown:
         return TrialResult(case, shown=False, seconds=process_time() - begun)
     known = [e for e in catalogue.values() if case.known or e.name not in case.effects]
@@ -133,6 +130,24 @@ def run(case: Case) -> TrialResult:
         held=_held(built, base),
         seconds=process_time() - begun,
     )
+
+
+def fitted(case: Case) -> TrialResult:
+    """Make the machine and fit its model, without a diagnosis: where the truth of it lies."""
+    try:
+        built = _built(case, load_catalogue())
+    except NotShown:
+        return TrialResult(case, shown=False)
+    _, base = fit_aligned(built.model.axes[AXIS], prepared(built))
+    return TrialResult(case, ratio=base.ratio, held=_held(built, base))
+
+
+def _built(case: Case, catalogue: Catalogue) -> Machine:
+    """The machine that a case names. Raises NotShown."""
+    stage = load_model(STAGE, catalogue)
+    rng = np.random.default_rng([case.seed, *(zlib.crc32(e.encode()) for e in case.effects)])
+    effects = [OUTSIDE[e] if e in OUTSIDE else catalogue[e] for e in case.effects]
+    return machine(stage, effects, case.strength, case.variation, rng)
 
 
 def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
