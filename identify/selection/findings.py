@@ -37,7 +37,7 @@ class Finding:
     """A missing effect, or one whose law has the wrong shape, that the data prove.
 
     tied: effects that these data cannot separate from it. explains: part of the squared test error
-    above the noise floor that comes back when it alone is taken out, about 0..1. tested: test
+    above the noise floor that comes back when it alone is taken out, at most 1. tested: test
     errors in ``unit`` without it and with it; of a wrong shape with the law and with a free curve
     beside it, as one linear step predicts. chosen: the same on the logs that chose; without test
     logs the test errors are these. parameters: of its law. proof: beside decoys; None where a shift
@@ -132,6 +132,10 @@ def _linear_step(fit: Fit, dataset: Dataset, on: Role, gain: float) -> Errors:
 
 
 def _share(errors: Errors, base: Fit, dataset: Dataset) -> float:
-    """Part of the base's squared error above the noise floor by which an error falls."""
-    above = error_in(errors.on, base, dataset) ** 2 - base.floor**2
-    return (errors.before**2 - errors.after**2) / above if above > 0.0 else 0.0
+    """Part of the squared error above the noise floor by which an error falls.
+
+    Of the base's, or of the error before where the fit without one finding leaves more.
+    """
+    above = max(error_in(errors.on, base, dataset), errors.before) ** 2 - base.floor**2
+    taken = errors.before**2 - errors.after**2
+    return min(taken / above, 1.0) if above > 0.0 else 0.0
