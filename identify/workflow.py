@@ -8,8 +8,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.given_logs import Role
 from identify.estimation.channel_delay import aligned, fit_aligned
-from identify.estimation.fit import Fit, holdout_error
+from identify.estimation.errors import error_if_any
+from identify.estimation.fit import Fit
 from identify.estimation.force_balance import require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.estimation.replay import simulated_error
@@ -50,6 +52,7 @@ def fit(
     model: MachineModel,
     logs: Logs,
     holdout: Logs | None = None,
+    test: Logs | None = None,
     *,
     catalogue: Catalogue | None = None,
     test_function: float | None = None,
@@ -57,12 +60,13 @@ def fit(
 ) -> FitResult:
     """Identify the free parameters of a model's effects.
 
-    logs, holdout: by name. catalogue: with it the result says which absent effects give the same
-    force as a parameter that changed. test_function: length in s; chosen from the noise where None.
-    Raises InputError for logs that do not fit the model, and where nothing can be fitted: an axis
-    that comes to rest within every test function, a force that is not a number.
+    logs, holdout, test: training, selection and test logs by name. catalogue: with it the result
+    says which absent effects give the same force as a parameter that changed. test_function: length
+    in s; chosen from the noise where None. Raises InputError for logs that do not fit the model,
+    and where nothing can be fitted: an axis that comes to rest within every test function, a force
+    that is not a number.
     """
-    found, given = datasets(model, logs, holdout or {}, test_function), model
+    found, given = datasets(model, logs, holdout or {}, test_function, test), model
     fits: dict[str, Fit] = {}
     for i, (axis, dataset) in enumerate(list(found.items())):
         fits = {a: replace(f) for a, f in fits.items()}  # less the matrices that they computed
@@ -71,14 +75,17 @@ def fit(
         found[axis], fits[axis] = with_own_noise(fitted, dataset)
         require_residual(fits[axis].axis, found[axis])
         progress("fitting", i + 1, len(found))
-    held = {a: holdout_error(f, found[a]) for a, f in fits.items()}
+    held, tested = (
+        {a: error_if_any(role, f, found[a]) for a, f in fits.items()}
+        for role in (Role.SELECTION, Role.TEST)
+    )
     known = Catalogue([]) if catalogue is None else usable(catalogue, given)
     intervals = {a: estimates(f) for a, f in fits.items()}
     for axis, result in fits.items():
         model = model.with_axis(axis, result.axis)
         model = model.with_intervals(axis, intervals_to_keep(result, intervals[axis]))
     give_back()
-    return FitResult(model, found, fits, intervals, held, given, known)
+    return FitResult(model, found, fits, intervals, held, tested, given, known)
 
 
 def fit_simulation(found: FitResult, *, progress: Progress = silent) -> SimulationFit:
@@ -91,8 +98,9 @@ def fit_simulation(found: FitResult, *, progress: Progress = silent) -> Simulati
     for i, (axis, dataset) in enumerate(found.datasets.items()):
         progress("fitting simulated motion", i, len(found.datasets))
         done = axes[axis] = fit_simulated_motion(found.fits[axis].axis, dataset.fit)
-        both = (simulated_error(a, dataset.holdout) for a in (done.begun, done.axis))
-        held[axis] = (next(both), next(both)) if dataset.holdout else None
+        others = dataset.test or dataset.holdout  # neither decides anything here
+        both = (simulated_error(a, others) for a in (done.begun, done.axis))
+        held[axis] = (next(both), next(both)) if others else None
         model = model.with_axis(axis, done.axis)
     return SimulationFit(model, found, axes, held)
 
@@ -121,6 +129,7 @@ def diagnose(
     model: MachineModel,
     logs: Logs,
     holdout: Logs | None = None,
+    test: Logs | None = None,
     *,
     catalogue: Catalogue,
     test_function: float | None = None,
@@ -128,11 +137,12 @@ def diagnose(
 ) -> Diagnosis:
     """Fit the model, then find which effect of the catalogue it lacks. Raises InputError.
 
-    Nonparametric effects of the model are removed first, so that their force can be explained.
+    Nonparametric effects of the model are removed first, so that their force can be explained. The
+    test logs decide nothing; the errors that are reported are theirs.
     """
     known = usable(catalogue, model)
     result = fit(
-        physics_alone(model), logs, holdout, catalogue=catalogue, test_function=test_function,
+        physics_alone(model), logs, holdout, test, catalogue=catalogue, test_function=test_function,
         progress=progress,
     )  # fmt: skip
     axes = {
@@ -176,6 +186,7 @@ def add(
     model: MachineModel,
     logs: Logs,
     holdout: Logs | None = None,
+    test: Logs | None = None,
     *,
     axis: str | None = None,
     test_function: float | None = None,
@@ -188,7 +199,7 @@ def add(
     """
     model.require_usable(effect, axis or next(iter(model.axes)))
     given, model = model, model if effect.is_nonparametric else physics_alone(model)
-    before = fit(model, logs, holdout, test_function=test_function, progress=progress)
+    before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
     names = [axis] if axis else list(before.fits)
     for name in names:
         model.axis(name)
@@ -212,6 +223,7 @@ def add_shape(
     model: MachineModel,
     logs: Logs,
     holdout: Logs | None = None,
+    test: Logs | None = None,
     *,
     axis: str | None = None,
     test_function: float | None = None,
@@ -225,7 +237,7 @@ def add_shape(
     none.
     """
     names = having_shape(effect, model, axis)
-    before = fit(model, logs, holdout, test_function=test_function, progress=progress)
+    before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
     fits = {n: before.fits[n] for n in names if n in before.fits}
     best, shape = reshaped(effect, fits, before.datasets)
     progress("adding", 1, 1)
@@ -262,17 +274,8 @@ def addition(
     moved = moved_parameters(base, best.fit)
     left = model.axes[name].names
     set_aside = tuple(n for n in given.axes[name].names if n not in left)
-    step = HistoryStep(
-        action="shape" if shape else "add",
-        effect=shape.effect if shape else best.effect.name,
-        axis=name,
-        fit_error_before=base.error,
-        fit_error_after=best.fit.error,
-        holdout_error_before=holdout_error(base, prepared[name]),
-        holdout_error_after=holdout_error(best.fit, prepared[name]),
-        unit=best.fit.axis.units.force,
-        notes=addition_notes(best, moved, set_aside, shape.effect if shape else None),
-    )
+    notes = addition_notes(best, moved, set_aside, shape.effect if shape else None)
+    step = _step(best, base, prepared[name], shape, notes)
     new = model.with_axis(name, best.fit.axis).with_history(step)
     new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
     moving, replayed = errors_of_both(model, new, name, prepared)
@@ -285,6 +288,29 @@ def addition(
         replayed=replayed,
         moved=moved,
         set_aside=set_aside,
+    )
+
+
+def _step(
+    best: Candidate, base: Fit, dataset: Dataset, shape: WrongShape | None, notes: tuple[str, ...]
+) -> HistoryStep:
+    """What an addition did to the errors on the logs of each role."""
+    (held, held_after), (tested, tested_after) = (
+        [error_if_any(role, f, dataset) for f in (base, best.fit)]
+        for role in (Role.SELECTION, Role.TEST)
+    )
+    return HistoryStep(
+        action="shape" if shape else "add",
+        effect=shape.effect if shape else best.effect.name,
+        axis=best.axis,
+        fit_error_before=base.error,
+        fit_error_after=best.fit.error,
+        holdout_error_before=held,
+        holdout_error_after=held_after,
+        test_error_before=tested,
+        test_error_after=tested_after,
+        unit=best.fit.axis.units.force,
+        notes=notes,
     )
 
 

@@ -8,6 +8,8 @@ from html.parser import HTMLParser
 import numpy as np
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted
 
+from identify.dataset.given_logs import Role
+from identify.estimation.errors import Errors
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import Estimate, NotExcited
 from identify.experiment_design.discrimination import SimulatedExperiment
@@ -86,10 +88,16 @@ def diagnosis_of(verdict: Verdict = Verdict.MISSING_EFFECTS, **changes: object) 
     return found
 
 
+def errors(before: float, after: float, on: Role = Role.SELECTION) -> tuple[Errors, Errors]:
+    """Test errors, and those on the logs that chose."""
+    chosen = Errors(before, after, Role.SELECTION)
+    return replace(chosen, on=on), chosen
+
+
 FOUND = (
-    Finding("cogging", ("quadratic_drag",), 0.871, 7.17, 2.19, "N", {"p": 0.0261},
+    Finding("cogging", ("quadratic_drag",), 0.871, *errors(7.17, 2.19), "N", {"p": 0.0261},
             Proof(0.813, 0.137)),
-    Finding("lugre", (), 0.119, 3.23, 2.19, "N", {"Fc": 0.31}, None),
+    Finding("lugre", (), 0.119, *errors(3.23, 2.19), "N", {"Fc": 0.31}, None),
 )  # fmt: skip
 STRUCTURE = Dependence(
     0.631, "other_axis_position", 0.0273, "m", {"time": 0.117, "position": 0.231}
@@ -178,7 +186,7 @@ def fit_result() -> FitResult:
     datasets = {"x": DATASET, "y": replace(DATASET, axis="y", channel_delay=0.0)}
     result = FitResult(
         MODEL, datasets, {"x": x, "y": y}, {"x": estimates(0.0), "y": estimates(0.02)},
-        {"x": 0.0611, "y": None}, MODEL, Catalogue([]),
+        {"x": 0.0611, "y": None}, {"x": None, "y": 0.0733}, MODEL, Catalogue([]),
     )  # fmt: skip
     result.__dict__["refits"] = {"x": refit_of(0.0), "y": Refit(0.0319, 0.0317, ())}
     return result
@@ -186,7 +194,9 @@ def fit_result() -> FitResult:
 
 STEPS = (
     HistoryStep("add", "cogging", "x", 7.31, 4.57, 7.83, 4.91, notes=("mass moved",)),
-    HistoryStep("add", "lugre", "x", 4.53, 2.29, 4.97, 2.71),
+    HistoryStep(
+        "add", "lugre", "x", 4.53, 2.29, 4.97, 2.71, test_error_before=5.03, test_error_after=2.83
+    ),
     HistoryStep("replace", "wear", "y", 3.41, 3.13, None, None),
 )
 

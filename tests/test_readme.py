@@ -48,7 +48,7 @@ def test_the_loop_runs_in_small_and_the_error_falls(tmp_path):
 
 
 def assert_the_error_falls(answer, folder):
-    """Every command ends well, and on held-out data the model with the effect errs far less."""
+    """Every command ends well, and on the test log the model with the effect errs far less."""
     steps = {command.split()[1] for command in COMMANDS}
     assert steps == {"simulate", "check", "fit", "compare", "diagnose", "add", "plan"}
     errors = []
@@ -57,7 +57,7 @@ def assert_the_error_falls(answer, folder):
         result = answer([*command.split(), *["--json"] * compares])
         assert result.returncode == 0, f"{command}\n{result.stderr}"
         if compares:
-            told = json.loads(result.stdout)["axes"]["x"]["logs"]["held.mcap"]
+            told = json.loads(result.stdout)["axes"]["x"]["logs"]["test.mcap"]
             errors.append(told["force_error"])
         if "diagnose" in command:
             assert "axis x" in result.stdout

@@ -16,6 +16,7 @@ from identify.cli.shared import (
     Json,
     Logs,
     Model,
+    Test,
     TestFunction,
     app,
     bars_on_stderr,
@@ -24,7 +25,7 @@ from identify.cli.shared import (
     read_checked,
     require_folder,
     say,
-    with_holdout,
+    with_roles,
 )
 
 
@@ -40,6 +41,7 @@ def fit(
     model: Model,
     logs: Logs,
     holdout: Holdout = None,
+    test: Test = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Fitted model to write.")] = None,
     objective: Annotated[
         Objective,
@@ -62,9 +64,9 @@ def fit(
     if out:
         require_folder(out)
     catalogue = catalogue_with(effects)
-    result, findings = with_holdout(
+    result, findings = with_roles(
         partial(workflow.fit, catalogue=catalogue, test_function=test_function),
-        machine_model(model, catalogue), logs, holdout,
+        machine_model(model, catalogue), logs, holdout, test,
     )  # fmt: skip
     fitted, text, found = result.model, as_text.fit_text(result), as_json.fit_json(result)
     if objective is Objective.SIMULATION:
@@ -119,6 +121,7 @@ def diagnose(
     model: Model,
     logs: Logs,
     holdout: Holdout = None,
+    test: Test = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")] = None,
     test_function: TestFunction = None,
     effects: Effects = None,
@@ -133,11 +136,12 @@ def diagnose(
         require_folder(out)
     catalogue = catalogue_with(effects)
     machine = machine_model(model, catalogue)
-    result, findings = with_holdout(
+    result, findings = with_roles(
         partial(workflow.diagnose, catalogue=catalogue, test_function=test_function),
         machine,
         logs,
         holdout,
+        test,
     )
     if out:
         from identify.output.report import write_report
@@ -161,6 +165,7 @@ def add(
     logs: Logs,
     out: Annotated[Path, typer.Option("--out", "-o", help="Model with the effect.")],
     holdout: Holdout = None,
+    test: Test = None,
     axis: Annotated[
         str | None, typer.Option(help="Axis; the one that it improves most if left out.")
     ] = None,
@@ -181,9 +186,9 @@ def add(
     require_folder(out)
     catalogue = catalogue_with(effects)
     chosen, made = catalogue[effect], workflow.add_shape if shape else workflow.add
-    result, findings = with_holdout(
+    result, findings = with_roles(
         partial(made, chosen, axis=axis, test_function=test_function),
-        machine_model(model, catalogue), logs, holdout,
+        machine_model(model, catalogue), logs, holdout, test,
     )  # fmt: skip
     save_model(result.model, out)
     say(as_text.add_text(result), as_json.add_json(result), as_json_, findings)

@@ -33,7 +33,19 @@ Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs to
 Model = Annotated[str, typer.Argument(metavar="MODEL", help="Machine model (.toml).")]
 Holdout = Annotated[
     list[Path] | None,
-    typer.Option("--holdout", help="MCAP log that no parameter is fitted on; may be repeated."),
+    typer.Option(
+        "--holdout",
+        help="Selection log (MCAP): no parameter is fitted on it, but it takes part in the choice "
+        "of effects; may be repeated.",
+    ),
+]
+Test = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--test",
+        help="Test log (MCAP), on which nothing is decided: it gives the error that is reported; "
+        "may be repeated.",
+    ),
 ]
 TestFunction = Annotated[
     float | None,
@@ -115,14 +127,19 @@ def machine_model(name: str, catalogue: Catalogue) -> MachineModel:
     return load_model(name, catalogue)
 
 
-def with_holdout(
-    job: Callable[..., Result], model: MachineModel, logs: list[Path], holdout: list[Path] | None
+def with_roles(
+    job: Callable[..., Result],
+    model: MachineModel,
+    logs: list[Path],
+    holdout: list[Path] | None,
+    test: list[Path] | None,
 ) -> tuple[Result, list[str]]:
-    """The result of a job on a model, logs and held-out logs; and the findings on the logs."""
-    recorded, findings = read_checked(logs, beside=holdout)
-    held = read_measured(holdout, beside=logs)
+    """The result of a job on a model and the logs of each role; and the findings on the first."""
+    held, tests = holdout or [], test or []
+    recorded, findings = read_checked(logs, beside=[*held, *tests])
+    others = read_measured(held, beside=[*logs, *tests]), read_measured(tests, [*logs, *held])
     with bars_on_stderr() as bars:
-        return job(model, recorded, held, progress=bars), findings
+        return job(model, recorded, *others, progress=bars), findings
 
 
 class Recordings(Mapping[str, "Log"]):

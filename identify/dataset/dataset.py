@@ -1,16 +1,18 @@
-"""The logs of one axis, prepared for identification: those to fit on and those held out."""
+"""The logs of one axis, prepared for identification, each in its role."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.beginning import beginnings
 from identify.dataset.excitation import excitation
+from identify.dataset.given_logs import Given, Role, moving_in, require_apart, require_one_kind
 from identify.dataset.motion import LONGEST_BLOCK, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.dataset.test_function import LEAST_BLOCKS
@@ -18,28 +20,28 @@ from identify.dataset.time_scale import choose_length
 from twin.effect import Excitation
 from twin.errors import InputError
 from twin.log import Log
-from twin.log.check import moves
 from twin.memory import give_back
-from twin.model.machine import AxisModel, MachineModel
+from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits
 
 Array = NDArray[np.float64]
 
 TRIED = 8.0  # s of motion on which nonlinear parameters are scanned before all of it is used
 SHORTEST_HEAD = 2.0  # s of each log
-MARGIN = 0.05  # of the range of the fit logs, by which a held-out log may exceed it
-LEAST_SHARED = 0.2  # part of the held-out logs that must lie within it
+MARGIN = 0.05  # of the range of the fit logs, by which a log of another role may exceed it
+LEAST_SHARED = 0.2  # part of the logs of a role that must lie within it
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Dataset:
-    """One axis: its prepared fit logs and held-out logs (may be none), and what they cover.
+    """One axis: its prepared logs by role, and what they cover.
 
-    The held-out logs take part in the choice of effects; no parameter is fitted on them.
-    covered: gives what the fit logs cover, which takes a while. channel_delay: s, by which the
-    force of the logs was shifted to earlier samples. still: names of logs that were left out
-    because the axis stands still in them. begun: s that were left out at the beginning of logs, by
-    name, as the axis did not yet move freely.
+    fit: the training logs. holdout: the selection logs (may be none), which take part in the choice
+    of effects; no parameter is fitted on them. test: the test logs (may be none), on which nothing
+    is decided. covered: gives what the fit logs cover, which takes a while. channel_delay: s, by
+    which the force of the logs was shifted to earlier samples. still: names of logs that were left
+    out because the axis stands still in them. begun: s that were left out at the beginning of logs,
+    by name, as the axis did not yet move freely.
     """
 
     axis: str
@@ -49,17 +51,18 @@ class Dataset:
     channel_delay: float = 0.0
     still: tuple[str, ...] = ()
     begun: Mapping[str, float] = field(default_factory=dict)
+    test: tuple[PreparedLog, ...] = ()
 
     @property
     def beyond(self) -> dict[str, float]:
-        """Part of each held-out log, 0..1 by name, that lies where no fit log has been."""
-        parts = {log.motion.name: 1.0 - float(np.mean(log.reached)) for log in self.holdout}
+        """Part of each log, 0..1 by name, that lies where no fit log has been."""
+        others = (*self.holdout, *self.test)
+        parts = {log.motion.name: 1.0 - float(np.mean(log.reached)) for log in others}
         return {name: part for name, part in parts.items() if part > 0.0}
 
     def __repr__(self) -> str:
-        return (
-            f"<Dataset of {self.axis}: {len(self.fit)} logs to fit, {len(self.holdout)} held out>"
-        )
+        fit, holdout, test = (len(self.having(role)) for role in Role)
+        return f"<Dataset of {self.axis}: logs: {fit} training, {holdout} selection, {test} test>"
 
     @property
     def excitation(self) -> Excitation:
@@ -68,8 +71,28 @@ class Dataset:
 
     @property
     def logs(self) -> tuple[PreparedLog, ...]:
-        """All logs, those to fit first."""
-        return (*self.fit, *self.holdout)
+        """All logs: training, selection, test."""
+        return (*self.fit, *self.holdout, *self.test)
+
+    def having(self, role: Role) -> tuple[PreparedLog, ...]:
+        """The logs of a role."""
+        return {Role.TRAINING: self.fit, Role.SELECTION: self.holdout, Role.TEST: self.test}[role]
+
+    def with_logs(self, logs: Iterable[PreparedLog]) -> Dataset:
+        """The same with other logs in the place of ``logs``, in that order."""
+        others = iter(logs)
+        fit, holdout, test = (tuple(islice(others, len(self.having(role)))) for role in Role)
+        return replace(self, fit=fit, holdout=holdout, test=test)
+
+    @property
+    def chosen_on(self) -> Role:
+        """Role of the logs that choose; without selection logs they are the training logs."""
+        return Role.SELECTION if self.holdout else Role.TRAINING
+
+    @property
+    def tested_on(self) -> Role:
+        """Role of the logs whose error is reported; without test logs they chose as well."""
+        return Role.TEST if self.test else self.chosen_on
 
     @cached_property
     def heads(self) -> tuple[PreparedLog, ...]:
@@ -90,11 +113,7 @@ class Dataset:
 
     def with_force_noise(self, size: float) -> Dataset:
         """The same with force noise that no sensor makes, N RMS by test functions, in all logs."""
-        fit, holdout = (
-            tuple(replace(log, force_noise=size) for log in logs)
-            for logs in (self.fit, self.holdout)
-        )
-        return replace(self, fit=fit, holdout=holdout)
+        return self.with_logs(replace(log, force_noise=size) for log in self.logs)
 
     @property
     def units(self) -> AxisUnits:
@@ -112,50 +131,35 @@ def datasets(
     logs: Mapping[str, Log],
     holdout: Mapping[str, Log],
     test_function: float | None = None,
+    test: Mapping[str, Log] | None = None,
 ) -> dict[str, Dataset]:
     """A dataset for each axis of the model that the logs hold and in which it moves.
 
-    logs, holdout: by name, for messages. test_function: length in s; where None, chosen from what
-    the logs hold. Raises InputError where no axis of the model moves in any log, where a signal is
-    not a number, and where a held-out log is also one to fit.
+    logs, holdout, test: by name, of the roles training, selection, test. test_function: length in
+    s; where None, chosen from what the training and selection logs hold. Raises InputError where no
+    axis of the model moves in any training log, where a signal is not a number, and where a log has
+    two roles.
     """
-    out = _prepared(model, dict(logs), dict(holdout), test_function)  # each log is read once
+    parts = zip(Role, (logs, holdout, test or {}), strict=True)
+    given = {role: dict(part) for role, part in parts}  # each log is read once
+    out = _prepared(model, given, test_function)
     give_back()
     return out
 
 
-def _prepared(
-    model: MachineModel,
-    logs: Mapping[str, Log],
-    holdout: Mapping[str, Log],
-    test_function: float | None,
-) -> dict[str, Dataset]:
-    _require_apart(logs, holdout)
+def _prepared(model: MachineModel, given: Given, test_function: float | None) -> dict[str, Dataset]:
+    require_apart(given)
     out: dict[str, Dataset] = {}
     for name, axis in model.axes.items():
-        _require_one_kind({**logs, **holdout}, name, axis)
-        going, still = _moving(logs, name)
-        if not going:
-            continue
-        held_going, still_held = _moving(holdout, name)
-        made = cache(partial(_motions, going, held_going, name, tuple(model.axes)))
-        motions_at = partial(_long_enough, made)
-        length = test_function or choose_length(motions_at, imposed=axis.is_imposed)
-        fit, held = motions_at(length)
-        begun = {} if axis.is_imposed else beginnings([*fit, *held])
-        fit, held = (
-            [m.after(begun[m.name]) if m.name in begun else m for m in some] for some in (fit, held)
-        )
-        out[name] = Dataset(
-            axis=name,
-            fit=tuple(PreparedLog.of(m, length) for m in fit),
-            holdout=_held_out(held, length, fit),
-            covered=cache(partial(excitation, fit, axis.hardware.travel)),
-            still=(*still, *still_held),
-            begun=begun,
-        )
+        for logs in given.values():
+            require_one_kind(logs, name, axis)
+        found = {role: moving_in(logs, name) for role, logs in given.items()}
+        going = {role: moving for role, (moving, _) in found.items()}
+        if going[Role.TRAINING]:
+            still = tuple(n for _, names in found.values() for n in names)
+            out[name] = replace(_of_axis(model, name, going, test_function), still=still)
     if not out:
-        known = sorted({a for log in logs.values() for a in log.axes})
+        known = sorted({a for log in given[Role.TRAINING].values() for a in log.axes})
         raise InputError(
             f"no axis of the model ({', '.join(model.axes)}) moves in the logs, which have "
             f"{', '.join(known)}; name the axes alike, or give a log in which one moves"
@@ -163,19 +167,58 @@ def _prepared(
     return out
 
 
-def _held_out(
-    held: Sequence[Motion], length: float, fit: Sequence[Motion]
+def _of_axis(model: MachineModel, name: str, going: Given, test_function: float | None) -> Dataset:
+    """The dataset of one axis from the logs in which it moves; test logs decide nothing of it."""
+    axis, machine = model.axes[name], tuple(model.axes)
+
+    def motions_at(*roles: Role) -> Callable[[float | None], tuple[list[Motion], ...]]:
+        made = cache(partial(_motions, [going[r] for r in roles], name, machine))
+        return partial(_long_enough, made)
+
+    deciding = motions_at(Role.TRAINING, Role.SELECTION)
+    length = test_function or choose_length(deciding, imposed=axis.is_imposed)
+    fit, held = deciding(length)
+    (test,) = motions_at(Role.TEST)(length)
+    begun = {} if axis.is_imposed else _begun(fit, held, test)
+    fit, held, test = (
+        [m.after(begun[m.name]) if m.name in begun else m for m in some]
+        for some in (fit, held, test)
+    )
+    return Dataset(
+        axis=name,
+        fit=tuple(PreparedLog.of(m, length) for m in fit),
+        holdout=_within_reach(held, length, fit),
+        test=_within_reach(test, length, fit),
+        covered=cache(partial(excitation, fit, axis.hardware.travel)),
+        begun=begun,
+    )
+
+
+def _begun(
+    fit: Sequence[Motion], held: Sequence[Motion], test: Sequence[Motion]
+) -> dict[str, float]:
+    """Ends (s) of beginnings that are left out, by log; test logs tell those of none but them."""
+    begun = dict(beginnings([*fit, *held]))
+    if test:
+        names = {m.name for m in test}
+        own = beginnings([*fit, *test])
+        begun.update({name: end for name, end in own.items() if name in names})
+    return begun
+
+
+def _within_reach(
+    motions: Sequence[Motion], length: float, fit: Sequence[Motion]
 ) -> tuple[PreparedLog, ...]:
-    """The held-out logs, which test a fit where its logs have been.
+    """Logs that test a fit, where its logs have been.
 
     Beyond, a force of position is extrapolated, and says nothing of what is there. All of them
     where they have little in common with the fit logs.
     """
     low, high = min(m.position.min() for m in fit), max(m.position.max() for m in fit)
     margin = MARGIN * (high - low)
-    within = [PreparedLog.of(m, length, (low - margin, high + margin)) for m in held]
+    within = [PreparedLog.of(m, length, (low - margin, high + margin)) for m in motions]
     if sum(np.count_nonzero(w.reached) for w in within) < LEAST_SHARED * sum(map(len, within)):
-        return tuple(PreparedLog.of(m, length) for m in held)
+        return tuple(PreparedLog.of(m, length) for m in motions)
     return tuple(within)
 
 
@@ -188,82 +231,25 @@ def by_log(found: Mapping[str, Dataset]) -> dict[str, dict[str, PreparedLog]]:
     return out
 
 
-def _require_apart(logs: Mapping[str, Log], holdout: Mapping[str, Log]) -> None:
-    """Raise InputError where a held-out log has the samples of one to fit."""
-    for held, other in holdout.items():
-        for name, log in logs.items():
-            if _same(log, other):
-                raise InputError(
-                    f"{held}: held out, but has the same samples as {name}, which is fitted, and "
-                    "so cannot test the fit; give a log of another experiment"
-                )
-
-
-def _same(one: Log, other: Log) -> bool:
-    shared = one.axes.keys() & other.axes.keys()
-    return len(one) == len(other) and any(
-        np.array_equal(one.axes[a].position, other.axes[a].position)
-        for a in shared
-        if moves(one, a)
-    )
-
-
-def _require_one_kind(logs: Mapping[str, Log], name: str, axis: AxisModel) -> None:
-    """Raise InputError where an axis is rotary in a log and linear in the model, or vice versa."""
-    units = axis.units
-    for log_name, log in logs.items():
-        if name in log.axes and (logged := log.axes[name].kind) != units:
-            raise InputError(
-                f"{log_name}: axis {name} is {logged.kind} (position in {logged.position}), but in "
-                f"the model it is {units.kind} (position in {units.position}); give the model "
-                f"{logged.mass_name} in {logged.mass}, or correct the units in the import map"
-            )
-
-
-def _moving(logs: Mapping[str, Log], axis: str) -> tuple[dict[str, Log], list[str]]:
-    """The logs in which the axis moves, by name, and the names of those in which it does not."""
-    held = {name: log for name, log in logs.items() if axis in log.axes}
-    for name, log in held.items():
-        _require_numbers(name, log, axis, "position", log.axes[axis].position)
-    going = {name: log for name, log in held.items() if moves(log, axis)}
-    for name, log in going.items():
-        _require_numbers(name, log, axis, "force", log.axes[axis].force)
-    return going, [name for name in held if name not in going]
-
-
 def _long_enough(
-    made: Callable[[float], tuple[list[Motion], list[Motion]]], length: float | None
-) -> tuple[list[Motion], list[Motion]]:
+    made: Callable[[float], tuple[list[Motion], ...]], length: float | None
+) -> tuple[list[Motion], ...]:
     """Motions whose blocks suit test functions of a length (s), made anew only where they do not.
 
     None: in blocks as long as their noise asks for.
     """
     usual = made(LONGEST_BLOCK)
-    if length is None or length >= LEAST_BLOCKS * max(m.period for some in usual for m in some):
+    longest = max((m.period for some in usual for m in some), default=0.0)
+    if length is None or length >= LEAST_BLOCKS * longest:
         return usual
     return made(length / LEAST_BLOCKS)
 
 
 def _motions(
-    logs: Mapping[str, Log],
-    holdout: Mapping[str, Log],
-    axis: str,
-    machine: tuple[str, ...],
-    longest: float,
-) -> tuple[list[Motion], list[Motion]]:
-    """Motions to fit and held out, in blocks of at most a length (s)."""
-    fit, held = (
+    parts: Sequence[Mapping[str, Log]], axis: str, machine: tuple[str, ...], longest: float
+) -> tuple[list[Motion], ...]:
+    """Motions of each part of the logs, in blocks of at most a length (s)."""
+    return tuple(
         [motion_of(log, axis, name, machine, longest) for name, log in some.items()]
-        for some in (logs, holdout)
+        for some in parts
     )
-    return fit, held
-
-
-def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array) -> None:
-    """Raise InputError where a signal (n,) is not a number somewhere."""
-    bad = np.flatnonzero(~np.isfinite(values))
-    if len(bad):
-        raise InputError(
-            f"{name}: {signal} of axis {axis} is not a finite number in {len(bad)} of {len(log)} "
-            f"samples, from {bad[0] * log.period:.6g} s; cut the log there, or give another"
-        )

@@ -57,7 +57,7 @@ class Scale:
 
 
 def choose_length(
-    motions_at: Callable[[float | None], tuple[Motions, Motions]], *, imposed: bool = False
+    motions_at: Callable[[float | None], tuple[Motions, ...]], *, imposed: bool = False
 ) -> float:
     """Length of the test functions, s, for the logs to fit and the held-out ones.
 

@@ -8,7 +8,6 @@ sample. Such a delay is removed from the log and reported.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -109,16 +108,8 @@ def moved_by(fit: Fit, dataset: Dataset) -> Dataset | None:
 def realigned(dataset: Dataset, shift: float) -> Dataset:
     """The dataset with a channel delay of ``shift`` (s) removed, counted from the original logs."""
     more = shift - dataset.channel_delay
-    return replace(
-        dataset,
-        fit=_moved(dataset.fit, more),
-        holdout=_moved(dataset.holdout, more),
-        channel_delay=shift,
+    moved = dataset.with_logs(
+        PreparedLog.of(w.motion.with_force_ahead(more), w.test_function.length, w.reach)
+        for w in dataset.logs
     )
-
-
-def _moved(logs: Sequence[PreparedLog], shift: float) -> tuple[PreparedLog, ...]:
-    return tuple(
-        PreparedLog.of(w.motion.with_force_ahead(shift), w.test_function.length, w.reach)
-        for w in logs
-    )
+    return replace(moved, channel_delay=shift)

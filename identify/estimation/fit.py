@@ -13,7 +13,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.dataset import Dataset
 from identify.dataset.drive import forces_lessened
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
@@ -287,11 +286,6 @@ def finished(
         kept=kept,
         begun=begun,
     )
-
-
-def holdout_error(fit: Fit, dataset: Dataset) -> float | None:
-    """RMS force error on the held-out logs in N, or None where there are none."""
-    return rms(error_on(fit.axis, dataset.holdout)) if dataset.holdout else None
 
 
 def error_on(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:

@@ -35,7 +35,7 @@ def with_time_origins(axis: AxisModel, dataset: Dataset) -> Dataset:
     The line is that of the axis' own forces that read the clock; where it has none, the strongest
     that several logs share, by the first of them. As it is where there is no such line.
     """
-    logs = (*dataset.fit, *dataset.holdout)
+    logs = dataset.logs
     rest = without_timed_forces(axis, logs[0])
     seen = [_left(rest, log) for log in logs]
     line = _own_line(axis, rest, logs[0])
@@ -49,8 +49,8 @@ def with_time_origins(axis: AxisModel, dataset: Dataset) -> Dataset:
     turns = (phases - phase) / (2.0 * np.pi)
     turns -= np.rint(turns)
     turns[np.abs(turns) < SAME] = 0.0
-    moved = tuple(_set(w, float(c)) for w, c in zip(logs, turns / frequency, strict=True))
-    return replace(dataset, fit=moved[: len(dataset.fit)], holdout=moved[len(dataset.fit) :])
+    pairs = zip(logs, turns / frequency, strict=True)
+    return dataset.with_logs(_set(log, float(c)) for log, c in pairs)
 
 
 def synchronised(fit: Fit, dataset: Dataset) -> tuple[Dataset, Fit]:
@@ -67,7 +67,7 @@ def synchronised(fit: Fit, dataset: Dataset) -> tuple[Dataset, Fit]:
 
 def time_origins(dataset: Dataset) -> Array:
     """When each log began, s; fit logs first."""
-    return np.array([log.motion.time_origin for log in (*dataset.fit, *dataset.holdout)])
+    return np.array([log.motion.time_origin for log in dataset.logs])
 
 
 def depends_on_time_origin(axis: AxisModel, dataset: Dataset) -> bool:

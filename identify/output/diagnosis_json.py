@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from identify.estimation.errors import Errors
 from identify.output.as_json import plan_json, refit_json
 from identify.output.remarks import remarks_on
 from identify.output.results import Diagnosis
@@ -52,6 +53,7 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "remainder": _remainder(d, result.left_over.get(axis)),
         "force_error": d.base.error,
         "noise_floor": d.base.floor,
+        **_test_errors(d.tested),
         "unit": units.force,
         "force_shift": d.dataset.channel_delay,
         "force_shift_unit": "s",
@@ -79,13 +81,21 @@ def _finding(f: Finding) -> dict[str, Any]:
         "explains": f.explains,
         "confidence": f.confidence,
         "indistinguishable_from": list(f.tied),
-        "test_error_before": f.error_before,
-        "test_error_after": f.error_after,
+        **_test_errors(f.tested),
         "unit": f.unit,
         "parameters": f.parameters,
         "gain": f.proof and f.proof.gain,
         "best_decoy": f.proof and f.proof.best_decoy,
         "shape": f.shape and _shape(f.shape),
+    }
+
+
+def _test_errors(errors: Errors) -> dict[str, Any]:
+    """RMS errors before and after, and the role of the logs that they are of."""
+    return {
+        "test_error_before": errors.before,
+        "test_error_after": errors.after,
+        "test_error_on": errors.on.value,
     }
 
 

@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING
 
 from identify.estimation.fit import Outcome
 from identify.output.words.estimation import outcome_in_words, prepared_in_words
-from identify.output.words.selection import moved_in_words, refit_in_words, repeat_in_words
+from identify.output.words.selection import (
+    also_chose_in_words,
+    moved_in_words,
+    refit_in_words,
+    repeat_in_words,
+)
 from identify.selection.confounded import Refit, moved_parameters
 from identify.selection.diagnosis import AxisDiagnosis
 
@@ -51,8 +56,10 @@ def remarks(
     if not found.dataset.holdout:
         out.append(
             "no log was held out, so candidates were judged by cross-validation on blocks of the "
-            "fit logs, which is a weaker test. Give --holdout a log of another experiment."
+            "training logs, which is a weaker test. Give --holdout a log of another experiment."
         )
+    if found.findings and (also := also_chose_in_words(found.dataset.tested_on)):
+        out.append(also)
     if not_planned is not None:
         out.append(f"no experiment that would tell them apart is proposed: {not_planned}")
     if not_tried:

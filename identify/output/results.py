@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.given_logs import Role
 from identify.estimation.fit import Fit
 from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
 from identify.output.simulation_fit import simulation_fit_text
 from identify.output.text import add_text, compare_text, diagnose_text, fit_text
-from identify.output.words.selection import addition_notes
+from identify.output.words.selection import addition_notes, also_chose_in_words
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import MovedParameter, Refit, refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
@@ -26,8 +27,9 @@ from twin.model.units import AxisUnits
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FitResult:
-    """A fitted machine: by axis the fit, the estimates and the held-out force error (RMS) if any.
+    """A fitted machine: by axis the fit, the estimates, and the RMS force errors on other logs.
 
+    holdout_error, test_error: on the selection and on the test logs; None where there are none.
     given: the model before the fit. catalogue: absent effects that a parameter may be confounded
     with.
     """
@@ -37,6 +39,7 @@ class FitResult:
     fits: Mapping[str, Fit]
     estimates: Mapping[str, tuple[Estimate, ...]]
     holdout_error: Mapping[str, float | None]
+    test_error: Mapping[str, float | None]
     given: MachineModel
     catalogue: Catalogue
 
@@ -66,8 +69,8 @@ class FitResult:
 class SimulationFit:
     """A machine fitted to the motion of whole logs, by axis, from a fit of the force residual.
 
-    holdout_error: by axis, RMS position error over the held-out logs before and after, begun as
-    measured; None where there are none.
+    holdout_error: by axis, RMS position error over the test logs, else the held-out logs, before
+    and after, begun as measured; None where there are none.
     """
 
     model: MachineModel
@@ -164,7 +167,16 @@ class Addition:
     def notes(self) -> tuple[str, ...]:
         """What a reader should know beside the errors, one sentence each."""
         reshaped = self.step.effect if self.step.action == "shape" else None
-        return addition_notes(self.candidate, self.moved, self.set_aside, reshaped)
+        notes = addition_notes(self.candidate, self.moved, self.set_aside, reshaped)
+        return notes if self.also_chose is None else (*notes, self.also_chose)
+
+    @property
+    def also_chose(self) -> str | None:
+        """That the errors are of logs that took part in the choice; None where a log tests."""
+        if self.step.test_error_after is not None:
+            return None
+        held = self.step.holdout_error_after is not None
+        return also_chose_in_words(Role.SELECTION if held else Role.TRAINING)
 
     @property
     def units(self) -> AxisUnits:

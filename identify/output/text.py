@@ -20,6 +20,7 @@ from identify.output.words.selection import (
     dependence_in_words,
     effect_in_words,
     finding_in_words,
+    named_errors_in_words,
     nonparametric_in_words,
     refit_in_words,
     remainder_in_words,
@@ -47,8 +48,9 @@ def fit_text(result: FitResult) -> str:
     """The fit of each axis, one parameter a line."""
     lines = []
     for axis, fit in result.fits.items():
-        held, unit, words = result.holdout_error[axis], fit.axis.units.force, fit.axis.units.words
-        tail = "" if held is None else f", held out {held:.4g} {unit}"
+        unit, words = fit.axis.units.force, fit.axis.units.words
+        others = {"held out": result.holdout_error[axis], "test": result.test_error[axis]}
+        tail = "".join(f", {on} {e:.4g} {unit}" for on, e in others.items() if e is not None)
         lines.append(
             f"axis {axis}: {words('force error')} {fit.error:.4g} {unit}{tail}, noise floor "
             f"{fit.floor:.4g} {unit} (ratio {fit.ratio:.2f})"
@@ -124,6 +126,7 @@ def diagnose_text(result: Diagnosis) -> str:
             f"  {words('force error')} {d.base.error:.4g} {unit}, noise floor "
             f"{d.base.floor:.4g} {unit} (ratio {d.base.ratio:.2f})"
         )
+        lines.append(f"  {named_errors_in_words(d)}")
         if d.ambiguous_with:
             lines.append(f"  these data cannot separate it from: {', '.join(d.ambiguous_with)}")
         if axis in result.next_experiments:
@@ -212,11 +215,14 @@ def add_text(result: Addition) -> str:
         f"  {words('force error on the fit logs'):33s} {s.fit_error_before:.4g} -> "
         f"{s.fit_error_after:.4g} {s.unit}",
     ]
-    if s.holdout_error_before is not None and s.holdout_error_after is not None:
-        lines.append(
-            f"  {words('force error on the held-out logs'):33s} {s.holdout_error_before:.4g} -> "
-            f"{s.holdout_error_after:.4g} {s.unit}"
-        )
+    others = {
+        "held-out logs": (s.holdout_error_before, s.holdout_error_after),
+        "test logs": (s.test_error_before, s.test_error_after),
+    }
+    for name, (before, after) in others.items():
+        if before is not None and after is not None:
+            what = words(f"force error on the {name}")
+            lines.append(f"  {what:33s} {before:.4g} -> {after:.4g} {s.unit}")
     if result.position_error is not None:
         (before, after), unit = result.position_error, result.units.position
         lines.append(

@@ -9,6 +9,7 @@ from functools import cached_property
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
+from identify.estimation.errors import Errors
 from identify.estimation.fit import Fit
 from identify.selection.candidates import Candidate
 from identify.selection.findings import (
@@ -107,6 +108,11 @@ class AxisDiagnosis:
     def with_named(self) -> Fit:
         """The fit with what is named, beside which a remainder is left."""
         return self.final if self.named or self.curves else self.base
+
+    @cached_property
+    def tested(self) -> Errors:
+        """Test errors without and with what is named; without test logs, of those that chose."""
+        return Errors.of(self.base, self.with_named, self.dataset, self.dataset.tested_on)
 
     @property
     def best(self) -> Candidate | None:

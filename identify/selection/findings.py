@@ -8,11 +8,13 @@ from enum import Enum
 from math import log
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.fit import Fit, holdout_error
+from identify.dataset.given_logs import Role
+from identify.estimation.errors import Errors, error_in
+from identify.estimation.fit import Fit
 from identify.selection.confidence import confidence
 from identify.selection.decoys import Proof, proof
 from identify.selection.found_shape import FoundShape, found_shape
-from identify.selection.wrong_shape import WrongShape
+from identify.selection.wrong_shape import WrongShape, gain_on_test_logs
 from twin.effect import Effect
 
 ALL = 0.999999  # of the squared error; no effect takes more
@@ -35,18 +37,18 @@ class Finding:
     """A missing effect, or one whose law has the wrong shape, that the data prove.
 
     tied: effects that these data cannot separate from it. explains: part of the squared test error
-    above the noise floor that comes back when it alone is taken out, at most 1. error_before,
-    error_after: RMS test error in ``unit`` without it and with it; of a wrong shape with the law
-    and with a free curve beside it, as one linear step predicts. parameters: of its law. proof:
-    beside decoys; None where a shift in time makes none. shape: the curve that is assumed and the
-    one found, where they differ.
+    above the noise floor that comes back when it alone is taken out, at most 1. tested: test
+    errors in ``unit`` without it and with it; of a wrong shape with the law and with a free curve
+    beside it, as one linear step predicts. chosen: the same on the logs that chose; without test
+    logs the test errors are these. parameters: of its law. proof: beside decoys; None where a shift
+    in time makes none. shape: the curve that is assumed and the one found, where they differ.
     """
 
     effect: str
     tied: tuple[str, ...]
     explains: float
-    error_before: float
-    error_after: float
+    tested: Errors
+    chosen: Errors
     unit: str
     parameters: dict[str, float]
     proof: Proof | None
@@ -57,7 +59,7 @@ class Finding:
     def margin(self) -> float:
         """Logarithm of how many times more error its best decoy leaves; none leaves all of it."""
         if self.proof is None:
-            return 2.0 * log(self.error_before / self.error_after)
+            return 2.0 * log(self.chosen.before / self.chosen.after)
         gain, decoy = (min(g, ALL) for g in (self.proof.gain, self.proof.best_decoy))
         return log((1.0 - decoy) / (1.0 - gain))
 
@@ -71,14 +73,15 @@ def found(
     effect: Effect, tied: tuple[str, ...], base: Fit, final: Fit, without: Fit, dataset: Dataset
 ) -> Finding:
     """The finding of one effect of a final fit; without: the same fit less this effect alone."""
-    before, after = (unseen_error(f, dataset) for f in (without, final))
+    chosen = Errors.of(without, final, dataset, dataset.chosen_on)
+    tested = Errors.of(without, final, dataset, Role.TEST) if dataset.test else chosen
     fitted = final.axis[effect.name]
     return Finding(
         effect=effect.name,
         tied=tied,
-        explains=_share(before, before**2 - after**2, base, dataset),
-        error_before=before,
-        error_after=after,
+        explains=_share(tested, base, dataset),
+        tested=tested,
+        chosen=chosen,
         unit=final.axis.units.force,
         parameters=dict(fitted.values),
         proof=proof(without, fitted, dataset),
@@ -87,14 +90,16 @@ def found(
 
 def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> Finding:
     """The finding of a law with the wrong shape in a final fit."""
-    before = unseen_error(final, dataset)
-    taken = shape.proof.gain * before**2
+    chosen = tested = _linear_step(final, dataset, dataset.chosen_on, shape.proof.gain)
+    if dataset.test:
+        gain = gain_on_test_logs(shape, final, dataset)
+        tested = _linear_step(final, dataset, Role.TEST, gain)
     return Finding(
         effect=shape.effect,
         tied=(),
-        explains=_share(before, taken, base, dataset),
-        error_before=before,
-        error_after=(before**2 - taken) ** 0.5,
+        explains=_share(tested, base, dataset),
+        tested=tested,
+        chosen=chosen,
         unit=final.axis.units.force,
         parameters=dict(final.axis[shape.effect].values),
         proof=shape.proof,
@@ -116,20 +121,21 @@ def with_shape(findings: Sequence[Finding], wrong: Finding) -> tuple[Finding, ..
 
 
 def left(finding: Finding) -> float:
-    """Squared test error that a finding leaves, N^2."""
-    return finding.error_after**2
+    """Squared error that a finding leaves on the logs that chose, N^2."""
+    return finding.chosen.after**2
 
 
-def _share(before: float, taken: float, base: Fit, dataset: Dataset) -> float:
-    """Part of the squared test error above the noise floor that is ``taken`` (N^2).
+def _linear_step(fit: Fit, dataset: Dataset, on: Role, gain: float) -> Errors:
+    """The errors of a fit before and after a linear step that takes this part of the square."""
+    before = error_in(on, fit, dataset)
+    return Errors(before, before * (1.0 - gain) ** 0.5, on)
 
-    Of the base's, or of the error ``before`` (N) where the fit without one finding leaves more.
+
+def _share(errors: Errors, base: Fit, dataset: Dataset) -> float:
+    """Part of the squared error above the noise floor by which an error falls.
+
+    Of the base's, or of the error before where the fit without one finding leaves more.
     """
-    above = max(unseen_error(base, dataset), before) ** 2 - base.floor**2
+    above = max(error_in(errors.on, base, dataset), errors.before) ** 2 - base.floor**2
+    taken = errors.before**2 - errors.after**2
     return min(taken / above, 1.0) if above > 0.0 else 0.0
-
-
-def unseen_error(fit: Fit, dataset: Dataset) -> float:
-    """RMS test error (N): on the held-out logs, or on the fit logs where there are none."""
-    held = holdout_error(fit, dataset)
-    return fit.error if held is None else held

@@ -15,9 +15,9 @@ import numpy as np
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
+from identify.estimation.errors import Errors, error_in
 from identify.estimation.fit import Fit
 from identify.selection.candidates import Candidate
-from identify.selection.findings import unseen_error
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.ranking import less
 from identify.selection.unpredictable import is_unpredictable
@@ -66,7 +66,7 @@ def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Resha
         return None
     supported = [c.gain.after for c in ranking if c.supported]
     most = RULE.beside_decoys * min(supported, default=np.inf) ** 2
-    if BY_REFIT * (1.0 - shape.proof.gain) * unseen_error(fit, dataset) ** 2 > most:
+    if BY_REFIT * (1.0 - shape.proof.gain) * error_in(dataset.chosen_on, fit, dataset) ** 2 > most:
         return None
     curve = fit_in_place(fit, dataset, shape.shape)
     return None if curve.gain.after**2 > most else Reshaped(shape, fit, curve.fit)
@@ -96,6 +96,6 @@ def _may_help(candidate: Candidate) -> bool:
 
 def _lessened(before: Fit, after: Fit, dataset: Dataset) -> float:
     """Part of the squared test error above the noise floor that is gone, at most 1."""
-    was, left = (unseen_error(f, dataset) for f in (before, after))
-    above = was**2 - before.floor**2
-    return 1.0 - (left**2 - after.floor**2) / above if above > 0.0 else 0.0
+    chosen = Errors.of(before, after, dataset, dataset.chosen_on)
+    above = chosen.before**2 - before.floor**2
+    return 1.0 - (chosen.after**2 - after.floor**2) / above if above > 0.0 else 0.0

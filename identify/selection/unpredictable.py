@@ -18,7 +18,8 @@ import numpy as np
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.estimation.decision import RULE
-from identify.estimation.fit import Fit, Outcome, finished, holdout_error
+from identify.estimation.errors import holdout_error
+from identify.estimation.fit import Fit, Outcome, finished
 from identify.selection.decoys import Trial
 from identify.selection.residual_dependence import coordinates_of, find_dependence, gathered
 from twin.model.machine import AxisModel

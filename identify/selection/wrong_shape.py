@@ -104,6 +104,12 @@ def best_shape(fit: Fit, dataset: Dataset, effect: str) -> WrongShape | None:
     return max(tried, key=lambda w: w.proof.gain, default=None)
 
 
+def gain_on_test_logs(found: WrongShape, fit: Fit, dataset: Dataset) -> float:
+    """Part of a fit's squared error that a free curve takes on the test logs in one linear step."""
+    trial = Trial.of(fit, replace(dataset, holdout=dataset.test))
+    return _proof(trial, found.shape, fit, dataset, decoys=0).gain
+
+
 def having_shape(effect: Effect, model: MachineModel, axis: str | None) -> list[str]:
     """The axes of a model, or the one given, where a free curve can replace the effect's law.
 

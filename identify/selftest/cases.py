@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import Fit, error_on, fit_axis, rms
 from identify.estimation.force_balance import residual
 from identify.estimation.subspace import unabsorbed
@@ -97,15 +98,14 @@ def machine(
     )
 
 
-def prepared(built: Machine) -> tuple[Dataset, Dataset]:
-    """The dataset of the diagnosis, and that of the test log, with the same test functions."""
-    dataset = datasets(built.model, built.logs, built.holdout)[AXIS]
-    return dataset, datasets(built.model, built.test, {}, dataset.test_function_length)[AXIS]
+def prepared(built: Machine) -> Dataset:
+    """The dataset of the diagnosis."""
+    return datasets(built.model, built.logs, built.holdout, test=built.test)[AXIS]
 
 
-def own_error(true: AxisModel, dataset: Dataset) -> float:
+def own_error(true: AxisModel, logs: Sequence[PreparedLog]) -> float:
     """RMS force (N) that a machine's own laws leave of its logs: what noise alone leaves."""
-    return rms(error_on(_quiet(true), dataset.fit))
+    return rms(error_on(_quiet(true), logs))
 
 
 def _about(stage: MachineModel, rng: np.random.Generator) -> Drawn:
@@ -146,7 +146,7 @@ class _Trial:
         logs = {run: _logged(drawn.true, run, seed, ReducedSimulator) for run, seed in pairs}
         dataset = datasets(drawn.model, logs, {})[AXIS]
         base = fit_axis(drawn.model.axes[AXIS], dataset.fit)
-        return cls(dataset, base, own_error(drawn.true.axes[AXIS], dataset))
+        return cls(dataset, base, own_error(drawn.true.axes[AXIS], dataset.fit))
 
 
 def plain_friction(stage: MachineModel, other: Effect) -> Fitted:

@@ -10,12 +10,13 @@ from time import process_time
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.channel_delay import fit_aligned, realigned
-from identify.estimation.fit import Fit, error_on, rms
+from identify.dataset.given_logs import Role
+from identify.estimation.channel_delay import fit_aligned
+from identify.estimation.errors import error_in
+from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates, half_widths
 from identify.estimation.subspace import unabsorbed
-from identify.estimation.time_origin import depends_on_time_origin, with_time_origins
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding, FindingKind
 from identify.selection.forward_selection import diagnose_axis
@@ -108,17 +109,13 @@ class TrialResult:
 def run(case: Case) -> TrialResult:
     """Make the machine, diagnose it with one thread, and compare with what was planted."""
     catalogue = load_catalogue()
-    stage = load_model(STAGE, catalogue)
-    rng = np.random.default_rng([case.seed, *(zlib.crc32(e.encode()) for e in case.effects)])
-    effects = [OUTSIDE[e] if e in OUTSIDE else catalogue[e] for e in case.effects]
     begun = process_time()
     try:
-        built = machine(stage, effects, case.strength, case.variation, rng)
+        built = _built(case, catalogue)
     except NotShown:
         return TrialResult(case, shown=False, seconds=process_time() - begun)
     known = [e for e in catalogue.values() if case.known or e.name not in case.effects]
-    dataset, test = prepared(built)
-    dataset, base = fit_aligned(built.model.axes[AXIS], dataset)
+    dataset, base = fit_aligned(built.model.axes[AXIS], prepared(built))
     found = diagnose_axis(base, dataset, Catalogue(known), workers=1).with_findings()
     return TrialResult(
         case=case,
@@ -127,12 +124,30 @@ def run(case: Case) -> TrialResult:
         ranking=tuple((c.effect.name, c.delta_bic) for c in found.ranking[:4]),
         ratio=base.ratio,
         left=found.final.ratio,
-        tested=_tested(found, test, built),
+        tested=_tested(found, built),
         depends_on=found.unexplained.depends_on if found.unexplained else None,
         coordinates=_right_coordinates(built, base, dataset),
         held=_held(built, base),
         seconds=process_time() - begun,
     )
+
+
+def fitted(case: Case) -> TrialResult:
+    """Make the machine and fit its model, without a diagnosis: where the truth of it lies."""
+    try:
+        built = _built(case, load_catalogue())
+    except NotShown:
+        return TrialResult(case, shown=False)
+    _, base = fit_aligned(built.model.axes[AXIS], prepared(built))
+    return TrialResult(case, ratio=base.ratio, held=_held(built, base))
+
+
+def _built(case: Case, catalogue: Catalogue) -> Machine:
+    """The machine that a case names. Raises NotShown."""
+    stage = load_model(STAGE, catalogue)
+    rng = np.random.default_rng([case.seed, *(zlib.crc32(e.encode()) for e in case.effects)])
+    effects = [OUTSIDE[e] if e in OUTSIDE else catalogue[e] for e in case.effects]
+    return machine(stage, effects, case.strength, case.variation, rng)
 
 
 def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
@@ -157,13 +172,10 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
     )
 
 
-def _tested(found: AxisDiagnosis, test: Dataset, built: Machine) -> float:
+def _tested(found: AxisDiagnosis, built: Machine) -> float:
     """Error of what was found on a log that decided nothing, over what noise leaves there."""
-    axis = found.final.axis
-    test = realigned(test, found.dataset.channel_delay)
-    if depends_on_time_origin(axis, test):
-        test = with_time_origins(axis, test)
-    return rms(error_on(axis, test.fit)) / own_error(built.true.axes[AXIS], test)
+    own = own_error(built.true.axes[AXIS], found.dataset.test)
+    return error_in(Role.TEST, found.final, found.dataset) / own
 
 
 def _right_coordinates(built: Machine, base: Fit, dataset: Dataset) -> tuple[str, ...]:

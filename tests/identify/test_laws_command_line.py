@@ -53,8 +53,10 @@ def refuse(constant: str) -> None:
 
 COMMON = ("--test-function", "0.07", "--effects", "e1.py", "--effects", "e2.py")
 HELD = ("--holdout", "h1.mcap", "--holdout", "h2.mcap")
+TESTED = ("--test", "t.mcap")
 LOGS = {"a.mcap": "log a.mcap", "b.mcap": "log b.mcap"}
 HOLDOUT = {"h1.mcap": "log h1.mcap", "h2.mcap": "log h2.mcap"}
+TEST = {"t.mcap": "log t.mcap"}
 NAME = "m.toml ['e1.py', 'e2.py']"
 
 
@@ -66,14 +68,14 @@ def test_the_loop_is_called_with_what_was_given(monkeypatch, cli, name):
     call = stub(monkeypatch, workflow, name, result)
     save = stub(monkeypatch, twin.model.file, "save_model")
     write = stub(monkeypatch, identify.output.report, "write_report")
-    held = HELD if name != "compare" else ()
+    held = (*HELD, *TESTED) if name != "compare" else ()
     out = ("-o", "out.x")
     code, text, warned = cli(name, "m.toml", "a.mcap", "b.mcap", *held, *COMMON, *out)
     assert (code, text.strip()) == (0, f"text of {name}")
     assert warned.splitlines() == ["twin: warned of a.mcap", "twin: warned of b.mcap"]
     given, named = call.only
     assert given[0].name == NAME
-    assert given[1:] == ((LOGS,) if name == "compare" else (LOGS, HOLDOUT))
+    assert given[1:] == ((LOGS,) if name == "compare" else (LOGS, HOLDOUT, TEST))
     assert named.pop("test_function") == 0.07
     catalogue = named.pop("catalogue", None)
     assert (catalogue or {}).get("all") == (None if name == "compare" else ["e1.py", "e2.py"])
@@ -95,7 +97,7 @@ def test_the_loop_is_called_with_what_was_given(monkeypatch, cli, name):
     given, named = call.calls[-1]
     assert named["test_function"] is None
     assert given[1:] == (({"a.mcap": "log a.mcap"},) if name == "compare" else (
-        {"a.mcap": "log a.mcap"}, {},
+        {"a.mcap": "log a.mcap"}, {}, {},
     ))  # fmt: skip
 
 
@@ -106,10 +108,10 @@ def test_add(monkeypatch, cli, kept, code):
     call = stub(monkeypatch, workflow, "add", result)
     save = stub(monkeypatch, twin.model.file, "save_model")
     command = ("add", "wear", "m.toml", "a.mcap", "b.mcap", "-o", "n.toml", "--axis", "y")
-    found, text, _ = cli(*command, *HELD, *COMMON)
+    found, text, _ = cli(*command, *HELD, *TESTED, *COMMON)
     assert (found, text.strip()) == (code, "text of add")
     given, named = call.only
-    assert (given[0], given[1].name, *given[2:]) == ("W", NAME, LOGS, HOLDOUT)
+    assert (given[0], given[1].name, *given[2:]) == ("W", NAME, LOGS, HOLDOUT, TEST)
     assert named == {"axis": "y", "test_function": 0.07}
     assert save.only == (("the new model", Path("n.toml")), {})
     found, text, _ = cli(*command, "--json")

@@ -11,7 +11,8 @@ import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, fitted
 
 from identify import workflow
-from identify.estimation import fit as estimation_fit
+from identify.dataset.given_logs import Role
+from identify.estimation import errors
 from identify.output import results
 from identify.output.words.selection import moved_in_words
 from identify.selection import confounded
@@ -120,9 +121,7 @@ def handed(monkeypatch):
     monkeypatch.setattr(workflow, "estimates", lambda fit: ("estimates", fit))
     monkeypatch.setattr(workflow, "intervals_to_keep", lambda fit, found: (fit.error, found))
     monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
-    monkeypatch.setattr(
-        estimation_fit, "error_on", lambda axis, logs: np.full(5, axis.mass * len(logs))
-    )
+    monkeypatch.setattr(errors, "error_on", lambda axis, logs: np.full(5, axis.mass * len(logs)))
     monkeypatch.setattr(results, "refit", lambda *given: given)
     monkeypatch.setattr(workflow, "require_residual", lambda axis, dataset: None)
     return seen
@@ -131,10 +130,10 @@ def handed(monkeypatch):
 def test_a_fit_takes_over_the_values_and_the_shift_of_each_axis(monkeypatch):
     seen, bars = handed(monkeypatch), []
     found = workflow.fit(
-        made.MODEL, "logs", "held", catalogue="known", test_function=0.07,
+        made.MODEL, "logs", "held", "test", catalogue="known", test_function=0.07,
         progress=lambda *done: bars.append(done),
     )  # fmt: skip
-    assert seen["datasets"] == (made.MODEL, "logs", "held", 0.07)
+    assert seen["datasets"] == (made.MODEL, "logs", "held", 0.07, "test")
     assert bars == [("fitting", 1, 2), ("fitting", 2, 2)]
     assert {a: m.mass for a, m in found.model.axes.items()} == {"x": 10.6, "y": 15.8}
     assert {a: s.channel_delay for a, s in found.datasets.items()} == {"x": 5.3e-4, "y": 7.9e-4}
@@ -142,8 +141,9 @@ def test_a_fit_takes_over_the_values_and_the_shift_of_each_axis(monkeypatch):
     assert found.model.intervals == {a: (f.error, ("estimates", f)) for a, f in found.fits.items()}
     assert all(found.estimates[a] == ("estimates", found.fits[a]) for a in "xy")
     assert found.refits == {a: (made.MODEL.axes[a], found.fits[a], "known") for a in "xy"}
+    assert found.test_error == {"x": None, "y": None}
     bare = replace(made.DATASET, holdout=())
-    assert workflow.holdout_error(found.fits["x"], bare) is None
+    assert workflow.error_if_any(Role.SELECTION, found.fits["x"], bare) is None
     assert len(workflow.fit(made.MODEL, "logs").catalogue) == 0
     assert seen["datasets"][2] == {}
 
@@ -202,9 +202,15 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
     monkeypatch.setattr(workflow, "worst_region", lambda *given: given)
     progress = lambda *done: bars.append(done)  # noqa: E731
     found = workflow.diagnose(
-        described, "logs", "held", catalogue="known", test_function=0.07, progress=progress
+        described,
+        "logs",
+        "held",
+        "test",
+        catalogue="known",
+        test_function=0.07,
+        progress=progress,
     )
-    assert asked["given"] == (made.MODEL, "logs", "held")
+    assert asked["given"] == (made.MODEL, "logs", "held", "test")
     assert asked["named"] == {"catalogue": "known", "test_function": 0.07, "progress": progress}
     for axis in "xy":
         d = found.axes[axis]
@@ -248,11 +254,11 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
     monkeypatch.setattr(workflow, "try_effect", attempt)
     monkeypatch.setattr(workflow, "addition", lambda best, base, *_: (best, base))
     wear = CATALOGUE["wear"]
-    best, base = add(wear, made.MODEL, "logs", "held", test_function=0.07)
+    best, base = add(wear, made.MODEL, "logs", "held", "test", test_function=0.07)
     assert (best.axis, base) == ("y", both.fits["y"])
     assert [t[1:] for t in tried] == [("sx", "wear"), ("sy", "wear")]
     assert [t[0] for t in tried] == list(both.fits.values())
-    assert seen[0][0][1:] == ("logs", "held")
+    assert seen[0][0][1:] == ("logs", "held", "test")
     assert seen[0][1]["test_function"] == 0.07
     bars = []
     found = add(wear, made.MODEL, "logs", axis="x", progress=lambda *done: bars.append(done))
@@ -270,7 +276,7 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
 def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     base = built_fit(7.3)
     best = built("cogging", fit=built_fit(2.9, axis=axis_of(fitted("cogging"))), t=9 if kept else 1)
-    dataset = replace(made.DATASET, holdout=("held",))
+    dataset = replace(made.DATASET, holdout=("held",), test=("test",))
     model = MachineModel("m", {"x": PLAIN, "y": replace(PLAIN, mass=3.0)})
     runs = []
 
@@ -284,8 +290,9 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     monkeypatch.setattr(workflow, "intervals_to_keep", lambda fit, found: (fit.error, found))
     monkeypatch.setattr(free_runs, "free_run", run)
     monkeypatch.setattr(free_runs, "rms_error", lambda r, axis: errors.get(r, 1.9))
+    told = {Role.SELECTION: {7.3: 8.1, 2.9: 3.3}, Role.TEST: {7.3: 9.7, 2.9: 4.1}}
     monkeypatch.setattr(
-        workflow, "holdout_error", lambda fit, s: {7.3: 8.1, 2.9: 3.3}[round(fit.error, 9)]
+        workflow, "error_if_any", lambda role, fit, s: told[role][round(fit.error, 9)]
     )
     monkeypatch.setattr(
         workflow,
@@ -298,6 +305,7 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     assert (step.action, step.effect, step.axis) == ("add", "cogging", "x")
     assert (step.fit_error_before, step.fit_error_after) == pytest.approx((7.3, 2.9))
     assert (step.holdout_error_before, step.holdout_error_after) == (8.1, 3.3)
+    assert (step.test_error_before, step.test_error_after) == (9.7, 4.1)
     assert (found.position_error, found.replayed) == ((5.1, 1.7), 1.9)
     assert all(r[1] == {"x": dataset.fit[0]} for r in runs)
     assert [r[2] for r in runs].count("MujocoSimulator") == 1

@@ -195,7 +195,8 @@ class AxisModel:
 class HistoryStep:
     """One step of the model's growth.
 
-    Errors are RMS force errors in ``unit``; None where not measured.
+    Errors are RMS force errors in ``unit``; None where not measured. The held-out logs may have
+    taken part in the choice of the effect; on the test logs nothing was decided.
     """
 
     action: str
@@ -207,6 +208,8 @@ class HistoryStep:
     holdout_error_after: float | None
     unit: str = LINEAR.force
     notes: tuple[str, ...] = ()
+    test_error_before: float | None = None
+    test_error_after: float | None = None
 
 
 @dataclass(frozen=True)

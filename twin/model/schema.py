@@ -108,6 +108,8 @@ class HistoryEntry(Entries):
     fit_error_after: float = Field(description="a finite number")
     holdout_error_before: float | None = Field(None, description="a finite number")
     holdout_error_after: float | None = Field(None, description="a finite number")
+    test_error_before: float | None = Field(None, description="a finite number")
+    test_error_after: float | None = Field(None, description="a finite number")
     unit: str = Field("N", description="a unit in quotes")
     notes: list[str] = Field([], description="a list of texts")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from identify.dataset.given_logs import Role
 from identify.output.report import (
     answer,
     equations,
@@ -84,15 +85,16 @@ def _facts(subject: Subject) -> list[tuple[str, str]]:
     logs = list(dict.fromkeys(log.motion.name for a in axes for log in a.logs))
     lengths = list(dict.fromkeys(quantity(a.logs[0].test_function.length, "s") for a in axes))
     facts = [("Model", subject.comparison.model.name), ("Logs", ", ".join(logs))]
-    if held := _held_out(subject.diagnosis):
-        facts.append(("Held out", ", ".join(held)))
+    for name, role in (("Held out", Role.SELECTION), ("Test", Role.TEST)):
+        if others := _names(role, subject.diagnosis):
+            facts.append((name, ", ".join(others)))
     return [*facts, ("Test function", ", ".join(lengths))]
 
 
-def _held_out(diagnosis: Diagnosis | None) -> list[str]:
+def _names(role: Role, diagnosis: Diagnosis | None) -> list[str]:
     if diagnosis is None:
         return []
-    logs = (log for d in diagnosis.axes.values() for log in d.dataset.holdout)
+    logs = (log for d in diagnosis.axes.values() for log in d.dataset.having(role))
     return list(dict.fromkeys(log.motion.name for log in logs))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from identify.dataset.given_logs import Role
 from identify.estimation.decision import RULE
 from identify.experiment_design.plan import Plan
 from identify.output.report.blocks import Answer, Section, Tile, Tone
@@ -141,7 +142,8 @@ def _tiles(axis: AxisComparison, found: AxisDiagnosis) -> list[Tile]:
     base, best = found.base, found.best
     unit, words = axis.units.force, axis.units.words
     if best is None:
-        return [*_error_tiles(base.error, base.floor, axis.units), *_position_tile(axis, "")]
+        errors = _error_tiles(base.error, base.floor, axis.units)
+        return [*errors, *_test_tile(found), *_position_tile(axis, "")]
     name, gain = spaced(best.effect.name), best.gain
     return [
         Tile(
@@ -154,6 +156,7 @@ def _tiles(axis: AxisComparison, found: AxisDiagnosis) -> list[Tile]:
             _change(unit, gain.before, gain.after),
             f"t = {number(gain.t)} over blocks",
         ),
+        *_test_tile(found),
         Tile(
             "Error over noise floor",
             f"{number(base.ratio)} → {number(best.fit.ratio)}",
@@ -161,6 +164,18 @@ def _tiles(axis: AxisComparison, found: AxisDiagnosis) -> list[Tile]:
         ),
         *_position_tile(axis, f", without {name}"),
     ]
+
+
+def _test_tile(found: AxisDiagnosis) -> list[Tile]:
+    """The error on test logs without and with what is named, where there are such logs."""
+    tested, units = found.tested, found.dataset.units
+    if tested.on is not Role.TEST:
+        return []
+    error, what = quantity(tested.before, units.force), "RMS"
+    if found.with_named is not found.base:
+        error = _change(units.force, tested.before, tested.after)
+        what = "with what is named, RMS"
+    return [Tile(units.words("Test force error"), error, what)]
 
 
 def _error_tiles(error: float, floor: float, units: AxisUnits) -> list[Tile]:
@@ -208,9 +223,15 @@ def _added(addition: Addition) -> Answer:
     step, unit, words = addition.step, addition.units.position, addition.units.words
     errors = _change(step.unit, step.fit_error_before, step.fit_error_after)
     tiles = [Tile(words("Force error on the fit logs"), errors, "RMS")]
-    if step.holdout_error_before is not None and step.holdout_error_after is not None:
-        held = _change(step.unit, step.holdout_error_before, step.holdout_error_after)
-        tiles.append(Tile(words("Held-out force error"), held, "RMS"))
+    others = {
+        "Held-out force error": (step.holdout_error_before, step.holdout_error_after),
+        "Test force error": (step.test_error_before, step.test_error_after),
+    }
+    tiles += [
+        Tile(words(name), _change(step.unit, before, after), "RMS")
+        for name, (before, after) in others.items()
+        if before is not None and after is not None
+    ]
     if addition.position_error and addition.replayed is not None:
         moved = _change(unit, *addition.position_error)
         replayed = f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo"
@@ -225,6 +246,6 @@ def _added(addition: Addition) -> Answer:
         headline=f"Axis {step.axis}: {spaced(step.effect)} {outcome}",
         sentence=sentence,
         tiles=tiles,
-        remarks=[],
+        remarks=[] if addition.also_chose is None else [capitalised(addition.also_chose)],
         tone=Tone.STRONG if addition.kept else Tone.PLAIN,
     )

@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from identify.output.report.blocks import Block, Column, Heading, Picture, Row, Section, Table
-from identify.output.report.drawing import BLUE, INK, ORANGE, new_figure
+from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, number, spaced, title_case
 from identify.output.results import Addition
@@ -59,6 +59,9 @@ def _figure(steps: Sequence[HistoryStep], floor: float | None) -> Figure:
     axes.plot(scale(fit), "o-", color=BLUE, label="fit logs", linewidth=1.6)
     if np.isfinite(held).any():
         axes.plot(scale(held), "s--", color=ORANGE, label="held out", linewidth=1.6)
+    tested = _numbers([steps[0].test_error_before, *(s.test_error_after for s in steps)])
+    if np.isfinite(tested).any():
+        axes.plot(scale(tested), "^-.", color=GREY, label="test", linewidth=1.6)
     _number_points(axes, scale(fit), scale(held))
     if floor is not None:
         axes.axhline(float(scale(floor)), color=INK, linestyle=":", label="noise floor")
@@ -99,6 +102,7 @@ def _label(step: HistoryStep) -> str:
 def _table(steps: Sequence[HistoryStep]) -> Table:
     errors = [e for s in steps for e in (s.fit_error_before, s.fit_error_after)]
     scale = Scale.of(steps[0].unit, errors)
+    tested = any(s.test_error_after is not None for s in steps)
     rows = [
         Row(
             (
@@ -107,11 +111,13 @@ def _table(steps: Sequence[HistoryStep]) -> Table:
                 scale.text(s.fit_error_after),
                 scale.text(s.holdout_error_before),
                 scale.text(s.holdout_error_after),
+                *((scale.text(s.test_error_before), scale.text(s.test_error_after)) * tested),
             )
         )
         for s in steps
     ]
-    names = ("Fit, before", "Fit, after", "Held out, before", "Held out, after")
+    names = ["Fit, before", "Fit, after", "Held out, before", "Held out, after"]
+    names += ["Test, before", "Test, after"] * tested
     columns = (Column("Effect added"), *(Column(n, numeric=True) for n in names))
     caption = "RMS force error; everything is refitted at each step."
     return Table(columns, rows, units_of(steps[0].unit).words(caption))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from identify.dataset.given_logs import Role
 from identify.output.words.numbers import PLAIN, Numbers
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Change, MovedParameter, Refit
@@ -31,6 +32,11 @@ VERDICTS = {
         "The error is above the noise floor, and no effect of the catalogue explains it."
     ),
 }
+ERROR = {
+    Role.TEST: "test error",
+    Role.SELECTION: "error on the selection logs",
+    Role.TRAINING: "error on the training logs",
+}
 SEVERAL = "Several effects explain the error equally well; these data cannot separate them."
 
 
@@ -49,8 +55,8 @@ def effect_in_words(found: AxisDiagnosis, effect: str) -> str:
 def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     """E.g. "cogging explains 93 % of the squared error above the noise floor: ..."."""
     unit = finding.unit
-    error = units_of(unit).words("test error")
-    before, after = (numbers.amount(e, unit) for e in (finding.error_before, finding.error_after))
+    error, tested = ERROR[finding.tested.on], finding.tested
+    before, after = (numbers.amount(e, unit) for e in (tested.before, tested.after))
     what, without, with_it = f"{finding.effect} explains", "without it", "with it"
     if finding.kind is FindingKind.RESEMBLES:
         what = f"what is missing resembles {finding.effect}, in another shape; that law explains"
@@ -67,6 +73,24 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.best_decoy))
     step = f"in one linear step it takes {gain:.0f} % of it, its best decoy {decoy:.0f} %"
     return f"{text}; {step}; {sure}"
+
+
+def named_errors_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str:
+    """The force error on the test logs, or on those that also chose, without and with the named."""
+    tested, units = found.tested, found.base.axis.units
+    before, after = (numbers.amount(e, units.force) for e in (tested.before, tested.after))
+    named = "" if found.with_named is found.base else f", with what is named {after}"
+    return f"{units.words('force error')} on the {tested.on.value} logs {before}{named}"
+
+
+def also_chose_in_words(on: Role) -> str | None:
+    """That the logs whose errors are told decided as well; None of test logs."""
+    if on is Role.TEST:
+        return None
+    return (
+        f"the errors told are of the {on.value} logs, which took part in the choice, and so "
+        "flatter it; give --test a log of another run, on which nothing is decided"
+    )
 
 
 def shape_in_words(effect: str, shape: FoundShape, numbers: Numbers = PLAIN) -> str:

@@ -18,6 +18,7 @@ from identify.estimation.intervals import (
     Inseparable,
     ModelWrong,
     Side,
+    _by_influence,
     estimates,
     half_widths,
     inseparable,
@@ -38,11 +39,72 @@ def jackknife(columns, data, at) -> np.ndarray:
     return student.ppf(0.95, 29) * spread
 
 
+def by_influence(columns, data, at) -> np.ndarray:
+    """The same by groups of like influence: each left out of a regression on what is its own.
+
+    That is what a column holds that no other column explains (R. Frisch, F. V. Waugh, 1933).
+    """
+    out = []
+    for j, column in enumerate(columns.T):
+        others = np.delete(columns, j, axis=1)
+        own = column - others @ np.linalg.lstsq(others, column, rcond=None)[0]
+        order = np.argsort(np.abs(own))
+        told = own[order] ** 2 / (own @ own)  # a test function is where the middle of its share is
+        ends = np.searchsorted(np.cumsum(told) - told / 2.0, np.arange(1, 10) / 10)
+        left = (data - columns @ at)[order]
+        parts = list(zip(np.split(own[order], ends), np.split(left, ends), strict=True))
+        moved = [(o @ r) ** 2 / (1.0 - (o @ o) / (own @ own)) for o, r in parts]
+        out.append(student.ppf(0.95, 9) * np.sqrt(np.sum(moved)) / (own @ own))
+    return np.array(out)
+
+
 @pytest.mark.parametrize("seed", [3, 4])
-def test_intervals_are_those_of_the_jackknife(seed):
+def test_intervals_are_those_of_the_jackknife_over_time_or_influence(seed):
     columns, data, at = linear(seed)
     fit = SimpleNamespace(jacobian=columns, residual=columns @ at - data)
-    np.testing.assert_allclose(half_widths(fit), jackknife(columns, data, at), rtol=1e-6)
+    both = jackknife(columns, data, at), by_influence(columns, data, at)
+    np.testing.assert_allclose(half_widths(fit), np.maximum(*both), rtol=1e-6)
+
+
+def test_noise_scatters_as_much_over_influence_as_over_time():
+    """White noise: both estimate the same; nothing is widened for a wrong model that is right."""
+    rng = np.random.default_rng(11)
+    columns = rng.normal(size=(900, 4)) * np.exp(rng.normal(size=(900, 1)))
+    inverse, wider = np.linalg.inv(columns.T @ columns), []
+    for _ in range(40):
+        data = rng.normal(size=900)
+        at = np.linalg.lstsq(columns, data, rcond=None)[0]
+        true = student.ppf(0.95, 9) * np.sqrt(np.diag(inverse))
+        wider.append(
+            _by_influence(columns @ np.linalg.inv(columns.T @ columns), data - columns @ at) / true
+        )
+    assert np.sqrt(np.mean(np.square(wider))) == pytest.approx(1.0, abs=0.07)
+
+
+def test_a_law_that_bends_is_seen_over_influence_though_not_over_time():
+    """A mass from a force that saturates: each second is like the next, weak pushes unlike strong.
+
+    The value that weak pushes tell is far outside the interval of the scatter over time.
+    """
+    rng = np.random.default_rng(12)
+    push = rng.normal(size=3000)
+    force = push - 0.05 * push**3 + 0.01 * rng.normal(size=3000)
+    columns, at = push[:, None], np.array([push @ force / (push @ push)])
+    (wide,) = half_widths(SimpleNamespace(jacobian=columns, residual=columns @ at - force))
+    (narrow,) = jackknife(columns, force, at)
+    assert abs(1.0 - at[0]) > 8.0 * narrow
+    assert wide > 3.0 * narrow
+
+
+def test_what_few_test_functions_tell_has_a_finite_interval():
+    """One that the last group tells alone, and one of no parameter."""
+    rng = np.random.default_rng(13)
+    column = np.where(np.arange(400) == 7, 1.0, 1e-9)[:, None]
+    influence = np.hstack([column, np.zeros((400, 1)), 1e-12 * rng.normal(size=(400, 1))])
+    found = _by_influence(influence, rng.normal(size=400))
+    assert np.isfinite(found).all()
+    assert found[1] == 0.0
+    assert found[2] == pytest.approx(1.83 * 1e-12 * 20.0, rel=0.5)
 
 
 def test_what_a_prior_or_bound_shifts_is_in_the_interval():
@@ -57,6 +119,7 @@ def test_what_a_prior_or_bound_shifts_is_in_the_interval():
             rest = columns.T @ columns - columns[b].T @ columns[b]
             moves.append(np.linalg.solve(rest, columns[b].T @ fit.residual[b]))
         spread = student.ppf(0.95, 29) * np.sqrt(29.0 / 30.0 * np.sum(np.square(moves), axis=0))
+        spread = np.maximum(spread, by_influence(columns, data, held))
         np.testing.assert_allclose(found, spread + np.abs(off), rtol=1e-5)
         assert (found > np.abs(off)).all()
 
@@ -82,10 +145,10 @@ def test_what_a_fit_does_not_see_has_no_interval_and_twins_are_named():
 
 def test_a_wrong_model_has_no_intervals():
     axis = AxisModel(1.0)
-    fit = SimpleNamespace(residual=np.ones(3), ratio=LARGEST_RATIO, error=0.3, floor=0.1, axis=axis)
+    fit = SimpleNamespace(residual=np.ones(3), ratio=LARGEST_RATIO, error=0.2, floor=0.1, axis=axis)
     assert refusal(fit) is None
     fit.ratio = 1.001 * LARGEST_RATIO
-    assert "0.3 N is 3.0 times the noise floor 0.1 N" in no_interval_in_words(refusal(fit))
+    assert "0.2 N is 2.0 times the noise floor 0.1 N" in no_interval_in_words(refusal(fit))
     fit.residual = np.zeros(0)
     assert "comes to rest within every test function" in no_interval_in_words(refusal(fit))
 

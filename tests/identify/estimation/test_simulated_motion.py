@@ -174,8 +174,8 @@ def test_each_axis_is_fitted_from_its_own_force_fit_and_judged_before_and_after(
     monkeypatch.setattr(workflow, "simulated_error", lambda axis, logs: axis.mass + len(logs))
     force = SimpleNamespace(
         model=MachineModel("m", given, 1000.0),
-        datasets={"x": SimpleNamespace(fit="fit of 2", holdout=("one",)),
-                  "y": SimpleNamespace(fit="fit of 3", holdout=())},
+        datasets={"x": SimpleNamespace(fit="fit of 2", holdout=("one",), test=()),
+                  "y": SimpleNamespace(fit="fit of 3", holdout=(), test=())},
         fits={a: SimpleNamespace(axis=m) for a, m in given.items()},
     )  # fmt: skip
     found = workflow.fit_simulation(force)
@@ -183,3 +183,5 @@ def test_each_axis_is_fitted_from_its_own_force_fit_and_judged_before_and_after(
     assert {a: f.axis.mass for a, f in found.axes.items()} == {"x": 20.0, "y": 30.0}
     assert found.holdout_error == {"x": (3.0, 21.0), "y": None}
     assert found.force is force
+    force.datasets["x"].test = ("two", "three")
+    assert workflow.fit_simulation(force).holdout_error["x"] == (4.0, 22.0)

@@ -70,6 +70,7 @@ def test_a_fit():
             "beginnings_left_out": {}, "beginnings_left_out_unit": "s",
             "force_error": pytest.approx(fit.error), "noise_floor": fit.floor, "unit": "N",
             "holdout_force_error": result.holdout_error[axis],
+            "test_force_error": result.test_error[axis],
             "force_shift": result.datasets[axis].channel_delay, "force_shift_unit": "s",
         }  # fmt: skip
         assert parameters == {
@@ -182,15 +183,17 @@ def test_a_diagnosis():
             {
                 "effect": "cogging", "kind": "missing", "explains": 0.871,
                 "indistinguishable_from": ["quadratic_drag"], "test_error_before": 7.17,
-                "test_error_after": 2.19, "unit": "N", "parameters": {"p": 0.0261},
+                "test_error_after": 2.19, "test_error_on": "selection", "unit": "N",
+                "parameters": {"p": 0.0261},
                 "gain": 0.813, "best_decoy": 0.137, "shape": None,
                 "confidence": made.FOUND[0].confidence,
             },
             {
                 "effect": "lugre", "kind": "missing", "explains": 0.119,
                 "indistinguishable_from": [], "test_error_before": 3.23, "test_error_after": 2.19,
-                "unit": "N", "parameters": {"Fc": 0.31}, "gain": None, "best_decoy": None,
-                "shape": None, "confidence": made.FOUND[1].confidence,
+                "test_error_on": "selection", "unit": "N", "parameters": {"Fc": 0.31},
+                "gain": None, "best_decoy": None, "shape": None,
+                "confidence": made.FOUND[1].confidence,
             },
         ],
         "remainder": {
@@ -203,6 +206,8 @@ def test_a_diagnosis():
             },
         },
         "force_error": pytest.approx(8.37), "noise_floor": 2.11, "unit": "N",
+        "test_error_before": x.tested.before, "test_error_after": x.tested.after,
+        "test_error_on": "selection",
         "force_shift": 0.000217, "force_shift_unit": "s",
         "repeats_not_general": {
             "period": 0.00253, "period_unit": "m", "amplitude": {"run 1": 1.07, "run 2": 0.93},
@@ -281,6 +286,7 @@ def test_an_addition(kept):
         "fit_error_before": s.fit_error_before, "fit_error_after": s.fit_error_after,
         "holdout_error_before": s.holdout_error_before,
         "holdout_error_after": s.holdout_error_after, "noise_floor": made.BEST.fit.floor,
+        "test_error_before": s.test_error_before, "test_error_after": s.test_error_after,
         "unit": "N", "position_error_before": a.position_error[0],
         "position_error_after": a.position_error[1], "position_error_in_mujoco": a.replayed,
         "position_unit": "m", "parameters": dict(made.BEST.fit.axis["cogging"].values),

@@ -70,10 +70,12 @@ def test_the_ledger_shows_each_step_in_its_row_and_column():
         "Cogging": {
             "Fit, before": "7.31 N", "Fit, after": "4.57 N",
             "Held out, before": "7.83 N", "Held out, after": "4.91 N",
+            "Test, before": "–", "Test, after": "–",
         },
         "Lugre": {
             "Fit, before": "4.53 N", "Fit, after": "2.29 N",
             "Held out, before": "4.97 N", "Held out, after": "2.71 N",
+            "Test, before": "5.03 N", "Test, after": "2.83 N",
         },
     }  # fmt: skip
     assert y == {
@@ -93,7 +95,8 @@ def test_the_ledger_has_the_unit_of_its_largest_error():
     rising = (replace(made.STEPS[0], fit_error_before=0.0341, fit_error_after=0.713),)
     assert growth._table(rising).rows[0].cells[1:3] == ("0.0341 N", "0.713 N")
     table = growth._table(made.STEPS)
-    assert [c.numeric for c in table.columns] == [False, True, True, True, True]
+    assert [c.numeric for c in table.columns] == [False] + 6 * [True]
+    assert [c.numeric for c in growth._table(rising).columns] == [False] + 4 * [True]
     assert [c.numeric for c in logs._table(made.comparison_of()).columns] == [False] + 5 * [True]
 
 

@@ -9,10 +9,12 @@ import built_results as made
 import pytest
 from built_fits import CATALOGUE, NOISE, built, built_fit, fitted
 
+from identify.dataset.given_logs import Role
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import NotExcited
 from identify.experiment_design.missing_excitation import Gap
 from identify.output import remarks as remarks_module
+from identify.output.diagnosis_json import diagnose_json
 from identify.output.machine_text import check_text, effect_text, effects_text
 from identify.output.remarks import remarks
 from identify.output.text import (
@@ -31,6 +33,7 @@ from identify.output.words.selection import (
     advice,
     change_in_words,
     moved_in_words,
+    named_errors_in_words,
     refit_in_words,
     repeat_in_words,
 )
@@ -52,7 +55,9 @@ def test_a_fit():
     assert lines[0] == (
         "axis x: force error 0.0513 N, held out 0.0611 N, noise floor 0.0127 N (ratio 4.04)"
     )
-    second = lines.index("axis y: force error 0.0317 N, noise floor 0.0131 N (ratio 2.42)")
+    second = lines.index(
+        "axis y: force error 0.0317 N, test 0.0733 N, noise floor 0.0131 N (ratio 2.42)"
+    )
     assert lines[1].strip() == outcome_in_words(Outcome.AT_BOUND)
     x, y = lines[:second], lines[second:]
     assert any("acts 217 us (0.22 samples)" in line for line in x)
@@ -128,17 +133,22 @@ def test_a_diagnosis():
     lines = lines.splitlines()
     assert lines[0] == f"{SEVERAL} cogging."
     assert lines[1] == "  force error 8.37 N, noise floor 2.11 N (ratio 3.97)"
+    tested = x.tested
+    assert lines.pop(2) == (
+        f"  force error on the selection logs {tested.before:.3g} N, with what is named "
+        f"{tested.after:.3g} N"
+    )
     assert lines[2] == "  these data cannot separate it from: quadratic_drag"
     planned = [f"  {line}" for line in plan_text(result.next_experiments["x"]).splitlines()]
     assert lines[3 : 3 + len(planned)] == planned
     rest = [" ".join(line.split()) for line in lines[3 + len(planned) :]]
     sure = [f"confidence {100.0 * f.confidence:.0f} %" for f in made.FOUND]
     assert rest[:3] == [
-        "cogging explains 87 % of the squared error above the noise floor: without it the test "
-        "error is 7.17 N, with it 2.19 N; in one linear step it takes 81 % of it, its best decoy "
-        f"14 %; {sure[0]}",
-        "lugre explains 12 % of the squared error above the noise floor: without it the test error "
-        f"is 3.23 N, with it 2.19 N; {sure[1]}",
+        "cogging explains 87 % of the squared error above the noise floor: without it the error "
+        "on the selection logs is 7.17 N, with it 2.19 N; in one linear step it takes 81 % of it, "
+        f"its best decoy 14 %; {sure[0]}",
+        "lugre explains 12 % of the squared error above the noise floor: without it the error on "
+        f"the selection logs is 3.23 N, with it 2.19 N; {sure[1]}",
         "what remains beside the named effects is 3.19 N, 1.6 times the noise floor",
     ]
     rest = rest[3:]
@@ -165,6 +175,21 @@ def test_a_diagnosis():
     assert "\n  note: no experiment that would tell them apart is proposed: no travel" in refused
     assert "cannot be told" not in y
     assert "squared error" not in y
+
+
+def test_what_decided_nothing_is_told_apart_from_what_also_chose():
+    """The error of test logs is a result; that of logs that chose says that they did."""
+    dataset = replace(made.DATASET, test=made.DATASET.holdout)
+    finding = replace(made.FOUND[0], tested=made.errors(7.17, 2.19, Role.TEST)[0])
+    tested = made.diagnosis_of(dataset=dataset, findings=(finding,))
+    assert "without it the test error is 7.17 N" in diagnose_text(made.diagnosed(tested))
+    told = made.diagnosis_of(findings=made.FOUND)
+    for on, d in (("test", tested), ("selection", told)):
+        errors = f"force error on the {on} logs {d.tested.before:.3g} N, with what is named"
+        assert named_errors_in_words(d).startswith(errors)
+        flatters = [r for r in remarks(d, None) if "which took part in the choice" in r]
+        assert [f"are of the {on} logs" in r for r in flatters] == [True] * (on != "test")
+    assert diagnose_json(made.diagnosed(tested))["axes"]["x"]["test_error_on"] == "test"
 
 
 def test_a_step_that_makes_the_rest_noise_has_no_errors():
@@ -274,8 +299,12 @@ def test_an_addition(kept):
         "free-running position error 3.71e-06 -> 1.93e-06 m (MuJoCo: 1.97e-06 m)",
         moved_in_words(made.MOVED),
     ]  # fmt: skip
+    assert "are of the selection logs, which took part in the choice" in lines[5]
     assert ("do not support" in lines[-1]) is not kept
-    assert len(lines) == (5 if kept else 6)
+    assert len(lines) == (6 if kept else 7)
+    tested = replace(made.addition(kept), step=made.STEPS[1])
+    assert "force error on the test logs      5.03 -> 2.83 N" in add_text(tested)
+    assert "took part in the choice" not in add_text(tested)
     unheld = add_text(replace(made.addition(), step=made.STEPS[2]))
     assert "held-out" not in unheld
     assert "added wear to axis y" in unheld

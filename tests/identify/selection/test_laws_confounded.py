@@ -215,5 +215,5 @@ def test_what_is_hidden_in_a_demonstration_is_physics_that_is_absent():
 
 
 def test_the_fall_of_the_error_is_told_in_its_order():
-    found = demo._fallen(made.addition())
-    assert "from 7830.00 mN to 4910.00 mN, 2 times; the noise floor is 1030.00 mN" in found
+    found = demo._fallen(replace(made.addition(), step=made.STEPS[1]))
+    assert "from 5030.00 mN to 2830.00 mN, 2 times; the noise floor is 1030.00 mN" in found

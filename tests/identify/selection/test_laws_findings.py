@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from built_fits import built_dataset, built_fit
 
+from identify.dataset.given_logs import Role
+from identify.estimation.errors import Errors
 from identify.selection.findings import _share
 
 
@@ -12,9 +16,11 @@ def test_a_share_is_of_the_squared_error_above_the_noise_floor():
     base = built_fit(0.7)
     base.__dict__["floor"] = 0.3
     without = built_dataset("one", held=())
-    assert _share(0.6, 0.2, base, without) == pytest.approx(0.2 / (0.7**2 - 0.3**2))
+    fall = Errors(0.6, 0.4, Role.TRAINING)
+    assert _share(fall, base, without) == pytest.approx((0.6**2 - 0.4**2) / (0.7**2 - 0.3**2))
     # Without one of several effects a fit may leave more than the base did.
-    assert _share(0.9, 0.2, base, without) == pytest.approx(0.2 / (0.9**2 - 0.3**2))
-    assert _share(0.9, 0.8, base, without) == 1.0
+    more = Errors(0.9, 0.5, Role.TRAINING)
+    assert _share(more, base, without) == pytest.approx((0.9**2 - 0.5**2) / (0.9**2 - 0.3**2))
+    assert _share(replace(more, after=0.1), base, without) == 1.0
     base.__dict__["floor"] = 0.8  # the base is at the floor: nothing is left to share
-    assert _share(0.6, 0.2, base, without) == 0.0
+    assert _share(fall, base, without) == 0.0

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from built_fits import PLAIN, axis_of, built, built_dataset, fitted
 
+from identify.dataset.given_logs import Role
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.output.words.selection import advice, finding_in_words, shape_in_words
 from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Step, Verdict
-from identify.selection.findings import FindingKind, with_shape
+from identify.selection.findings import FindingKind, found_wrong, with_shape
 from identify.selection.found_shape import AHEAD, BEHIND, BOTH, found_shape
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.reshaping import curve_in_place
@@ -136,8 +137,16 @@ def test_a_shape_is_the_verdict_where_it_is_all_that_is_found(dataset) -> None:
     assert told.verdict is Verdict.WRONG_SHAPE
     (finding,) = told.findings
     assert (finding.effect, finding.kind) == ("cable_slab", FindingKind.WRONG_SHAPE)
-    assert finding.error_after < 0.5 * finding.error_before
+    assert finding.tested.after < 0.5 * finding.tested.before
+    assert finding.tested is finding.chosen
     assert finding.explains > 0.7
+    if there.holdout:  # a test log that is like the selection log has the same errors
+        both = replace(there, test=there.holdout)
+        same = found_wrong(wrong_shape(base, both), base, base, both)
+        assert (same.tested.on, same.chosen) == (Role.TEST, finding.chosen)
+        assert same.tested.before == same.chosen.before
+        assert same.tested.after == pytest.approx(same.chosen.after, rel=1e-6)
+        assert same.explains == pytest.approx(finding.explains, rel=1e-6)
     assert isinstance(finding.proof, Proof)
     assert finding.shape is not None
     quiet = replace(lost, verdict=Verdict.NOTHING_MISSING, unexplained=None).with_findings()

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built_results import errors
 
 from identify.selection import confidence as stated
 from identify.selection.confidence import Level, confidence
@@ -15,7 +16,7 @@ from identify.selftest.calibration import LEAST_ANSWERS, MOST_LEVELS, levels, re
 from identify.selftest.case import Case
 from identify.selftest.trial import Answer, TrialResult
 
-MADE = Finding("a", (), 0.9, 2.0, 1.0, "N", {}, Proof(0.75, 0.5))
+MADE = Finding("a", (), 0.9, *errors(2.0, 1.0), "N", {}, Proof(0.75, 0.5))
 
 
 def answers(count: int, seed: int) -> list[Answer]:

@@ -148,7 +148,7 @@ def test_a_friction_is_scaled_until_the_model_falls_short_by_the_strength(
 # --- the demonstration ----------------------------------------------------------------------
 
 
-def test_a_demonstration_holds_out_its_third_log_and_writes_what_it_found(monkeypatch, tmp_path):
+def test_a_demonstration_chooses_by_its_third_log_and_tests_by_its_fourth(monkeypatch, tmp_path):
     hidden, said, calls, recorded = fitted("cogging"), [], {}, []
     found, as_fitted = made.diagnosed(), {}
 
@@ -156,13 +156,17 @@ def test_a_demonstration_holds_out_its_third_log_and_writes_what_it_found(monkey
         recorded.append((machine, experiment, path.name, seed))
         return path.name
 
-    def diagnose(model, logs, held, **named):
-        calls["diagnose"] = (model, dict(logs), dict(held))
+    def diagnose(model, *logs, **named):
+        calls["diagnose"] = (model, *map(dict, logs))
         return found
 
-    def add(effect, model, logs, held, axis, progress):
-        calls["add"] = (effect.name, model, dict(logs), dict(held), axis)
-        return made.addition()
+    added = made.addition()
+    tested = replace(added.step, test_error_before=0.237, test_error_after=0.00411)
+    added = replace(added, step=tested)
+
+    def add(effect, model, *logs, axis, progress):
+        calls["add"] = (effect.name, model, *map(dict, logs), axis)
+        return added
 
     monkeypatch.setattr(demo, "hidden_machine", lambda model, catalogue, rng: ("machine", hidden))
     monkeypatch.setattr(demo, "_record", record)
@@ -173,22 +177,24 @@ def test_a_demonstration_holds_out_its_third_log_and_writes_what_it_found(monkey
     monkeypatch.setattr(demo, "write_report", lambda *given, **named: calls.update(report=named))
     model = MachineModel("m", {"x": PLAIN})
     out = demo.demo(model, CATALOGUE, tmp_path / "new", 4, said.append)
-    names = [f"machine_{i}.mcap" for i in (1, 2, 3)]
+    names = [f"machine_{i}.mcap" for i in (1, 2, 3, 4)]
     assert [r[1:] for r in recorded] == [
         ("tracking", names[0], 1004), ("moves", names[1], 2004), ("tracking", names[2], 3004),
+        ("moves", names[3], 4004),
     ]  # fmt: skip
-    fit, held = {n: n for n in names[:2]}, {names[2]: names[2]}
-    assert calls["diagnose"] == (model, fit, held)
-    assert calls["add"] == ("cogging", found.model, fit, held, "x")
+    roles = {n: n for n in names[:2]}, {names[2]: names[2]}, {names[3]: names[3]}
+    assert calls["diagnose"] == (model, *roles)
+    assert calls["add"] == ("cogging", found.model, *roles, "x")
     assert calls["save"] == (made.MODEL, tmp_path / "new" / "better.toml")
     assert calls["report"]["comparison"] is found.comparison
     assert out.named
     assert out.report == tmp_path / "new" / "report.html"
     assert [line[:2] for line in said] == ["1.", "2.", "3.", "4."]
     assert "cogging on x" in said[2]
+    assert "from 237.00 mN to 4.11 mN, 58 times" in said[3]
     assert not replace(out, hidden=fitted("wear")).named
     del calls["add"]
-    as_fitted[found] = made.addition()  # the diagnosis has the fit already
+    as_fitted[found] = added  # the diagnosis has the fit already
     again = demo.demo(model, CATALOGUE, tmp_path / "new", 4, said.append)
     assert again.addition is as_fitted[found]
     assert "add" not in calls

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, built, built_dataset, built_fit, fitted
+from built_results import errors
 from scipy.stats import binomtest
 
 from identify.estimation.fit import Outcome, finished
@@ -347,7 +348,7 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
         planted=(), model=SimpleNamespace(axes={"x": PLAIN}), reshaped={"lugre"}, right={"gms"},
     )  # fmt: skip
     asked = {}
-    finding = Finding("wear", ("cogging",), 0.9, 2.0, 1.0, "N", {}, Proof(0.9, 0.1))
+    finding = Finding("wear", ("cogging",), 0.9, *errors(2.0, 1.0), "N", {}, Proof(0.9, 0.1))
     findings = (
         finding, replace(finding, effect="gms"), replace(finding, effect="wear", tied=()),
         replace(finding, effect="lugre", kind=FindingKind.WRONG_SHAPE),
@@ -370,10 +371,10 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
         return SimpleNamespace(with_findings=lambda: replace(found, findings=findings))
 
     monkeypatch.setattr(trial, "machine", build)
-    monkeypatch.setattr(trial, "prepared", lambda built: ("dataset", "test log"))
+    monkeypatch.setattr(trial, "prepared", lambda built: "dataset")
     monkeypatch.setattr(trial, "fit_aligned", lambda axis, given: (given, base))
     monkeypatch.setattr(trial, "diagnose_axis", diagnose)
-    monkeypatch.setattr(trial, "_tested", lambda found, test, built: (test, 1.2))
+    monkeypatch.setattr(trial, "_tested", lambda found, built: 1.2)
     monkeypatch.setattr(trial, "_held", lambda built, base: (OFF[0],))
     out = trial.run(Case(("cogging",), 3.0, 7, "bumps", known))
     first = asked["draw"]
@@ -384,7 +385,7 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
     assert (out.verdict, out.ratio, out.left) == ("UNEXPLAINED", 8.0, pytest.approx(1.1))
     assert out.ranking == (("wear", 90.0), ("gms", 80.0))
     assert (out.depends_on, out.held, out.shown) == ("time", (OFF[0],), True)
-    assert out.tested == ("test log", 1.2)
+    assert out.tested == 1.2
     # Planted; right besides; neither; its law is another; it is not.
     assert [a.right for a in out.answers] == [True, True, False, True, False]
     assert [a.beside_decoys for a in out.answers] == [True] * 4 + [False]

@@ -1,0 +1,86 @@
+"""The logs as they are given: their roles, and what is refused of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.log import Log
+from twin.log.check import moves
+from twin.model.machine import AxisModel
+
+Array = NDArray[np.float64]
+
+
+class Role(Enum):
+    """What a log is for: parameters are fitted on it, it chooses effects, or it decides nothing."""
+
+    TRAINING = "training"
+    SELECTION = "selection"
+    TEST = "test"
+
+
+Given = Mapping[Role, Mapping[str, Log]]  # logs by name
+
+
+BUSY = {Role.TRAINING: "is fitted", Role.SELECTION: "chooses effects"}
+
+
+def require_apart(given: Given) -> None:
+    """Raise InputError where a log that is to test a fit has samples that took part in it."""
+    for busy, free in combinations(Role, 2):
+        for held, other in given[free].items():
+            for name, log in given[busy].items():
+                if _same(log, other):
+                    what = "held out" if free is Role.SELECTION else "a test log"
+                    raise InputError(
+                        f"{held}: {what}, but has the same samples as {name}, which {BUSY[busy]}, "
+                        "and so cannot test the fit; give a log of another experiment"
+                    )
+
+
+def _same(one: Log, other: Log) -> bool:
+    shared = one.axes.keys() & other.axes.keys()
+    return len(one) == len(other) and any(
+        np.array_equal(one.axes[a].position, other.axes[a].position)
+        for a in shared
+        if moves(one, a)
+    )
+
+
+def require_one_kind(logs: Mapping[str, Log], name: str, axis: AxisModel) -> None:
+    """Raise InputError where an axis is rotary in a log and linear in the model, or vice versa."""
+    units = axis.units
+    for log_name, log in logs.items():
+        if name in log.axes and (logged := log.axes[name].kind) != units:
+            raise InputError(
+                f"{log_name}: axis {name} is {logged.kind} (position in {logged.position}), but in "
+                f"the model it is {units.kind} (position in {units.position}); give the model "
+                f"{logged.mass_name} in {logged.mass}, or correct the units in the import map"
+            )
+
+
+def moving_in(logs: Mapping[str, Log], axis: str) -> tuple[dict[str, Log], list[str]]:
+    """The logs in which the axis moves, by name, and the names of those in which it does not."""
+    held = {name: log for name, log in logs.items() if axis in log.axes}
+    for name, log in held.items():
+        _require_numbers(name, log, axis, "position", log.axes[axis].position)
+    going = {name: log for name, log in held.items() if moves(log, axis)}
+    for name, log in going.items():
+        _require_numbers(name, log, axis, "force", log.axes[axis].force)
+    return going, [name for name in held if name not in going]
+
+
+def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array) -> None:
+    """Raise InputError where a signal (n,) is not a number somewhere."""
+    bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad):
+        raise InputError(
+            f"{name}: {signal} of axis {axis} is not a finite number in {len(bad)} of {len(log)} "
+            f"samples, from {bad[0] * log.period:.6g} s; cut the log there, or give another"
+        )

@@ -1,0 +1,108 @@
+"""Training logs fit, selection logs choose, test logs decide nothing and give the error told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from constructed import CATALOGUE, effect
+from machines import one_axis
+
+from identify.dataset.dataset import datasets
+from identify.dataset.given_logs import Role
+from identify.estimation.channel_delay import realigned
+from identify.output.diagnosis_json import diagnose_json
+from identify.output.results import Diagnosis
+from identify.workflow import add_named, diagnose
+from twin.effects import Catalogue
+from twin.errors import InputError
+from twin.experiments.named import simulate
+from twin.log import Log
+from twin.model.file import load_model
+from twin.simulator import ReducedSimulator
+
+STAGE = replace(one_axis(load_model("proton_xy", CATALOGUE)), sample_rate=2000.0)
+PULLED = STAGE.with_axis("x", STAGE.axes["x"].with_effect(effect("quadratic_drag", {"c": 30.0})))
+KNOWN = Catalogue([CATALOGUE["quadratic_drag"], CATALOGUE["constant_force"]])
+TESTED = {"test_error_before", "test_error_after", "test_error_on", "explains"}
+
+
+def logged(seed: int, seconds: float = 4.0) -> Log:
+    return simulate(PULLED, "tracking", seed=seed, duration=seconds, simulator=ReducedSimulator)
+
+
+LOGS, HELD, TEST = {"a": logged(1)}, {"b": logged(2)}, {"c": logged(3)}
+
+
+def louder(log: Log) -> Log:
+    """The log with another force, which no model of the machine explains."""
+    x = log.axes["x"]
+    force = x.columns["force"] + np.random.default_rng(4).normal(0.0, 0.5, len(log))
+    return replace(log, axes={"x": replace(x, columns={**x.columns, "force": force})})
+
+
+def diagnosed(test: Mapping[str, Log]) -> Diagnosis:
+    return diagnose(STAGE, LOGS, HELD, test, catalogue=KNOWN)
+
+
+@pytest.fixture(scope="module")
+def found() -> Diagnosis:
+    return diagnosed(TEST)
+
+
+def without(told: object, keys: set[str]) -> object:
+    """The same at every depth, less some keys."""
+    if isinstance(told, dict):
+        return {k: without(v, keys) for k, v in told.items() if k not in keys}
+    return [without(v, keys) for v in told] if isinstance(told, list) else told
+
+
+def test_a_test_log_decides_nothing_and_gives_the_errors(found):
+    other = diagnosed({"c": louder(TEST["c"])})
+    told, changed = diagnose_json(found), diagnose_json(other)
+    assert without(changed, TESTED) == without(told, TESTED)
+    assert told["missing"] == ["quadratic_drag"]
+    (finding,), (noisy,) = told["findings"], changed["findings"]
+    for part, worse in ((told, changed), (finding, noisy)):
+        assert part["test_error_on"] == "test"
+        assert part["test_error_before"] > 3.0 * part["test_error_after"]
+        assert worse["test_error_after"] > 3.0 * part["test_error_after"]
+    assert finding["explains"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_an_addition_tells_the_errors_on_the_logs_of_each_role(found):
+    step, dataset = add_named(found).step, found.axes["x"].dataset
+    assert (step.test_error_before, step.test_error_after) == pytest.approx(
+        (found.axes["x"].tested.before, found.axes["x"].tested.after)
+    )
+    assert step.test_error_after != step.holdout_error_after
+    assert [len(dataset.having(role)) for role in Role] == [1, 1, 1]
+
+
+def test_logs_are_prepared_alike_in_each_role():
+    """What a log is as a test log it is as a selection log."""
+    tested = datasets(STAGE, LOGS, {}, test=TEST)["x"]
+    chosen = datasets(STAGE, LOGS, TEST)["x"]
+    assert (tested.tested_on, tested.chosen_on) == (Role.TEST, Role.TRAINING)
+    assert (chosen.tested_on, chosen.chosen_on) == (Role.SELECTION, Role.SELECTION)
+    (log,), (same,) = tested.test, chosen.holdout
+    np.testing.assert_array_equal(log.command, same.command)
+    assert log.reach == same.reach
+    moved = realigned(tested, 2e-4), realigned(chosen, 2e-4)
+    np.testing.assert_array_equal(moved[0].test[0].command, moved[1].holdout[0].command)
+    assert tested.with_force_noise(0.3).test[0].force_noise == 0.3
+
+
+@pytest.mark.parametrize(
+    ("logs", "held", "why"),
+    [
+        ({"a": TEST["c"]}, HELD, "a test log, but has the same samples as a, which is fitted"),
+        (LOGS, {"b": TEST["c"]}, "a test log, but has the same samples as b, which chooses"),
+    ],
+)
+def test_a_log_has_one_role(logs, held, why):
+    with pytest.raises(InputError, match=f"c: {why}") as told:
+        datasets(STAGE, logs, held, test=TEST)
+    assert "\n" not in str(told.value)
