@@ -60,7 +60,7 @@ SPEEDS = (
     *(k / 1e3 for k in range(15, 250, 10)),
 )  # fmt: skip
 FULL = Size(9, SPEEDS, 6)
-SMALL = Size(2, (0.001, 0.003, 0.006, 0.01, 0.02, 0.06), 2)
+SMALL = Size(2, (0.002, 0.004, 0.006, 0.01, 0.02, 0.06), 2)
 
 
 @dataclass(frozen=True, eq=False)
