@@ -19,6 +19,7 @@ from identify.cli.shared import (
 from twin.errors import InputError
 
 REPORT, RESULTS = "thesis.html", "thesis.json"
+SEED = 1
 
 
 @app.command()
@@ -41,7 +42,9 @@ def reproduce(
         str | None, typer.Option("--model", help="Machine model (.toml) that goes with --log.")
     ] = None,
     axis: Annotated[str | None, typer.Option(help="Axis of --log, where several move.")] = None,
-    seed: Annotated[int, typer.Option(help="Draws the noise.")] = 1,
+    seed: Annotated[
+        int | None, typer.Option(help="Draws the noise of the twin.", show_default=str(SEED))
+    ] = None,
     as_json_: Json = False,
 ) -> None:
     """Run the thesis's study on the twin; its printed numbers stand beside ours."""
@@ -54,17 +57,33 @@ def reproduce(
     from identify.thesis.chapters import reproduce_on_logs
     from twin.files import make_folder, write_atomically
 
-    if (log is None) != (model is None):
-        raise InputError("--log and --model go together; give both, or neither to use the twin")
+    _require_one_source(log, model, small=small, seed=seed, axis=axis)
     make_folder(out)
     if log is not None and model is not None:
         machine = machine_model(model, catalogue_with(None))
         result = reproduce_on_logs(chapter or (), machine, dict(read_measured(log)), axis=axis)
     else:
         with bars_on_stderr() as bars:
-            result = workflow.reproduce(chapter or (), small=small, seed=seed, progress=bars)
+            drawn = SEED if seed is None else seed
+            result = workflow.reproduce(chapter or (), small=small, seed=drawn, progress=bars)
     found = reproduction_json(result)
     write_reproduction(out / REPORT, result)
     write_atomically(out / RESULTS, json.dumps(plain(found)).encode())
     text = f"{reproduction_text(result)}\nreport: {out / REPORT}"
     say(text, {**found, "report": str(out / REPORT)}, as_json_)
+
+
+def _require_one_source(
+    log: list[Path] | None, model: str | None, *, small: bool, seed: int | None, axis: str | None
+) -> None:
+    """Raise InputError for options of the twin beside those of a real machine's logs."""
+    if (log is None) != (model is None):
+        raise InputError("--log and --model go together; give both, or neither to use the twin")
+    if log is None and axis is not None:
+        raise InputError("--axis chooses an axis of --log; leave it out, or give --log and --model")
+    if log is not None and (small or seed is not None):
+        name = "--small" if small else "--seed"
+        raise InputError(
+            f"{name} is for the twin, on which chapters are simulated; logs are used as they were "
+            f"recorded: leave out {name}, or --log"
+        )

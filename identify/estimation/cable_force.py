@@ -57,6 +57,9 @@ def cable_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> CableForce:
     kept = np.ones(len(found.position), dtype=bool)
     for spike in spikes:
         kept &= np.abs(found.position - spike.centre) > (0.5 + MARGIN) * spike.width
+    ends = np.flatnonzero(kept)
+    between = slice(ends[0], ends[-1] + 1)  # beyond a spike at the end nothing is known
+    found, kept = found.part(between), kept[between]
     from scipy.special import stdtrit  # no fit needs it
 
     smoothed = found.alike @ smoother(found.position, kept).T

@@ -59,8 +59,9 @@ def curve_through(one_way: VelocityMap) -> MapCurve:
     groups = speeds_of(one_way)
     if len(groups) < 2 or len(one_way) <= len(LINE):
         raise InputError(
-            f"the map holds {len(one_way)} plateaus at {len(groups)} speeds in one direction; a "
-            "curve needs three at two speeds, and a Stribeck curve six speeds or more"
+            f"the map holds {len(one_way)} plateaus at {len(groups)} "
+            f"speed{'' if len(groups) == 1 else 's'} in one direction; a curve needs three at two "
+            "speeds, and a Stribeck curve six speeds or more"
         )
     line = line_through(one_way)
     if len(groups) <= len(NAMES) + 1:

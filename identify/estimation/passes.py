@@ -37,6 +37,12 @@ class Passes:
     forwards: Array
     backwards: Array
 
+    def part(self, positions: slice) -> Passes:
+        """The same at some of the positions."""
+        return Passes(
+            self.position[positions], self.forwards[:, positions], self.backwards[:, positions]
+        )
+
     @property
     def alike(self) -> Array:
         """(p, k) N, the force of position by pairs of passes: -(F_pos + F_neg)/2."""

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identify.output.words.numbers import Numbers
+from identify.output.words.numbers import RAISED, Numbers
 
 PREFIXED = frozenset({"m", "m/s", "m/s^2", "N", "N m", "s", "A", "rad", "rad/s", "rad/s^2"})
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 LEAST = 0.5  # in its unit, of the largest value printed in it
 DIGITS = 3  # significant digits of a printed number
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 NOTHING = "–"  # printed where there is no value
 
 

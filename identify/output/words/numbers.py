@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
+
+RAISED = str.maketrans("+-0123456789", "⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_POWER = re.compile(r"(?<=\d)e([+-])0*(\d+)")
+_MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,20 @@ def _ratio(value: float) -> str:
 PLAIN = Numbers(_amount, _span, _ratio)  # SI units, for a terminal and for JSON
 
 
+def typeset(sentence: str) -> str:
+    """A sentence of the terminal as it is printed on a page: ±, µ, powers of ten, minus signs."""
+
+    def power(found: re.Match[str]) -> str:
+        return "×10" + f"{found[1].strip('+')}{found[2]}".translate(RAISED)
+
+    return _MINUS.sub("−", _POWER.sub(power, sentence.replace("+-", "±").replace(" um", " µm")))
+
+
 def capitalised(sentence: str) -> str:
-    """The sentence with a capital letter and a full stop, for a list or a paragraph."""
-    return f"{sentence[:1].upper()}{sentence[1:]}{'' if sentence.endswith('.') else '.'}"
+    """The sentence with a capital letter and a full stop, for a list or a paragraph.
+
+    A name of the code that begins it keeps its letters.
+    """
+    named = any(c.isdigit() or c == "_" for c in sentence.partition(" ")[0])
+    begin = sentence[:1] if named else sentence[:1].upper()
+    return typeset(f"{begin}{sentence[1:]}{'' if sentence.endswith('.') else '.'}")

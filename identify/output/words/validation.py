@@ -58,7 +58,12 @@ def _place(region: Region, numbers: Numbers) -> str:
 def correlation_in_words(correlation: Correlation) -> str:
     """E.g. "force residual against command: 12 % of the lags beyond the 90 % bounds, ..."."""
     other = "its own past" if correlation.signal == "residual" else correlation.signal
-    verdict = "no more than by chance" if correlation.passes else "so the residual is not noise"
+    reach = f"±{correlation.limit:.2g} that chance can reach"
+    verdict = (
+        f"none beyond the {reach}"
+        if correlation.passes
+        else f"some beyond the {reach}, so the residual is not noise"
+    )
     return (
         f"force residual against {other}: {100 * correlation.outside:.0f} % of the lags beyond the "
         f"90 % bounds of ±{correlation.bound:.2g}, {verdict}"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import identify
+from identify.estimation.cable_force import cable_force
 from identify.estimation.passes import Passes, smoother
 from identify.estimation.spikes import Spike, find_spikes, pitch_of
 from twin.effects import load_catalogue
@@ -52,6 +53,20 @@ def test_a_spike_that_was_not_found_leaves_the_pitch_as_it_is() -> None:
     found = pitch_of(tuple(Spike(p, 0.004, 0.05, 0.05) for p in places))
     assert found is not None
     assert found.value == pytest.approx(0.03)
+
+
+def test_no_force_is_told_beyond_a_spike_at_the_end(monkeypatch) -> None:
+    """Where the grid begins 2.2 mm before a bump of 4 mm, nothing is known before the bump."""
+    whole = made(0.05, 0.05, np.random.default_rng(3))
+    first = int(np.searchsorted(PLACE, 0.004 - 0.12 - 0.0022))
+    begun = whole.part(slice(first, None))
+    monkeypatch.setattr("identify.estimation.cable_force.passes", lambda axis, logs: begun)
+    found = cable_force(ONE.axes["x"], [])
+    assert found.spikes[0].centre == pytest.approx(0.004 - 0.12, abs=2e-4)
+    assert found.position[0] > found.spikes[0].centre + 0.002
+    assert found.position[-1] == PLACE[-1]
+    assert found.kept[0]
+    assert found.force == pytest.approx(np.interp(found.position, PLACE, CABLE), abs=2e-3)
 
 
 def test_the_smoother_keeps_parabolas_even_where_something_is_left_out() -> None:

@@ -26,6 +26,7 @@ from identify.output.report.overlay import representative
 from identify.output.report.subject import LogForces, Subject
 from identify.output.report.units import Scale, number, quantity
 from identify.output.results import Diagnosis
+from identify.output.words.numbers import capitalised
 from identify.output.words.selection import verdict_in_words
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.residual_dependence import Dependence
@@ -151,6 +152,18 @@ def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
 )
 def test_numbers_with_units(value: float | None, unit: str, text: str) -> None:
     assert quantity(value, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("said", "printed"),
+    [
+        ("open-loop: -0.5 +- 2e-05 m of 4 um", "Open-loop: −0.5 ± 2×10⁻⁵ m of 4 µm."),
+        ("sigma0 is off (-3.6e+03 %)", "sigma0 is off (−3.6×10³ %)."),
+        ("payload_mass would make 1-2 N.", "payload_mass would make 1-2 N."),
+    ],
+)
+def test_a_sentence_of_the_terminal_is_typeset_on_a_page(said: str, printed: str) -> None:
+    assert capitalised(said) == printed
 
 
 def test_an_interval_sets_the_digits_of_its_value() -> None:

@@ -205,7 +205,7 @@ def test_what_is_outside_and_passes_counts_the_tested_lags_alone():
     assert not Correlation("command", found.lag, value, tested, 0.1, 0.205).passes
     assert not Correlation("command", found.lag, -value, tested, 0.1, 0.205).passes
     assert (
-        "against command: 50 % of the lags beyond the 90 % bounds of ±0.1"
+        "against command: 50 % of the lags beyond the 90 % bounds of ±0.1, none beyond the ±0.22"
         in correlation_in_words(found)
     )
     own = Correlation("residual", found.lag, value, tested, 0.1, 1)

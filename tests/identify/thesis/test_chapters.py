@@ -11,7 +11,7 @@ from cli_runs import twin
 import identify
 from twin.errors import InputError
 
-QUICK = ("cable", "twin")
+QUICK = ("simulation", "cable", "twin")
 
 
 @pytest.fixture(scope="module")
@@ -29,10 +29,8 @@ def chapters(written: Path) -> dict:
     return json.loads((written / "printed.json").read_text())["chapters"]
 
 
-@pytest.mark.slow
-def test_every_mean_of_the_simulation_study_is_within_a_thousandth(tmp_path: Path) -> None:
-    done = twin("reproduce", "--chapter", "simulation", "--small", "--json", folder=tmp_path)
-    chapter = json.loads(done.stdout)["chapters"]["simulation"]
+def test_every_mean_of_the_simulation_study_is_within_a_thousandth(chapters) -> None:
+    chapter = chapters["simulation"]
     assert chapter["snr_db"] == 80.0
     for name, p in chapter["parameters"].items():
         assert p["mean"] == pytest.approx(p["true"], rel=1e-3), name

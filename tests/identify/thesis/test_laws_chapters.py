@@ -105,7 +105,7 @@ def test_steady_friction_is_what_the_laws_reach_at_one_place(way, place):
 
 def test_brisk_moves_are_repeated_and_too_fast_ones_left_out(monkeypatch):
     monkeypatch.setattr(track, "simulate", lambda model, moves, **more: (moves, more["seed"]))
-    size = track.Size(1, (0.001, 0.004, 0.005, 0.07, 0.08), 3, None)
+    size = track.Size(1, (0.001, 0.004, 0.005, 0.07, 0.08), 3)
     logs = track._logs(TRACK, "x", 0.02, size, np.random.default_rng(0))
     assert {label: len(moves.speeds) for label, (moves, _) in logs.items()} == {
         "0.001 m/s": 1, "0.004 m/s": 1, "0.005 m/s": 3, "0.07 m/s": 3,

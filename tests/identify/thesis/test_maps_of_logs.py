@@ -52,7 +52,7 @@ def test_few_fast_speeds_are_a_line_and_plateaus_at_one_speed_count_once() -> No
     found = curve_through(fast)
     assert tuple(found.half) == LINE
     assert found.values == pytest.approx({"Fc": 0.285, "sigma2": 0.018}, rel=0.05)
-    with pytest.raises(InputError, match="3 plateaus at 1 speeds"):
+    with pytest.raises(InputError, match="3 plateaus at 1 speed in"):
         curve_through(one_way(np.array([0.1]), 1e-4, 1))
 
 

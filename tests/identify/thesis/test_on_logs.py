@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from cli_runs import twin
+from cli_runs import refusal
 
 from identify.output.plain import plain
 from identify.output.report.thesis import write_reproduction
@@ -43,10 +43,14 @@ def test_a_chapter_that_needs_the_twin_says_so() -> None:
         reproduce_on_logs(["models"], MODEL, {})
 
 
-def test_a_log_without_a_model_is_one_line(tmp_path: Path) -> None:
-    run = twin("reproduce", "--log", "some.mcap", folder=tmp_path)
-    assert run.returncode == 2
-    assert run.stderr.strip() == (
-        "twin: --log and --model go together; give both, or neither to use the twin"
-    )
-    assert not (tmp_path / "out").exists()
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--log", "l.mcap"), "--log and --model go together; give both"),
+        (("--axis", "x"), "--axis chooses an axis of --log; leave it out, or give --log"),
+        (("--log", "l.mcap", "--model", "m.toml", "--small"), "--small is for the twin"),
+        (("--log", "l.mcap", "--model", "m.toml", "--seed", "1"), "leave out --seed, or --log"),
+    ],
+)
+def test_options_of_the_twin_and_of_logs_do_not_mix(options, said: str, tmp_path: Path) -> None:
+    assert said in refusal("reproduce", *options, folder=tmp_path)

@@ -1,4 +1,8 @@
-"""The PMP setpoint generator: jerk-limited moves, passes, staircases, reversals and sines."""
+"""Setpoints: jerk-limited moves, passes, staircases, reversals and sines.
+
+The jerk-limited profile is this project's assumption; the thesis prints no generator of its motion
+platform. A recorded reference replaces it (twin.experiments.replay).
+"""
 
 from twin.experiments.trajectory.generators import (
     constant_speed_passes,

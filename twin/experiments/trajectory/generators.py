@@ -1,4 +1,9 @@
-"""Setpoints of the named experiments, as the motion platform (PMP) generates them.
+"""Setpoints of the named experiments.
+
+The thesis drives its stage through the Prodrive Motion Platform (PMP) and prints no generator of
+setpoints, so the jerk-limited profile of every move is this project's assumption. Nothing depends
+on it: whatever is run takes a `Setpoint`, and `recorded_setpoint` (twin.experiments.replay) makes
+one of the reference that a log recorded.
 
 Every generator returns a setpoint that starts and ends at rest, so that setpoints can be put one
 after the other with `concatenate`. Sample k is the setpoint at t = k / sample_rate. Positions are

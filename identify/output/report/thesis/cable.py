@@ -103,8 +103,8 @@ def _passes(cable: CableForce) -> Figure:
         axes.fill_between(place, low, high, where=~cable.kept, color=FLOOR, alpha=0.6)
         axes.set_ylim(low, high)
         axes.set_ylabel("Force (N)")
-        axes.legend(loc="upper left")
     lower.set_xlabel("Position (mm)")
+    figure.legend(loc="outside upper right", ncols=2)
     return figure
 
 
@@ -147,5 +147,4 @@ def _spikes(cable: CableForce) -> Table:
         )
         for i, s in enumerate(cable.spikes, 1)
     ]
-    return Table(columns, rows, "Tops as seen through test functions of 20 ms, which are 2 mm long "
-                 "at this speed and lower them.")  # fmt: skip
+    return Table(columns, rows, "Tops as seen through test functions of 20 ms, which lower them.")

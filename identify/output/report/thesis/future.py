@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from identify.output.report.blocks import (
@@ -38,8 +39,9 @@ def section(result: FutureResult) -> Section:
         Picture(
             _run(result),
             "Dry friction found in each part of a long run, with its 90 % interval, against the "
-            "distance travelled. Line: the mean of the machine's own value over that part. First "
-            "it warms, then it wears; orange: the same machine without both.",
+            "distance travelled; some are longer than the picture. Line: the mean of the machine's "
+            "own value over that part. First it warms, then it wears; orange: the same machine "
+            "without both.",
         ),
         _aging(result),
     ]
@@ -152,9 +154,10 @@ def _run(result: FutureResult) -> Figure:
             drift.distance, 1e3 * drift.found, 1e3 * drift.half, fmt="o", color=color, ecolor=INK,
             elinewidth=0.6, markersize=3, label=name,
         )  # fmt: skip
-    low = min(d.truth.min() for d in (result.aging.level, result.aging.steady))
-    high = max(d.truth.max() for d in (result.aging.level, result.aging.steady))
-    margin = 0.4 * (high - low)
+    both = result.aging.level, result.aging.steady
+    shown = np.concatenate([each for d in both for each in (d.truth, d.found)])
+    low, high = shown.min(), shown.max()
+    margin = 0.1 * (high - low)
     axes.set_ylim(1e3 * (low - margin), 1e3 * (high + margin))
     axes.set_xlabel("Distance travelled (m)")
     axes.set_ylabel("Dry friction (mN)")

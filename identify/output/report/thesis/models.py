@@ -18,7 +18,7 @@ from identify.output.report.blocks import (
     Tone,
 )
 from identify.output.report.drawing import BLUE, new_figure
-from identify.output.report.units import number, quantity, spaced
+from identify.output.report.units import number, quantity, spaced, with_minus
 from identify.output.words.numbers import capitalised
 from identify.output.words.thesis_models import models_in_words, next_nearest
 from identify.thesis.models import Drawn, ModelsResult
@@ -116,7 +116,7 @@ def _traits(result: ModelsResult) -> Table:
     rows = [
         Row((
             spaced(law), *(quantity(x, "N") for x in (t.fall, t.lag, t.slow, t.fast)),
-            f"{1e6 * t.drift:.1f} \u00b5m/s",
+            with_minus(f"{1e6 * t.drift:.1f} \u00b5m/s"),
         ))
         for law, t in zip(result.laws, result.traits, strict=True)
     ]  # fmt: skip

@@ -71,8 +71,8 @@ def _answer(result: SimulationResult) -> Answer:
         off = 100 * (printed.printed / printed.true - 1.0)
         tiles.insert(1, Tile("of sigma2 in the thesis", f"{abs(off):.2g} %", "printed mean"))
     sentence = (
-        "A velocity map of both directions gives the static parameters, reversals of 50 µm the "
-        "dynamic ones."
+        "A velocity map of both directions gives the static parameters, reversals between −50 and "
+        "+50 µm the dynamic ones."
     )
     return Answer(simulation_headline(result), sentence, tiles, [], Tone.STRONG)
 

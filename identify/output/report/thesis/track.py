@@ -45,7 +45,7 @@ def _answer(result: TrackResult) -> Answer:
     said = [capitalised(text) for text in track_in_words(result)]
     sentence = (
         "After 5 mm the bristles have not settled, so the map reads friction too low; a fit of the "
-        "whole law does not mind."
+        "whole law allows for that."
     )
     found = max(_worst(result.fits, name) for name in LEVELS)
     headline = f"The profile along the track is recovered within {100.0 * found:.2g} %"

@@ -21,7 +21,7 @@ from identify.output.report.blocks import (
     Tone,
 )
 from identify.output.report.drawing import BLUE, FLOOR, INK, ORANGE, new_figure
-from identify.output.report.units import number, pretty
+from identify.output.report.units import number, pretty, with_minus
 from identify.output.words.numbers import capitalised
 from identify.output.words.thesis_twin import twin_in_words, twin_of_logs_in_words
 from identify.thesis.printed import EMPS_CLOSED_LOOP
@@ -128,7 +128,10 @@ def _table(alike: Agreement, caption: str = "") -> Table:
         Column("Unit"),
     )
     rows = [
-        Row((d.label, f"{d.a:.6g}", f"{d.b:.6g}", number(d.standard_error), pretty(d.unit)))
+        Row((
+            d.label, *(with_minus(f"{value:.6g}") for value in (d.a, d.b)),
+            number(d.standard_error), pretty(d.unit),
+        ))
         for d in _differences(alike)
-    ]
+    ]  # fmt: skip
     return Table(columns, rows, caption)
