@@ -281,9 +281,8 @@ class _Stretches:
     def _report_absent_chunks(self) -> None:
         """Chunks of the summary that were not found at all, not even damaged."""
         there = {p.span for p in self._parts}
-        for index in self._salvage.announced:
-            span = (index.message_start_time, index.message_end_time)
-            if span not in there and index.chunk_start_offset not in self._salvage.damaged:
+        for place, span in self._salvage.announced:
+            if span not in there and place not in self._salvage.damaged:
                 self._lost.append(
                     f"the chunk of samples from {seconds(span[0])} to {seconds(span[1])} that the "
                     "summary announces is not there"

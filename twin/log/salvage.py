@@ -56,7 +56,8 @@ class Salvage:
     """One pass over the bytes of a damaged log, which keeps no sample, but where they are.
 
     lost: one sentence for each damage; unproved: one for what no checksum proves, which is taken
-    where ``keep_unproved``. announced: chunks of the summary; damaged: places of those found so.
+    where ``keep_unproved``. announced: place and times (ns) of the chunks in the summary. damaged:
+    places of those found so.
     """
 
     def __init__(self, file: FileBytes, reason: str, keep_unproved: bool) -> None:
@@ -64,7 +65,7 @@ class Salvage:
         self.unproved: list[str] = []
         self.extras = Extras()
         self.topics = Topics()
-        self.announced: list[ChunkIndex] = []
+        self.announced: list[tuple[int, tuple[int, int]]] = []
         self.damaged: set[int] = set()
         self._file = file
         self._keep_unproved = keep_unproved
@@ -173,7 +174,9 @@ class Salvage:
             self.damaged.add(record.offset)
             open_chunk(record, budget)
         elif record.opcode == Opcode.CHUNK_INDEX:
-            self.announced.append(record.parsed(ChunkIndex))
+            index = record.parsed(ChunkIndex)
+            span = (index.message_start_time, index.message_end_time)
+            self.announced.append((index.chunk_start_offset, span))
         else:
             self.extras.add(record)
 
