@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from twin.errors import InputError
 from twin.log.chunks import Inflation, payloads
-from twin.log.container import open_mcap, parse
+from twin.log.container import McapFile, parse
 from twin.log.decode import message_parts, record_at
 from twin.log.importers.mapping import ImportMap
 from twin.log.importers.table import Table, chosen, extra, parsing, require_columns
@@ -76,7 +76,8 @@ class _Topics:
     def messages(self, path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
         """Topic, log time in ns and message; of topics that are not wanted the first alone."""
         shown: set[int] = set()
-        with open_mcap(path) as file:
+        with open(path, "rb") as stream:
+            file = McapFile(stream, path.stat().st_size)
             for payload in payloads(file.records(), lambda record: None, Inflation(file.size)):
                 offset = 0
                 while offset < len(payload.data):
