@@ -150,7 +150,7 @@ def _explained(path: Path) -> Iterator[None]:
 
 
 def _try_device(path: Path) -> None:
-    """Write nothing to a device, which it may refuse; the reader of a pipe would take it for all."""
+    """Write nothing to a device, which it may refuse; a pipe would end there for its reader."""
     if path.is_char_device():
         with open(path, "wb", buffering=0) as stream:
             stream.write(b"")
