@@ -55,7 +55,7 @@ class FoundChunk:
         """Its schema, channel and message records, decompressed; raises Damaged."""
         data = file.part(self.start, self.end)
         chunk = Chunk(self.compression, data, 0, 0, self.crc, self.size)
-        return decompressed(chunk, Inflation(len(file)))
+        return decompressed(chunk)
 
 
 def found_chunks(file: FileBytes) -> Iterator[tuple[FoundChunk, bytes]]:
@@ -115,9 +115,8 @@ def _opened(
             continue
         end = start + stored
         try:
-            content = decompressed(
-                Chunk(name, file.part(start, end), last, first, crc, size), budget
-            )
+            budget.take(size, stored)  # before it is read: what only looks like chunks may be many
+            content = decompressed(Chunk(name, file.part(start, end), last, first, crc, size))
         except Damaged:
             continue
         return FoundChunk(offset, start, end, name, size, crc, stored == outer), content
