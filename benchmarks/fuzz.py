@@ -6,16 +6,20 @@ exchanged for others. Of a log nothing else than what was written may come back.
 
 from __future__ import annotations
 
+import json
 import re
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from io import BytesIO
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 import scipy.io
+from mcap.writer import CompressionType, Writer
 
 from benchmarks.figures import Figure, Target
 from twin.effects import load_catalogue
@@ -36,6 +40,11 @@ MAP = b"""sample_rate = 1000.0
 [axes.x]
 position = {column = "q", unit = "mm", sign = -1, delay_samples = 2}
 force = {column = "f", unit = "V", scale = 35.0}
+"""
+TOPICS = b"""sample_rate = 1000.0
+[axes.x]
+position = {column = "/axis/x.position", unit = "mm"}
+force = {column = "/axis/x.force", unit = "N"}
 """
 
 Rng = np.random.Generator
@@ -163,6 +172,11 @@ def _subjects(folder: Path) -> Iterator[Subject]:
     (folder / "map.toml").write_bytes(MAP)
     yield Subject("log", ".mcap", _log_bytes(log, folder), lambda p: _same(read_log(p), log), False)
     yield Subject("recovery", ".mcap", _log_bytes(log, folder), lambda p: _recovered(p, log), False)
+    plain = _plain_bytes(log)
+    yield Subject("recovery, plain", ".mcap", plain, lambda p: _recovered(p, log), False)
+    (folder / "topics.toml").write_bytes(TOPICS)
+    by_topic = partial(_imported_as, mapping=folder / "topics.toml", log=log)
+    yield Subject("mcap", ".mcap", plain, by_topic, False)
     model = find_model("example_machine").read_bytes().replace(b'mujoco = "proton_xy.xml"\n', b"")
     yield Subject("model", ".toml", model, lambda p: bool(load_model(p, catalogue)), True)
     yield Subject("map", ".toml", MAP, lambda p: bool(load_mapping(p)), True)
@@ -171,10 +185,12 @@ def _subjects(folder: Path) -> Iterator[Subject]:
     )
     csv = f"t,q,f\n{rows}\n".encode()
     scipy.io.savemat(folder / "a.mat", columns)
-    json = str({n: list(map(float, c)) for n, c in columns.items()}).replace("'", '"').encode()
+    table = json.dumps({n: list(map(float, c)) for n, c in columns.items()}).encode()
     mat = (folder / "a.mat").read_bytes()
-    for name, data in (("csv", csv), ("json", json), ("mat", mat)):
-        yield Subject(name, f".{name}", data, lambda p: _imported(p, folder), name != "mat")
+    for name, data in (("csv", csv), ("json", table), ("mat", mat)):
+        yield Subject(
+            name, f".{name}", data, lambda p: _imported(p, folder / "map.toml"), name != "mat"
+        )
 
 
 def _log_bytes(log: Log, folder: Path) -> bytes:
@@ -187,8 +203,34 @@ def _log_bytes(log: Log, folder: Path) -> bytes:
     return (folder / "a.mcap").read_bytes()
 
 
-def _imported(path: Path, folder: Path) -> bool:
-    return len(import_log(path, load_mapping(folder / "map.toml"))) > 0
+def _plain_bytes(log: Log) -> bytes:
+    """The log as another program may write it: JSON in chunks that are not compressed."""
+    stream = BytesIO()
+    writer = Writer(stream, chunk_size=4000, compression=CompressionType.NONE)
+    writer.start()
+    channel = writer.register_channel("/axis/x", "json", 0)
+    columns = log.axes["x"].columns
+    for k in range(len(log)):
+        time = round(k * 1e9 / RATE)
+        data = json.dumps({name: float(column[k]) for name, column in columns.items()})
+        writer.add_message(channel, time, data.encode(), time)
+    writer.finish()
+    return stream.getvalue()
+
+
+def _imported(path: Path, mapping: Path) -> bool:
+    return len(import_log(path, load_mapping(mapping))) > 0
+
+
+def _imported_as(path: Path, mapping: Path, log: Log) -> bool:
+    """Whether chunks with checksums gave what was written, or nothing."""
+    found, written = import_log(path, load_mapping(mapping)), log.axes["x"]
+    if len(found) != len(log):
+        return False
+    x = found.axes["x"]
+    return np.array_equal(x.force, written.force) and np.allclose(
+        x.position, 1e-3 * written.position, rtol=1e-12, atol=0.0
+    )
 
 
 def _same(found: Log, log: Log, first: int = 0) -> bool:

@@ -1,12 +1,18 @@
-"""The first module of `twin`: from here on Ctrl-C and SIGTERM end it in one line, at any moment."""
+"""The first module of `twin`: from here on Ctrl-C and SIGTERM end it in one line, at any moment.
+
+What is loaded before is loaded without: only what the interpreter has loaded for itself.
+"""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
-from types import FrameType
-from typing import Any, NoReturn
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from types import FrameType
+    from typing import Any, NoReturn
 
 SECONDS = 2.0  # for what runs to be left in order; then the program ends where it is
 AGAIN = 0.05  # s after which a signal is raised again that a library has swallowed

@@ -12,7 +12,7 @@ from twin.log import AxisLog, Log, Recovery, read_log, recover_log
 
 RATE, COUNT, PER_CHUNK = 500.0, 33, 7
 CHUNKS = -(-COUNT // PER_CHUNK)
-ROW = 31 + 4 * 9
+ROW = 31 + 4 * 12
 NAMES = ("position", "velocity", "current", "force")
 LOG = Log(
     RATE,

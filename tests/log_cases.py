@@ -12,7 +12,7 @@ from mcap.writer import CompressionType, Writer
 
 from twin.log import FIELDS, AxisLog, Log
 from twin.log.log import Array
-from twin.log.schema import FIELD_NUMBERS, file_descriptor_set
+from twin.log.schema import file_descriptor_set
 
 RATE = 10_000.0
 
@@ -71,7 +71,7 @@ Encode = Callable[[Mapping[str, float]], bytes]
 
 def protobuf_encoder(fields: tuple[str, ...]) -> tuple[bytes, Encode]:
     """Schema and encoder with the stock protobuf library, which omits zeros."""
-    schema = file_descriptor_set("twin.AxisSample", {f: FIELD_NUMBERS[f] for f in fields})
+    schema = file_descriptor_set("twin.AxisSample", {f: n for n, f in enumerate(fields, 1)})
     message = GetMessages(FileDescriptorSet.FromString(schema).file)["twin.AxisSample"]
     return schema, lambda values: message(**values).SerializeToString()
 

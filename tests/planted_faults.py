@@ -153,6 +153,8 @@ def limited(c: Columns) -> None:
         c[name] = np.clip(c[name], -most, most)
 
 
+HIDDEN = {("readings 500 samples late", "bare")}  # no column shows it
+
 FAULTS: dict[str, tuple[Plant, Fault]] = {
     "40 samples missing": (missing, Fault.MISSING),
     "a stuck encoder": (on_x(stuck), Fault.STUCK),
@@ -167,6 +169,7 @@ FAULTS: dict[str, tuple[Plant, Fault]] = {
     "force 20 samples early": (late(-20, *DRIVEN), Fault.LAG),
     "position 3 samples late": (late(3, "position"), Fault.LAG),
     "position 20 samples late": (late(20, "position"), Fault.LAG),
+    "readings 500 samples late": (late(500, "position", "velocity", *DRIVEN), Fault.LAG),
     "200 ppm between clocks": (on_x(drifting), Fault.DRIFT),
     "swapped axes": (swapped("position"), Fault.SWAPPED),
     "swapped forces": (swapped(*DRIVEN), Fault.SWAPPED),

@@ -22,9 +22,10 @@ _unfinished: set[Path] = set()
 
 def require_writable(path: Path) -> None:
     """Raise InputError now, instead of after the work, where the file could not be written."""
-    if _is_direct(path):
-        return
     with _explained(path):
+        if _is_direct(path):
+            _try_device(path)
+            return
         target = _target(path)
         with _part(path, target) as (stream, _):
             stream.write(TRIAL)
@@ -148,9 +149,16 @@ def _explained(path: Path) -> Iterator[None]:
         ) from error
 
 
+def _try_device(path: Path) -> None:
+    """Write nothing to a device, which it may refuse; a pipe would end there for its reader."""
+    if path.is_char_device():
+        with open(path, "wb", buffering=0) as stream:
+            stream.write(b"")
+
+
 def _is_direct(path: Path) -> bool:
     """Whether there is nothing to replace: a device, a pipe, standard output."""
-    if path.as_posix().startswith(("/dev/", "/proc/")):
+    if path.parent.as_posix() in ("/dev", "/dev/fd") or path.as_posix().startswith("/proc/"):
         return True
     try:
         mode = path.stat().st_mode

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from collections.abc import Sequence
 
 from identify.cli import agree, loop, machine, plan, reproduce, selftest
 from identify.cli.shared import app
@@ -26,6 +27,7 @@ def main() -> None:
     # they load, is a fifth of the start.
     gc.set_threshold(OBJECTS)
     try:
+        _require_no_empty(sys.argv[1:])
         code = app(standalone_mode=False)
         if code == INTERRUPTED:
             raise KeyboardInterrupt
@@ -47,6 +49,16 @@ def main() -> None:
                 "it with the command and what TWIN_TRACEBACK=1 adds"
             )
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _require_no_empty(arguments: Sequence[str]) -> None:
+    """Raise InputError for an argument without a letter, as an unset variable of a script leaves.
+
+    As a path it would be this folder.
+    """
+    if "" in arguments:
+        place = arguments.index("")
+        raise InputError(" ".join([*arguments[:place][-1:], "'': is empty; give a name"]))
 
 
 def fail(message: str) -> int:

@@ -156,21 +156,16 @@ def recover(
     as_json_: Json = False,
 ) -> None:
     """Keep the intact parts of a damaged log: the longest at OUT, the others beside it."""
-    from twin.log import recover_log, write_log
+    from twin.log import recover_file
 
     require_folder(out)
-    good, recovery = recover_log(log, unproved=unproved)
-    parts = {
-        out.with_name(f"{out.stem}.part{n}{out.suffix}"): part
-        for n, part in enumerate(recovery.others, 1)
-    }
-    for path, part in {out: good, **parts}.items():
-        write_log(part, path)
+    recovery, files = recover_file(log, out, unproved=unproved)
+    others = {str(path): text for path, text in files.items() if path != out}
     result = {
         "log": str(out), "kept": recovery.kept, "lost": list(recovery.lost),
-        "not_proved": list(recovery.unproved), "others": [str(p) for p in parts],
+        "not_proved": list(recovery.unproved), "others": list(others),
     }  # fmt: skip
-    written = [f"{path}: {part.metadata['recovered']}" for path, part in parts.items()]
+    written = [f"{path}: {text}" for path, text in others.items()]
     say("\n".join([str(recovery), *written]), result, as_json_)
 
 

@@ -65,3 +65,12 @@ def test_a_library_that_is_being_loaded_cannot_make_an_error_of_a_signal(
         env={**os.environ, "PYTHONPATH": path},
     )  # fmt: skip
     assert (run.returncode, run.stdout, run.stderr) == (code, "", f"twin: {word}\n")
+
+
+def test_nothing_is_loaded_before_a_signal_is_heeded() -> None:
+    """But what the interpreter and the script that pip makes have loaded for themselves."""
+    script = "import re, signal, sys; a = {*sys.modules}; import identify.start; " + (
+        "print(*sorted({*sys.modules} - a))"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.split() == ["__future__", "identify", "identify.start"]

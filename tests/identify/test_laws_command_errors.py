@@ -56,6 +56,18 @@ def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, sai
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("fit", "m.toml", "a.mcap", "-o", ""), "-o ''"),
+        (("", "a.mcap"), "''"),
+        (("check", ""), "check ''"),
+    ],
+)
+def test_an_empty_argument_is_no_name(cli, arguments, said):
+    assert cli(*arguments) == (2, "", f"twin: {said}: is empty; give a name\n")
+
+
 def test_a_traceback_is_shown_where_it_is_asked_for(monkeypatch):
     monkeypatch.setenv("TWIN_TRACEBACK", "1")
     monkeypatch.setattr(sys, "argv", ["twin", "effects"])

@@ -190,17 +190,15 @@ def test_import_and_recover(monkeypatch, cli):
     )  # fmt: skip
     assert (load.only[0], read.only[0]) == ((Path("m.toml"),), ([Path("d.csv")], "the map"))
     assert write.calls.pop()[0] == (log, Path("r.mcap"))
-    part = SimpleNamespace(metadata={"recovered": "2 samples"})
-    log = SimpleNamespace(metadata={"recovered": "41 samples"})
-    found = SimpleNamespace(kept=41, lost=("end",), unproved=("all",), others=(part,))
-    mend = stub(monkeypatch, twin.log, "recover_log", (log, found))
+    found = SimpleNamespace(kept=41, lost=("end",), unproved=("all",))
+    files = {Path("g.mcap"): "41 samples", Path("g.part1.mcap"): "2 samples"}
+    mend = stub(monkeypatch, twin.log, "recover_file", (found, files))
     code, text, _ = cli("recover", "bad.mcap", "-o", "g.mcap", "--json")
     assert json.loads(text) == {
         "log": "g.mcap", "kept": 41, "lost": ["end"], "not_proved": ["all"],
         "others": ["g.part1.mcap"],
     }  # fmt: skip
-    assert mend.only == ((Path("bad.mcap"),), {"unproved": False})
-    assert [c[0] for c in write.calls] == [(log, Path("g.mcap")), (part, Path("g.part1.mcap"))]
+    assert mend.only == ((Path("bad.mcap"), Path("g.mcap")), {"unproved": False})
 
 
 @pytest.mark.parametrize(("severity", "code"), [(Severity.ERROR, 1), (Severity.WARNING, 0)])

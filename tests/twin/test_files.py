@@ -96,6 +96,9 @@ def test_a_full_disk_is_one_line_and_found_before_the_work(
 ) -> None:
     with pytest.raises(InputError, match="/dev/full: cannot be written: No space left"):
         write_atomically(Path("/dev/full"), b"x" * 10**6)
+    with pytest.raises(InputError, match="/dev/full: cannot be written: No space left"):
+        require_writable(Path("/dev/full"))
+    require_writable(Path("/dev/null"))
     part = tmp_path / f".a.bin.{os.getpid()}{PART}"
     part.symlink_to("/dev/full")
     monkeypatch.setattr("twin.files._remove_left_over", lambda folder: None)

@@ -21,6 +21,7 @@ from twin.errors import InputError
 
 MOST_OF_ONE = 6  # of one effect on an axis
 LONGEST_TRIAL = 30.0  # s for loading, trying and compiling a user's file
+LARGEST_TRIAL = 4 << 30  # bytes for the same
 
 
 class Catalogue(Mapping[str, Effect]):
@@ -97,7 +98,7 @@ def _try_apart(path: Path) -> None:
     from twin.apart import NoAnswer, apart
 
     try:
-        apart(_load_and_try, path, seconds=LONGEST_TRIAL)
+        apart(_load_and_try, path, seconds=LONGEST_TRIAL, memory=LARGEST_TRIAL)
     except NoAnswer as error:
         raise InputError(f"{path}: {error}") from error
 

@@ -3,7 +3,7 @@
 from twin.log.decode import read_log
 from twin.log.encode import record_log, write_log, write_topics
 from twin.log.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, AxisLog, Log
-from twin.log.recover import Recovery, recover_log
+from twin.log.recover import Recovery, recover_file, recover_log
 
 __all__ = [
     "FIELDS",
@@ -14,6 +14,7 @@ __all__ = [
     "Recovery",
     "read_log",
     "record_log",
+    "recover_file",
     "recover_log",
     "write_log",
     "write_topics",

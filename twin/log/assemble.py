@@ -15,7 +15,8 @@ from twin.log.container import Damaged, Record
 from twin.log.instants import seconds
 from twin.log.layout import Block
 from twin.log.log import Array, AxisLog, Log
-from twin.log.series import JITTER, Series
+from twin.log.series import Series
+from twin.log.spacing import JITTER, Spacing
 from twin.log.topics import (
     AXIS_PREFIX,
     TRUTH_PREFIX,
@@ -248,7 +249,7 @@ def require_fields(topic: Topic) -> None:
     )
 
 
-def common_rate(series: Sequence[Series], extras: Extras) -> float:
+def common_rate(series: Iterable[Spacing], extras: Extras) -> float:
     """The sample rate of all series, Hz; raises InputError where they or the metadata differ."""
     rates = {s.topic.name: s.sample_rate() for s in series}
     stated = positive_number(extras.metadata, "sample_rate_hz")

@@ -56,7 +56,8 @@ def open_chunk(record: Record, budget: Inflation) -> Payload:
     place = f"chunk at byte {record.offset}"
     chunk = record.parsed(Chunk)
     with at(place):
-        return Payload(place, decompressed(chunk, budget))
+        budget.take(chunk.uncompressed_size, len(chunk.data))
+        return Payload(place, decompressed(chunk))
 
 
 def has_checksum(record: Record) -> bool:
@@ -64,9 +65,8 @@ def has_checksum(record: Record) -> bool:
     return any(record.content[_CHECKSUM]) or not any(record.content[_SIZE_INSIDE])
 
 
-def decompressed(chunk: Chunk, budget: Inflation) -> bytes:
+def decompressed(chunk: Chunk) -> bytes:
     """The records in a chunk, of the size it states and with the checksum; raises Damaged."""
-    budget.take(chunk.uncompressed_size, len(chunk.data))
     data = _decompress(chunk)
     if len(data) != chunk.uncompressed_size:
         raise Damaged(f"{len(data)} bytes where {chunk.uncompressed_size} are announced")

@@ -60,7 +60,7 @@ def read_parts(
     """
     wanted = Wanted(None, fields, truth=False)
     with _remedied(path), open_mcap(Path(path)) as file:
-        yield from _parts(file, file.records_with(_channels(file, wanted)), wanted, samples)
+        yield from log_parts(file, file.records_with(_channels(file, wanted)), wanted, samples)
 
 
 def read_strictly(path: Path, wanted: Wanted = EVERYTHING) -> Log:
@@ -68,7 +68,7 @@ def read_strictly(path: Path, wanted: Wanted = EVERYTHING) -> Log:
     with open_mcap(path) as file:
         everything = wanted == EVERYTHING
         records = file.records() if everything else file.selected(_channels(file, wanted))
-        return next(_parts(file, records, wanted, None))
+        return next(log_parts(file, records, wanted, None))
 
 
 def samples_by_axis(path: str | Path) -> dict[str, int]:
@@ -92,7 +92,7 @@ def _remedied(path: str | Path) -> Iterator[None]:
         ) from error
 
 
-def _parts(
+def log_parts(
     file: McapFile, records: Iterator[Record], wanted: Wanted, samples: int | None
 ) -> Iterator[Log]:
     """The log in parts of ``samples`` or a few more; whole where None."""

@@ -56,12 +56,22 @@ def record_log(parts: Iterable[Log], path: str | Path) -> int:
     ``path.unfinished``, and what a killed run leaves of it can be recovered up to the last chunk.
     Raises InputError as write_log does.
     """
-    coming = iter(parts)
     with recording(Path(path)) as stream:
-        first = next(coming)
-        samples = _counted(chain([first], coming))
-        written = _written(stream, outline(first), samples, first.sample_rate, first.attachments)
-        return deque(written, maxlen=1).pop()
+        return _recorded(stream, parts)
+
+
+def write_parts(parts: Iterable[Log], path: str | Path) -> int:
+    """``record_log`` for what is there already: nothing is left of it where it is not finished."""
+    with replacing(Path(path)) as stream:
+        return _recorded(stream, parts)
+
+
+def _recorded(stream: BinaryIO, parts: Iterable[Log]) -> int:
+    coming = iter(parts)
+    first = next(coming)
+    samples = _counted(chain([first], coming))
+    written = _written(stream, outline(first), samples, first.sample_rate, first.attachments)
+    return deque(written, maxlen=1).pop()
 
 
 def write_topics(

@@ -20,6 +20,7 @@ from twin.log.schema import (
     AXIS_TRUTH,
     FIELD_NUMBERS,
     file_descriptor_set,
+    numbered,
     protobuf_segments,
 )
 from twin.log.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_units
@@ -94,7 +95,7 @@ def outline_of_topics(
     """Plan a file of any topics, "/model/x" -> column -> (n,); units: "/model/x/force" -> unit."""
     signals = [
         Signals(
-            topic, SERIES, columns, {column: n for n, column in enumerate(columns, 1)},
+            topic, SERIES, columns, numbered(columns),
             {"sample_rate_hz": repr(float(sample_rate)),
              **{f"unit.{c}": u for c in columns if (u := units.get(f"{topic}/{c}"))}},
         )
@@ -142,7 +143,7 @@ def _axis_signals(log: Log) -> Iterator[Signals]:
 
 def _truth_signals(log: Log) -> Iterator[Signals]:
     for name, columns in log.truth.items():
-        numbers = {column: n for n, column in enumerate(columns, 1)}
+        numbers = numbered(columns)
         units = complete_units(log.axes[name].units) if name in log.axes else {}
         known = {f"unit.{c}": units[c] for c in _TRUTH_UNITS if c in columns and c in units}
         metadata = {**_common(name, log), **known}

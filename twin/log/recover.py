@@ -1,27 +1,36 @@
-"""Recover a damaged log: every stretch of samples that a checksum proves, without a gap in it."""
+"""Recover a damaged log: every stretch of samples that a checksum proves, without a gap in it.
+
+Samples stay in the file until they are written or asked for, so that a log of any length can be
+recovered: it is read to find what is proved, in the order of time to find the gaps, and to be kept.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
 from mcap.opcode import Opcode
 
-from twin.errors import InputError
-from twin.log.assemble import Extras, assembled, common_rate, require_fields
+from twin.errors import InputError, at
+from twin.log.assemble import EVERYTHING, Extras
 from twin.log.chunks import has_checksum
 from twin.log.container import open_mcap, reading
-from twin.log.decode import read_strictly
+from twin.log.decode import log_parts
+from twin.log.encode import write_parts
+from twin.log.file_bytes import FileBytes
 from twin.log.instants import seconds
 from twin.log.layout import Block, sample_times
-from twin.log.log import Log
+from twin.log.log import Log, joined
 from twin.log.salvage import Part, Salvage
-from twin.log.series import Series
+from twin.log.stretch import Stretch, Trace
 from twin.log.topics import Topic
 
 METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
+INTACT_STEP = 1 << 17  # samples of an intact log that are held in memory at a time
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,14 @@ class Recovery:
         return "\n".join((f"kept {self.kept}", *(f"not proved: {u}" for u in self.unproved), *lost))
 
 
+@dataclass(frozen=True)
+class _Kept:
+    """A stretch of samples: what it is, and its logs, which follow each other."""
+
+    text: str
+    logs: Callable[[], Iterator[Log]]
+
+
 def recover_log(path: str | Path, *, unproved: bool = False) -> tuple[Log, Recovery]:
     """Read the longest series of intact chunks without a gap between them, and all others.
 
@@ -49,18 +66,54 @@ def recover_log(path: str | Path, *, unproved: bool = False) -> tuple[Log, Recov
     nothing speaks against them. Metadata has no checksum of its own; where it contradicts the
     chunks it is ignored. Raises InputError where nothing is left.
     """
-    path = Path(path)
+    with _recovered(Path(path), unproved) as (kept, recovery):
+        log, *others = [joined(stretch.logs()) for stretch in kept]
+    return log, replace(recovery, others=tuple(others))
+
+
+def recover_file(
+    path: Path, out: Path, *, unproved: bool = False
+) -> tuple[Recovery, dict[Path, str]]:
+    """Write what ``recover_log`` reads to files, a piece at a time: the longest series to ``out``.
+
+    The others are beside it. Returns the recovery without its logs, and what each file holds.
+    Raises InputError as recover_log does, and where writing fails.
+    """
+    with _recovered(path, unproved) as (kept, recovery):
+        names = (out.with_name(f"{out.stem}.part{n}{out.suffix}") for n in range(1, len(kept)))
+        files = dict(zip((out, *names), kept, strict=True))
+        for name, stretch in files.items():
+            write_parts(stretch.logs(), name)
+    return recovery, {name: stretch.text for name, stretch in files.items()}
+
+
+@contextmanager
+def _recovered(path: Path, unproved: bool) -> Iterator[tuple[list[_Kept], Recovery]]:
+    """What is kept, the longest first; the file stays open until it was read."""
     try:
-        log = read_strictly(path)
+        count = sum(len(part) for part in _intact(path))
     except InputError as error:
         reason = str(error).removeprefix(f"{path}: ")
     else:
         doubt = _doubt(path)
         if doubt and not unproved:
             raise InputError(f"{path}: {doubt[0]}; it can be read as it is, or with --unproved")
-        return log, Recovery(f"all {len(log)} samples", (), doubt)
+        text = f"all {count} samples"
+        yield [_Kept(text, lambda: _intact(path))], Recovery(text, (), doubt)
+        return
     with reading(path):
-        return _Stretches(path.read_bytes(), reason, unproved).result()
+        stream = open(path, "rb")  # noqa: SIM115
+    with stream:
+        with reading(path):
+            file = FileBytes(stream, os.fstat(stream.fileno()).st_size)
+            kept, recovery = _Stretches(path, file, reason, unproved).result()
+        yield kept, recovery
+
+
+def _intact(path: Path) -> Iterator[Log]:
+    """A log in which no fault is found, in parts; raises InputError."""
+    with open_mcap(path) as file:
+        yield from log_parts(file, file.records(), EVERYTHING, INTACT_STEP)
 
 
 def _doubt(path: Path) -> tuple[str, ...]:
@@ -73,42 +126,17 @@ def _doubt(path: Path) -> tuple[str, ...]:
     return ("the log has no checksums that prove its samples",)
 
 
-@dataclass(frozen=True)
-class _Stretch:
-    """Samples of topics side by side: which of each series, how many, time of the first in ns."""
-
-    spans: Mapping[Series, slice]
-    count: int
-    start: int
-
-    @property
-    def text(self) -> str:
-        return f"{self.count} samples from {seconds(self.start)}"
-
-    @property
-    def names(self) -> set[str]:
-        return {series.topic.name for series in self.spans}
-
-    def log(self, extras: Extras) -> Log:
-        """The log; raises InputError where an axis has too few signals, or rates differ."""
-        for series in self.spans:
-            if not series.topic.is_truth:
-                require_fields(series.topic)
-        rate = common_rate(list(self.spans), extras)
-        columns = ((s.topic, s.part(span)) for s, span in self.spans.items())
-        return assembled(columns, rate, extras)
-
-
 class _Stretches:
     """The samples of a damaged log in stretches without a gap."""
 
-    def __init__(self, data: bytes, reason: str, keep_unproved: bool) -> None:
+    def __init__(self, path: Path, file: FileBytes, reason: str, keep_unproved: bool) -> None:
+        self._name = str(path)
         self._keep_unproved = keep_unproved
-        self._salvage = Salvage(data, reason, keep_unproved)
+        self._salvage = Salvage(file, reason, keep_unproved)
         self._lost = self._salvage.lost
         self._parts = self._sorted(list(self._salvage.parts()))
 
-    def result(self) -> tuple[Log, Recovery]:
+    def result(self) -> tuple[list[_Kept], Recovery]:
         """The longest series and the others; raises InputError where there is none."""
         stretches = self._together(self._by_topic())
         self._report_absent_chunks()
@@ -120,36 +148,42 @@ class _Stretches:
             )
             why = "; ".join(dict.fromkeys([*self._lost, *self._salvage.unproved]))
             raise InputError(f"nothing can be recovered ({why}){hint}")
+        extras = self._salvage.extras
         # the rate is stated in every chunk too, and there a checksum protects it
-        self._salvage.extras.metadata.pop("sample_rate_hz", None)
+        extras.metadata.pop("sample_rate_hz", None)
         longest = max(stretches, key=lambda s: s.count * len(s.spans))
-        log = self._log(longest)
+        longest.empty(extras)
         others = list(self._others(stretches, longest))
         lost = self._lost if self._keep_unproved else [*self._lost, *self._salvage.unproved]
-        extras = self._salvage.extras
         unproved: list[str] = [METADATA] if extras.metadata and not extras.proved else []
         unproved += self._salvage.unproved if self._keep_unproved else []
         recovery = Recovery(
-            longest.text, tuple(dict.fromkeys(lost)), tuple(dict.fromkeys(unproved)), tuple(others)
+            longest.text, tuple(dict.fromkeys(lost)), tuple(dict.fromkeys(unproved))
         )
-        return log, recovery
+        return [self._kept(stretch) for stretch in (longest, *others)], recovery
 
-    def _log(self, stretch: _Stretch) -> Log:
+    def _kept(self, stretch: Stretch) -> _Kept:
         metadata = {**self._salvage.extras.metadata, "recovered": stretch.text}
         if self._keep_unproved and self._salvage.unproved:
             metadata["not_proved"] = "; ".join(self._salvage.unproved)
-        return stretch.log(Extras(metadata, self._salvage.extras.attachments))
+        extras = Extras(metadata, self._salvage.extras.attachments)
+        return _Kept(stretch.text, lambda: self._logs(stretch, extras))
 
-    def _others(self, stretches: list[_Stretch], longest: _Stretch) -> Iterator[Log]:
+    def _logs(self, stretch: Stretch, extras: Extras) -> Iterator[Log]:
+        with at(self._name):
+            yield from stretch.logs(extras)
+
+    def _others(self, stretches: list[Stretch], longest: Stretch) -> Iterator[Stretch]:
         topics = set().union(*(s.names for s in stretches))
         for stretch in stretches:
             if stretch is longest:
                 continue
             try:
-                yield self._log(stretch)
+                stretch.empty(self._salvage.extras)
             except InputError as error:
                 self._lost.append(f"{stretch.text}: {error}")
                 continue
+            yield stretch
             absent = ", ".join(sorted(topics - stretch.names))
             why = (
                 f"{absent} has no samples there"
@@ -163,10 +197,10 @@ class _Stretches:
 
     def _sorted(self, parts: list[Part]) -> list[Part]:
         """In the order of time, each once."""
-        seen: dict[bytes, str] = {}
+        seen: dict[tuple[int, ...], str] = {}
         once = []
         for part in parts:
-            if (first := seen.setdefault(part.data, part.place)) != part.place:
+            if (first := seen.setdefault(part.identity, part.place)) != part.place:
                 self._lost.append(f"a copy of the {first} is left out (the {part.place})")
             else:
                 once.append(part)
@@ -175,13 +209,13 @@ class _Stretches:
             self._lost.append("chunks were out of order; they are sorted by time")
         return ordered
 
-    def _by_topic(self) -> list[Series]:
+    def _by_topic(self) -> list[Trace]:
         """The samples of each topic in series without a gap, topics in the order of the file."""
-        found: dict[int, list[Series]] = {}
+        found: dict[int, list[Trace]] = {}
         known: dict[int, int] = {}  # losses when the last samples of a channel were read
         channels: dict[str, int] = {}
         for part in self._parts:
-            for block in part.blocks:
+            for number, block in enumerate(self._salvage.blocks(part)):
                 topic = self._salvage.topics.topic(block.channel, b"")
                 if topic is None:
                     continue
@@ -191,36 +225,39 @@ class _Stretches:
                 own = found.setdefault(block.channel, [])
                 explained = bool(own) and known[block.channel] != part.losses
                 known[block.channel] = part.losses
-                self._append(own, topic, block, "" if explained else part.place)
-        every = (series for _, own in sorted(found.items()) for series in own)
-        return [series for series in every if series.count and self._has_rate(series)]
+                self._append(own, topic, (part, number, block), explained)
+        every = (trace for _, own in sorted(found.items()) for trace in own)
+        return [trace for trace in every if trace.count and self._has_rate(trace)]
 
-    def _append(self, own: list[Series], topic: Topic, block: Block, place: str) -> None:
+    def _append(
+        self, own: list[Trace], topic: Topic, samples: tuple[Part, int, Block], explained: bool
+    ) -> None:
         """Take samples into the last series, or a new one.
 
-        place: where damage that was seen does not explain a gap, so that it is a loss of its own.
+        explained: whether damage that was seen explains a gap, so that it is no loss of its own.
         """
+        place = "" if explained else f"{samples[0].place}: "
         if own:
             try:
-                own[-1].append(block)
+                own[-1].append(*samples)
                 return
             except InputError as error:
-                if place:
-                    self._lost.append(f"{place}: {error}")
-        own.append(Series(topic, 0))
+                if not explained:
+                    self._lost.append(f"{place}{error}")
+        own.append(Trace(topic, self._salvage.blocks))
         try:
-            own[-1].append(block)
+            own[-1].append(*samples)
         except InputError as error:
-            self._lost.append(f"{place}: {error}" if place else str(error))
+            self._lost.append(f"{place}{error}")
 
-    def _has_rate(self, series: Series) -> bool:
+    def _has_rate(self, trace: Trace) -> bool:
         try:
-            return series.sample_rate() > 0.0
+            return trace.sample_rate() > 0.0
         except InputError as error:
             self._lost.append(str(error))
             return False
 
-    def _together(self, series: list[Series]) -> list[_Stretch]:
+    def _together(self, series: list[Trace]) -> list[Stretch]:
         """The stretches of time in which the same topics have samples, an axis at least."""
         if not series:
             return []
@@ -238,15 +275,14 @@ class _Stretches:
                 continue
             within = {s: slice(a - spans[s].start, b - spans[s].start) for s in here.values()}
             start = max(s.start + int(sample_times(w.start, 1, rate)[0]) for s, w in within.items())
-            out.append(_Stretch(within, b - a, start))
+            out.append(Stretch(within, b - a, start))
         return out
 
     def _report_absent_chunks(self) -> None:
         """Chunks of the summary that were not found at all, not even damaged."""
         there = {p.span for p in self._parts}
-        for index in self._salvage.announced:
-            span = (index.message_start_time, index.message_end_time)
-            if span not in there and index.chunk_start_offset not in self._salvage.damaged:
+        for place, span in self._salvage.announced:
+            if span not in there and place not in self._salvage.damaged:
                 self._lost.append(
                     f"the chunk of samples from {seconds(span[0])} to {seconds(span[1])} that the "
                     "summary announces is not there"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 from mcap.opcode import Opcode
 from mcap.records import ChunkIndex, Footer
@@ -15,59 +16,67 @@ from twin.log.assemble import Extras
 from twin.log.chunks import Inflation, open_chunk
 from twin.log.container import IN_CHUNKS, MAGIC, RECORD_HEAD, Record
 from twin.log.decode import Decoder
+from twin.log.file_bytes import FileBytes
 from twin.log.layout import Block
-from twin.log.scan import FoundChunk, FoundChunks
+from twin.log.scan import FoundChunk, found_chunks
 from twin.log.topics import Topics
 
 _OPCODES = frozenset(Opcode)
 _DATA_END = RECORD_HEAD.pack(Opcode.DATA_END, 4)
+_TAKEN = (Opcode.CHUNK, Opcode.CHUNK_INDEX, Opcode.METADATA, Opcode.ATTACHMENT)
 _FOOTER_BYTES = RECORD_HEAD.size + 20
+_KEPT_CONTENTS = 2  # decompressed at a time, as several topics may lie in one chunk
+
+Stored = FoundChunk | tuple[tuple[int, int], ...]
+"""Where samples lie in the file: a chunk, or stretches of definitions and messages outside them."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """The samples of a chunk, or of messages outside chunks; losses: how many were known then."""
+    """The samples of a chunk, or of messages outside chunks.
+
+    start: time in ns and number of the first sample; end: time of the last. identity: the same for
+    a copy. losses: how many were known when it was found.
+    """
 
     place: str
-    data: bytes
-    blocks: list[Block]
+    stored: Stored
+    start: tuple[int, int]
+    end: int
+    identity: tuple[int, ...]
     losses: int
-
-    @property
-    def start(self) -> tuple[int, int]:
-        """Time in ns and number of its first sample."""
-        return min((int(b.log_time[0]), int(b.sequence[0])) for b in self.blocks)
 
     @property
     def span(self) -> tuple[int, int]:
         """Times of its first and last message, ns."""
-        return self.start[0], max(int(b.log_time[-1]) for b in self.blocks)
+        return self.start[0], self.end
 
 
 class Salvage:
-    """One pass over the bytes of a damaged log.
+    """One pass over the bytes of a damaged log, which keeps no sample, but where they are.
 
     lost: one sentence for each damage; unproved: one for what no checksum proves, which is taken
-    where ``keep_unproved``. announced: chunks of the summary; damaged: places of those found so.
+    where ``keep_unproved``. announced: place and times (ns) of the chunks in the summary. damaged:
+    places of those found so.
     """
 
-    def __init__(self, data: bytes, reason: str, keep_unproved: bool) -> None:
+    def __init__(self, file: FileBytes, reason: str, keep_unproved: bool) -> None:
         self.lost = [reason]
         self.unproved: list[str] = []
         self.extras = Extras()
         self.topics = Topics()
-        self.announced: list[ChunkIndex] = []
+        self.announced: list[tuple[int, tuple[int, int]]] = []
         self.damaged: set[int] = set()
-        self._data = data
+        self._file = file
         self._keep_unproved = keep_unproved
         self._decoder = Decoder(self.topics)
-        self._loose: dict[int, bytearray] = {}  # place -> definitions and messages outside chunks
-        self._chunks = FoundChunks(data)
+        self._loose: list[list[tuple[int, int]]] = []  # places, in batches
+        self._content = lru_cache(_KEPT_CONTENTS)(self._read)
         self._register_summary()
 
     def parts(self) -> Iterator[Part]:
         """Samples in the order of the file, and along the way metadata and attachments."""
-        for chunk in self._walk():
+        for chunk, content in self._walk():
             place = f"chunk at byte {chunk.offset}"
             if not chunk.length_holds:
                 self.lost.append(
@@ -78,107 +87,149 @@ class Salvage:
                 self.unproved.append(f"{place}: has no checksum that proves its samples")
                 if not self._keep_unproved:
                     continue
-            yield from self._part(place, chunk.data)
-        for start, batch in self._loose.items():
-            for part in self._part(f"messages from byte {start}", bytes(batch)):
+            yield from self._part(place, chunk, content)
+        for batch in self._loose:
+            place, stored = f"messages from byte {batch[0][0]}", tuple(batch)
+            for part in self._part(place, stored, self._read(stored)):
                 self.unproved.append(f"{part.place}: no checksum proves their samples")
                 if self._keep_unproved:
                     yield part
 
-    def _part(self, place: str, data: bytes) -> Iterator[Part]:
+    def blocks(self, part: Part) -> list[Block]:
+        """The samples of a part, read from the file again."""
+        return [b for b in self._decoder.blocks(self._content(part.stored)) if len(b.log_time)]
+
+    def _read(self, stored: Stored) -> bytes:
+        if isinstance(stored, FoundChunk):
+            return stored.content(self._file)
+        return b"".join(self._file.part(start, end) for start, end in stored)
+
+    def _part(self, place: str, stored: Stored, content: bytes) -> Iterator[Part]:
         try:
             with at(place):
-                blocks = [b for b in self._decoder.blocks(data) if len(b.log_time)]
+                blocks = [b for b in self._decoder.blocks(content) if len(b.log_time)]
         except InputError as error:
             self.lost.append(str(error))
             return
         if blocks:
-            yield Part(place, data, blocks, len(self.lost))
+            start = min((int(b.log_time[0]), int(b.sequence[0])) for b in blocks)
+            end = max(int(b.log_time[-1]) for b in blocks)
+            crc = stored.crc if isinstance(stored, FoundChunk) else 0
+            identity = (*start, end, len(content), crc or zlib.crc32(content))
+            yield Part(place, stored, start, end, identity, len(self.lost))
 
-    def _walk(self) -> Iterator[FoundChunk]:
+    def _walk(self) -> Iterator[tuple[FoundChunk, bytes]]:
         """Chunks in the order of the file; behind unreadable bytes, from the next one on."""
-        data, previous, offset = self._data, len(MAGIC), len(MAGIC)
-        budget = Inflation(len(data))
-        while offset < len(data) and data[offset:] != MAGIC:
-            chunk = self._chunks.at(offset)
-            if chunk is not None:
-                yield chunk
-                previous = offset = chunk.end
+        file, previous, offset = self._file, len(MAGIC), len(MAGIC)
+        budget, found = Inflation(len(file)), found_chunks(file)
+        following = next(found, None)
+        while offset < len(file) and not self._ends(offset):
+            while following is not None and following[0].offset < offset:
+                following = next(found, None)
+            if following is not None and following[0].offset == offset:
+                yield following
+                previous = offset = following[0].end
                 continue
-            record = _record_at(data, offset)
-            following = self._chunks.next(previous)
-            if record is not None and not self._hides(record, following):
-                self._take(record, budget)
-                previous, offset = offset, record.end
+            end = _record_end(file, offset)
+            if end is not None and not self._hides(offset, end, following and following[0]):
+                self._take(offset, end, budget)
+                previous, offset = offset, end
             elif following is None:
-                self.lost.append(f"bytes {offset} to {len(data) - 1}: cut off or unreadable")
+                self.lost.append(f"bytes {offset} to {len(file) - 1}: cut off or unreadable")
                 return
             else:
-                self.lost.append(f"bytes {previous} to {following.offset - 1}: unreadable")
-                previous = offset = following.offset
+                self.lost.append(f"bytes {previous} to {following[0].offset - 1}: unreadable")
+                previous = offset = following[0].offset
 
-    def _hides(self, record: Record, following: FoundChunk | None) -> bool:
-        """Whether a record reaches over a chunk because its length is damaged."""
-        if following is None or following.offset >= record.end:
+    def _ends(self, offset: int) -> bool:
+        return (
+            offset == len(self._file) - len(MAGIC) and self._file.part(offset, offset + 8) == MAGIC
+        )
+
+    def _hides(self, offset: int, end: int, following: FoundChunk | None) -> bool:
+        """Whether a record reaches over a chunk because its length is damaged.
+
+        An attachment whose checksum holds may be a log, with chunks of its own.
+        """
+        if following is None or following.offset >= end:
             return False
-        return record.opcode != Opcode.ATTACHMENT or not _attachment_holds(record)
+        if self._file.part(offset, offset + 1)[0] != Opcode.ATTACHMENT:
+            return True
+        crc = self._file.checksum(offset + RECORD_HEAD.size, end - 4)
+        return crc != int.from_bytes(self._file.part(end - 4, end), "little")
 
-    def _take(self, record: Record, budget: Inflation) -> None:
+    def _take(self, offset: int, end: int, budget: Inflation) -> None:
         """Take metadata, an attachment, or a message outside the chunks."""
-        try:
-            if record.opcode == Opcode.CHUNK:
-                self.damaged.add(record.offset)
-                open_chunk(record, budget)
-            elif record.opcode in IN_CHUNKS:
-                self._add_loose(record)
-            elif record.opcode == Opcode.CHUNK_INDEX:
-                self.announced.append(record.parsed(ChunkIndex))
-            else:
-                self.extras.add(record)
-        except InputError as error:
-            self.lost.append(str(error))
+        opcode = self._file.part(offset, offset + 1)[0]
+        if opcode in IN_CHUNKS:
+            self._add_loose(offset, end)
+        elif opcode in _TAKEN:
+            try:
+                self._take_record(_record(self._file, offset, end), budget)
+            except InputError as error:
+                self.lost.append(str(error))
 
-    def _add_loose(self, record: Record) -> None:
-        batch = next(reversed(self._loose.values()), None)
-        if batch is None or len(batch) >= chunks.LOOSE_BYTES:
-            batch = self._loose[record.offset] = bytearray()
-        batch += RECORD_HEAD.pack(record.opcode, len(record.content)) + record.content
+    def _take_record(self, record: Record, budget: Inflation) -> None:
+        if record.opcode == Opcode.CHUNK:
+            self.damaged.add(record.offset)
+            open_chunk(record, budget)
+        elif record.opcode == Opcode.CHUNK_INDEX:
+            index = record.parsed(ChunkIndex)
+            span = (index.message_start_time, index.message_end_time)
+            self.announced.append((index.chunk_start_offset, span))
+        else:
+            self.extras.add(record)
+
+    def _add_loose(self, offset: int, end: int) -> None:
+        """Remember where it is; records side by side are one place."""
+        batch = self._loose[-1] if self._loose else None
+        if batch is None or sum(b - a for a, b in batch) >= chunks.LOOSE_BYTES:
+            batch = []
+            self._loose.append(batch)
+        if batch and batch[-1][1] == offset:
+            batch[-1] = (batch[-1][0], end)
+        else:
+            batch.append((offset, end))
 
     def _register_summary(self) -> None:
         """Take schemas and channels from the summary, where its checksum holds."""
-        data, footer_at = self._data, len(self._data) - len(MAGIC) - _FOOTER_BYTES
-        record = _record_at(data, footer_at) if footer_at > 0 else None
-        if record is None or record.opcode != Opcode.FOOTER or len(record.content) != 20:
+        file, footer_at = self._file, len(self._file) - len(MAGIC) - _FOOTER_BYTES
+        end = _record_end(file, footer_at) if footer_at > 0 else None
+        if end != footer_at + _FOOTER_BYTES:
+            return
+        record = _record(file, footer_at, end)
+        if record.opcode != Opcode.FOOTER:
             return
         footer = record.parsed(Footer)
+        if not footer.summary_crc:
+            return
         # Where bytes are gone or too many, the summary is not where the footer says.
-        after_data = data.rfind(_DATA_END, 0, footer_at) + len(_DATA_END) + 4
-        for start in (footer.summary_start, after_data):
-            if (
-                footer.summary_crc
-                and zlib.crc32(data[start : record.end - 4]) == footer.summary_crc
-            ):
+        data_end = file.last(_DATA_END, footer_at)
+        starts = [footer.summary_start]
+        starts += [] if data_end is None else [data_end + len(_DATA_END) + 4]
+        for start in starts:
+            if file.checksum(start, end - 4) == footer.summary_crc:
                 self._register(start, footer_at)
                 return
 
-    def _register(self, offset: int, end: int) -> None:
-        while offset < end and (record := _record_at(self._data, offset)):
+    def _register(self, offset: int, stop: int) -> None:
+        while offset < stop and (end := _record_end(self._file, offset)):
+            record = _record(self._file, offset, end)
             if record.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self.topics.register(record.opcode, record.content)
-            offset = record.end
+            offset = end
 
 
-def _record_at(data: bytes, offset: int) -> Record | None:
-    start = offset + RECORD_HEAD.size
-    if start > len(data):
+def _record_end(file: FileBytes, offset: int) -> int | None:
+    """Where the record at a place ends, if there may be one."""
+    head = file.part(offset, offset + RECORD_HEAD.size)
+    if len(head) < RECORD_HEAD.size:
         return None
-    opcode, length = RECORD_HEAD.unpack_from(data, offset)
-    if opcode not in _OPCODES or length > len(data) - start:
-        return None
-    return Record(opcode, offset, data[start : start + length])
+    opcode, length = RECORD_HEAD.unpack(head)
+    end = offset + len(head) + length
+    return end if opcode in _OPCODES and end <= len(file) else None
 
 
-def _attachment_holds(record: Record) -> bool:
-    """Whether its checksum proves an attachment; it may hold a log, with chunks of its own."""
-    content = record.content
-    return zlib.crc32(content[:-4]) == int.from_bytes(content[-4:], "little")
+def _record(file: FileBytes, offset: int, end: int) -> Record:
+    opcode, content = file.part(offset, offset + 1)[0], offset + RECORD_HEAD.size
+    return Record(opcode, offset, file.part(content, end))

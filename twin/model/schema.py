@@ -121,7 +121,10 @@ class HistoryEntry(Entries):
 class ModelFile(Entries):
     """A whole machine model."""
 
-    name: str | None = Field(None, max_length=200, description="a text of up to 200 characters")
+    name: str | None = Field(
+        None, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$",
+        description="a text of up to 200 characters on one line",
+    )  # fmt: skip
     mujoco: str | None = Field(
         None, pattern=r"^[^/\\\x00]+$",
         description="the name of an MJCF file that is beside this one, without folders",

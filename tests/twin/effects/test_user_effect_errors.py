@@ -39,6 +39,7 @@ FAULTS = {
     "crash": ("EFFECT = ", "import ctypes\nctypes.string_at(0)\nEFFECT = ", "crashed .*SIGSEGV"),
     "loop": ("EFFECT = ", "while True:\n    pass\nEFFECT = ", "a loop without an end"),
     "loop in the law": (LAW_END, f"while io[V] > 0.05:\n        pass\n    {LAW_END}", "a loop"),
+    "hunger": ("EFFECT = ", "bytearray(1 << 33)\nEFFECT = ", "as an effect: MemoryError"),
     "unknown name": (LAW_END, "io[OUT] = missing", "name 'missing' is not defined"),
 }  # fmt: skip
 

@@ -124,6 +124,15 @@ def test_a_position_recorded_late(clean: Log, lag: float) -> None:
     assert re.match(rf"give {column} delay_samples = (499|500|501) ", against_force.remedy)
 
 
+def test_where_all_readings_are_late_the_position_alone_is_not_corrected(clean: Log) -> None:
+    readings = with_axis(clean, "x", late(500, "position", "force", "current"))
+    finding = only(check_log(readings), Fault.LAG)
+    assert milliseconds(finding) == pytest.approx(50.0, abs=0.5)
+    assert re.match(
+        "give position and current and force delay_samples = (49|50). in", finding.remedy
+    )
+
+
 def test_a_measured_velocity_recorded_late(clean: Log) -> None:
     velocity = clean.truth["x"]["velocity"]
     slow = with_axis(clean, "x", lambda c: late(80, "velocity")({**c, "velocity": velocity}))

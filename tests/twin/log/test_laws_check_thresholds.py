@@ -181,7 +181,8 @@ def test_another_signal_that_is_late_is_told(name, other, quiet, told):
         assert milliseconds == pytest.approx(behind, abs=0.15)
         assert found.what.startswith(f"{subject} is ")
         assert found.what.endswith(f" {other}")
-        remedied = name if late > 0.0 else "position"
+        readings = "position" if name == "velocity" else "position and force"
+        remedied = name if late > 0.0 else readings
         assert found.remedy == f"give {remedied} delay_samples = {round(samples)} in the import map"
         assert found.severity is Severity.WARNING
 

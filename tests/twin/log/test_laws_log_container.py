@@ -56,7 +56,7 @@ from twin.errors import InputError
 from twin.log import FIELDS, AxisLog, Log, encode, read_log, write_log
 
 RATE, COUNT = 3000.0, 45
-TRUTH = tuple(f"state{k}" for k in range(18))  # field numbers above 15 take two bytes
+TRUTH = tuple(f"state{k}" for k in range(18))
 
 
 def distinct(name: str, axis: str) -> np.ndarray:
@@ -76,7 +76,8 @@ LOG = Log(
     {"x": {f: distinct(f, "t") for f in TRUTH}},
     {"model.toml": b"mass = 1\n", "stage.xml": b"<mujoco/>", "raw": bytes(range(200))},
 )
-ROW = (31 + 7 * 9) + 2 * (31 + 2 * 9) + (31 + 15 * 9 + 3 * 10)  # bytes of a sample on four topics
+FIRST_NUMBER = 1 << 18  # of the fields: their tags have four bytes
+ROW = (31 + 7 * 12) + 2 * (31 + 2 * 12) + (31 + 18 * 12)  # bytes of a sample on four topics
 PER_CHUNK = 7
 
 
@@ -278,7 +279,7 @@ def test_every_value_stands_in_its_own_field_for_the_stock_decoder(data):
         assert schema.name == ("twin.AxisTruth" if truth else "twin.AxisSample")
         numbers = {f.name: f.number for f in kind.DESCRIPTOR.fields}
         names = TRUTH if truth else FIELDS
-        assert numbers == {n: names.index(n) + 1 for n in columns}
+        assert numbers == {n: names.index(n) + FIRST_NUMBER for n in columns}
         for k, message in enumerate(sent):
             sample = kind.FromString(message.data)
             assert {n: getattr(sample, n) for n in columns} == {n: c[k] for n, c in columns.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import resource
+import struct
 import time
 import zlib
 from collections.abc import Callable
@@ -13,7 +14,7 @@ import pytest
 import zstandard
 from log_cases import RATE, protobuf_encoder, two_axes, write_foreign
 from mcap.records import Channel, Chunk, Message
-from mcap_bytes import joined, json_channel, plain_file
+from mcap_bytes import MAGIC, joined, json_channel, plain_file
 
 from twin.errors import InputError
 from twin.log import Log, read_log, recover_log
@@ -45,6 +46,13 @@ def claims(size: int) -> bytes:
     return plain_file([Chunk("lz4", b"\x04\x22\x4d\x18@@\xc0", 0, 0, 1, size)])
 
 
+def heads(count: int) -> bytes:
+    """What looks like so many chunks, each as large as most of the file."""
+    size = 27 * count
+    head = struct.pack("<BQQQQII", 6, size + 44, 0, 1, size, 1, 4) + b"zstd"
+    return MAGIC + (head + size.to_bytes(8, "little")) * count
+
+
 CHANNEL = joined([json_channel(1, "/axis/x")])
 OTHER = joined([Message(7, 0, b"{}", 0, 0)])
 DEEP = joined([json_channel(1, "/axis/x"), Message(1, 0, b"[" * 100_000, 0, 0)])
@@ -61,6 +69,7 @@ CASES: dict[str, Callable[[], bytes]] = {
     "a claim": lambda: claims(1 << 60),
     "deep nesting": lambda: bomb(DEEP, len(DEEP)),
     "many channels": lambda: MANY,
+    "heads of large chunks": lambda: heads(100_000),
 }
 
 

@@ -31,7 +31,7 @@ def small_log() -> Log:
 @pytest.fixture
 def intact(tmp_path, monkeypatch, small_log) -> bytes:
     """Bytes of a file of ten chunks of 12 samples."""
-    monkeypatch.setattr(encode, "CHUNK_BYTES", 12 * 94)
+    monkeypatch.setattr(encode, "CHUNK_BYTES", 12 * (31 + 7 * 12))
     write_log(small_log, tmp_path / "intact.mcap")
     return (tmp_path / "intact.mcap").read_bytes()
 

@@ -152,3 +152,25 @@ def test_logs_with_all_topics_in_one_chunk_are_read_too(tmp_path):
     ends = np.cumsum([0, *(len(part) for part in read_parts(tmp_path / "a.mcap", 20))])
     assert ends[-1] == COUNT
     assert all(b - a >= 20 for a, b in pairwise(ends[:-1]))
+
+
+def test_a_log_is_smaller_than_the_stock_writers(tmp_path):
+    """Though that has all topics in one chunk, whose messages repeat the head of the one before."""
+    count, rng = 4000, np.random.default_rng(1)
+    t = np.arange(count) / LOG.sample_rate
+
+    def axis(phase: float) -> AxisLog:
+        motion = 0.1 * np.sin(9.0 * t + phase)
+        noisy = {"position": 1e-9, "force": 0.05, "current": 1e-3}
+        read = {n: motion + size * rng.standard_normal(count) for n, size in noisy.items()}
+        return AxisLog({f: read.get(f, motion) for f in FIELDS if f != "velocity"})
+
+    log = Log(LOG.sample_rate, {"x": axis(0.0), "y": axis(1.0)})
+    write_log(log, tmp_path / "own.mcap")
+    schema, make = protobuf_encoder(tuple(log.axes["x"].columns))
+    write_foreign(
+        tmp_path / "stock.mcap", log, make, schema=("twin.AxisSample", "protobuf", schema),
+        encoding="protobuf", chunk_size=1 << 20,
+    )  # fmt: skip
+    own, stock = ((tmp_path / f"{n}.mcap").stat().st_size for n in ("own", "stock"))
+    assert own < stock

@@ -136,6 +136,7 @@ def value_at(document: Any, path: tuple[Any, ...]) -> Any:
         (("axes", "x", "effects", "cogging"), {"pich": 1.0}, "'cogging' has no parameter 'pich'"),
         (("axes", "a b"), {"mass": 1.0}, "give a table for each of 1 to 64 axes"),
         (("mujoco",), "../other.xml", "without folders"),
+        (("name",), "x\n\x00", "give a text of up to 200 characters on one line"),
         (("history", 0, "notes"), "why", r"history.0: notes = 'why': give a list of texts"),
     ],
 )  # fmt: skip

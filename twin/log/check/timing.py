@@ -18,6 +18,7 @@ STEADY = 0.25e-3  # s, what friction that the check does not know may account fo
 STEADY_SAMPLES = 1.5
 SURE = 5.0  # times the error
 DRIFT = 60e-6  # s/s
+READINGS = ("position", "velocity", "current", "force")
 FOLLOWING = 30e-3  # s, what a slow position loop may account for
 
 
@@ -50,8 +51,19 @@ def check(axis: Axis) -> Iterator[Finding]:
         setpoint = axis.smoother.velocity(columns["setpoint_position"])
         lag = _lag(axis, axis.velocity, setpoint)
         if lag < -allowed or lag > max(allowed, FOLLOWING):
-            late = "position" if lag > 0.0 else "setpoint_position"
-            yield _disagree(axis, "position", "its setpoint", late, lag)
+            yield _disagree(axis, "position", "its setpoint", _late(axis, lag, allowed), lag)
+
+
+def _late(axis: Axis, lag: float, allowed: float) -> str:
+    """The columns that are late where the position is so many s behind its setpoint.
+
+    Where the force is not, all readings are: the position alone would then be wrong to correct,
+    above all where a slow position loop is the cause.
+    """
+    if lag < 0.0:
+        return "setpoint_position"
+    apart = axis.lag.clear and abs(axis.lag.seconds) > allowed
+    return "position" if apart else " and ".join(n for n in READINGS if n in axis.log.columns)
 
 
 def _steady(axis: Axis) -> Iterator[Finding]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from array import array
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from twin.errors import InputError
 from twin.log.chunks import Inflation, payloads
-from twin.log.container import open_mcap, parse
+from twin.log.container import Damaged, McapFile, parse
 from twin.log.decode import message_parts, record_at
 from twin.log.importers.mapping import ImportMap
 from twin.log.importers.table import Table, chosen, extra, parsing, require_columns
@@ -74,9 +75,13 @@ class _Topics:
         self._decoders: dict[int, Decode | None] = {}
 
     def messages(self, path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
-        """Topic, log time in ns and message; of topics that are not wanted the first alone."""
-        shown: set[int] = set()
-        with open_mcap(path) as file:
+        """Topic, log time in ns and message; of topics that are not wanted the first alone.
+
+        Raises Damaged where there are not as many as the file announces.
+        """
+        shown = Counter[int]()
+        with open(path, "rb") as stream:
+            file = McapFile(stream, path.stat().st_size)
             for payload in payloads(file.records(), lambda record: None, Inflation(file.size)):
                 offset = 0
                 while offset < len(payload.data):
@@ -86,13 +91,15 @@ class _Topics:
                         continue
                     number, _, time, _, data = message_parts(content)
                     topic = self._channels[number].topic
-                    if number in shown and not any(
+                    shown[number] += 1
+                    if shown[number] > 1 and not any(
                         w.startswith(f"{topic}.") for w in wanted or (f"{topic}.",)
                     ):
                         continue
-                    shown.add(number)
                     decode = self._decoder(number)
                     yield topic, time, decode(data) if decode else None
+        if file.statistics is not None:
+            _require_all(shown, file.statistics.channel_message_counts)
 
     def _register(self, opcode: int, content: bytes) -> None:
         if opcode == Opcode.SCHEMA:
@@ -109,6 +116,15 @@ class _Topics:
             schema = self._schemas.get(channel.schema_id)
             self._decoders[number] = _decoder_for(channel.message_encoding, schema)
         return self._decoders[number]
+
+
+def _require_all(found: Mapping[int, int], announced: Mapping[int, int]) -> None:
+    """Raise Damaged where messages are missing: a chunk whose kind is damaged is passed over."""
+    if sum(found.values()) != sum(announced.values()):
+        raise Damaged(
+            f"{sum(found.values())} messages where its statistics announce "
+            f"{sum(announced.values())}; copy the file again"
+        )
 
 
 def _decoder_for(encoding: str, schema: Schema | None) -> Decode | None:
