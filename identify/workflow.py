@@ -18,24 +18,22 @@ from identify.estimation.replay import simulated_error
 from identify.estimation.simulated_motion import fit_simulated_motion
 from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.measure import cable_force, velocity_map
-from identify.output.results import Addition, Comparison, Diagnosis, FitResult, SimulationFit
-from identify.output.words.selection import addition_notes
-from identify.selection.candidates import Candidate, score, try_effect, usable
-from identify.selection.confounded import moved_parameters
+from identify.output.addition import Addition, addition
+from identify.output.results import Comparison, Diagnosis, FitResult, SimulationFit
+from identify.selection.candidates import score, try_effect, usable
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone, reshaped
 from identify.selection.unpredictable import noise_known, with_own_noise
-from identify.selection.wrong_shape import WrongShape, having_shape
+from identify.selection.wrong_shape import having_shape
 from identify.validation.agreement import Agreement, agreement
-from identify.validation.free_run import errors_of_both
 from identify.validation.misfit_maps import compare_axis, position_errors, worst_region
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.log import Log
 from twin.memory import give_back
-from twin.model.machine import HistoryStep, MachineModel
+from twin.model.machine import MachineModel
 
 if TYPE_CHECKING:
     from identify.thesis.chapters import Reproduction
@@ -254,64 +252,6 @@ def add_named(found: Diagnosis) -> Addition | None:
         return None
     prepared = {axis: one.dataset for axis, one in found.axes.items()}
     return addition(best, leading.base, prepared, found.model, found.model)
-
-
-def addition(
-    best: Candidate,
-    base: Fit,
-    prepared: Mapping[str, Dataset],
-    model: MachineModel,
-    given: MachineModel,
-    shape: WrongShape | None = None,
-) -> Addition:
-    """The candidate added to a fitted model; ``given``: the model before that was fitted.
-
-    shape: that of a law of the model which the candidate is; None where it is a missing effect. It
-    is kept if it is proved and lowers the test error: one that differs at a few places lowers the
-    error of a few blocks alone.
-    """
-    name = best.axis
-    moved = moved_parameters(base, best.fit)
-    left = model.axes[name].names
-    set_aside = tuple(n for n in given.axes[name].names if n not in left)
-    notes = addition_notes(best, moved, set_aside, shape.effect if shape else None)
-    step = _step(best, base, prepared[name], shape, notes)
-    new = model.with_axis(name, best.fit.axis).with_history(step)
-    new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
-    moving, replayed = errors_of_both(model, new, name, prepared)
-    return Addition(
-        model=new,
-        step=step,
-        candidate=best,
-        kept=best.supported if shape is None else shape.proof.holds and best.gain.falls,
-        position_error=moving,
-        replayed=replayed,
-        moved=moved,
-        set_aside=set_aside,
-    )
-
-
-def _step(
-    best: Candidate, base: Fit, dataset: Dataset, shape: WrongShape | None, notes: tuple[str, ...]
-) -> HistoryStep:
-    """What an addition did to the errors on the logs of each role."""
-    (held, held_after), (tested, tested_after) = (
-        [error_if_any(role, f, dataset) for f in (base, best.fit)]
-        for role in (Role.SELECTION, Role.TEST)
-    )
-    return HistoryStep(
-        action="shape" if shape else "add",
-        effect=shape.effect if shape else best.effect.name,
-        axis=best.axis,
-        fit_error_before=base.error,
-        fit_error_after=best.fit.error,
-        holdout_error_before=held,
-        holdout_error_after=held_after,
-        test_error_before=tested,
-        test_error_after=tested_after,
-        unit=best.fit.axis.units.force,
-        notes=notes,
-    )
 
 
 def agree(

@@ -15,7 +15,8 @@ from identify.estimation.intervals import Estimate, NotExcited
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
-from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+from identify.output.addition import Addition
+from identify.output.results import Comparison, Diagnosis, FitResult
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Step, Verdict

@@ -7,7 +7,8 @@ from typing import Any
 from identify.estimation.intervals import Estimate
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
-from identify.output.results import Addition, Comparison, FitResult
+from identify.output.addition import Addition
+from identify.output.results import Comparison, FitResult
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
 from identify.output.words.experiment_design import gap_in_words, not_run_in_words
 from identify.output.words.validation import loop_in_words, region_in_words

@@ -7,22 +7,18 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.given_logs import Role
 from identify.estimation.fit import Fit
 from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
 from identify.output.simulation_fit import simulation_fit_text
-from identify.output.text import add_text, compare_text, diagnose_text, fit_text
-from identify.output.words.selection import addition_notes, also_chose_in_words
-from identify.selection.candidates import Candidate
-from identify.selection.confounded import MovedParameter, Refit, refit
+from identify.output.text import compare_text, diagnose_text, fit_text
+from identify.selection.confounded import Refit, refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.misfit_maps import AxisComparison, Region
 from twin.effect import Effect
 from twin.effects import Catalogue
-from twin.model.machine import HistoryStep, MachineModel
-from twin.model.units import AxisUnits
+from twin.model.machine import MachineModel
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,49 +138,3 @@ class Diagnosis:
 
     def __repr__(self) -> str:
         return f"<Diagnosis of {self.model.name}; print it to read it>"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Addition:
-    """A model with one added effect.
-
-    step: errors before and after. kept: whether evidence and held-out logs support the effect.
-    position_error: free-running RMS error before and after; replayed: the same after, stepped by
-    MuJoCo. Both in the units of the axis, None where the motion is imposed. moved: parameters that
-    the effect changed. set_aside: nonparametric effects that were removed from the model before.
-    """
-
-    model: MachineModel
-    step: HistoryStep
-    candidate: Candidate
-    kept: bool
-    position_error: tuple[float, float] | None
-    replayed: float | None
-    moved: tuple[MovedParameter, ...] = ()
-    set_aside: tuple[str, ...] = ()
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a reader should know beside the errors, one sentence each."""
-        reshaped = self.step.effect if self.step.action == "shape" else None
-        notes = addition_notes(self.candidate, self.moved, self.set_aside, reshaped)
-        return notes if self.also_chose is None else (*notes, self.also_chose)
-
-    @property
-    def also_chose(self) -> str | None:
-        """That the errors are of logs that took part in the choice; None where a log tests."""
-        if self.step.test_error_after is not None:
-            return None
-        held = self.step.holdout_error_after is not None
-        return also_chose_in_words(Role.SELECTION if held else Role.TRAINING)
-
-    @property
-    def units(self) -> AxisUnits:
-        """Of the axis that the effect was added to."""
-        return self.candidate.fit.axis.units
-
-    def __str__(self) -> str:
-        return add_text(self)
-
-    def __repr__(self) -> str:
-        return f"<Addition of {self.model.name}; print it to read it>"

@@ -40,7 +40,8 @@ from twin.experiments.file import in_short
 from twin.experiments.kinds import kind_of
 
 if TYPE_CHECKING:  # results print themselves by these functions
-    from identify.output.results import Addition, Comparison, Diagnosis, FitResult
+    from identify.output.addition import Addition
+    from identify.output.results import Comparison, Diagnosis, FitResult
     from identify.validation.misfit_maps import AxisComparison
 
 

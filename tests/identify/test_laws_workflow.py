@@ -13,13 +13,15 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, fitted
 from identify import workflow
 from identify.dataset.given_logs import Role
 from identify.estimation import errors
+from identify.output import addition as adding
 from identify.output import results
+from identify.output.addition import addition
 from identify.output.words.selection import moved_in_words
 from identify.selection import confounded
 from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import Verdict
 from identify.validation import free_run as free_runs
-from identify.workflow import add, addition
+from identify.workflow import add
 from twin.errors import CannotRun, InputError
 from twin.model.machine import MachineModel
 
@@ -286,16 +288,16 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
         return effects, simulator
 
     errors = {(1, "reduced"): 5.1, (2, "reduced"): 1.7}
-    monkeypatch.setattr(workflow, "estimates", lambda fit: (fit,))
-    monkeypatch.setattr(workflow, "intervals_to_keep", lambda fit, found: (fit.error, found))
+    monkeypatch.setattr(adding, "estimates", lambda fit: (fit,))
+    monkeypatch.setattr(adding, "intervals_to_keep", lambda fit, found: (fit.error, found))
     monkeypatch.setattr(free_runs, "free_run", run)
     monkeypatch.setattr(free_runs, "rms_error", lambda r, axis: errors.get(r, 1.9))
     told = {Role.SELECTION: {7.3: 8.1, 2.9: 3.3}, Role.TEST: {7.3: 9.7, 2.9: 4.1}}
     monkeypatch.setattr(
-        workflow, "error_if_any", lambda role, fit, s: told[role][round(fit.error, 9)]
+        adding, "error_if_any", lambda role, fit, s: told[role][round(fit.error, 9)]
     )
     monkeypatch.setattr(
-        workflow,
+        adding,
         "moved_parameters",
         lambda a, b: (replace(made.MOVED, before=a.error, after=b.error),),
     )

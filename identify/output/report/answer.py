@@ -5,10 +5,10 @@ from __future__ import annotations
 from identify.dataset.given_logs import Role
 from identify.estimation.decision import RULE
 from identify.experiment_design.plan import Plan
+from identify.output.addition import Addition
 from identify.output.report.blocks import Answer, Section, Tile, Tone
 from identify.output.report.subject import Subject
 from identify.output.report.units import SCALED, Scale, number, quantity, spaced
-from identify.output.results import Addition
 from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import (

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
+from identify.output.addition import Addition
 from identify.output.report.blocks import Block, Column, Heading, Picture, Row, Section, Table
 from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, number, spaced, title_case
-from identify.output.results import Addition
 from twin.model.machine import HistoryStep
 from twin.model.units import units_of
 

@@ -12,7 +12,8 @@ from identify.dataset.prepared_log import PreparedLog, moving
 from identify.estimation.fit import sticks
 from identify.estimation.force_balance import residual
 from identify.experiment_design.plan import Plan
-from identify.output.results import Addition, Comparison, Diagnosis
+from identify.output.addition import Addition
+from identify.output.results import Comparison, Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict

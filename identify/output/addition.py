@@ -1,0 +1,124 @@
+"""A model with one effect more, and what that did to the errors; ``print`` shows the text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.given_logs import Role
+from identify.estimation.errors import error_if_any
+from identify.estimation.fit import Fit
+from identify.estimation.intervals import estimates, intervals_to_keep
+from identify.output.text import add_text
+from identify.output.words.selection import addition_notes, also_chose_in_words
+from identify.selection.candidates import Candidate
+from identify.selection.confounded import MovedParameter, moved_parameters
+from identify.selection.wrong_shape import WrongShape
+from identify.validation.free_run import errors_of_both
+from twin.model.machine import HistoryStep, MachineModel
+from twin.model.units import AxisUnits
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Addition:
+    """A model with one added effect.
+
+    step: errors before and after. kept: whether evidence and held-out logs support the effect.
+    position_error: free-running RMS error before and after; replayed: the same after, stepped by
+    MuJoCo. Both in the units of the axis, None where the motion is imposed. moved: parameters that
+    the effect changed. set_aside: nonparametric effects that were removed from the model before.
+    """
+
+    model: MachineModel
+    step: HistoryStep
+    candidate: Candidate
+    kept: bool
+    position_error: tuple[float, float] | None
+    replayed: float | None
+    moved: tuple[MovedParameter, ...] = ()
+    set_aside: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader should know beside the errors, one sentence each."""
+        reshaped = self.step.effect if self.step.action == "shape" else None
+        notes = addition_notes(self.candidate, self.moved, self.set_aside, reshaped)
+        return notes if self.also_chose is None else (*notes, self.also_chose)
+
+    @property
+    def also_chose(self) -> str | None:
+        """That the errors are of logs that took part in the choice; None where a log tests."""
+        if self.step.test_error_after is not None:
+            return None
+        held = self.step.holdout_error_after is not None
+        return also_chose_in_words(Role.SELECTION if held else Role.TRAINING)
+
+    @property
+    def units(self) -> AxisUnits:
+        """Of the axis that the effect was added to."""
+        return self.candidate.fit.axis.units
+
+    def __str__(self) -> str:
+        return add_text(self)
+
+    def __repr__(self) -> str:
+        return f"<Addition of {self.model.name}; print it to read it>"
+
+
+def addition(
+    best: Candidate,
+    base: Fit,
+    prepared: Mapping[str, Dataset],
+    model: MachineModel,
+    given: MachineModel,
+    shape: WrongShape | None = None,
+) -> Addition:
+    """The candidate added to a fitted model; ``given``: the model before that was fitted.
+
+    shape: that of a law of the model which the candidate is; None where it is a missing effect. It
+    is kept if it is proved and lowers the test error: one that differs at a few places lowers the
+    error of a few blocks alone.
+    """
+    name = best.axis
+    moved = moved_parameters(base, best.fit)
+    left = model.axes[name].names
+    set_aside = tuple(n for n in given.axes[name].names if n not in left)
+    notes = addition_notes(best, moved, set_aside, shape.effect if shape else None)
+    step = _step(best, base, prepared[name], shape, notes)
+    new = model.with_axis(name, best.fit.axis).with_history(step)
+    new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
+    moving, replayed = errors_of_both(model, new, name, prepared)
+    return Addition(
+        model=new,
+        step=step,
+        candidate=best,
+        kept=best.supported if shape is None else shape.proof.holds and best.gain.falls,
+        position_error=moving,
+        replayed=replayed,
+        moved=moved,
+        set_aside=set_aside,
+    )
+
+
+def _step(
+    best: Candidate, base: Fit, dataset: Dataset, shape: WrongShape | None, notes: tuple[str, ...]
+) -> HistoryStep:
+    """What an addition did to the errors on the logs of each role."""
+    (held, held_after), (tested, tested_after) = (
+        [error_if_any(role, f, dataset) for f in (base, best.fit)]
+        for role in (Role.SELECTION, Role.TEST)
+    )
+    return HistoryStep(
+        action="shape" if shape else "add",
+        effect=shape.effect if shape else best.effect.name,
+        axis=best.axis,
+        fit_error_before=base.error,
+        fit_error_after=best.fit.error,
+        holdout_error_before=held,
+        holdout_error_after=held_after,
+        test_error_before=tested,
+        test_error_after=tested_after,
+        unit=best.fit.axis.units.force,
+        notes=notes,
+    )
