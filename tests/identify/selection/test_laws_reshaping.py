@@ -1,0 +1,62 @@
+"""When a free curve competes, and beside which effects it is sought: the rules on both sides."""
+
+from __future__ import annotations
+
+import importlib
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from built_fits import built, built_fit, dataset_stub
+
+from identify.selection.decoys import Proof
+from identify.selection.wrong_shape import Shape, WrongShape
+
+module = importlib.import_module("identify.selection.reshaping")
+BASE, CURVED = built_fit(8.0), built_fit(2.0)
+DATASET = SimpleNamespace(**vars(dataset_stub()), chosen_on=None)
+
+
+@pytest.mark.parametrize(
+    ("bic", "t", "after", "helps"),
+    [(10.1, 0.0, 2.1, True), (9.9, 2.9, 1.0, False), (9.9, 3.1, 1.0, True), (9.9, 9.0, 2.1, False)],
+)
+def test_an_effect_may_help_with_evidence_or_a_clear_fall_of_the_test_error(bic, t, after, helps):
+    assert module._may_help(built(bic=bic, t=t, before=2.0, after=after)) is helps
+
+
+def test_beside_a_curve_those_effects_are_tried_first_that_take_most(monkeypatch):
+    tried = []
+
+    def reshaped(fit, dataset, ranking):
+        tried.append(fit.error)
+
+    monkeypatch.setattr(module, "_reshaped", reshaped)
+    ranking = [
+        built("wear", bic=40.0, t=9.0, before=8.0, after=7.0, fit=built_fit(7.0)),
+        built("cogging", bic=4.0, t=9.0, before=8.0, after=3.0, fit=built_fit(3.0)),
+        built("dahl", bic=4.0, t=1.0, before=8.0, after=2.0, fit=built_fit(2.0)),
+        built("gms", bic=40.0, t=9.0, before=8.0, after=5.0, fit=built_fit(5.0)),
+    ]
+    assert module._beside_an_effect(BASE, DATASET, ranking) is None
+    assert tried == [3.0, 5.0, 7.0]
+
+
+@pytest.mark.parametrize(("gain", "refitted"), [(0.58, False), (0.6, True)])
+def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypatch, gain, refitted):
+    # Of the best effect's squared error, 0.8 is what a curve may leave; a refit may leave 0.3 of
+    # what a linear step does.
+    asked = []
+    shape = WrongShape(object.__new__(Shape), Proof(gain, 0.0))
+    object.__setattr__(shape.shape, "curve", type("Plain", (), {"rubs": False}))
+
+    def in_place(fit, dataset, shape):
+        asked.append(shape)
+        return built(before=8.0, after=9.0)
+
+    monkeypatch.setattr(module, "wrong_shape", lambda fit, dataset: shape)
+    monkeypatch.setattr(module, "error_in", lambda role, fit, dataset: 8.0)
+    monkeypatch.setattr(module, "fit_in_place", in_place)
+    best = 8.0 * np.sqrt(0.3 * 0.41 / 0.8)
+    assert module._reshaped(BASE, DATASET, [built(t=9.0, before=8.0, after=best)]) is None
+    assert bool(asked) is refitted
