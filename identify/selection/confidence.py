@@ -20,12 +20,13 @@ class Level:
     right: float
 
 
-# 70 answers on 84 machines of seed 22 (0 to 5 floors, every variation, some outside the catalogue):
-# all right but two, which named the nearest effect for one of no catalogue, as resembled since. So
-# few wrong ones do not tell margins apart, and a level is known to some 5 points.
+# 264 answers on 324 machines of seeds 22 and 798565785 (0 to 5 floors, every variation, pairs,
+# effects outside the catalogue or taken out of it), by Laplace's rule: 214 of 238 and 25 of 26 were
+# right. The first seed alone had given 95 %; of the second 87 % were right. Small margins were
+# wrong little more often than large ones (23 of 29 of the least sixth), so there is one level.
 # `python -m benchmarks.confidence --seed 1` fits the table anew, on more machines.
-BESIDE_DECOYS = (Level(-0.44, 0.95),)  # 63 answers
-WITHOUT_DECOYS = (Level(0.0, 0.89),)  # 7 answers
+BESIDE_DECOYS = (Level(-0.44, 0.9),)
+WITHOUT_DECOYS = (Level(0.0, 0.93),)
 
 
 def confidence(margin: float, *, beside_decoys: bool) -> float:

@@ -188,7 +188,7 @@ class AxisDiagnosis:
         if left(wrong) < RULE.beside_decoys * left(finding):
             return with_shape(others, wrong)
         tied = replace(finding, tied=(*finding.tied, wrong.effect))
-        return with_shape((*others, tied), wrong)
+        return with_shape((*others, tied), replace(wrong, tied=(finding.effect,)))
 
     @property
     def _proved(self) -> list[Step]:

@@ -165,6 +165,7 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
             over = {c.over for e in case.effects if e in OUTSIDE for c in OUTSIDE[e].curves}
             right = not {*built.reshaped}.isdisjoint(names)
             right |= finding.shape is not None and finding.shape.over in over
+            right |= not {*case.effects}.isdisjoint(finding.tied)
         case FindingKind.RESEMBLES:
             right = any(e in OUTSIDE for e in case.effects)
     return Answer(
