@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import replace
 from types import SimpleNamespace
 
+import built_results as made
 import numpy as np
 import pytest
-from built_fits import built, built_fit, dataset_stub
+from built_fits import axis_of, built, built_fit, dataset_stub, fitted
 
 from identify.selection.decoys import Proof
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from identify.selection.findings import FindingKind
 from identify.selection.wrong_shape import Shape, WrongShape
 
 module = importlib.import_module("identify.selection.reshaping")
@@ -60,3 +64,33 @@ def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypat
     best = 8.0 * np.sqrt(0.3 * 0.41 / 0.8)
     assert module._reshaped(BASE, DATASET, [built(t=9.0, before=8.0, after=best)]) is None
     assert bool(asked) is refitted
+
+
+# --- a finding against the curve of a law that the model has ---------------------------------
+
+
+@pytest.mark.parametrize(
+    ("left", "kinds", "ties"),
+    [
+        (2.6, ["missing"], [()]),  # the curve leaves far more error
+        (2.2, ["missing", "wrong_shape"], [("cable_slab",), ("cogging",)]),  # about as much
+        (1.5, ["wrong_shape"], [()]),  # clearly less
+    ],
+)
+def test_a_curve_that_leaves_as_little_is_an_ambiguity_on_both_sides(
+    monkeypatch, left, kinds, ties
+):
+    diagnoses = importlib.import_module("identify.selection.diagnosis")
+    missing = replace(made.FOUND[0], tied=())
+    wrong = replace(missing, effect="cable_slab", kind=FindingKind.WRONG_SHAPE)
+    wrong = replace(wrong, chosen=replace(wrong.chosen, after=left))
+    shape = SimpleNamespace(
+        shape=SimpleNamespace(curve=SimpleNamespace(rubs=False)), effect="cable_slab"
+    )
+    monkeypatch.setattr(diagnoses, "wrong_shape", lambda fit, dataset: shape)
+    monkeypatch.setattr(diagnoses, "found_wrong", lambda *_: wrong)
+    base = built_fit(8.0, axis=axis_of(fitted("cable_slab")))
+    whole = AxisDiagnosis(DATASET, base, (), (), base, Verdict.MISSING_EFFECTS, None)
+    found = whole._against_shapes(missing, base, (missing,))
+    assert [f.kind.value for f in found] == kinds
+    assert [f.tied for f in found] == ties
