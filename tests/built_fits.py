@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.given_logs import Role
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import Evidence, Gain
@@ -102,7 +103,10 @@ def stage(fit: Fit, *steps: Step) -> SelectionState:
 
 def dataset_stub(holdout: Sequence[object] = (), fit: Sequence[object] = ()) -> SimpleNamespace:
     """What the rules ask of a dataset, with no logs in it."""
-    return SimpleNamespace(axis="x", holdout=tuple(holdout), fit=tuple(fit), channel_delay=0.0)
+    return SimpleNamespace(
+        axis="x", holdout=tuple(holdout), fit=tuple(fit), channel_delay=0.0,
+        chosen_on=Role.SELECTION if holdout else Role.TRAINING,
+    )  # fmt: skip
 
 
 def built_motion(name: str = "run", seconds: float = 3.0, seed: int = 1, slow: float = 1.0):

@@ -77,8 +77,7 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
     sensing = [f for f in axis.effects if f.effect.kind is Kind.SENSING and not is_noise(f.effect)]
     if not sensing:
         return motion, np.broadcast_to(0.0, motion.raw.shape[1])
-    part = replace(axis, effects=tuple(sensing))
-    error, rate = reading_error(part, motion)
+    error, rate = reading_error(replace(axis, effects=tuple(sensing)), motion)
     blocks = motion.signals.copy()
     for block, at_samples in zip(blocks, (error, rate), strict=False):
         block -= at_samples.reshape(blocks.shape[1], -1).mean(axis=1)
@@ -91,10 +90,10 @@ def reading_error(
 ) -> tuple[Array, Array]:
     """The error that these sensing effects add to the readings, (n,) m, and its rate, m/s.
 
-    path: the motion's smoothed position, (n,) m, where it is at hand.
     The error depends on the true position, which is the reading less the error: a fixed-point
     iteration that starts from the reading, of which one pass is exact to first order in the error.
-    The readings are smoothed first, because inverting a delay would amplify their noise.
+    The readings are smoothed first, because inverting a delay would amplify their noise: path,
+    (n,) m, made of the motion where it is not at hand.
     """
     table = axis_table({motion.axis: sensing})
     _, _, _, first, last = table.axes[0]

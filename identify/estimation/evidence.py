@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -124,6 +125,11 @@ def left_out(residual: Array, jacobian: Array, scale: Array, blocks: int = BLOCK
         move = np.linalg.lstsq(without, gradient, rcond=1e-12)[0]
         out[span] = residual[span] + block @ move
     return out
+
+
+def by_blocks(left: Array, right: Array, blocks: Sequence[slice]) -> Array:
+    """Inner products (b, p, q) of columns (n, p) and (n, q), or (b, p) with one (n,), by blocks."""
+    return np.stack([left[span].T @ right[span] for span in blocks])
 
 
 def blocks_of(count: int, blocks: int = BLOCKS) -> list[slice]:

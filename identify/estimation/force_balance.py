@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -139,8 +139,8 @@ def changes(
         if not effect:
             out[index] = steps[index, None] * _by_mass(axis, logs)
         elif _has_columns(axis, own):
-            for log, span in zip(logs, spans, strict=True):
-                out[index, span] = _columns(axis, own, log)
+            for span, part in zip(spans, _columns(axis, own, logs), strict=True):
+                out[index, span] = part
             out[index] *= steps[index, None]
         else:
             group = group_of(axis, effect)
@@ -149,8 +149,8 @@ def changes(
                 write(group, [c], [v + step])
                 for c, v, step in zip(own, values, steps[index], strict=True)
             ]
-            for log, span in zip(logs, spans, strict=True):
-                out[index, span] = _differences(group, moved, effect, log)
+            for span, part in zip(spans, _differences(group, moved, effect, logs), strict=True):
+                out[index, span] = part
     return out
 
 
@@ -161,31 +161,37 @@ def _has_columns(axis: AxisModel, where: Sequence[ParameterReference]) -> bool:
     )
 
 
-def _columns(axis: AxisModel, where: Sequence[ParameterReference], log: PreparedLog) -> Array:
-    """Averaged force (m, n) per unit of these strengths of one effect that has columns."""
+def _columns(
+    axis: AxisModel, where: Sequence[ParameterReference], logs: Sequence[PreparedLog]
+) -> Iterator[Array]:
+    """Averaged force (m, n) per unit of strengths of one effect that has columns, by logs."""
     own = axis[where[0].effect]
     names = [p.name for p in own.effect.strengths]
     rows = [names.index(c.parameter.name) for c in where]
-    motion, test = true_motion(axis, log.motion)[0], log.test_function
-    return averaged_columns(
-        own.effect, own.vector(), motion.signals, motion.period, motion.time_origin, test.weights,
-        test.stride,
-    )[rows]  # fmt: skip
+    for log in logs:
+        motion, test = true_motion(axis, log.motion)[0], log.test_function
+        yield averaged_columns(
+            own.effect, own.vector(), motion.signals, motion.period, motion.time_origin,
+            test.weights, test.stride,
+        )[rows]  # fmt: skip
 
 
 def _differences(
-    group: AxisModel, moved: Sequence[AxisModel], effect: str, log: PreparedLog
-) -> Array:
-    """Change (m, n) N of the averaged force when one effect's values move from those of a group."""
+    group: AxisModel, moved: Sequence[AxisModel], effect: str, logs: Sequence[PreparedLog]
+) -> Iterator[Array]:
+    """Change (m, n) N of the averaged force when one effect's values move, log after log."""
     kind = group[effect].effect.kind
     # An effect alone of no strength gives no force, which need not be walked for.
     strengths = [group[effect].values[p.name] for p in group[effect].effect.strengths]
     absent = len(group.effects) == 1 and bool(strengths) and not any(strengths)
     if kind is Kind.SENSING and absent:
-        return _apparent_forces(moved, log)
+        yield from (_apparent_forces(moved, log) for log in logs)
+        return
     if kind is Kind.SENSING or (kind is Kind.ACTUATION and _is_stepped_finely(group)):
-        base = 0.0 if absent else averaged_force(group, [log])
-        return np.stack([averaged_force(axis, [log]) - base for axis in moved])
+        for log in logs:
+            base = 0.0 if absent else averaged_force(group, [log])
+            yield np.stack([averaged_force(axis, [log]) - base for axis in moved])
+        return
     # The motion and the force behind it stay; all sets of values go along it in one walk.
     table = _between(group)
     at = table.labels.index(("", effect))
@@ -195,12 +201,13 @@ def _differences(
     for row, axis in zip(sets[bases:], moved, strict=True):
         vector = axis[effect].vector()
         row[first : first + len(vector)] = vector
-    motion = _driven(group, log)[0]
-    nothing = 0.0 if absent else total_forces(table, sets[:1], motion)
-    at_once = max(AT_ONCE // motion.signals.shape[1], 1)
-    batches = (sets[i : i + at_once] for i in range(bases, len(sets), at_once))
-    forces = (total_forces(table, batch, motion) - nothing for batch in batches)
-    return np.concatenate([log.test_function.mean(force) for force in forces])
+    for log in logs:
+        motion = _driven(group, log)[0]
+        unmoved = 0.0 if absent else total_forces(table, sets[:1], motion)
+        at_once = max(AT_ONCE // motion.signals.shape[1], 1)
+        batches = [sets[i : i + at_once] for i in range(bases, len(sets), at_once)]
+        means = [log.test_function.mean(total_forces(table, b, motion) - unmoved) for b in batches]
+        yield np.concatenate(means)
 
 
 def _apparent_forces(sensing: Sequence[AxisModel], log: PreparedLog) -> Array:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.decision import RULE
-from identify.estimation.evidence import blocks_of
+from identify.estimation.evidence import blocks_of, by_blocks
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.time_origin import depends_on_time_origin
@@ -151,19 +151,16 @@ class _Part:
 
         The latter are shifted by parts of each log; None: they are left out.
         """
-        _, own = self._own
+        spans, own = self._own
         if shifts is None:
             return own
-        tried = self._shifted(shifts)
-        spans, _ = self._own
-        first = own.shape[1]
+        tried, first = self._shifted(shifts), own.shape[1]
         both = first + tried.shape[1]
         out = np.empty((len(own), both, both))
         out[:, :first, :first] = own
-        for i, span in enumerate(spans):
-            out[i, first:, first:] = tried[span].T @ tried[span]
-            out[i, first:, 0] = tried[span].T @ self.force[span]
-            out[i, first:, 1:first] = tried[span].T @ self.base[span]
+        out[:, first:, first:] = by_blocks(tried, tried, spans)
+        out[:, first:, 0] = by_blocks(tried, self.force, spans)
+        out[:, first:, 1:first] = by_blocks(tried, self.base, spans)
         out[:, :first, first:] = out[:, first:, :first].swapaxes(1, 2)
         return out
 
@@ -171,8 +168,8 @@ class _Part:
     def _own(self) -> tuple[list[slice], Array]:
         """Samples of each block, and the products of force and base's columns, force first."""
         spans = blocks_of(len(self.force))
-        both = [np.column_stack([self.force[s], self.base[s]]) for s in spans]
-        return spans, np.stack([b.T @ b for b in both])
+        both = np.column_stack([self.force, self.base])
+        return spans, by_blocks(both, both, spans)
 
     def _shifted(self, shifts: Array) -> Array:
         """The columns that are tried (n, j), shifted by parts of each log."""

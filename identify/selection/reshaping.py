@@ -25,9 +25,7 @@ from identify.selection.wrong_shape import WrongShape, wrong_shape
 
 MOST_TRIED = 3  # effects beside which a curve is sought
 MOST_CURVES = 3  # on one axis
-BY_REFIT = (
-    0.3  # of the squared error after a linear step with a curve, that a refit leaves at least
-)
+BY_REFIT = 0.3  # of the squared error that a curve's linear step leaves, a refit leaves at least
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.evidence import blocks_of
+from identify.estimation.evidence import blocks_of, by_blocks
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian
 from identify.estimation.smoothing import part_rows, smoothing
@@ -156,9 +156,7 @@ class _Rest:
     @classmethod
     def of(cls, columns: Array, force: Array, physics: Array, own: NDArray[np.bool_]) -> _Rest:
         spans = blocks_of(len(force))
-        parts = [columns[span] for span in spans]
-        grams = np.stack([c.T @ c for c in parts])
-        pulls = np.stack([c.T @ force[s] for s, c in zip(spans, parts, strict=True)])
+        grams, pulls = by_blocks(columns, columns, spans), by_blocks(columns, force, spans)
         others, aims = grams.sum(axis=0) - grams, pulls.sum(axis=0) - pulls
         base = others[:, ~own][:, :, ~own] + physics[np.ix_(~own, ~own)]
         across = others[:, ~own][:, :, own]
@@ -166,8 +164,9 @@ class _Rest:
         follows, alone = solved[..., :-1], solved[..., -1]
         back = across.swapaxes(1, 2)
         # The block's own products, with the physics taken out of force and columns.
-        out = np.zeros((len(spans), len(own), int(own.sum())))
-        out[:, ~own], out[:, own] = -follows, np.eye(int(own.sum()))
+        count = int(own.sum())
+        out = np.zeros((len(spans), len(own), count))
+        out[:, ~own], out[:, own] = -follows, np.eye(count)
         held = np.zeros((len(spans), len(own)))
         held[:, ~own] = alone
         seen = (grams @ held[..., None])[..., 0]

@@ -18,7 +18,7 @@ from identify.selection.wrong_shape import Shape, WrongShape
 
 module = importlib.import_module("identify.selection.reshaping")
 BASE, CURVED = built_fit(8.0), built_fit(2.0)
-DATASET = SimpleNamespace(**vars(dataset_stub()), chosen_on=None)
+DATASET = dataset_stub()
 
 
 @pytest.mark.parametrize(
