@@ -172,7 +172,8 @@ class Effect:
     assumes, where a diagnosis may ask whether a free curve does better. several: whether an axis
     may have the effect more than once, as cogging of poles and of slots; number: which of these it
     is. is_itself: (values by name, the motion covered) -> whether the law with these values is the
-    effect, and not some other force that it imitates.
+    effect, and not some other force that it imitates. dead_time: whether it does nothing but delay
+    the force against the reading; which of the two is late, no log of both can tell.
     """
 
     kind: Kind
@@ -196,6 +197,7 @@ class Effect:
     several: bool = False
     number: int = 1
     is_itself: Callable[[Mapping[str, float], Excitation], bool] | None = None
+    dead_time: bool = False
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]

@@ -80,9 +80,9 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     coarse = [p for p in effect.strengths if p.screened]
     if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
         found = _best(head, found, coarse, RESCORED_SHAPES)
-    found = _best(head, found, effect.strengths, FULL_SHAPES)
     if effect.kind is Kind.FRICTION:
-        return found[:REFINED_STARTS]
+        return _unlike(_best(head, found, effect.strengths, len(found)))
+    found = _best(head, found, effect.strengths, FULL_SHAPES)
     whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
     first = _try(whole, found[0].shape, effect.strengths)
     if not _beyond_chance(base, first):
@@ -101,6 +101,15 @@ def _best(
 ) -> list[Start]:
     scored = [_try(ground, s.shape, strengths) for s in tried]
     return sorted(scored, key=lambda s: s.squared_error)[:count]
+
+
+def _unlike(found: Sequence[Start]) -> list[Start]:
+    """The first of some starts, and the next that shares no value of its shape, where one does.
+
+    The linear step ranks stiffnesses poorly where all are far off; each may lead to another fit.
+    """
+    others = (s for s in found[1:] if not s.shape.items() & found[0].shape.items())
+    return [found[0], *itertools.islice(others, REFINED_STARTS - 1)]
 
 
 def one_linear_step(base: Fit, start: Start) -> Fit:

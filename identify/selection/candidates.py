@@ -29,7 +29,7 @@ from identify.estimation.time_origin import phases_found
 from identify.estimation.variable_projection import Start, fit_thoroughly, one_linear_step, starts
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
-from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.model.machine import AxisModel, MachineModel
 
 Array = NDArray[np.float64]
 
@@ -126,7 +126,8 @@ def look_at(base: Fit, dataset: Dataset, effect: Effect) -> Look:
         axis = base.axis.with_effect(best.fitted)
         fit = finished(axis, base.begun, dataset.fit, base.outcome)
     elif effect.kind is Kind.FRICTION:
-        fit = _fitted_to_heads(base, dataset, best.fitted)
+        fit, best = _fitted_to_heads(base, dataset, found)
+        found = (best, *(s for s in found if s is not best))
     else:
         share = 1.0 - best.squared_error / max(float(base.residual @ base.residual), 1e-300)
         fit = None if _promising(base, best) else one_linear_step(base, best)
@@ -168,18 +169,26 @@ def _promising(base: Fit, start: Start) -> bool:
     return bool(start.gain(base) > RULE.promise * asked)
 
 
-def _fitted_to_heads(base: Fit, dataset: Dataset, fitted: Fitted) -> Fit | None:
-    """Another friction fitted to the heads, if it is no better there than the present one."""
+def _fitted_to_heads(
+    base: Fit, dataset: Dataset, found: Sequence[Start]
+) -> tuple[Fit | None, Start]:
+    """Another friction fitted to the heads, if it is no better there than the present one.
+
+    And the start that led furthest.
+    """
     if sum(map(len, dataset.heads)) > 0.5 * sum(map(len, dataset.fit)):
-        return None
+        return None, found[0]
     old = _on_heads(base, dataset)
-    new = fit_axis(base.axis.with_effect(fitted), dataset.heads, HEAD_EVALUATIONS)
+    fits = [
+        fit_axis(base.axis.with_effect(s.fitted), dataset.heads, HEAD_EVALUATIONS) for s in found
+    ]
+    new, start = min(zip(fits, found, strict=True), key=lambda pair: pair[0].error)
     either = moving(dataset.heads, sticks(old.axis) or sticks(new.axis))
     before, after = (residual(f.axis, dataset.heads)[either] for f in (old, new))
     gain = effective_samples(before) * evidence(before, after, 1).log_gain
     if gain > RULE.promise * RULE.least_bic:
-        return None
-    return finished(new.axis, base.begun, dataset.fit, new.outcome)
+        return None, start
+    return finished(new.axis, base.begun, dataset.fit, new.outcome), start
 
 
 @lru_cache(maxsize=1)  # every friction is compared with the same base

@@ -13,13 +13,12 @@ from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.time_origin import synchronised
 from identify.estimation.variable_projection import fit_thoroughly
 from identify.selection.candidates import Candidate, score
-from identify.selection.decoys import proof
-from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, Verdict, kept
+from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, kept
 from identify.selection.pair_search import held_at_floor, search_pairs
 from identify.selection.ranking import Progress, less, rank, tie, took_friction
 from identify.selection.reshaping import Reshaped, curve_in_place
-from identify.selection.residual_dependence import explains, find_dependence
 from identify.selection.unpredictable import is_unpredictable, with_own_noise
+from identify.selection.verdict import decided, part_explained
 from twin.effect import Kind
 from twin.effects import Catalogue
 
@@ -70,7 +69,7 @@ def diagnose_axis(
         states[-1] = replace(states[-1], fit=final)
     if not any(map(_foretells, found)):
         dataset, states = _with_own_noise(dataset, states)
-    return _decided(dataset, ranking, states).beside(base, tuple(curves))
+    return decided(dataset, ranking, states).beside(base, tuple(curves))
 
 
 def _earlier(steps: Sequence[Step], curves: Sequence[Reshaped]) -> list[Candidate]:
@@ -116,7 +115,7 @@ def _next(
     """The next steps: the best effect, a pair that is needed together, or none."""
     if ranking and _is_added(ranking[0], base):
         best = ranking[0]
-        near = tuple(c for c in ranking[1:] if c.supported and _near(best, c))
+        near = tuple(c for c in _near(best, ranking) if c.supported)
         tied = tuple(c.effect.name for c in near if tie(dataset, best, c))
         return [Step(best, tied or _friction_instead(base, best, ranking), rivals=near)]
     if base.at_floor or held_at_floor(base, dataset):
@@ -130,9 +129,10 @@ def _next(
     level = [p for p in pairs[1:] if tie(dataset, pair.together, p.together)]
     alike = sorted({name for p in level for name in p.names} - pair.names)
     first, second = pair.first, pair.second
+    alone = next(c for c in ranking if c.effect.name == first.effect.name)
     return [
-        Step(first, tuple(alike), beside=second.effect.name),
-        Step(second, (), beside=first.effect.name),
+        Step(first, tuple(alike), beside=second.effect.name, rivals=_near(alone, ranking)),
+        Step(second, (), beside=first.effect.name, rivals=_near(second, pair.seconds)),
     ]
 
 
@@ -153,38 +153,18 @@ def _friction_instead(base: Fit, best: Candidate, ranking: Sequence[Candidate]) 
     if not took_friction(base.axis, best.fit.axis):
         return ()
     frictions = (c for c in ranking if c.effect.kind is Kind.FRICTION and c.supported)
-    return tuple(c.effect.name for c in frictions if _part(base, c.fit) > RULE.nearly_all)[:1]
+    return tuple(c.effect.name for c in frictions if part_explained(base, c.fit) > RULE.nearly_all)[
+        :1
+    ]
 
 
-def _near(best: Candidate, other: Candidate) -> bool:
-    """Whether a candidate explains about as much as the best."""
-    return other.evidence.log_gain > RULE.near * best.evidence.log_gain and not other.is_noise
-
-
-def _compared_again(states: Sequence[SelectionState], dataset: Dataset) -> tuple[Step, ...]:
-    """The steps, with ties decided beside all effects that were added.
-
-    When an early effect was compared with its rivals, the later effects were still missing.
-    """
-    base, (steps, final) = states[0].fit, (states[-1].steps, states[-1].fit)
-    still = kept(steps)
-    if len(still) < 2:
-        return steps
-    named = {s.candidate.effect.name for s in still}
-
-    def level(own: Candidate, rival: Candidate) -> bool:
-        axis = final.axis.without(own.effect.name)
-        fit = fit_axis(axis.with_effect(rival.fit.axis[rival.effect.name]), dataset.fit)
-        return tie(dataset, own, score(base, fit, dataset, rival.effect))
-
-    def compared(step: Step) -> Step:
-        rivals = [r for r in step.rivals if r.effect.name not in named]
-        if not rivals:
-            return replace(step, tied=())
-        own = score(base, final, dataset, step.candidate.effect)
-        return replace(step, tied=tuple(r.effect.name for r in rivals if level(own, r)))
-
-    return tuple(compared(s) if s in still and s.beside is None else s for s in steps)
+def _near(best: Candidate, ranking: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """The other candidates that explain about as much as the best."""
+    least = RULE.near * best.evidence.log_gain
+    return tuple(
+        c for c in ranking
+        if c.effect.name != best.effect.name and c.evidence.log_gain > least and not c.is_noise
+    )  # fmt: skip
 
 
 def _eliminated_backwards(
@@ -206,88 +186,3 @@ def _eliminated_backwards(
             fit = without
             dropped.append(candidate.effect.name)
     return fit, tuple(dropped)
-
-
-def _decided(
-    dataset: Dataset, ranking: tuple[Candidate, ...], states: Sequence[SelectionState]
-) -> AxisDiagnosis:
-    """The verdict on the added effects, up to the last one that explained enough.
-
-    Beyond it, and where none explains enough, those are named that are proved against decoys.
-    """
-    base = states[0].fit
-    explained = list(states)
-    while len(explained) > 1 and not _convincing(explained[-2], explained[-1], dataset):
-        explained.pop()
-    steps, final = _compared_again(explained, dataset), explained[-1].fit
-    enough = len(explained) > 1 and _convincing(states[0], explained[-1], dataset)
-    if not (enough and final.at_floor) and len(states) > 1:
-        sure = kept(steps) if enough else []
-        graded = _graded(states, [s.candidate.effect.name for s in sure], dataset)
-        if graded is not None:
-            steps, final, enough = *graded, True
-    if enough:
-        verdict = Verdict.MISSING_EFFECTS
-        done = final.at_floor or held_at_floor(final, dataset)
-        dependence = None if done else find_dependence(final, dataset)
-    elif len(states) == 1 and base.at_floor:
-        verdict, dependence = Verdict.NOTHING_MISSING, None
-    else:
-        steps, final = states[-1].steps, states[-1].fit
-        verdict, dependence = Verdict.UNEXPLAINED, find_dependence(base, dataset)
-    return AxisDiagnosis(dataset, base, ranking, steps, final, verdict, dependence)
-
-
-def _graded(
-    states: Sequence[SelectionState], sure: Sequence[str], dataset: Dataset
-) -> tuple[tuple[Step, ...], Fit] | None:
-    """The steps with those marked that are sure or proved against decoys, and the fit with them.
-
-    None where that proves none beyond the sure ones.
-    """
-    base, (steps, final) = states[0].fit, (states[-1].steps, states[-1].fit)
-    names = [s.candidate.effect.name for s in kept(steps)]
-    if not set(sure) < set(names):
-        return None
-    proved = set(sure)
-    for step in kept(steps):
-        effect = step.candidate.effect
-        if effect.name in sure or effect.name not in final.axis.names:
-            continue
-        beside = proof(less(effect, final, base, dataset), final.axis[effect.name], dataset)
-        if beside is not None and beside.holds:
-            proved.add(effect.name)
-    if proved == set(sure):
-        return None
-    axis = final.axis
-    for name in set(names) - proved:
-        axis = axis.without(name) if name in axis.names else axis
-    fit = final if axis is final.axis else fit_axis(axis, dataset.fit)
-    named = (replace(s, proved=s.candidate.effect.name in proved) for s in steps)
-    return tuple(named), fit
-
-
-def _convincing(before: SelectionState, after: SelectionState, dataset: Dataset) -> bool:
-    """Whether effects reach the noise floor, explain nearly all, or remove the foremost dependence.
-
-    A wrong effect that imitates the missing one does not remove the foremost dependence.
-    """
-    added = after.steps[len(before.steps) :]
-    return (
-        after.fit.at_floor
-        or held_at_floor(after.fit, dataset)
-        or _part(before.fit, after.fit) > RULE.nearly_all
-        or _gone(before.fit, after.fit, added, dataset)
-    )
-
-
-def _part(base: Fit, final: Fit) -> float:
-    """Part of the squared error above the noise floor that is explained."""
-    was, left = base.error**2 - base.floor**2, final.error**2 - final.floor**2
-    return 1.0 - left / was if was > 0.0 else 0.0
-
-
-def _gone(base: Fit, final: Fit, steps: Sequence[Step], dataset: Dataset) -> bool:
-    """Whether effects with much evidence removed the dependence of the residual."""
-    proven = all(s.candidate.delta_bic > RULE.partial_bic for s in steps[:1])
-    return proven and _part(base, final) > RULE.least_part and explains(base, final, dataset)

@@ -24,12 +24,13 @@ class Pair:
     """Two effects that were found beside each other.
 
     first: its fit without the second, its evidence and gain beside the second. second: beside the
-    first. together: both against the base.
+    first. together: both against the base. seconds: all that were ranked beside the first.
     """
 
     first: Candidate
     second: Candidate
     together: Candidate
+    seconds: tuple[Candidate, ...]
 
     @property
     def names(self) -> frozenset[str]:
@@ -55,14 +56,20 @@ def search_pairs(
         beside, seconds = ranked(first.fit, dataset)
         if not (seconds and seconds[0].supported):
             continue
-        pair = _pair(base, dataset, replace(first, fit=beside), seconds[0])
+        pair = _pair(base, dataset, replace(first, fit=beside), seconds)
         if pair is not None and all(p.names != pair.names for p in pairs):
             pairs.append(pair)
     return sorted(pairs, key=lambda p: -p.together.delta_bic)
 
 
-def _pair(base: Fit, dataset: Dataset, first: Candidate, second: Candidate) -> Pair | None:
-    """The pair, if both together reach the noise floor and each is needed; else None."""
+def _pair(
+    base: Fit, dataset: Dataset, first: Candidate, seconds: tuple[Candidate, ...]
+) -> Pair | None:
+    """The pair, if both together reach the noise floor and each is needed; else None.
+
+    seconds: ranked beside the first.
+    """
+    second = seconds[0]
     both = second.fit
     if not (both.at_floor or held_at_floor(both, dataset)):
         return None
@@ -70,7 +77,7 @@ def _pair(base: Fit, dataset: Dataset, first: Candidate, second: Candidate) -> P
     needed = score(less(first.effect, both, base, dataset), both, dataset, first.effect)
     if not (together.supported and needed.supported):
         return None
-    return Pair(replace(needed, fit=first.fit), second, together)
+    return Pair(replace(needed, fit=first.fit), second, together, seconds)
 
 
 def held_at_floor(fit: Fit, dataset: Dataset) -> bool:

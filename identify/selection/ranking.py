@@ -148,11 +148,15 @@ def _merit(c: Candidate) -> tuple[bool, float]:
 
 
 def tie(dataset: Dataset, best: Candidate, other: Candidate) -> bool:
-    """Whether neither the evidence nor the held-out error favours the best of two candidates."""
+    """Whether the held-out error does not favour the best of two candidates.
+
+    Evidence on the fit logs does not count: beside what is left of the force, or where one of the
+    two smooths the noise of the reading, it separates what other logs do not.
+    """
     if best.is_noise or other.is_noise:
         return False
-    if best.evidence.over(other.evidence) > RULE.least_separation:
-        return False
+    if best.effect.dead_time and other.effect.dead_time:
+        return True
     logs = dataset.holdout or dataset.fit
     either = sticks(best.fit.axis) or sticks(other.fit.axis)
     kept = moving(logs, either)

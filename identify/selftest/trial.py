@@ -24,6 +24,7 @@ from identify.selection.residual_dependence import dependences
 from identify.selftest.case import Case
 from identify.selftest.cases import AXIS, Machine, NotShown, machine, own_error, prepared
 from identify.selftest.laws import OUTSIDE
+from twin.effect import Effect, Kind
 from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model
 from twin.model.machine import Fitted
@@ -153,8 +154,9 @@ def _built(case: Case, catalogue: Catalogue) -> Machine:
 def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
     """A finding as an answer.
 
-    Right is a wrong shape where the machine's law has another; and that a missing effect only
-    resembles one of the catalogue where what is planted is none of it.
+    Right is a wrong shape where the machine's law has another, and so over the coordinate of what
+    is planted where that is a friction in place of the model's or the catalogue has no name for it;
+    and that a missing effect only resembles one of the catalogue where what is planted is none.
     """
     names = (finding.effect, *finding.tied)
     match finding.kind:
@@ -162,7 +164,8 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
             right = not {*case.effects, *built.right}.isdisjoint(names)
             right |= not {*built.reshaped}.isdisjoint(finding.tied)
         case FindingKind.WRONG_SHAPE:
-            over = {c.over for e in case.effects if e in OUTSIDE for c in OUTSIDE[e].curves}
+            nameless = [f.effect for f in built.planted if _has_no_name(f.effect, case)]
+            over = {c.over for effect in nameless for c in effect.curves}
             right = not {*built.reshaped}.isdisjoint(names)
             right |= finding.shape is not None and finding.shape.over in over
             right |= not {*case.effects}.isdisjoint(finding.tied)
@@ -171,6 +174,11 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
     return Answer(
         names, finding.kind, right, finding.margin, finding.proof is not None, finding.confidence
     )
+
+
+def _has_no_name(planted: Effect, case: Case) -> bool:
+    """Whether another shape of a law that the model has may be all there is to say of an effect."""
+    return planted.name in OUTSIDE or not case.known or planted.kind is Kind.FRICTION
 
 
 def _tested(found: AxisDiagnosis, built: Machine) -> float:

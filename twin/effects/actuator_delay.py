@@ -36,5 +36,6 @@ EFFECT = Effect(
     states=tuple(f"past_{i}" for i in range(SLOTS)),
     law=law,
     fingerprint="residual follows the rate of change of the command, at every speed and place",
+    dead_time=True,
     excited_by="moves with high jerk: the command must change fast",
 )  # fmt: skip

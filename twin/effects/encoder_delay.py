@@ -34,5 +34,6 @@ EFFECT = Effect(
     states=tuple(f"past_{i}" for i in range(SLOTS)),
     law=law,
     fingerprint="residual follows the jerk: the force comes before the acceleration it causes",
+    dead_time=True,
     excited_by="moves with high jerk: the acceleration must change fast",
 )

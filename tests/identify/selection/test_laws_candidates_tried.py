@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -93,9 +94,8 @@ def tried(
         """A part that is asked about this base, dataset and start, in that order."""
 
         def part(*asked):
-            wanted = (base, dataset, starts[0].fitted)
-            assert all(a is w for a, w in zip(asked, wanted, strict=True))
-            return fit
+            assert asked == (base, dataset, tuple(starts))
+            return fit, starts[0]
 
         return part
 
@@ -174,10 +174,12 @@ def auditioned(monkeypatch, *, after, head=40, whole=100):
     dataset.heads = [range(head)]
     new_axis = axis_of(mass=7.7).with_effect(fitted("dahl"))
 
+    starts = [SimpleNamespace(fitted=fitted("dahl", n=n)) for n in (0.5, 1.0)]
+
     def fit_axis(axis, logs, most):
         assert logs is dataset.heads
-        assert axis.names == ("dahl",)
-        return built_fit(1.0, axis=new_axis)
+        further = axis["dahl"].values["n"] == 1.0  # the second start
+        return built_fit(1.0, axis=new_axis) if further else built_fit(1.1, axis=axis)
 
     def on_heads(given, where):
         assert (given, where) == (base, dataset)
@@ -192,7 +194,10 @@ def auditioned(monkeypatch, *, after, head=40, whole=100):
         lambda axis, logs: noise if axis is PLAIN else after(noise),
     )  # fmt: skip
     monkeypatch.setattr(candidates, "finished", lambda axis, *_: built_fit(0.5, axis=axis))
-    return _fitted_to_heads(base, dataset, fitted("dahl")), noise, new_axis
+    found, start = _fitted_to_heads(base, dataset, starts)
+    whole_logs = head > 0.5 * whole
+    assert start is starts[0 if whole_logs else 1]
+    return found, noise, new_axis
 
 
 @pytest.mark.parametrize(("part", "passed"), [(0.9, False), (1.1, True)])

@@ -239,10 +239,16 @@ def test_a_tie_is_parted_by_t_above_two_and_evidence_above_two(monkeypatch, t, b
     assert tied(monkeypatch, 1.0, 1.0)[0] is alike
 
 
-def test_the_evidence_parts_two_candidates_by_more_than_ten(monkeypatch):
-    assert tied(monkeypatch, 1.0, 1.0, (1.0101, 1.0))[0] is False
-    assert tied(monkeypatch, 1.0, 1.0, (1.0099, 1.0))[0] is True
-    assert tied(monkeypatch, 1.0, 1.0, (1.0, 1.5))[0] is True
+def test_evidence_on_the_fit_logs_parts_no_two_candidates(monkeypatch):
+    assert tied(monkeypatch, 1.0, 1.0, (9.0, 1.0))[0] is True
+    assert tied(monkeypatch, 1.0, 1.1, (1.0, 9.0))[0] is False
+
+
+def test_no_log_tells_which_of_force_and_reading_is_late(monkeypatch):
+    monkeypatch.setattr(ranking, "residual", lambda *_: pytest.fail("compared"))
+    late = [built(e) for e in CATALOGUE.values() if e.dead_time]
+    assert len(late) > 1
+    assert all(tie(DATASET, one, other) for one in late for other in late if one is not other)
 
 
 def test_a_tie_is_judged_on_the_held_out_logs_where_there_are_any(monkeypatch):

@@ -9,16 +9,10 @@ import numpy as np
 import pytest
 from built_fits import NOISE, PLAIN, built, built_fit, dataset_stub, stage, step
 
-from identify.selection.forward_selection import (
-    _convincing,
-    _friction_instead,
-    _gone,
-    _is_added,
-    _near,
-    _part,
-)
+from identify.selection.forward_selection import _friction_instead, _is_added, _near
+from identify.selection.verdict import _convincing, _gone, part_explained
 
-module = importlib.import_module("identify.selection.forward_selection")
+module = importlib.import_module("identify.selection.verdict")
 # The rules as they were decided.
 BEYOND_DOUBT, FLOOR_SURE, MOST_STEPS = 100.0, (0.85, 1.15), 5
 DATASET = dataset_stub()
@@ -37,12 +31,14 @@ def fit_with_part(part: float, base_error: float = 5.0, base_floor: float = 3.0)
 
 @pytest.mark.parametrize("part", [-0.5, 0.0, 0.3, 0.95, 1.0])
 def test_the_part_explained_is_counted_above_the_floor_of_each_fit(part):
-    assert _part(built_fit(5.0, 3.0), fit_with_part(part)) == pytest.approx(part, abs=1e-12)
+    assert part_explained(built_fit(5.0, 3.0), fit_with_part(part)) == pytest.approx(
+        part, abs=1e-12
+    )
 
 
 def test_no_part_is_explained_of_an_error_within_its_floor():
-    assert _part(built_fit(2.0, 2.0), built_fit(0.5, 0.4)) == 0.0
-    assert _part(built_fit(1.0, 2.0), built_fit(0.5, 0.4)) == 0.0
+    assert part_explained(built_fit(2.0, 2.0), built_fit(0.5, 0.4)) == 0.0
+    assert part_explained(built_fit(1.0, 2.0), built_fit(0.5, 0.4)) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -61,12 +57,10 @@ def test_at_the_floor_only_much_evidence_asks_for_an_effect(bic, t, base, asked)
 
 
 def test_a_rival_gains_more_than_four_fifths_of_the_best():
-    best = built(gain=5.0)
-    assert _near(best, built(gain=4.01))
-    assert not _near(best, built(gain=4.0))
-    assert not _near(best, built(gain=3.9))
-    assert not _near(best, built(NOISE, gain=4.5))
-    assert _near(built(gain=1.0), built(gain=5.0))  # the larger is always near
+    best, near = built("wear", gain=5.0), built(gain=4.01)
+    others = [built(gain=4.0), built(gain=3.9), built(NOISE, gain=4.5)]
+    assert _near(best, [best, near, *others]) == (near,)
+    assert _near(near, [best, near]) == (best,)  # the larger is always near
 
 
 # --- what stands in for a friction ----------------------------------------------------------

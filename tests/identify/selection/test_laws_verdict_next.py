@@ -68,8 +68,10 @@ def test_no_pair_is_sought_where_nothing_foretells_what_is_left(monkeypatch):
 
 
 def test_a_pair_is_added_with_the_others_that_tie_with_it(monkeypatch):
+    seconds = (built("cogging", gain=5.0), built("gms", gain=4.5), built("lugre", gain=3.0))
+
     def pair(first, second, bic):
-        return Pair(built(first), built(second), built(second, bic=bic))
+        return Pair(built(first), built(second, gain=5.0), built(second, bic=bic), seconds)
 
     pairs = [pair("wear", "cogging", 90.0), pair("wear", "dahl", 80.0), pair("gms", "lugre", 70.0)]
     monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: False)
@@ -78,9 +80,12 @@ def test_a_pair_is_added_with_the_others_that_tie_with_it(monkeypatch):
     monkeypatch.setattr(
         module, "tie", lambda s, a, b: a is pairs[0].together and b is pairs[1].together
     )
-    first, second = _next(HIGH, DATASET, [built(t=1.0)], None)
+    alone = [built(e, gain=g, t=1.0) for e, g in (("wear", 2.0), ("dahl", 1.7), ("leuven", 1.0))]
+    first, second = _next(HIGH, DATASET, alone, None)
     assert (first.candidate, first.tied, first.beside) == (pairs[0].first, ("dahl",), "cogging")
     assert (second.candidate, second.tied, second.beside) == (pairs[0].second, (), "wear")
+    # Compared with these once both are there, as neither had evidence before.
+    assert (first.rivals, second.rivals) == ((alone[1],), (seconds[1],))
     monkeypatch.setattr(module, "search_pairs", lambda *_: [])
     assert _next(HIGH, DATASET, [], None) == []
 
@@ -110,7 +115,7 @@ def looped(monkeypatch, errors, *, moved=(), shifts=2):
     monkeypatch.setattr(module, "curve_in_place", lambda fit, dataset, ranking, given: None)
     monkeypatch.setattr(module, "_next", following)
     monkeypatch.setattr(module, "_eliminated_backwards", back)
-    monkeypatch.setattr(module, "_decided", decide)
+    monkeypatch.setattr(module, "decided", decide)
     monkeypatch.setattr(module, "moved_by", lambda fit, dataset: next(moves, None))
     monkeypatch.setattr(module, "fit_axis", lambda axis, logs: built_fit(6.0, axis=axis))
     monkeypatch.setattr(module, "synchronised", lambda fit, dataset: (dataset, fit))

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from built_fits import axis_of, built, built_fit, dataset_stub, fitted, stage, step
 
+from identify.dataset.given_logs import Role
+from identify.estimation.errors import Errors
 from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, kept
-from identify.selection.forward_selection import (
-    _compared_again,
-    _decided,
-    _eliminated_backwards,
-    _graded,
-)
+from identify.selection.forward_selection import _eliminated_backwards
 from identify.selection.residual_dependence import Dependence
+from identify.selection.verdict import _compared_again, _graded
+from identify.selection.verdict import decided as decide
 
-module = importlib.import_module("identify.selection.forward_selection")
+module = importlib.import_module("identify.selection.verdict")
+searched = importlib.import_module("identify.selection.forward_selection")
 diagnoses = importlib.import_module("identify.selection.diagnosis")
 # The rules as they were decided.
 BEYOND_DOUBT, FLOOR_SURE, MOST_STEPS = 100.0, (0.85, 1.15), 5
@@ -84,9 +84,9 @@ def looked_back(monkeypatch, needed):
         scored.append((smaller.axis.names[1:], larger.axis.names[1:], effect.name))
         return built(effect, t=9.0 if next(answers) else 1.0)
 
-    monkeypatch.setattr(module, "less", less)
-    monkeypatch.setattr(module, "score", score)
-    monkeypatch.setattr(module, "fit_thoroughly", lambda axis, dataset: built_fit(3.0, axis=axis))
+    monkeypatch.setattr(searched, "less", less)
+    monkeypatch.setattr(searched, "score", score)
+    monkeypatch.setattr(searched, "fit_thoroughly", lambda axis, dataset: built_fit(3.0, axis=axis))
     earlier = [built("cogging"), built("wear")]
     fit, dropped = _eliminated_backwards(HIGH, full, DATASET, earlier)
     return fit, dropped, scored, full
@@ -135,14 +135,19 @@ def test_ties_are_told_again_only_beside_several_effects(monkeypatch):
     steps = (
         step("cogging", ("quadratic_drag",), rivals=rivals),
         step("wear", ("payload_mass",)),
-        step("end_stop", ("payload_mass",), beside="wear"),
+        step("end_stop", ("payload_mass",), beside="wear", rivals=(built("constant_force"),)),
         step("lugre", ("dahl",)),
         step("gms", (), dropped=("lugre",)),
     )
     again = _compared_again([stage(HIGH), stage(final, *steps)], DATASET)
-    assert [s.tied for s in again] == [("constant_force",), (), ("payload_mass",), ("dahl",), ()]
-    assert ties == [("cogging", True, "constant_force"), ("cogging", True, "quadratic_drag")]
-    assert fits == [("wear", "end_stop", r) for r in ("constant_force", "quadratic_drag")]
+    assert [s.tied for s in again] == [
+        ("constant_force",), (), ("payload_mass", "constant_force"), ("dahl",), (),
+    ]  # fmt: skip
+    compared = [("cogging", "constant_force"), ("cogging", "quadratic_drag")]
+    compared.append(("end_stop", "constant_force"))
+    assert ties == [(own, True, rival) for own, rival in compared]
+    own = [("wear", "end_stop"), ("wear", "end_stop"), ("cogging", "wear")]
+    assert fits == [(*o, rival) for o, (_, rival) in zip(own, compared, strict=True)]
     alone = (steps[0],)
     assert _compared_again([stage(HIGH), stage(final, *alone)], DATASET) == alone
 
@@ -153,7 +158,7 @@ STRUCTURE = Dependence(0.5, "position", None, "m", {"position": 0.5})
 
 
 def decided(monkeypatch, stages, convinced, held=False, graded=None):
-    """_decided with convinced(number of steps before, after); what structure was sought in."""
+    """The verdict with convinced(number of steps before, after); what structure was sought in."""
     sought = []
 
     def structure(fit, dataset):
@@ -167,7 +172,7 @@ def decided(monkeypatch, stages, convinced, held=False, graded=None):
     monkeypatch.setattr(module, "find_dependence", structure)
     monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is DATASET)
     monkeypatch.setattr(module, "_graded", lambda states, sure, dataset: graded)
-    found = _decided(DATASET, (built("wear"),), stages)
+    found = decide(DATASET, (built("wear"),), stages)
     return found, sought
 
 
@@ -241,7 +246,6 @@ def test_a_step_is_named_that_is_sure_or_beats_its_decoys(monkeypatch, holds, su
         lambda effect, fit, base, d: built_fit(9.0, axis=fit.axis.without(effect.name)),
     )
     monkeypatch.setattr(module, "proof", proof)
-    monkeypatch.setattr(module, "fit_axis", lambda axis, logs: built_fit(4.5, axis=axis))
     found = _graded(states, sure, dataset_stub())
     assert all(name not in names for names, name in asked)
     assert not set(sure) & {name for _, name in asked}
@@ -252,6 +256,28 @@ def test_a_step_is_named_that_is_sure_or_beats_its_decoys(monkeypatch, holds, su
     assert [s.candidate.effect.name for s in steps if s.proved] == named
     assert set(named) <= set(fit.axis.names)
     assert ("wear" in fit.axis.names) is ("wear" in named)
+
+
+@pytest.mark.parametrize(("after", "named"), [(3.5, True), (3.6, False)])
+def test_without_decoys_an_effect_is_proved_by_a_fifth_less_of_the_squared_error(
+    monkeypatch, after, named
+):
+    """And one that is not goes with what it replaced: a friction never goes alone."""
+    final = built_fit(4.0, axis=axis_of(fitted("wear")).with_effect(fitted("lugre")))
+    states = [stage(HIGH), stage(final, step("lugre"), step("wear"))]
+    asked = []
+
+    def less(effect, fit, base, dataset):
+        asked.append((effect.name, fit.error, base is HIGH))
+        return built_fit(4.5, axis=fit.axis)
+
+    errors = Errors(4.0, after, Role.SELECTION)
+    monkeypatch.setattr(module, "less", less)
+    monkeypatch.setattr(module, "proof", lambda without, fitted, dataset: None)
+    monkeypatch.setattr(module.Errors, "of", lambda *_: errors)
+    found = _graded(states, (), dataset_stub())
+    assert (found is not None) is named
+    assert {name for name, _, beside in asked if beside} == {"lugre", "wear"}
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Two explanations are a tie unless the evidence, or a held-out gain worth having, parts them."""
+"""Two explanations are a tie unless a held-out gain worth having parts them."""
 
 from types import SimpleNamespace
 
@@ -15,7 +15,9 @@ from twin.effects import load_catalogue
 def candidate(scale: float, gain: float):
     """A candidate with this log gain, whose held-out residual is a noise times ``scale``."""
     fit = SimpleNamespace(axis=scale, floor=1e-3)
-    return SimpleNamespace(is_noise=False, fit=fit, evidence=Evidence(gain, 1, 1000.0))
+    return SimpleNamespace(
+        is_noise=False, effect=load_catalogue()["wear"], fit=fit, evidence=Evidence(gain, 1, 1000.0)
+    )
 
 
 @pytest.mark.parametrize(
@@ -24,10 +26,9 @@ def candidate(scale: float, gain: float):
         (1.0002, 1.0, True),  # lower in every block, and next to nothing
         (1.2, 1.0, False),
         (0.8, 1.0, True),
-        (1.0, 0.98, False),
-        (1.0, 0.995, True),
+        (1.0, 0.98, True),
     ],
-    ids=["a trace held out", "much held out", "worse held out", "evidence", "little evidence"],
+    ids=["a trace held out", "much held out", "worse held out", "evidence of the fit logs"],
 )
 def test_tie(scale, gain, tied, monkeypatch):
     noise = 1e-3 * np.random.default_rng(1).standard_normal(3000)

@@ -1,0 +1,140 @@
+"""The verdict on the effects that a selection added: which of them are named, and beside what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from identify.dataset.dataset import Dataset
+from identify.estimation.decision import RULE
+from identify.estimation.errors import Errors
+from identify.estimation.fit import Fit, fit_axis
+from identify.selection.candidates import Candidate, score
+from identify.selection.decoys import proof
+from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, Verdict, kept
+from identify.selection.pair_search import held_at_floor
+from identify.selection.ranking import less, tie
+from identify.selection.residual_dependence import explains, find_dependence
+from twin.effect import Effect
+
+
+def decided(
+    dataset: Dataset, ranking: tuple[Candidate, ...], states: Sequence[SelectionState]
+) -> AxisDiagnosis:
+    """The verdict on the added effects, up to the last one that explained enough.
+
+    Beyond it, and where none explains enough, those are named that are proved against decoys.
+    """
+    base = states[0].fit
+    explained = list(states)
+    while len(explained) > 1 and not _convincing(explained[-2], explained[-1], dataset):
+        explained.pop()
+    steps, final = _compared_again(explained, dataset), explained[-1].fit
+    enough = len(explained) > 1 and _convincing(states[0], explained[-1], dataset)
+    if not (enough and final.at_floor) and len(states) > 1:
+        sure = kept(steps) if enough else []
+        graded = _graded(states, [s.candidate.effect.name for s in sure], dataset)
+        if graded is not None:
+            steps, final, enough = *graded, True
+    if enough:
+        verdict = Verdict.MISSING_EFFECTS
+        done = final.at_floor or held_at_floor(final, dataset)
+        dependence = None if done else find_dependence(final, dataset)
+    elif len(states) == 1 and base.at_floor:
+        verdict, dependence = Verdict.NOTHING_MISSING, None
+    else:
+        steps, final = states[-1].steps, states[-1].fit
+        verdict, dependence = Verdict.UNEXPLAINED, find_dependence(base, dataset)
+    return AxisDiagnosis(dataset, base, ranking, steps, final, verdict, dependence)
+
+
+def _graded(
+    states: Sequence[SelectionState], sure: Sequence[str], dataset: Dataset
+) -> tuple[tuple[Step, ...], Fit] | None:
+    """The steps with those marked that are sure or proved, and the fit with them.
+
+    None where that proves none beyond the sure ones.
+    """
+    base, (steps, final) = states[0].fit, (states[-1].steps, states[-1].fit)
+    there = [s.candidate.effect for s in kept(steps) if s.candidate.effect.name in final.axis.names]
+    if not {*sure} <= {e.name for e in there}:  # a later step made one of them needless
+        return None
+    unsure = [e for e in there if e.name not in sure]
+    left_out = [e for e in unsure if not _is_proved(e, final, base, dataset)]
+    if len(left_out) == len(unsure):
+        return None
+    fit = final
+    for effect in left_out:
+        fit = less(effect, fit, base, dataset)
+    names = {*sure} | {e.name for e in unsure if e not in left_out}
+    named = (replace(s, proved=s.candidate.effect.name in names) for s in steps)
+    return tuple(named), fit
+
+
+def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:
+    """Whether an effect leaves clearly less of the held-out logs than the fit without it.
+
+    Less than its best decoy, where a shift in time makes one.
+    """
+    without = less(effect, final, base, dataset)
+    beside = proof(without, final.axis[effect.name], dataset)
+    if beside is not None:
+        return beside.holds
+    chosen = Errors.of(without, final, dataset, dataset.chosen_on)
+    return chosen.after**2 < RULE.beside_decoys * chosen.before**2
+
+
+def _convincing(before: SelectionState, after: SelectionState, dataset: Dataset) -> bool:
+    """Whether effects reach the noise floor, explain nearly all, or remove the foremost dependence.
+
+    A wrong effect that imitates the missing one does not remove the foremost dependence.
+    """
+    added = after.steps[len(before.steps) :]
+    return (
+        after.fit.at_floor
+        or held_at_floor(after.fit, dataset)
+        or part_explained(before.fit, after.fit) > RULE.nearly_all
+        or _gone(before.fit, after.fit, added, dataset)
+    )
+
+
+def part_explained(base: Fit, final: Fit) -> float:
+    """Part of the squared error above the noise floor that is explained."""
+    was, left = base.error**2 - base.floor**2, final.error**2 - final.floor**2
+    return 1.0 - left / was if was > 0.0 else 0.0
+
+
+def _gone(base: Fit, final: Fit, steps: Sequence[Step], dataset: Dataset) -> bool:
+    """Whether effects with much evidence removed the dependence of the residual."""
+    proven = all(s.candidate.delta_bic > RULE.partial_bic for s in steps[:1])
+    return (
+        proven and part_explained(base, final) > RULE.least_part and explains(base, final, dataset)
+    )
+
+
+def _compared_again(states: Sequence[SelectionState], dataset: Dataset) -> tuple[Step, ...]:
+    """The steps, with ties decided beside all effects that were added.
+
+    When an early effect was compared with its rivals, the later effects were still missing.
+    """
+    base, (steps, final) = states[0].fit, (states[-1].steps, states[-1].fit)
+    still = kept(steps)
+    if len(still) < 2:
+        return steps
+    named = {s.candidate.effect.name for s in still}
+
+    def level(own: Candidate, rival: Candidate) -> bool:
+        axis = final.axis.without(own.effect.name)
+        fit = fit_axis(axis.with_effect(rival.fit.axis[rival.effect.name]), dataset.fit)
+        return tie(dataset, own, score(base, fit, dataset, rival.effect))
+
+    def compared(step: Step) -> Step:
+        rivals = [r for r in step.rivals if r.effect.name not in named]
+        with_pair = step.tied if step.beside else ()
+        if not rivals:
+            return replace(step, tied=with_pair)
+        own = score(base, final, dataset, step.candidate.effect)
+        tied = (r.effect.name for r in rivals if level(own, r))
+        return replace(step, tied=tuple(dict.fromkeys((*with_pair, *tied))))
+
+    return tuple(compared(s) if s in still else s for s in steps)
