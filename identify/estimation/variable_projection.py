@@ -41,13 +41,14 @@ class Start:
     """An effect at one shape with the strengths that one linear step finds best beside a base.
 
     force (n,): N, residual with it and the base as it is. left (n,): N, after the base's own
-    parameters followed by a linear step.
+    parameters followed by a linear step. is_silent: whether no strength makes a force there.
     """
 
     shape: dict[str, float]
     fitted: Fitted
     force: Array
     left: Array
+    is_silent: bool = False
 
     @cached_property
     def squared_error(self) -> float:
@@ -68,7 +69,8 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
 
     All shapes are tried on the logs' heads with the screened strengths, the best of them with every
     strength, and the best of those on all of the logs; the others only if the first gains more
-    there than chance. A friction's shapes are told apart by the heads.
+    there than chance. So are the shapes that make no force on the heads, such as a stop that only a
+    later move reaches. A friction's shapes are told apart by the heads.
     """
     excitation = _with_what_repeats(base, dataset)
     nothing, absent = np.zeros(0), Fitted.at_start(effect)
@@ -80,14 +82,15 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     coarse = [p for p in effect.strengths if p.screened]
     if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
         found = _best(head, found, coarse, RESCORED_SHAPES)
+    found = _best(head, found, effect.strengths, len(found))
     if effect.kind is Kind.FRICTION:
-        return _unlike(_best(head, found, effect.strengths, len(found)))
-    found = _best(head, found, effect.strengths, FULL_SHAPES)
+        return _unlike(found)
     whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
+    unseen = [s for s in found if s.is_silent]
+    found = [s for s in found if not s.is_silent][:FULL_SHAPES] or unseen[:1]
     first = _try(whole, found[0].shape, effect.strengths)
-    if not _beyond_chance(base, first):
-        return [first]
-    others = [_try(whole, s.shape, effect.strengths) for s in found[1:]]
+    likely = found[1:] if _beyond_chance(base, first) else []
+    others = [_try(whole, s.shape, effect.strengths) for s in (*likely, *unseen)]
     return sorted((first, *others), key=lambda s: s.squared_error)[:REFINED_STARTS]
 
 
@@ -244,7 +247,8 @@ def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter
     moved = {c.parameter.name: v for c, v in zip(where, values, strict=True)}
     added = force + columns @ step
     fitted = replace(first, values={**first.values, **moved})
-    return Start(shape, fitted, added, unabsorbed(added, ground.basis))
+    left = unabsorbed(added, ground.basis)
+    return Start(shape, fitted, added, left, is_silent=not columns.any())
 
 
 def _clipped(effect: Effect, excitation: Excitation, shape: dict[str, float]) -> dict[str, float]:

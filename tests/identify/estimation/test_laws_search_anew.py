@@ -1,4 +1,4 @@
-"""A shape is sought anew where the first fit leaves more than noise."""
+"""Which shapes are sought again: where the first fit leaves more than noise, or saw too little."""
 
 from __future__ import annotations
 
@@ -7,17 +7,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from built_fits import PLAIN, axis_of, built_dataset, built_fit, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, built_fit, fitted
 
 from identify.estimation import variable_projection as search
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.estimation.variable_projection import (
     Start,
+    _Ground,
     _is_nearest,
     _promises,
+    _try,
+    _unlike,
     fit_thoroughly,
     fit_without,
+    starts,
 )
 from twin.effect import Excitation
 
@@ -127,3 +131,50 @@ def test_without_an_effect_the_rest_stays_where_it_was(dataset, base):
     np.testing.assert_allclose(
         found.residual, residual(base.axis, dataset.fit)[found.kept] - 0.2, atol=1e-9
     )
+
+
+# --- shapes that the heads do not tell ------------------------------------------------------
+
+
+def of_shape(squared: float, shape: dict[str, float], *, silent: bool = False) -> Start:
+    left = np.array([np.sqrt(squared)])
+    return Start(shape, None, left, left, is_silent=silent)
+
+
+def test_a_start_beside_the_best_shares_no_value_with_it():
+    shapes = [(0.1, 5.0), (0.2, 5.0), (0.1, 6.0), (0.2, 6.0), (0.3, 7.0)]
+    found = [of_shape(1.0, {"v0": v, "sigma0": s}) for v, s in shapes]
+    assert _unlike(found) == [found[0], found[3]]
+    assert _unlike(found[:3]) == [found[0]]
+
+
+def test_a_law_is_silent_where_the_motion_does_not_reach_it():
+    dataset = built_dataset("one", "two")
+    base = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
+    reached = max(float(log.motion.position.max()) for log in dataset.fit)
+    stop = CATALOGUE["end_stop"]
+    ground = _Ground.of(base, dataset, stop, SEEN, on_heads=False)
+    for high, silent in ((0.99 * reached, False), (1.01 * reached, True)):
+        start = _try(ground, {"low": -10.0, "high": high}, stop.strengths)
+        assert start.is_silent is silent
+
+
+@pytest.mark.parametrize("worth", [True, False])
+def test_what_is_silent_on_the_heads_is_tried_on_all_of_the_logs(monkeypatch, worth):
+    """Whatever the best of the others gains; the heads' order tells nothing of the silent ones."""
+    on_heads = [of_shape(i, {"low": i}, silent=i in (0.0, 3.0, 5.0)) for i in np.arange(6.0)]
+    left = {0.0: 9.0, 3.0: 8.0, 5.0: 1.0}  # of squared error on all of the logs; others: 7 N^2
+
+    def tried(ground, shape, strengths):
+        assert ground == "whole"
+        return of_shape(left.get(shape["low"], 7.0 + 0.1 * shape["low"]), shape)
+
+    monkeypatch.setattr(search, "_with_what_repeats", lambda base, dataset: SEEN)
+    monkeypatch.setattr(search, "tried_shapes", lambda e, x: ({"low": i} for i in range(6)))
+    monkeypatch.setattr(search, "_best", lambda *_: on_heads)
+    monkeypatch.setattr(search, "_try", tried)
+    monkeypatch.setattr(search, "_beyond_chance", lambda base, start: worth)
+    grounds = SimpleNamespace(of=lambda *_, on_heads: "head" if on_heads else "whole")
+    monkeypatch.setattr(search, "_Ground", grounds)
+    found = starts("base", "dataset", CATALOGUE["end_stop"])
+    assert [s.shape["low"] for s in found] == [5.0, 1.0]
