@@ -16,14 +16,10 @@ from identify.selftest.design import DEVELOPMENT, FULL
 
 
 def table(results: Sequence[TrialResult]) -> str:
-    """The two tables, as Python text."""
+    """The table, as Python text."""
     answers = answers_of(results)
-    lines = []
-    for name, beside in (("BESIDE_DECOYS", True), ("WITHOUT_DECOYS", False)):
-        own = [a for a in answers if a.beside_decoys is beside]
-        steps = "".join(f"Level({v.margin:.2f}, {v.right:.2f}), " for v in levels(own))
-        lines.append(f"{name} = ({steps.rstrip()})  # {len(own)} answers")
-    return "\n".join(lines)
+    steps = "".join(f"Level({v.left:.2f}, {v.right:.2f}), " for v in levels(answers))
+    return f"LEVELS = ({steps.rstrip()})  # {len(answers)} answers"
 
 
 def main() -> None:

@@ -15,9 +15,10 @@ from identify.selection.candidates import Candidate
 from identify.selection.findings import (
     Finding,
     FindingKind,
+    as_a_whole,
     found,
     found_wrong,
-    left,
+    squared_left,
     with_shape,
 )
 from identify.selection.ranking import less
@@ -144,6 +145,7 @@ class AxisDiagnosis:
             findings = with_shape(findings, wrong)
         shapes = bool(findings) and all(f.kind is FindingKind.WRONG_SHAPE for f in findings)
         verdict = Verdict.WRONG_SHAPE if shapes else self.verdict
+        findings = as_a_whole(findings, self.with_named, self.dataset)
         return replace(self, findings=findings, verdict=verdict)
 
     def beside(self, base: Fit, curves: tuple[Reshaped, ...]) -> AxisDiagnosis:
@@ -182,10 +184,10 @@ class AxisDiagnosis:
         if shape is None or shape.shape.curve.rubs or shape.effect not in self.base.axis.names:
             return findings
         wrong = found_wrong(shape, self.base, without, self.dataset)
-        if RULE.near * left(wrong) > left(finding):
+        if RULE.near * squared_left(wrong) > squared_left(finding):
             return findings
         others = tuple(f for f in findings if f is not finding)
-        if left(wrong) < RULE.beside_decoys * left(finding):
+        if squared_left(wrong) < RULE.beside_decoys * squared_left(finding):
             return with_shape(others, wrong)
         tied = replace(finding, tied=(*finding.tied, wrong.effect))
         return with_shape((*others, tied), replace(wrong, tied=(finding.effect,)))

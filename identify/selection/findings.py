@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import log
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.given_logs import Role
@@ -16,8 +15,6 @@ from identify.selection.decoys import Proof, proof
 from identify.selection.found_shape import FoundShape, found_shape
 from identify.selection.wrong_shape import WrongShape, gain_on_test_logs
 from twin.effect import Effect
-
-ALL = 0.999999  # of the squared error; no effect takes more
 
 
 class FindingKind(Enum):
@@ -41,7 +38,8 @@ class Finding:
     errors in ``unit`` without it and with it; of a wrong shape with the law and with a free curve
     beside it, as one linear step predicts. chosen: the same on the logs that chose; without test
     logs the test errors are these. parameters: of its law. proof: beside decoys; None where a shift
-    in time makes none. shape: the curve that is assumed and the one found, where they differ.
+    in time makes none. shape: the curve that is assumed and the one found, where they differ. left:
+    over the noise floor, the error that all findings together leave on the logs that chose.
     """
 
     effect: str
@@ -54,19 +52,12 @@ class Finding:
     proof: Proof | None
     kind: FindingKind = FindingKind.MISSING
     shape: FoundShape | None = None
-
-    @property
-    def margin(self) -> float:
-        """Logarithm of how many times more error its best decoy leaves; none leaves all of it."""
-        if self.proof is None:
-            return 2.0 * log(self.chosen.before / self.chosen.after)
-        gain, decoy = (min(g, ALL) for g in (self.proof.gain, self.proof.best_decoy))
-        return log((1.0 - decoy) / (1.0 - gain))
+    left: float = 1.0
 
     @property
     def confidence(self) -> float:
         """How often such an answer was right on machines of the self-test, 0..1."""
-        return confidence(self.margin, beside_decoys=self.proof is not None)
+        return confidence(self.left)
 
 
 def found(
@@ -120,7 +111,14 @@ def with_shape(findings: Sequence[Finding], wrong: Finding) -> tuple[Finding, ..
     )
 
 
-def left(finding: Finding) -> float:
+def as_a_whole(findings: tuple[Finding, ...], final: Fit, dataset: Dataset) -> tuple[Finding, ...]:
+    """The findings with what they leave together, beside a final fit with the missing effects."""
+    errors = [f.chosen.after for f in findings if f.kind is FindingKind.WRONG_SHAPE]
+    least = min([error_in(dataset.chosen_on, final, dataset), *errors])
+    return tuple(replace(f, left=least / final.floor) for f in findings)
+
+
+def squared_left(finding: Finding) -> float:
     """Squared error that a finding leaves on the logs that chose, N^2."""
     return finding.chosen.after**2
 

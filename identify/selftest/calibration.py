@@ -50,22 +50,23 @@ def answers_of(results: Sequence[TrialResult]) -> list[Answer]:
 
 
 def levels(answers: Sequence[Answer]) -> tuple[Level, ...]:
-    """How often answers were right by their margin: a rising staircase of a few levels.
+    """How often answers were right by the error they left: a falling staircase of a few levels.
 
-    Levels hold equally many answers, at least LEAST_ANSWERS; one that is not above the one before
+    Levels hold equally many answers, at least LEAST_ANSWERS; one that is not below the one before
     is joined with it (isotonic regression: pool adjacent violators, R. E. Barlow et al.,
     Statistical Inference under Order Restrictions, 1972). The rate of a level is (right + 1) /
-    (answers + 2), Laplace's rule, so that none is certain.
+    (answers + 2), Laplace's rule, so that none is certain. The last has no end.
     """
-    ordered = sorted(answers, key=lambda a: a.margin)
+    ordered = sorted(answers, key=lambda a: a.left)
     count = min(max(len(ordered) // LEAST_ANSWERS, 1), MOST_LEVELS)
     pooled: list[list[Answer]] = []
     for part in np.array_split(np.arange(len(ordered)), count):
         pooled.append([ordered[i] for i in part])
-        while len(pooled) > 1 and _rate(pooled[-1]) <= _rate(pooled[-2]):
+        while len(pooled) > 1 and _rate(pooled[-1]) >= _rate(pooled[-2]):
             last = pooled.pop()
             pooled[-1] += last
-    return tuple(Level(part[0].margin if part else 0.0, _rate(part)) for part in pooled)
+    ends = [part[-1].left for part in pooled[:-1]] + [np.inf]
+    return tuple(Level(end, _rate(part)) for end, part in zip(ends, pooled, strict=True))
 
 
 def _rate(answers: Sequence[Answer]) -> float:

@@ -34,6 +34,7 @@ DURATION = 12.0  # s of each log
 TRAINING, SELECTION, TEST = ("tracking", "moves"), "tracking", "moves"  # what is run for each role
 HIDDEN = 0.9  # part of an effect's force, absorbed by a fit, from which the mass is held fixed
 ROUNDS = 2  # corrections of a friction's level
+LEVELS = (0.1, 10.0)  # times the machine's own friction, within which the level is sought
 REACHED = 0.7  # part of the wanted force that an effect must reach within its bounds
 TRIES = 6  # draws of an effect's values until it shows
 
@@ -195,10 +196,11 @@ def _with_friction(
         beyond = max(trial.base.error**2 - max(best, trial.floor) ** 2, 1e-4 * trial.floor**2)
         return float(np.sqrt(beyond) / trial.floor)
 
+    drawn_at, scale = fitted, 1.0
     for _ in range(ROUNDS):
-        scale = float(np.clip(strength / left(fitted), 0.1, 10.0))
-        scaled = {p.name: scale * fitted.values[p.name] for p in effect.strengths}
-        fitted = Fitted.at_start(effect, {**fitted.values, **scaled})
+        scale = float(np.clip(scale * strength / left(fitted), *LEVELS))
+        scaled = {p.name: scale * drawn_at.values[p.name] for p in effect.strengths}
+        fitted = Fitted.at_start(effect, {**drawn_at.values, **scaled})
     if left(fitted) < REACHED * strength:
         raise NotShown(effect.name)
     return having(fitted), fitted

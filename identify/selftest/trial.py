@@ -38,15 +38,14 @@ NEARLY = 0.8  # part of the strongest dependence from which a coordinate counts 
 class Answer:
     """A finding of the diagnosis, and whether it is right.
 
-    names: the effect, and those declared as ambiguous with it. beside_decoys, margin: what its
-    confidence is read from. confidence: stated, 0..1.
+    names: the effect, and those declared as ambiguous with it. left: error over the noise floor,
+    which its confidence is read from. confidence: stated, 0..1.
     """
 
     names: tuple[str, ...]
     kind: FindingKind
     right: bool
-    margin: float = np.nan
-    beside_decoys: bool = True
+    left: float = np.nan
     confidence: float = np.nan
 
 
@@ -171,9 +170,7 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
             right |= not {*case.effects}.isdisjoint(finding.tied)
         case FindingKind.RESEMBLES:
             right = any(e in OUTSIDE for e in case.effects)
-    return Answer(
-        names, finding.kind, right, finding.margin, finding.proof is not None, finding.confidence
-    )
+    return Answer(names, finding.kind, right, finding.left, finding.confidence)
 
 
 def _has_no_name(planted: Effect, case: Case) -> bool:

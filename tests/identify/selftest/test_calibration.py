@@ -1,4 +1,4 @@
-"""Confidence: a rising staircase, fitted to answers whose truth is known, and judged on others."""
+"""Confidence: a falling staircase, fitted to answers whose truth is known, and judged on others."""
 
 from __future__ import annotations
 
@@ -6,64 +6,63 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built_fits import built_dataset, built_fit
 from built_results import errors
 
 from identify.selection import confidence as stated
 from identify.selection.confidence import Level, confidence
-from identify.selection.decoys import Proof
-from identify.selection.findings import Finding, FindingKind
+from identify.selection.findings import Finding, FindingKind, as_a_whole
 from identify.selftest.calibration import LEAST_ANSWERS, MOST_LEVELS, levels, reliability
 from identify.selftest.case import Case
 from identify.selftest.trial import Answer, TrialResult
 
-MADE = Finding("a", (), 0.9, *errors(2.0, 1.0), "N", {}, Proof(0.75, 0.5))
+MADE = Finding("a", (), 0.9, *errors(2.0, 1.0), "N", {}, None)
 
 
 def answers(count: int, seed: int) -> list[Answer]:
-    """Right with a chance that grows with the margin: 1 - exp(-margin)."""
+    """Right with a chance that falls with the error left: exp(1 - left), from the floor on."""
     rng = np.random.default_rng(seed)
     return [
-        Answer(("a",), FindingKind.MISSING, bool(rng.random() < 1.0 - np.exp(-m)), m)
-        for m in rng.exponential(1.0, count)
+        Answer(("a",), FindingKind.MISSING, bool(rng.random() < np.exp(1.0 - left)), left)
+        for left in 1.0 + rng.exponential(1.0, count)
     ]
 
 
-def test_a_margin_is_how_many_times_less_is_left_than_by_the_best_decoy() -> None:
-    assert MADE.margin == pytest.approx(np.log(2.0))
-    assert replace(MADE, proof=None).margin == pytest.approx(np.log(4.0))
-    assert np.isfinite(replace(MADE, proof=Proof(1.0, 0.3)).margin)
-    assert replace(MADE, proof=Proof(0.5, -0.5)).margin > 0.0 > replace(
-        MADE, proof=Proof(0.5, 0.6)
-    ).margin  # fmt: skip
+def test_confidence_falls_with_the_error_that_is_left(monkeypatch) -> None:
+    monkeypatch.setattr(stated, "LEVELS", (Level(1.3, 0.9), Level(np.inf, 0.6)))
+    assert [confidence(left) for left in (0.8, 1.3, 1.31, 99.0)] == [0.9, 0.9, 0.6, 0.6]
+    assert replace(MADE, left=1.2).confidence == 0.9
+    assert replace(MADE, left=1.4).confidence == 0.6
 
 
-def test_confidence_rises_with_the_margin(monkeypatch) -> None:
-    monkeypatch.setattr(stated, "BESIDE_DECOYS", (Level(0.2, 0.6), Level(1.0, 0.9)))
-    found = [confidence(m, beside_decoys=True) for m in (-1.0, 0.2, 0.99, 1.0, 9.0)]
-    assert found == [0.6, 0.6, 0.6, 0.9, 0.9]
+def test_all_findings_together_leave_the_least_that_the_shapes_among_them_leave() -> None:
+    final = built_fit(2.0, 0.5)
+    shape = replace(MADE, kind=FindingKind.WRONG_SHAPE, chosen=errors(2.0, 0.7)[1])
+    dataset = built_dataset("one", held=())
+    alone, among = as_a_whole((MADE,), final, dataset), as_a_whole((MADE, shape), final, dataset)
+    assert [f.left for f in alone] == pytest.approx([2.0 / 0.5])
+    assert [f.left for f in among] == pytest.approx([0.7 / 0.5] * 2)
 
 
-def test_the_table_that_is_shipped_rises() -> None:
-    for table in (stated.BESIDE_DECOYS, stated.WITHOUT_DECOYS):
-        right = [level.right for level in table]
-        assert right == sorted(right)
-        assert all(0.0 < r < 1.0 for r in right)
+def test_the_table_that_is_shipped_falls_and_has_no_end() -> None:
+    right = [level.right for level in stated.LEVELS]
+    assert right == sorted(right, reverse=True)
+    assert all(0.0 < r < 1.0 for r in right)
+    assert stated.LEVELS[-1].left == np.inf
 
 
-def test_levels_rise_and_are_as_many_as_the_answers_allow() -> None:
+def test_levels_fall_and_are_as_many_as_the_answers_allow() -> None:
     few, some, many = (levels(answers(n, 3)) for n in (LEAST_ANSWERS - 1, 65, 4000))
     assert len(few) == 1
     assert len(some) <= 2
     assert len(many) == MOST_LEVELS
-    assert [v.right for v in many] == sorted(v.right for v in many)
-    assert levels([]) == (Level(0.0, 0.5),)
+    assert [v.right for v in many] == sorted((v.right for v in many), reverse=True)
+    assert levels([]) == (Level(np.inf, 0.5),)
 
 
 def test_a_table_of_some_answers_holds_on_others(monkeypatch) -> None:
-    monkeypatch.setattr(stated, "BESIDE_DECOYS", levels(answers(4000, 1)))
-    judged = [
-        replace(a, confidence=confidence(a.margin, beside_decoys=True)) for a in answers(4000, 2)
-    ]
+    monkeypatch.setattr(stated, "LEVELS", levels(answers(4000, 1)))
+    judged = [replace(a, confidence=confidence(a.left)) for a in answers(4000, 2)]
     found = reliability([TrialResult(Case(("a",), 5.0, 1), answers=tuple(judged))])
     assert sum(t.right.trials for t in found) == 4000
     for tenth in found:

@@ -49,7 +49,7 @@ FOREIGN = next(iter(OUTSIDE))
 
 def answer(*names: str, right: bool, sure: float = 0.6, shape: bool = False) -> Answer:
     kind = FindingKind.WRONG_SHAPE if shape else FindingKind.MISSING
-    return Answer(names, kind, right, 1.0, True, sure)
+    return Answer(names, kind, right, 1.0, sure)
 
 
 def outcomes_of(counts: dict[TrialResult, int]) -> list[TrialResult]:
@@ -388,10 +388,9 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
     assert out.tested == 1.2
     # Planted; right besides; neither; its law is another; it is not.
     assert [a.right for a in out.answers] == [True, True, False, True, False]
-    assert [a.beside_decoys for a in out.answers] == [True] * 4 + [False]
     assert out.answers[0].names == ("wear", "cogging")
-    assert (out.answers[0].margin, out.answers[0].confidence) == (
-        finding.margin, finding.confidence,
+    assert (out.answers[0].left, out.answers[0].confidence) == (
+        finding.left, finding.confidence,
     )  # fmt: skip
     trial.run(Case(("cogging",), 3.0, 7, "bumps", known))
     assert asked["draw"] == first

@@ -69,7 +69,7 @@ def test_a_design_plants_every_physical_effect_the_stage_lacks():
 
 # --- what is shown, of invented outcomes ------------------------------------------------------
 
-SURE = Answer(("a",), FindingKind.MISSING, True, 1.0, True, 0.95)
+SURE = Answer(("a",), FindingKind.MISSING, True, 1.0, 0.95)
 NAMED = TrialResult(Case(("a",), 5.0, 1), "MISSING_EFFECTS", (SURE,), ratio=5.0, left=1.0)
 WRONG = replace(NAMED, answers=(replace(SURE, names=("b",), right=False, confidence=0.55),))
 QUIET = TrialResult(Case((), 0.0, 2), "NOTHING_MISSING", held=(Held("mass", 0.3, True),))
