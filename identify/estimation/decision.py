@@ -40,6 +40,10 @@ class DecisionRule:
     same_error: relative error that simpler values may have. pair_first: part of the squared error
     that the first of two effects must explain alone.
 
+    beside_decoys: part of what its best decoy leaves of the squared error that an effect may leave.
+    least_finding: least part of the squared error that one of several effects must explain; the law
+    of another, a tenth off, leaves as much.
+
     least_share: share of the squared residual below which a dependence does not count. rather: part
     of the share of time from which another coordinate is preferred. left_over: part of a dependence
     that may remain after an effect that explains it.
@@ -80,6 +84,7 @@ class DecisionRule:
     pair_first: float = 0.1
 
     beside_decoys: float = 0.8
+    least_finding: float = 0.01
 
     least_share: float = 0.1
     rather: float = 0.8

@@ -70,7 +70,7 @@ def found(
     return Finding(
         effect=effect.name,
         tied=tied,
-        explains=_share(tested, base, dataset),
+        explains=share_explained(tested, base, dataset),
         tested=tested,
         chosen=chosen,
         unit=final.axis.units.force,
@@ -88,7 +88,7 @@ def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> F
     return Finding(
         effect=shape.effect,
         tied=(),
-        explains=_share(tested, base, dataset),
+        explains=share_explained(tested, base, dataset),
         tested=tested,
         chosen=chosen,
         unit=final.axis.units.force,
@@ -129,7 +129,7 @@ def _linear_step(fit: Fit, dataset: Dataset, on: Role, gain: float) -> Errors:
     return Errors(before, before * (1.0 - gain) ** 0.5, on)
 
 
-def _share(errors: Errors, base: Fit, dataset: Dataset) -> float:
+def share_explained(errors: Errors, base: Fit, dataset: Dataset) -> float:
     """Part of the squared error above the noise floor by which an error falls.
 
     Of the base's, or of the error before where the fit without one finding leaves more.

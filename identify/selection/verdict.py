@@ -12,6 +12,7 @@ from identify.estimation.fit import Fit, fit_axis
 from identify.selection.candidates import Candidate, score
 from identify.selection.decoys import proof
 from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, Verdict, kept
+from identify.selection.findings import share_explained
 from identify.selection.pair_search import held_at_floor
 from identify.selection.ranking import less, tie
 from identify.selection.residual_dependence import explains, find_dependence
@@ -37,6 +38,7 @@ def decided(
         if graded is not None:
             steps, final, enough = *graded, True
     if enough:
+        steps, final = _without_small(steps, final, base, dataset)
         verdict = Verdict.MISSING_EFFECTS
         done = final.at_floor or held_at_floor(final, dataset)
         dependence = None if done else find_dependence(final, dataset)
@@ -69,6 +71,29 @@ def _graded(
     names = {*sure} | {e.name for e in unsure if e not in left_out}
     named = (replace(s, proved=s.candidate.effect.name in names) for s in steps)
     return tuple(named), fit
+
+
+def _without_small(
+    steps: tuple[Step, ...], final: Fit, base: Fit, dataset: Dataset
+) -> tuple[tuple[Step, ...], Fit]:
+    """The steps and the fit without those that explain next to nothing beside the others.
+
+    What a large effect's law leaves of it may be significant, and be taken by any other law.
+    """
+
+    def share(step: Step) -> float:
+        without = less(step.candidate.effect, final, base, dataset)
+        return share_explained(Errors.of(without, final, dataset, dataset.chosen_on), base, dataset)
+
+    named = [s for s in kept(steps) if s.proved and s.candidate.effect.name in final.axis.names]
+    if len(named) < 2:
+        return steps, final
+    least, smallest = min(((share(s), s) for s in named), key=lambda pair: pair[0])
+    if least >= RULE.least_finding:
+        return steps, final
+    rest = tuple(replace(s, proved=False) if s is smallest else s for s in steps)
+    without = less(smallest.candidate.effect, final, base, dataset)
+    return _without_small(rest, without, base, dataset)
 
 
 def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:

@@ -49,7 +49,7 @@ EFFECT = Effect(
             "frequency", "Hz", 100.0, 1.0, 2000.0, "of the load on the contact, drive held",
             scan=lambda e: tuple(20.0 * 1.25**k for k in range(11)),
         ),
-        Parameter("damping", "1", 0.1, 1e-4, 0.5, "damping ratio of film and contact", fixed=True),
+        Parameter("damping", "1", 0.1, 1e-4, 0.5, "damping ratio of film and contact"),
     ),
     states=("displacement", "speed"),
     law=law,

@@ -9,7 +9,7 @@ from built_fits import built_dataset, built_fit
 
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors
-from identify.selection.findings import _share
+from identify.selection.findings import share_explained
 
 
 def test_a_share_is_of_the_squared_error_above_the_noise_floor():
@@ -17,10 +17,14 @@ def test_a_share_is_of_the_squared_error_above_the_noise_floor():
     base.__dict__["floor"] = 0.3
     without = built_dataset("one", held=())
     fall = Errors(0.6, 0.4, Role.TRAINING)
-    assert _share(fall, base, without) == pytest.approx((0.6**2 - 0.4**2) / (0.7**2 - 0.3**2))
+    assert share_explained(fall, base, without) == pytest.approx(
+        (0.6**2 - 0.4**2) / (0.7**2 - 0.3**2)
+    )
     # Without one of several effects a fit may leave more than the base did.
     more = Errors(0.9, 0.5, Role.TRAINING)
-    assert _share(more, base, without) == pytest.approx((0.9**2 - 0.5**2) / (0.9**2 - 0.3**2))
-    assert _share(replace(more, after=0.1), base, without) == 1.0
+    assert share_explained(more, base, without) == pytest.approx(
+        (0.9**2 - 0.5**2) / (0.9**2 - 0.3**2)
+    )
+    assert share_explained(replace(more, after=0.1), base, without) == 1.0
     base.__dict__["floor"] = 0.8  # the base is at the floor: nothing is left to share
-    assert _share(fall, base, without) == 0.0
+    assert share_explained(fall, base, without) == 0.0
