@@ -15,10 +15,17 @@ from identify.estimation.variable_projection import fit_thoroughly
 from identify.selection.candidates import Candidate, score
 from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, kept
 from identify.selection.pair_search import held_at_floor, search_pairs
-from identify.selection.ranking import Progress, less, rank, tie, took_friction
+from identify.selection.ranking import (
+    Progress,
+    less,
+    part_explained,
+    rank,
+    tie,
+    took_friction,
+)
 from identify.selection.reshaping import Reshaped, curve_in_place
 from identify.selection.unpredictable import is_unpredictable, with_own_noise
-from identify.selection.verdict import decided, part_explained
+from identify.selection.verdict import decided
 from twin.effect import Kind
 from twin.effects import Catalogue
 

@@ -2,7 +2,7 @@
 
 While another effect is missing, the residual is coloured and the base distorted, so a candidate has
 a small effective sample size and may raise the held-out error. With both effects the error can
-reach the noise floor.
+reach the noise floor, or come near what noise leaves.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, error_on, rms
 from identify.selection.candidates import Candidate, score
-from identify.selection.ranking import less
+from identify.selection.ranking import less, part_explained
 
 FIRSTS = 3  # candidates for the first effect of a pair
 
@@ -44,7 +44,7 @@ def search_pairs(
     ranking: Sequence[Candidate],
     ranked: Callable[[Fit, Dataset], tuple[Fit, tuple[Candidate, ...]]],
 ) -> list[Pair]:
-    """Pairs that bring the error to the noise floor, best first.
+    """Pairs that bring the error to the noise floor or explain nearly all of it, best first.
 
     ranked: ranks every absent effect beside a fit. Fit and held-out logs must support both effects
     together, and each beside the other.
@@ -65,13 +65,14 @@ def search_pairs(
 def _pair(
     base: Fit, dataset: Dataset, first: Candidate, seconds: tuple[Candidate, ...]
 ) -> Pair | None:
-    """The pair, if both together reach the noise floor and each is needed; else None.
+    """The pair, if both together explain enough and each is needed; else None.
 
     seconds: ranked beside the first.
     """
     second = seconds[0]
     both = second.fit
-    if not (both.at_floor or held_at_floor(both, dataset)):
+    nearly_all = part_explained(base, both) > RULE.nearly_all  # beside noise that has no model
+    if not (nearly_all or both.at_floor or held_at_floor(both, dataset)):
         return None
     together = score(base, both, dataset, second.effect)
     needed = score(less(first.effect, both, base, dataset), both, dataset, first.effect)

@@ -114,6 +114,12 @@ def _explained(base: Fit, candidate: Candidate) -> float:
     return 1.0 - (candidate.fit.error / base.error) ** 2
 
 
+def part_explained(base: Fit, final: Fit) -> float:
+    """Part of the squared error above the noise floor that is explained."""
+    was, left = base.error**2 - base.floor**2, final.error**2 - final.floor**2
+    return 1.0 - left / was if was > 0.0 else 0.0
+
+
 def less(effect: Effect, fit: Fit, base: Fit, dataset: Dataset) -> Fit:
     """The fit without an effect, refitted; a friction is replaced by that of the base."""
     if effect.kind is Kind.FRICTION:

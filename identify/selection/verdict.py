@@ -14,7 +14,7 @@ from identify.selection.decoys import proof
 from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, Verdict, kept
 from identify.selection.findings import share_explained
 from identify.selection.pair_search import held_at_floor
-from identify.selection.ranking import less, tie
+from identify.selection.ranking import less, part_explained, tie
 from identify.selection.residual_dependence import explains, find_dependence
 from twin.effect import Effect
 
@@ -121,12 +121,6 @@ def _convincing(before: SelectionState, after: SelectionState, dataset: Dataset)
         or part_explained(before.fit, after.fit) > RULE.nearly_all
         or _gone(before.fit, after.fit, added, dataset)
     )
-
-
-def part_explained(base: Fit, final: Fit) -> float:
-    """Part of the squared error above the noise floor that is explained."""
-    was, left = base.error**2 - base.floor**2, final.error**2 - final.floor**2
-    return 1.0 - left / was if was > 0.0 else 0.0
 
 
 def _gone(base: Fit, final: Fit, steps: Sequence[Step], dataset: Dataset) -> bool:

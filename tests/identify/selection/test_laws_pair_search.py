@@ -104,6 +104,16 @@ def test_a_pair_brings_the_error_to_the_floor_and_needs_both(monkeypatch):
     assert ahead(monkeypatch, made, {})[0] == []
 
 
+def test_a_pair_far_above_the_floor_must_explain_nearly_all(monkeypatch):
+    """What stood above a floor of 1 N beside noise that no model foretells."""
+    base = built_fit(40.0)
+    for part, found in ((0.951, 1), (0.949, 0)):
+        left = np.sqrt(1.0 + (1.0 - part) * (40.0**2 - 1.0))
+        seconds = {"cogging": [second("wear", "cogging", error=left)]}
+        pairs = ahead(monkeypatch, [first("cogging", 30.0)], seconds, base=base)[0]
+        assert len(pairs) == found
+
+
 def test_a_first_explains_a_part_alone(monkeypatch):
     seconds = {"cogging": [second("wear", "cogging")]}
     edge = 4.0 * np.sqrt(1.0 - LEAST_PART)

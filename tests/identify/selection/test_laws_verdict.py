@@ -10,7 +10,8 @@ import pytest
 from built_fits import NOISE, PLAIN, built, built_fit, dataset_stub, stage, step
 
 from identify.selection.forward_selection import _friction_instead, _is_added, _near
-from identify.selection.verdict import _convincing, _gone, part_explained
+from identify.selection.ranking import part_explained
+from identify.selection.verdict import _convincing, _gone
 
 module = importlib.import_module("identify.selection.verdict")
 # The rules as they were decided.
