@@ -3,7 +3,8 @@
 Slow force noise, such as of a cooling hose or of an amplifier, stands above the noise floor that
 sensors tell, and no effect explains it. What cannot be predicted is noise: neither curves over a
 coordinate of the motion, nor what moved before, learned on some logs, foretell the residual of the
-others, or its size, better than the same shifted in time; and it has no line in its spectrum.
+others, or its size, better than the same shifted in time; it has no line in its spectrum, and does
+not swing between bounds as a tone of moving frequency does.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.estimation.decision import RULE
 from identify.estimation.errors import holdout_error
+from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit, Outcome, finished
 from identify.selection.decoys import Trial
 from identify.selection.residual_dependence import coordinates_of, find_dependence, gathered
@@ -51,10 +53,13 @@ def noise_known(axis: AxisModel, dataset: Dataset) -> Dataset:
 
 @lru_cache(maxsize=1)  # a selection asks it of one fit for its curves, its pairs and its end
 def is_unpredictable(fit: Fit, dataset: Dataset) -> bool:
-    """Whether neither the motion nor its past foretells the residual, and no line stands out.
+    """Whether neither the motion nor its past foretells the residual, and it swings as noise does.
 
     Neither on the held-out logs nor on blocks left out of the fit logs; noise is as large on both.
+    No line stands out of its spectrum, and it has no amplitude that it keeps.
     """
+    if keeps_its_amplitude(fit.residual):
+        return False
     held = holdout_error(fit, dataset)
     if held is not None and held > ALIKE * fit.error:
         return False
@@ -69,6 +74,17 @@ def is_unpredictable(fit: Fit, dataset: Dataset) -> bool:
         _foretells(t, columns, least, sticking)
         for (t, least), columns in itertools.product(trials, predictors)
     )
+
+
+def keeps_its_amplitude(force: Array) -> bool:
+    """Whether a force (n,) swings between bounds, as a tone does, also one of moving frequency.
+
+    By its kurtosis: 3 of Gaussian noise, 1.5 of a sine; that of n samples scatters by sqrt(24 / n)
+    (R. A. Fisher, Statistical Methods for Research Workers, section 14).
+    """
+    squares = force**2
+    kurtosis = np.mean(squares**2) / np.mean(squares) ** 2
+    return bool(kurtosis < 3.0 - RULE.least_t * np.sqrt(24.0 / effective_samples(force)))
 
 
 def _foretells(trial: Trial, columns: Columns, least: float, sticking: bool) -> bool:

@@ -10,7 +10,12 @@ from built_fits import PLAIN, built_dataset
 
 from identify.estimation.fit import Outcome, finished
 from identify.output.words.estimation import prepared_in_words
-from identify.selection.unpredictable import is_unpredictable, noise_known, with_own_noise
+from identify.selection.unpredictable import (
+    is_unpredictable,
+    keeps_its_amplitude,
+    noise_known,
+    with_own_noise,
+)
 
 SIZE = 0.05  # N RMS, far above what sensors make here
 
@@ -49,13 +54,19 @@ def of_speed(log, rng):
     return noise(log, rng) * (1.0 + 4.0 * (log.test_function.mean(log.motion.velocity) > 0.0))
 
 
+def chirp(log, rng):
+    """A tone that moves from 5 to 25 Hz, of constant amplitude."""
+    time = log.time
+    return np.sqrt(2.0) * SIZE * np.sin(2.0 * np.pi * (5.0 + 10.0 * time / time[-1]) * time)
+
+
 def fit_to(data):
     return finished(PLAIN, PLAIN, data.fit, Outcome.CONVERGED)
 
 
 @pytest.mark.parametrize("held", [("held",), ()], ids=["held out", "left out"])
 @pytest.mark.parametrize(
-    ("force", "is_noise"), [(noise, True), (of_place, False), (of_speed, False)]
+    ("force", "is_noise"), [(noise, True), (of_place, False), (of_speed, False), (chirp, False)]
 )
 def test_only_what_nothing_foretells_is_noise(force, is_noise, held):
     data = left(force, held)
@@ -82,3 +93,15 @@ def test_what_is_larger_on_the_held_out_logs_is_no_noise():
     data = left(noise)
     more = tuple(replace(log, command=2.0 * log.command) for log in data.holdout)
     assert not is_unpredictable(fit_to(data), replace(data, holdout=more))
+
+
+def test_a_tone_keeps_its_amplitude_and_noise_does_not():
+    """Kurtosis 1.5 and 3; the limit of n independent samples is 3 - 3 sqrt(24 / n)."""
+    rng = np.random.default_rng(4)
+    time = np.linspace(0.0, 1.0, 4000)
+    swinging = np.sin(2.0 * np.pi * (5.0 + 60.0 * time) * time)
+    assert keeps_its_amplitude(swinging)
+    assert keeps_its_amplitude(swinging + 0.3 * rng.standard_normal(4000))
+    assert not any(keeps_its_amplitude(rng.standard_normal(400)) for _ in range(100))
+    assert not any(keeps_its_amplitude(slow_noise(rng, 2000)) for _ in range(20))
+    assert not keeps_its_amplitude(swinging[:300])  # too few to tell
