@@ -27,6 +27,7 @@ from identify.estimation.fit import Fit, Outcome, error_on, finished, fit_axis, 
 from identify.estimation.force_balance import residual
 from identify.estimation.time_origin import phases_found
 from identify.estimation.variable_projection import Start, fit_thoroughly, one_linear_step, starts
+from identify.selection.decoys import proof
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel, MachineModel
@@ -45,7 +46,8 @@ class Candidate:
 
     plausible: whether the axis travels far enough for what repeats along the track to be seen to,
     as one cycle over all of the travel is any smooth force of position; and no time, length or
-    frequency of the law ended at its bound, beyond which it is another law.
+    frequency of the law ended at its bound, beyond which it is another law. beats_decoys: whether
+    it was set against them, and held.
     """
 
     effect: Effect
@@ -54,6 +56,7 @@ class Candidate:
     evidence: Evidence
     gain: Gain
     plausible: bool = True
+    beats_decoys: bool = False
 
     def __repr__(self) -> str:
         return f"<Candidate {self.effect.name} on {self.axis}: evidence {self.delta_bic:.4g}>"
@@ -66,8 +69,9 @@ class Candidate:
     @property
     def supported(self) -> bool:
         """Whether evidence and held-out logs support the effect, and its values are plausible."""
+        held_out = self.gain.t > RULE.least_t or self.beats_decoys
         return (
-            self.delta_bic > RULE.least_bic and self.gain.t > RULE.least_t and self.plausible
+            self.delta_bic > RULE.least_bic and held_out and self.plausible
             and (self.is_noise or self.gain.after < self.gain.before)
         )  # fmt: skip
 
@@ -221,7 +225,7 @@ def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     before, after = both(lambda f: f.residual[shared[f.kept]])
     added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
     added += phases_found(fit.axis, effect.name, dataset)
-    proof = evidence(before, after, added)
+    found = evidence(before, after, added)
     if dataset.holdout:
         held = moving(dataset.holdout, sticks(base.axis) or sticks(fit.axis))
         motions = [log.motion for log in dataset.holdout]  # it may differ from the fit logs
@@ -229,18 +233,32 @@ def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
             residual(f.axis, dataset.holdout)[held] / forces_lessened(f.axis, motions)
             for f in (base, fit)
         ]
-    elif proof.delta_bic > RULE.least_bic:
+    elif found.delta_bic > RULE.least_bic:
         pair = both(lambda f: _cross_validated(f, shared[f.kept]))
     else:  # not supported, whatever cross-validation would give
         pair = [before, after]
-    return Candidate(
-        effect=effect,
-        axis=dataset.axis,
-        fit=fit,
-        evidence=proof,
-        gain=held_out_gain(pair[0], pair[1], base.floor),
-        plausible=proof.delta_bic < RULE.least_bic or _is_plausible(fit, effect, dataset),
+    gain = held_out_gain(pair[0], pair[1], base.floor)
+    candidate = Candidate(effect, dataset.axis, fit, found, gain)
+    if found.delta_bic < RULE.least_bic:
+        return candidate
+    return replace(
+        candidate,
+        plausible=_is_plausible(fit, effect, dataset),
+        beats_decoys=gain.t < RULE.least_t and _beats_decoys(base, candidate, dataset),
     )
+
+
+def _beats_decoys(base: Fit, candidate: Candidate, dataset: Dataset) -> bool:
+    """Whether a held-out gain that is large, but uneven over the blocks, is the effect's own.
+
+    Where much else is left, blocks differ by that.
+    """
+    gain = candidate.gain
+    if gain.after**2 > RULE.beside_decoys * gain.before**2:
+        return False
+    name = candidate.effect.name
+    beside = proof(base, candidate.fit.axis[name], dataset)
+    return beside is not None and beside.holds
 
 
 def _is_plausible(fit: Fit, effect: Effect, dataset: Dataset) -> bool:
