@@ -1,0 +1,67 @@
+"""A held-out gain that is large but uneven over the blocks counts where it beats its decoys."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from built_fits import built, built_dataset, built_fit
+
+from identify.dataset.given_logs import Role
+from identify.estimation.evidence import Gain
+from identify.selection.candidates import _beats_decoys
+from identify.selection.decoys import Proof
+from identify.selection.findings import _linear_step
+
+module = importlib.import_module("identify.selection.candidates")
+LEAST_T, LEAST_BIC, PART = 3.0, 10.0, 0.8  # the rules as they were decided
+
+
+@pytest.mark.parametrize(
+    ("t", "beats", "bic", "after", "supported"),
+    [
+        (LEAST_T + 0.1, False, 50.0, 1.0, True),
+        (LEAST_T - 0.1, False, 50.0, 1.0, False),
+        (LEAST_T - 0.1, True, 50.0, 1.0, True),
+        (LEAST_T - 0.1, True, LEAST_BIC - 0.1, 1.0, False),
+        (LEAST_T - 0.1, True, 50.0, 2.1, False),
+    ],
+)
+def test_beating_the_decoys_stands_for_an_even_gain_alone(t, beats, bic, after, supported):
+    made = replace(built(bic=bic, t=t, before=2.0, after=after), beats_decoys=beats)
+    assert made.supported is supported
+
+
+@pytest.mark.parametrize(
+    ("part", "proof", "beats"),
+    [
+        (PART - 0.01, Proof(0.9, 0.1), True),
+        (PART + 0.01, Proof(0.9, 0.1), False),  # not asked
+        (PART - 0.01, Proof(0.9, 0.88), False),
+        (PART - 0.01, None, False),  # a friction has no decoys
+    ],
+)
+def test_an_effect_must_take_a_fifth_of_the_held_out_square_and_hold(
+    monkeypatch, part, proof, beats
+):
+    base = built_fit(5.0)
+    made = replace(built("wear"), gain=Gain(2.0, 2.0 * np.sqrt(part), 1.0))
+
+    def asked(without, fitted, dataset):
+        assert (without, fitted, dataset) == (base, made.fit.axis["wear"], "data")
+        assert part < PART
+        return proof
+
+    monkeypatch.setattr(module, "proof", asked)
+    assert _beats_decoys(base, made, "data") is beats
+
+
+def test_a_linear_step_takes_none_of_the_noise():
+    fit = built_fit(2.0, 0.5)
+    data = built_dataset("one", held=())
+    assert _linear_step(fit, data, Role.TRAINING, 0.75).after == pytest.approx(1.0)
+    assert _linear_step(fit, data, Role.TRAINING, 0.999).after == pytest.approx(0.5)
+    quiet = built_fit(0.4, 0.5)
+    assert _linear_step(quiet, data, Role.TRAINING, 0.5).after == pytest.approx(0.4)
