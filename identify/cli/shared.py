@@ -135,6 +135,9 @@ def with_roles(
     test: list[Path] | None,
 ) -> tuple[Result, list[str]]:
     """The result of a job on a model and the logs of each role; and the findings on the first."""
+    from twin.memory import share
+
+    share()
     held, tests = holdout or [], test or []
     recorded, findings = read_checked(logs, beside=[*held, *tests])
     others = read_measured(held, beside=[*logs, *tests]), read_measured(tests, [*logs, *held])

@@ -78,6 +78,11 @@ class Fit:
         return floor_of(self.axis, self.logs)
 
     @cached_property
+    def samples(self) -> float:
+        """Effective sample size of the residual."""
+        return effective_samples(self.residual)
+
+    @cached_property
     def lessened(self) -> float:
         """RMS force of the motor over the RMS command, where that is less than half; else 1."""
         return forces_lessened(self.axis, [log.motion for log in self.logs])
@@ -123,7 +128,7 @@ class Fit:
         """
         if not len(self.residual):
             return ()
-        noise = self.error * np.sqrt(len(self.residual) / effective_samples(self.residual))
+        noise = self.error * np.sqrt(len(self.residual) / self.samples)
         values = read(self.axis, self.scaling.where)
         out = []
         for c, value, column in zip(self.scaling.where, values, self.jacobian.T, strict=True):

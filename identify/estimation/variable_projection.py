@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,7 @@ class Start:
         if before == 0.0:
             return 0.0
         part = before / max(self.squared_error, 1e-12 * before)
-        return float(effective_samples(base.residual) * np.log(part))
+        return float(base.samples * np.log(part))
 
 
 def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
@@ -205,18 +205,24 @@ class _Ground:
         cls, base: Fit, dataset: Dataset, effect: Effect, excitation: Excitation, *, on_heads: bool
     ) -> _Ground:
         rest = _without_friction(base.axis) if effect.kind is Kind.FRICTION else base.axis
-        columns = [i for i, c in enumerate(base.scaling.where) if _belongs(c, rest)]
         among = dataset.in_heads if on_heads else np.ones(len(base.kept), dtype=bool)
-        rows = among[base.kept]
         return cls(
             excitation=excitation,
             logs=dataset.heads if on_heads else dataset.fit,
             effect=effect,
             rest=rest,
-            basis=orthonormal(base.jacobian[rows][:, columns]),
-            unchanged=base.residual[rows],
+            basis=_basis(base, dataset if on_heads else None, rest.names),
+            unchanged=base.residual[among[base.kept]],
             kept=base.kept[among],
         )
+
+
+@lru_cache(maxsize=4)  # every effect asks it of the same base: on the heads and whole
+def _basis(base: Fit, heads: Dataset | None, names: tuple[str, ...]) -> Array:
+    """Orthonormal basis of what the base's parameters of some effects can add, on heads if any."""
+    columns = [i for i, c in enumerate(base.scaling.where) if not c.effect or c.effect in names]
+    rows = base.jacobian if heads is None else base.jacobian[heads.in_heads[base.kept]]
+    return orthonormal(rows[:, columns])
 
 
 def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter]) -> Start:
@@ -241,10 +247,6 @@ def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter
 def _clipped(effect: Effect, excitation: Excitation, shape: dict[str, float]) -> dict[str, float]:
     values = {**effect.starts(excitation), **shape}
     return {p.name: float(min(max(values[p.name], p.lower), p.upper)) for p in effect.parameters}
-
-
-def _belongs(c: ParameterReference, axis: AxisModel) -> bool:
-    return not c.effect or c.effect in axis.names
 
 
 def _without_friction(axis: AxisModel) -> AxisModel:

@@ -164,7 +164,7 @@ def refitted(base: Fit, dataset: Dataset, look: Look) -> Candidate:
 def _promising(base: Fit, start: Start) -> bool:
     """Whether the gain of the linear step is large enough that a refit may give evidence."""
     free = len(start.fitted.effect.parameters) - len(start.fitted.fixed)
-    asked = RULE.least_bic + free * np.log(effective_samples(base.residual))
+    asked = RULE.least_bic + free * np.log(base.samples)
     return bool(start.gain(base) > RULE.promise * asked)
 
 
