@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 from contextlib import suppress
 
-
 M_ARENA_MAX = -8  # malloc.h of glibc
 
 

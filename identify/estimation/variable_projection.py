@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit, Outcome, finished, fit_axis
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.scaling import Scaling
