@@ -19,6 +19,7 @@ from identify.dataset.drive import parts_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import Fit, Outcome, finished, fit_axis
 from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.levenberg_marquardt import minimise
 from identify.estimation.scaling import Scaling
 from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.effect import Effect, Excitation, Kind, Parameter
@@ -32,6 +33,8 @@ RESCORED_SHAPES = 12  # best shapes of a coarse scan that are tried with every s
 CHANCE = 4.0  # twice the gain in log likelihood, for each strength, that a scan of noise finds
 FULL_SHAPES = 4  # best shapes on the logs' heads that are tried on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
+EXACT = 1e-13  # relative fall of the squared error below which strengths within bounds are found
+MOST_STEPS = 100
 BETTER = 0.99  # part of the error that a new start must reach to be taken
 
 
@@ -270,9 +273,10 @@ def _bounded_step(
     if ((step < low) | (step > high)).any():
         if len(step) == 1:
             return np.clip(step, low, high) / norms
-        from scipy.optimize import lsq_linear  # longer to load than most fits take
-
-        factor = np.linalg.cholesky(normal)
-        bounds = (low, np.maximum(high, low + 1e-12))
-        step = lsq_linear(factor.T, np.linalg.solve(factor, wanted), bounds=bounds).x
+        factor = np.linalg.cholesky(normal).T.astype(float)
+        aim = np.linalg.solve(factor.T, wanted)
+        step = minimise(
+            lambda x: factor @ x - aim, lambda x: factor, step, (low, high),
+            tolerance=EXACT, most_evaluations=MOST_STEPS,
+        ).x  # fmt: skip
     return np.asarray(step / norms)

@@ -148,7 +148,8 @@ def refitted(base: Fit, dataset: Dataset, look: Look) -> Candidate:
         return first
     if fit.outcome is Outcome.NOT_CONVERGED:
         fit = fit_axis(fit.axis, dataset.fit)
-    first = score(base, simplified(fit, dataset, effect), dataset, effect)
+    fit = simplified(fit, dataset, effect)
+    first = first if fit is first.fit else score(base, fit, dataset, effect)
     if first.fit.at_floor or first.delta_bic < RULE.least_bic:
         return first
     # It helps but does not explain everything. The effect was missing when the base was fitted,
