@@ -87,16 +87,16 @@ Effects = Annotated[
 
 @contextmanager
 def bars_on_stderr() -> Iterator[Progress]:
-    """Progress bars on standard error, one for each kind of work."""
+    """Progress bars on standard error, one for each kind of work; none where nobody sees it."""
+    if not sys.stderr.isatty():
+        yield lambda what, done, total: None
+        return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     tasks: dict[str, Any] = {}
-    console = Console(stderr=True)
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bars:
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
 
         def show(what: str, done: int, total: int) -> None:
             if what not in tasks:
@@ -135,6 +135,9 @@ def with_roles(
     test: list[Path] | None,
 ) -> tuple[Result, list[str]]:
     """The result of a job on a model and the logs of each role; and the findings on the first."""
+    from twin.memory import share
+
+    share()
     held, tests = holdout or [], test or []
     recorded, findings = read_checked(logs, beside=[*held, *tests])
     others = read_measured(held, beside=[*logs, *tests]), read_measured(tests, [*logs, *held])

@@ -186,7 +186,7 @@ class Motion:
                 return step
         return 0.0
 
-    @cached_property
+    @property
     def rounding(self) -> Array:
         """What rounding to the readings' step made of the position, (n + 1,) m, about.
 

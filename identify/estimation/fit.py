@@ -78,6 +78,11 @@ class Fit:
         return floor_of(self.axis, self.logs)
 
     @cached_property
+    def samples(self) -> float:
+        """Effective sample size of the residual."""
+        return effective_samples(self.residual)
+
+    @cached_property
     def lessened(self) -> float:
         """RMS force of the motor over the RMS command, where that is less than half; else 1."""
         return forces_lessened(self.axis, [log.motion for log in self.logs])
@@ -123,7 +128,7 @@ class Fit:
         """
         if not len(self.residual):
             return ()
-        noise = self.error * np.sqrt(len(self.residual) / effective_samples(self.residual))
+        noise = self.error * np.sqrt(len(self.residual) / self.samples)
         values = read(self.axis, self.scaling.where)
         out = []
         for c, value, column in zip(self.scaling.where, values, self.jacobian.T, strict=True):
@@ -160,7 +165,7 @@ def _is_added(axis: AxisModel, c: ParameterReference) -> bool:
     return effect.kind is not Kind.FRICTION and not effect.is_nonparametric
 
 
-def _is_constant(axis: AxisModel, c: ParameterReference) -> bool:
+def is_constant(axis: AxisModel, c: ParameterReference) -> bool:
     """Whether it is a strength whose column no free parameter changes: of a force with no other."""
     if not (c.effect and c.parameter.strength):
         return False
@@ -197,9 +202,10 @@ class _Problem:
         self.pull = np.zeros(len(self.start))
         self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
         # A force is linear in its strengths, so their columns are computed once.
-        self.constant = np.array([_is_constant(axis, c) for c in self.scaling.where], dtype=bool)
+        self.constant = np.array([is_constant(axis, c) for c in self.scaling.where], dtype=bool)
         self.constant_columns = jacobian(axis, logs, self._where(self.constant))
         self._last: tuple[bytes, Array] = b"", np.zeros((0, 0))
+        self._last_force: tuple[bytes, Array] = b"", np.zeros(0)
 
     def set_priors(self, internal: Array) -> float:
         """Weigh the priors by the residual's size, its colour, and the force to be explained.
@@ -207,7 +213,7 @@ class _Problem:
         Returns the effective sample size of the residual there.
         """
         axis = self.scaling.outside(self.axis, internal)
-        left = residual(axis, self.logs)[self.kept]
+        left = self.force(internal)
         inertia = axis.mass * np.concatenate([log.acceleration for log in self.logs])
         command = np.concatenate([log.command for log in self.logs])
         explained = rms((command - inertia)[self.kept])
@@ -241,9 +247,17 @@ class _Problem:
             self._last = place, self.scaling.chain(axis, self.jacobian(axis))[self.kept]
         return self._last[1]
 
+    def force(self, internal: Array) -> Array:
+        """The kept residual (n,) N; that of the last place is kept, as the columns are."""
+        place = internal.tobytes()
+        if self._last_force[0] != place:
+            axis = self.scaling.outside(self.axis, internal)
+            self._last_force = place, residual(axis, self.logs)[self.kept]
+        return self._last_force[1]
+
     def rows(self, internal: Array) -> Array:
-        force = residual(self.scaling.outside(self.axis, internal), self.logs)[self.kept]
-        return np.concatenate([force, self.pull * (internal - self.centre), self.smooth @ internal])
+        pulled = self.pull * (internal - self.centre)
+        return np.concatenate([self.force(internal), pulled, self.smooth @ internal])
 
     def slopes(self, internal: Array) -> Array:
         return np.vstack([self.columns(internal), np.diag(self.pull), self.smooth])
@@ -269,23 +283,16 @@ def fit_axis(
         samples = problem.set_priors(internal)
         internal, converged = problem.solve(internal, NEGLIGIBLE / samples)
     outcome = Outcome.CONVERGED if converged else Outcome.NOT_CONVERGED
-    return finished(problem.scaling.outside(axis, internal), axis, logs, outcome)
+    fitted, left = problem.scaling.outside(axis, internal), problem.force(internal)
+    return Fit(fitted, logs, problem.scaling, outcome, left, problem.kept, axis)
 
 
 def finished(
     axis: AxisModel, begun: AxisModel, logs: Sequence[PreparedLog], outcome: Outcome
 ) -> Fit:
     """The fit object of an axis with its present values, without fitting."""
-    kept = moving(logs, sticks(axis))
-    return Fit(
-        axis=axis,
-        logs=logs,
-        scaling=Scaling(free_parameters(axis)),
-        outcome=outcome,
-        residual=residual(axis, logs)[kept],
-        kept=kept,
-        begun=begun,
-    )
+    kept, scaling = moving(logs, sticks(axis)), Scaling(free_parameters(axis))
+    return Fit(axis, logs, scaling, outcome, residual(axis, logs)[kept], kept, begun)
 
 
 def error_on(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:

@@ -17,13 +17,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identify.estimation.evidence import left_out
-from identify.estimation.fit import Fit
+from identify.estimation.fit import Fit, is_constant
 from identify.estimation.force_balance import changes
 from twin.model.intervals import AxisIntervals
 from twin.model.parameters import ParameterReference, read, write
@@ -166,6 +167,8 @@ def open_sides(fit: Fit, where: Sequence[ParameterReference], half: Array) -> di
     """
     tried: list[tuple[ParameterReference, Side, float]] = []
     for c, width, value in zip(where, half, read(fit.axis, where), strict=True):
+        if is_constant(fit.axis, c):  # the squared error is a parabola in it
+            continue
         for side, far in ((Side.SMALLER, -FAR * width), (Side.LARGER, FAR * width)):
             to = np.clip(value + far, c.parameter.lower, c.parameter.upper)
             step = read(write(fit.axis, [c], [to]), [c])[0] - value
@@ -208,6 +211,7 @@ def refusal(fit: Fit) -> NoInterval | None:
     return ModelWrong(fit.error, fit.floor, fit.axis.units.force)
 
 
+@lru_cache(maxsize=2)  # its estimates, the file and what the fit changed ask for the same
 def half_widths(fit: Fit) -> Array:
     """Half widths (k,) of the 90 % intervals, in the parameters' units; inf where not excited."""
     return half_widths_of(fit, np.eye(fit.jacobian.shape[1]))

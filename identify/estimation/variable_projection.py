@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit, Outcome, finished, fit_axis
 from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.levenberg_marquardt import minimise
 from identify.estimation.scaling import Scaling
 from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.effect import Effect, Excitation, Kind, Parameter
@@ -33,6 +33,8 @@ RESCORED_SHAPES = 12  # best shapes of a coarse scan that are tried with every s
 CHANCE = 4.0  # twice the gain in log likelihood, for each strength, that a scan of noise finds
 FULL_SHAPES = 4  # best shapes on the logs' heads that are tried on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
+EXACT = 1e-13  # relative fall of the squared error below which strengths within bounds are found
+MOST_STEPS = 100
 BETTER = 0.99  # part of the error that a new start must reach to be taken
 
 
@@ -61,7 +63,7 @@ class Start:
         if before == 0.0:
             return 0.0
         part = before / max(self.squared_error, 1e-12 * before)
-        return float(effective_samples(base.residual) * np.log(part))
+        return float(base.samples * np.log(part))
 
 
 def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
@@ -217,18 +219,24 @@ class _Ground:
         cls, base: Fit, dataset: Dataset, effect: Effect, excitation: Excitation, *, on_heads: bool
     ) -> _Ground:
         rest = _without_friction(base.axis) if effect.kind is Kind.FRICTION else base.axis
-        columns = [i for i, c in enumerate(base.scaling.where) if _belongs(c, rest)]
         among = dataset.in_heads if on_heads else np.ones(len(base.kept), dtype=bool)
-        rows = among[base.kept]
         return cls(
             excitation=excitation,
             logs=dataset.heads if on_heads else dataset.fit,
             effect=effect,
             rest=rest,
-            basis=orthonormal(base.jacobian[rows][:, columns]),
-            unchanged=base.residual[rows],
+            basis=_basis(base, dataset if on_heads else None, rest.names),
+            unchanged=base.residual[among[base.kept]],
             kept=base.kept[among],
         )
+
+
+@lru_cache(maxsize=4)  # every effect asks it of the same base: on the heads and whole
+def _basis(base: Fit, heads: Dataset | None, names: tuple[str, ...]) -> Array:
+    """Orthonormal basis of what the base's parameters of some effects can add, on heads if any."""
+    columns = [i for i, c in enumerate(base.scaling.where) if not c.effect or c.effect in names]
+    rows = base.jacobian if heads is None else base.jacobian[heads.in_heads[base.kept]]
+    return orthonormal(rows[:, columns])
 
 
 def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter]) -> Start:
@@ -256,10 +264,6 @@ def _clipped(effect: Effect, excitation: Excitation, shape: dict[str, float]) ->
     return {p.name: float(min(max(values[p.name], p.lower), p.upper)) for p in effect.parameters}
 
 
-def _belongs(c: ParameterReference, axis: AxisModel) -> bool:
-    return not c.effect or c.effect in axis.names
-
-
 def _without_friction(axis: AxisModel) -> AxisModel:
     return replace(
         axis, effects=tuple(f for f in axis.effects if f.effect.kind is not Kind.FRICTION)
@@ -282,9 +286,10 @@ def _bounded_step(
     if ((step < low) | (step > high)).any():
         if len(step) == 1:
             return np.clip(step, low, high) / norms
-        from scipy.optimize import lsq_linear  # longer to load than most fits take
-
-        factor = np.linalg.cholesky(normal)
-        bounds = (low, np.maximum(high, low + 1e-12))
-        step = lsq_linear(factor.T, np.linalg.solve(factor, wanted), bounds=bounds).x
+        factor = np.linalg.cholesky(normal).T.astype(float)
+        aim = np.linalg.solve(factor.T, wanted)
+        step = minimise(
+            lambda x: factor @ x - aim, lambda x: factor, step, (low, high),
+            tolerance=EXACT, most_evaluations=MOST_STEPS,
+        ).x  # fmt: skip
     return np.asarray(step / norms)

@@ -153,7 +153,8 @@ def refitted(base: Fit, dataset: Dataset, look: Look) -> Candidate:
         return first
     if fit.outcome is Outcome.NOT_CONVERGED:
         fit = fit_axis(fit.axis, dataset.fit)
-    first = score(base, simplified(fit, dataset, effect), dataset, effect)
+    fit = simplified(fit, dataset, effect)
+    first = first if fit is first.fit else score(base, fit, dataset, effect)
     if first.fit.at_floor or first.delta_bic < RULE.least_bic:
         return first
     # It helps but does not explain everything. The effect was missing when the base was fitted,
@@ -169,7 +170,7 @@ def refitted(base: Fit, dataset: Dataset, look: Look) -> Candidate:
 def _promising(base: Fit, start: Start) -> bool:
     """Whether the gain of the linear step is large enough that a refit may give evidence."""
     free = len(start.fitted.effect.parameters) - len(start.fitted.fixed)
-    asked = RULE.least_bic + free * np.log(effective_samples(base.residual))
+    asked = RULE.least_bic + free * np.log(base.samples)
     return bool(start.gain(base) > RULE.promise * asked)
 
 

@@ -49,19 +49,25 @@ class Linearised:
         cls, base: Fit, dataset: Dataset, fitted: Fitted, among: NDArray[np.bool_] | None = None
     ) -> Linearised:
         """The base's residual, or some of its test functions (n,), with an effect's columns."""
-        rows = np.flatnonzero(base.kept)
-        some = slice(None) if among is None or among.all() else np.flatnonzero(among)
+        some = np.flatnonzero(np.ones(len(base.residual), bool) if among is None else among)
         effect = fitted.effect
         free = [p for p in effect.strengths if p.name not in fitted.fixed]
         own = [ParameterReference(effect.name, p) for p in free]
         where = [*base.scaling.where, *own]
         alone = replace(base.axis, effects=(fitted,))
-        new = jacobian(alone, dataset.fit, own)[rows[some]]
+        first = len(base.scaling.where)
+        columns = np.empty((len(some), len(where)))
+        columns[:, :first] = base.jacobian[some]
+        rows, end = np.flatnonzero(base.kept)[some], 0
+        for log in dataset.fit:  # one after the other: there are many columns
+            begin, end = end, end + len(log)
+            here = (rows >= begin) & (rows < end)
+            columns[here, first:] = jacobian(alone, [log], own)[rows[here] - begin]
         norms = np.linalg.norm(base.jacobian, axis=0)
         bends = smoothing(base.axis, where, len(base.residual))
         physics = bends.T @ bends + np.diag([*(RIDGE * norms) ** 2, *np.zeros(len(own))])
         return cls(
-            where, base.residual[some], np.hstack([base.jacobian[some], new]), physics,
+            where, base.residual[some], columns, physics,
             {
                 part.name: _penalty(part, effect.name, where)
                 for part in effect.parts if not fitted.fixed.issuperset(part.strengths)

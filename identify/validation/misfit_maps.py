@@ -124,7 +124,7 @@ def compare_axis(
     floor = floor_of(axis, dataset.fit)
     where = {k: v[kept] for k, v in _coordinates(axis, dataset.fit).items()}
     force = every[kept]
-    maps = _maps(axis, dataset, force, where)
+    maps = _maps(axis, dataset, floor, force, where)
     maps.append(misfit_by_frequency(axis, dataset.fit))
     return AxisComparison(
         axis=dataset.axis,
@@ -144,15 +144,15 @@ def compare_axis(
 def worst_region(fit: Fit, dataset: Dataset) -> Region | None:
     """Where the force error of a fit stands most above its noise floor; None where nowhere."""
     where = {k: v[fit.kept] for k, v in _coordinates(fit.axis, dataset.fit).items()}
-    maps = _maps(fit.axis, dataset, fit.residual, where)
-    return next(iter(worst_regions(maps, effective_samples(fit.residual))), None)
+    maps = _maps(fit.axis, dataset, floor_of(fit.axis, dataset.fit), fit.residual, where)
+    return next(iter(worst_regions(maps, fit.samples)), None)
 
 
 def _maps(
-    axis: AxisModel, dataset: Dataset, force: Array, where: Mapping[str, Array]
+    axis: AxisModel, dataset: Dataset, floor: float, force: Array, where: Mapping[str, Array]
 ) -> list[MisfitMap]:
-    """The misfit of a force (n,) N along each coordinate (n,)."""
-    motion, floor = dataset.fit[0].motion, floor_of(axis, dataset.fit)
+    """The misfit of a force (n,) N, with its noise floor in N, along each coordinate (n,)."""
+    motion = dataset.fit[0].motion
     return [
         misfit_map(name, force, values, floor, unit_of(name, motion, KNOWN_UNITS), axis.units.force)
         for name, values in where.items()

@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from twin.signals import between, local_cubic, local_parabola, rate, sliding_products, usual_size
+from twin.signals import (
+    MANY,
+    between,
+    local_cubic,
+    local_parabola,
+    median,
+    rate,
+    sliding_products,
+    usual_size,
+)
 
 PERIOD = 0.02
 T = PERIOD * np.arange(-8, 9)
@@ -49,3 +58,14 @@ def test_sliding_products_are_those_of_every_stretch():
         pattern = rng.normal(size=length)
         wanted = [pattern @ signal[k : k + length] for k in range(38 - length)]
         np.testing.assert_allclose(sliding_products(signal, pattern), wanted, atol=1e-12)
+
+
+def test_the_median_of_many_is_exact():
+    rng = np.random.default_rng(5)
+    for count in (MANY - 1, MANY, 3 * MANY + 1):
+        noise = np.abs(rng.normal(size=count))
+        wave = np.sin(np.arange(count) * 2.0 * np.pi / (count // 1000))  # as often as the sample
+        for values in (noise, np.sort(noise), np.round(noise, 1), wave, np.full(count, 2.0)):
+            assert median(values) == np.median(values)
+        noise[7] = np.nan
+        assert np.isnan(median(noise))

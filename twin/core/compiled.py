@@ -18,6 +18,7 @@ import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
+from numba.core.runtime import rtsys
 from numba.extending import register_jitable
 
 from twin.effect import own_functions
@@ -25,6 +26,11 @@ from twin.effect import own_functions
 
 class _Cache(FunctionCache):
     """A function's cache, keyed by all that is compiled into the function."""
+
+    def load_overload(self, sig, target_context):
+        # Of what numba prepares for its compiler (0.4 s), machine code needs only its runtime.
+        rtsys.initialize(target_context)
+        return self._load_overload(sig, target_context)
 
     def _index_key(self, sig, codegen):
         return (*super()._index_key(sig, codegen), digest(self._py_func))

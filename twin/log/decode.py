@@ -54,11 +54,18 @@ def read_parts(
 ) -> Iterator[Log]:
     """The same log without truth in parts of ``samples`` or a few more, one after the other.
 
-    So that a long one need not be held in memory; the whole is verified when the last part was
-    taken. Raises InputError as read_log does. A log that does not state its sample rate, that has
-    no statistics, or whose topics do not lie side by side, is one part.
+    So that a long one need not be held in memory. Raises InputError as read_log does. A log that
+    does not state its sample rate, that has no statistics, or whose topics do not lie side by side,
+    is one part.
     """
     wanted = Wanted(None, fields, truth=False)
+    with _remedied(path), open_mcap(Path(path)) as file:
+        yield from log_parts(file, file.selected(_channels(file, wanted)), wanted, samples)
+
+
+def verified_parts(path: str | Path, samples: int) -> Iterator[Log]:
+    """The same, with all of the file verified when the last part was taken."""
+    wanted = Wanted(truth=False)
     with _remedied(path), open_mcap(Path(path)) as file:
         yield from log_parts(file, file.records_with(_channels(file, wanted)), wanted, samples)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from twin.log.check import check_log
 from twin.log.check.parts import Part, together
 from twin.log.check.report import CheckReport
-from twin.log.decode import read_parts, samples_by_axis
+from twin.log.decode import read_parts, samples_by_axis, verified_parts
 from twin.log.log import Log, joined
 from twin.log.thin import thinned
 from twin.memory import give_back
@@ -21,9 +21,9 @@ LONGEST_STEP = 5e-4  # s: two in a block of motion; with one the residual is hal
 
 
 def check_file(path: Path) -> CheckReport:
-    """The findings on a whole log, which is read part by part. Raises InputError."""
+    """The findings on a whole log, which is read part by part and verified. Raises InputError."""
     reports: list[Part] = []
-    for _ in _checked(_parts(path), reports):
+    for _ in _checked(verified_parts(path, _part_samples(path)), reports):
         pass
     return together(reports)
 
@@ -52,9 +52,14 @@ def step_of(paths: Iterable[Path]) -> int:
 
 def _parts(path: Path, fields: Sequence[str] | None = None) -> Iterator[Log]:
     """The log in as few parts of about the same length as memory allows."""
+    return read_parts(path, _part_samples(path), fields=fields)
+
+
+def _part_samples(path: Path) -> int:
+    """Samples of such a part."""
     counts = samples_by_axis(path)
     parts = max(1, -(-sum(counts.values()) // LARGEST_PART))
-    return read_parts(path, -(-max(counts.values(), default=1) // parts), fields=fields)
+    return -(-max(counts.values(), default=1) // parts)
 
 
 def _checked(parts: Iterable[Log], reports: list[Part]) -> Iterator[Log]:

@@ -32,6 +32,12 @@ from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters, read
 
 
+class Stub(SimpleNamespace):
+    """What is asked of a fit, which is one thing with itself alone."""
+
+    __hash__ = object.__hash__
+
+
 def jackknife(columns, data, at) -> np.ndarray:
     """Half widths of 90 % by leaving one block of 30 out, by refitting."""
     moves = [without(columns, data, b) - at for b in cut(len(data), 30)]
@@ -61,7 +67,7 @@ def by_influence(columns, data, at) -> np.ndarray:
 @pytest.mark.parametrize("seed", [3, 4])
 def test_intervals_are_those_of_the_jackknife_over_time_or_influence(seed):
     columns, data, at = linear(seed)
-    fit = SimpleNamespace(jacobian=columns, residual=columns @ at - data)
+    fit = Stub(jacobian=columns, residual=columns @ at - data)
     both = jackknife(columns, data, at), by_influence(columns, data, at)
     np.testing.assert_allclose(half_widths(fit), np.maximum(*both), rtol=1e-6)
 
@@ -90,7 +96,7 @@ def test_a_law_that_bends_is_seen_over_influence_though_not_over_time():
     push = rng.normal(size=3000)
     force = push - 0.05 * push**3 + 0.01 * rng.normal(size=3000)
     columns, at = push[:, None], np.array([push @ force / (push @ push)])
-    (wide,) = half_widths(SimpleNamespace(jacobian=columns, residual=columns @ at - force))
+    (wide,) = half_widths(Stub(jacobian=columns, residual=columns @ at - force))
     (narrow,) = jackknife(columns, force, at)
     assert abs(1.0 - at[0]) > 8.0 * narrow
     assert wide > 3.0 * narrow
@@ -112,7 +118,7 @@ def test_what_a_prior_or_bound_shifts_is_in_the_interval():
     columns, data, at = linear(5)
     for off in ([0.7, 0.0, 0.0], [0.1, -0.02, 30.0]):
         held = at + off
-        fit = SimpleNamespace(jacobian=columns, residual=columns @ held - data)
+        fit = Stub(jacobian=columns, residual=columns @ held - data)
         found = half_widths(fit)
         moves = []
         for b in cut(len(data), 30):
@@ -126,12 +132,12 @@ def test_what_a_prior_or_bound_shifts_is_in_the_interval():
 
 def test_what_a_fit_does_not_see_has_no_interval_and_twins_are_named():
     columns, data, at = linear(6)
-    seen = half_widths(SimpleNamespace(jacobian=columns, residual=columns @ at - data))
+    seen = half_widths(Stub(jacobian=columns, residual=columns @ at - data))
     wide = np.column_stack([columns[:, 0], np.zeros(len(data)), columns[:, 1:]])
-    some = half_widths(SimpleNamespace(jacobian=wide, residual=columns @ at - data))
+    some = half_widths(Stub(jacobian=wide, residual=columns @ at - data))
     np.testing.assert_allclose(some[[0, 2, 3]], seen)
     assert np.isinf(some[1])
-    none = SimpleNamespace(jacobian=0.0 * wide, residual=data)
+    none = Stub(jacobian=0.0 * wide, residual=data)
     assert np.isinf(half_widths(none)).all()
     p = Parameter("", "N", 0.0, -1.0, 1.0, "")
     where = [ParameterReference("e", replace(p, name=n)) for n in "abcde"]
@@ -139,13 +145,13 @@ def test_what_a_fit_does_not_see_has_no_interval_and_twins_are_named():
     for correlation, told in ((INSEPARABLE + 3e-5, True), (INSEPARABLE - 1e-4, False)):
         near = -7.0 * (correlation * a + np.sqrt(1.0 - correlation**2) * b)
         jacobian = np.stack([c, 0.0 * a, a, near], axis=1)
-        fit = SimpleNamespace(jacobian=jacobian, scaling=Scaling(tuple(where[:4])))
+        fit = Stub(jacobian=jacobian, scaling=Scaling(tuple(where[:4])))
         assert inseparable(fit) == ({"e.c": "e.d", "e.d": "e.c"} if told else {})
 
 
 def test_a_wrong_model_has_no_intervals():
     axis = AxisModel(1.0)
-    fit = SimpleNamespace(residual=np.ones(3), ratio=LARGEST_RATIO, error=0.2, floor=0.1, axis=axis)
+    fit = Stub(residual=np.ones(3), ratio=LARGEST_RATIO, error=0.2, floor=0.1, axis=axis)
     assert refusal(fit) is None
     fit.ratio = 1.001 * LARGEST_RATIO
     assert "0.2 N is 2.0 times the noise floor 0.1 N" in no_interval_in_words(refusal(fit))
@@ -167,7 +173,7 @@ def test_a_side_is_open_where_the_error_hardly_rises(monkeypatch, rises, wanted)
     p = Parameter("a", "N", 0.0, -9.0, 9.0, "")
     c = ParameterReference("constant_force", p)
     axis = AxisModel(1.0, effects=(replace(effect("constant_force"), values={"a": 2.0}),))
-    fit = SimpleNamespace(
+    fit = Stub(
         axis=axis, logs=None, scaling=Scaling((c,)), kept=np.array([True, True, False]),
         residual=np.array([3.0, 0.0]), jacobian=np.array([[0.0], [1.0]]),
     )  # fmt: skip
@@ -206,7 +212,7 @@ def test_the_rise_foreseen_counts_what_a_bound_or_prior_left_of_the_slope(monkey
     """With a slope of 0.8 at the end, a step d is foreseen to raise the square by 0.8 d + d^2."""
     c = ParameterReference("constant_force", Parameter("a", "N", 0.0, -9.0, 9.0, ""))
     axis = AxisModel(1.0, effects=(replace(effect("constant_force"), values={"a": 2.0}),))
-    fit = SimpleNamespace(
+    fit = Stub(
         axis=axis, logs=None, scaling=Scaling((c,)), kept=np.array([True, True]),
         residual=np.array([3.0, 0.4]), jacobian=np.array([[0.0], [1.0]]),
     )  # fmt: skip

@@ -11,7 +11,7 @@ from built_fits import CATALOGUE, axis_of, built_fit, fitted
 from constructed import COVERED, log_of
 from scipy.stats import t as student
 
-from identify.estimation.intervals import half_widths, half_widths_of
+from identify.estimation.intervals import half_widths_of
 from identify.estimation.stribeck_curve import StribeckCurve
 from identify.estimation.velocity_map import VelocityMap
 from identify.thesis import chapters, future, residuals, track, twin
@@ -65,7 +65,7 @@ def test_what_two_estimates_have_in_common_is_surer_than_either():
     one = rng.standard_normal(600)
     columns = np.stack([one, one + 1e-3 * rng.standard_normal(600)], axis=1)
     fit = SimpleNamespace(jacobian=columns, residual=rng.standard_normal(600))
-    alone, (both,) = half_widths(fit), half_widths_of(fit, np.ones((2, 1)))
+    alone, (both,) = half_widths_of(fit, np.eye(2)), half_widths_of(fit, np.ones((2, 1)))
     assert both < 0.01 * alone.min()
     assert both == pytest.approx(1.7 / np.sqrt(600), rel=0.5)
 

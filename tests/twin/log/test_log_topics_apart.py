@@ -14,7 +14,7 @@ from mcap_bytes import CHUNK, CHUNK_INDEX, Piece, parsed, records
 from twin.errors import InputError
 from twin.log import FIELDS, AxisLog, Log, chunks, encode, read_log, recover_log, write_log
 from twin.log.container import McapFile
-from twin.log.decode import read_parts
+from twin.log.decode import read_parts, verified_parts
 from twin.log.outline import outline
 
 COUNT, PER_CHUNK = 100, 13
@@ -84,7 +84,8 @@ def test_a_flipped_bit_in_what_is_not_asked_for_is_found_by_a_check_alone(path):
     data[chunk.end - 5] ^= 1
     path.write_bytes(data)
     assert len(read_log(path, truth=False)) == COUNT
-    for read in (read_log, lambda p: list(read_parts(p, 20))):
+    assert sum(map(len, read_parts(path, 20))) == COUNT
+    for read in (read_log, lambda p: list(verified_parts(p, 20))):
         with pytest.raises(InputError, match="twin recover"):
             read(path)
 

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.log.check.dynamics import Dynamics, fit_dynamics
 from twin.log.check.lag import Lag, Trend, find_lag, find_trend
 from twin.log.check.smooth import Smoother
 from twin.log.log import AxisLog
-from twin.signals import Array, white_noise
+from twin.signals import Array, median, white_noise
 
 _IMPOSSIBLE = 4.0  # times the acceleration that 99 % of the samples stay below
 _NOISE = 10.0  # times the rms of noise
@@ -78,7 +79,7 @@ class Axis:
     def force_size(self) -> float:
         """What 99 % of the command stays within about its median, N."""
         force = self.log.force
-        return float(np.quantile(np.abs(force - np.median(force)), 0.99))
+        return float(np.quantile(np.abs(force - median(force)), 0.99))
 
     @cached_property
     def velocity(self) -> Array:
@@ -127,15 +128,21 @@ class Axis:
         return np.where(second > self.possible_jump, second, 0.0)
 
     @cached_property
+    def bends(self) -> NDArray[np.intp]:
+        """(k,) samples at which the position bends impossibly."""
+        return np.flatnonzero(self.jumps) + 1
+
+    @cached_property
     def kept(self) -> Array:
         """(m,) 1.0 where the low-passed motion is free of impossible jumps, else 0.0.
 
         All 1.0 where little would be left.
         """
+        if not len(self.bends):
+            return np.ones(len(self.velocity))
         jumps = np.zeros(len(self.log))
-        jumps[1:-1] = self.jumps > 0.0
-        reach = np.ones(4 * self.smoother.samples + 1)
-        hit = np.convolve(jumps, reach, "same") if jumps.any() else jumps
+        jumps[self.bends] = 1.0
+        hit = np.convolve(jumps, np.ones(4 * self.smoother.samples + 1), "same")
         free = self.smoother.held((hit > 0.5).astype(float)) == 0.0
         return free.astype(float) if free.mean() > 0.5 else np.ones(len(free))
 
@@ -175,7 +182,10 @@ class Axis:
 
 def held_samples(signal: Array) -> int:
     """For how many samples each value of a signal is held, where it is; else 0."""
-    change = np.flatnonzero(np.diff(signal))
+    changes = np.diff(signal) != 0.0
+    if 3 * np.count_nonzero(changes) > 2 * len(signal):  # most from each sample to the next
+        return 0
+    change = np.flatnonzero(changes)
     if len(change) < _FEWEST_CHANGES:
         return 0
     steps = np.diff(change)

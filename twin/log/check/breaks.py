@@ -76,10 +76,10 @@ def check(axis: Axis) -> Iterator[Finding]:
 
 def find_breaks(axis: Axis) -> list[Break]:
     """All breaks in the order of time; none where the position is held for some samples each."""
-    if axis.position_held:
+    bends = axis.bends
+    if not len(bends) or axis.position_held:
         return []
     stuck = list(_stuck(axis))
-    bends = np.flatnonzero(axis.jumps) + 1
     for b in stuck:
         bends = bends[(bends < b.first - 2) | (bends > b.last + 2)]
     if not len(bends):
@@ -214,6 +214,8 @@ def is_uneven(axis: Axis) -> bool:
 
 def _bends_of_a_clock(axis: Axis) -> NDArray[np.intp]:
     """Where the position bends, but not by most of the travel, as a counter that wraps."""
+    if not len(axis.bends):
+        return axis.bends
     most = 0.5 * float(np.ptp(axis.log.position))
     return np.flatnonzero((axis.jumps > 0.0) & (axis.jumps < most))
 

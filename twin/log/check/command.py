@@ -27,9 +27,9 @@ def check(axis: Axis) -> Iterator[Finding]:
     if count := axis.force_held:
         yield held(axis, "the force", count)
         return
-    off = off_course(force)
-    single = _single(off, _LARGE * axis.force_size)
-    if len(single):
+    least = _LARGE * axis.force_size
+    steps = np.abs(np.diff(force)).max()  # a sample off its neighbours is off one beside it
+    if steps > least and len(single := _single(off := off_course(force), least)):
         first = single[0] / axis.sample_rate
         more = f" and {len(single) - 1} more times" if len(single) > 1 else ""
         yield Finding(

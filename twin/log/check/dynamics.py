@@ -42,7 +42,8 @@ def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int) -> Dy
     size = np.sqrt(np.mean(regressors**2, axis=0))
     scaled = regressors / np.where(size > 0.0, size, 1.0)
     for _ in range(_ROUNDS):
-        gains = np.linalg.lstsq(scaled[use], force[use])[0]
+        rows = scaled * use[:, None]
+        gains = np.linalg.lstsq(rows.T @ scaled, rows.T @ force, rcond=1e-12)[0]
         residual = force - scaled @ gains
         error = np.abs(residual)
         use = (kept > 0.0) & (error <= np.quantile(error[kept > 0.0], 1.0 - _TRIMMED))

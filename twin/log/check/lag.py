@@ -38,10 +38,12 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
     reach = min(round(LONGEST / block), len(signal) // _MOTION)
     inner = slice(reach, len(signal) - reach)
     weights = kept[inner]
-    basis = np.linalg.qr(_unit_columns(explained_by[inner] * weights[:, None]))[0]
+    columns = _unit_columns(explained_by[inner] * weights[:, None])
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-12, hermitian=True)
     centred = signal - signal.mean()
     total = sliding_products(centred**2, weights)
-    found = np.sum(sliding_products(centred, basis.T) ** 2, axis=0)
+    products = sliding_products(centred, columns.T)
+    found = np.einsum("ij,ij->j", products, inverse @ products)
     residual = np.maximum(total - found, 0.0)
     dips = 1 + np.flatnonzero((residual[1:-1] <= residual[:-2]) & (residual[1:-1] < residual[2:]))
     if not len(dips):

@@ -45,7 +45,7 @@ def _unexplained_jumps(axis: Axis) -> NDArray[np.intp]:
     """Samples (k,) where the position bends, but for those that another check names."""
     if axis.position_held or is_uneven(axis):
         return np.empty(0, dtype=np.intp)
-    jumps = np.flatnonzero(axis.jumps) + 1
+    jumps = axis.bends
     for found in find_breaks(axis):
         jumps = jumps[(jumps < found.first - 2) | (jumps > found.last + 2)]
     return jumps
