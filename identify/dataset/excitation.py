@@ -40,7 +40,7 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
         period=motions[0].period,
         force_max=float(np.abs(command).max()),
         lines=lines(heard),
-        ripples=ripples(heard),
+        ripples=(*{p for m in motions for p in m.ripples}, *ripples(heard)),
         resolution=max(m.resolution for m in motions),
     )
 

@@ -74,20 +74,27 @@ def _variance(axis: AxisModel, motion: Motion, test_function: TestFunction) -> f
     noise = noise_of(axis, motion)
     passed = noise.power
     if any(is_noise(f.effect) for f in axis.effects):
-        passed = passed + _rounding(axis, motion, noise.segment)
+        passed = passed + noise.bend * _rounding(motion, noise)
     response = test_function.response(motion.sample_period, noise.segment)
     return float(np.trapezoid(passed * response, noise.frequency))
 
 
-def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
-    """One-sided power (segment // 2 + 1,) N^2/Hz of the apparent force of the readings' rounding.
+def _rounding(motion: Motion, noise: Noise) -> Array:
+    """One-sided power (k,) m^2/Hz that the readings' rounding adds to their noise.
 
-    At speed rounding is white and already in the median spectrum; its slow steps are added here.
+    Slow steps are long; at speed rounding is white, and in the median spectrum already.
     """
     dt = motion.sample_period
-    power = densities(_less_lines(pieces_of(motion.rounding, segment)), dt).mean(axis=0)
-    frequency = np.asarray(np.fft.rfftfreq(segment, dt), dtype=float)
-    return np.asarray(_bend(axis, motion, frequency) * power)
+    power = densities(_less_lines(pieces_of(motion.rounding, noise.segment)), dt)
+    usual = np.median(power[:, _band(motion, noise.frequency)]) / np.log(2.0)
+    return np.asarray(power.mean(axis=0) - min(usual, noise.reading))
+
+
+def _band(motion: Motion, frequency: Array) -> NDArray[np.bool_]:
+    """Which frequencies (k,) Hz are above those of the effects."""
+    dt = motion.sample_period
+    top = BAND[2] if motion.velocity_weight == 0.0 else BAND_OF_BOTH
+    return np.asarray((frequency > min(BAND[0], BAND[1] / dt)) & (frequency < top / dt))
 
 
 def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
@@ -100,7 +107,7 @@ def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
 def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     """The measurement noise of one log, from its raw residual."""
     dt = motion.sample_period
-    velocity = motion.raw[0]
+    velocity = motion.unrippled
     # Noise in the command moves the axis as well; without the actuator's delay the two would not
     # cancel and would look like measurement noise.
     command = actual_force(axis, motion)
@@ -112,10 +119,10 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     frequency, power = _median_spectrum(raw, segment, dt, _at_rest(axis, motion))
     half = np.cos(np.pi * frequency * dt) ** 2
     bend = _bend(axis, motion, frequency)
-    top = BAND[2] if motion.velocity_weight == 0.0 else BAND_OF_BOTH
-    band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < top / dt)
+    band = _band(motion, frequency)
     force, reading = map(float, fitted_levels(np.stack([half, bend], axis=1)[band], power[band]))
-    if force < PLAIN * reading * bend[band][0]:
+    # What else fills the band, such as a load that rings in its play, is no noise of the command.
+    if force < PLAIN * reading * bend[band][0] or force > motion.command_noise:
         force = motion.command_noise
     return Noise(frequency, force, reading, bend, segment)
 
