@@ -194,7 +194,7 @@ class Motion:
 
     @cached_property
     def rounding(self) -> Array:
-        """What rounding to the readings' step makes of such a motion, (n + 1,) m."""
+        """What rounding to the readings' step made of the position, (n + 1,) m, about."""
         return rounding(self.readings, self.resolution)
 
 

@@ -58,36 +58,65 @@ class Noise:
 
 def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     """RMS noise floor in N of the force residual of these logs."""
-    own = [log.force_noise for log in logs]
     sensors = noise_floor(axis, [(log.motion, log.test_function) for log in logs])
-    return float(np.hypot(sensors, np.sqrt(np.mean(np.square(own)))))
+    return _with_own(sensors, logs)
+
+
+def unrounded_floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
+    """The floor (N RMS) that these logs would have, had their readings not been rounded."""
+    noises = [noise_of(axis, log.motion) for log in logs]
+    parts = [
+        _passed(
+            n.power - n.bend * min(n.reading, _white_rounding(log.motion)),
+            n,
+            log.motion,
+            log.test_function,
+        )
+        for n, log in zip(noises, logs, strict=True)
+    ]
+    return _with_own(_together(parts, [log.motion for log in logs]), logs)
 
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
     """RMS in N of what measurement noise alone leaves in the force residual of these logs."""
-    parts = [_variance(axis, *log) for log in logs]
-    weights = [motion.signals.shape[1] for motion, _ in logs]
-    return float(np.sqrt(np.average(parts, weights=weights)))
+    return _together([_variance(axis, *log) for log in logs], [motion for motion, _ in logs])
+
+
+def _with_own(sensors: float, logs: Sequence[PreparedLog]) -> float:
+    """Noise of sensors, N RMS, together with that which no sensor makes."""
+    return float(np.hypot(sensors, np.sqrt(np.mean([log.force_noise**2 for log in logs]))))
+
+
+def _together(variances: Sequence[float], motions: Sequence[Motion]) -> float:
+    return float(np.sqrt(np.average(variances, weights=[m.signals.shape[1] for m in motions])))
 
 
 def _variance(axis: AxisModel, motion: Motion, test_function: TestFunction) -> float:
     noise = noise_of(axis, motion)
-    passed = noise.power
+    power = noise.power
     if any(is_noise(f.effect) for f in axis.effects):
-        passed = passed + noise.bend * _rounding(motion, noise)
+        power = power + noise.bend * _slow_rounding(motion, noise.segment)
+    return _passed(power, noise, motion, test_function)
+
+
+def _passed(power: Array, noise: Noise, motion: Motion, test_function: TestFunction) -> float:
+    """Variance, N^2, of a power (k,) N^2/Hz that a test function passes."""
     response = test_function.response(motion.sample_period, noise.segment)
-    return float(np.trapezoid(passed * response, noise.frequency))
+    return float(np.trapezoid(power * response, noise.frequency))
 
 
-def _rounding(motion: Motion, noise: Noise) -> Array:
-    """One-sided power (k,) m^2/Hz that the readings' rounding adds to their noise.
+def _slow_rounding(motion: Motion, segment: int) -> Array:
+    """One-sided power (segment // 2 + 1,) m^2/Hz of the slow steps of the readings' rounding.
 
-    Slow steps are long; at speed rounding is white, and in the median spectrum already.
+    At speed rounding is white and already in the median spectrum; its slow steps are not.
     """
-    dt = motion.sample_period
-    power = densities(_less_lines(pieces_of(motion.rounding, noise.segment)), dt)
-    usual = np.median(power[:, _band(motion, noise.frequency)]) / np.log(2.0)
-    return np.asarray(power.mean(axis=0) - min(usual, noise.reading))
+    pieces = _less_lines(pieces_of(motion.rounding, segment))
+    return np.asarray(densities(pieces, motion.sample_period).mean(axis=0))
+
+
+def _white_rounding(motion: Motion) -> float:
+    """One-sided power, m^2/Hz, of rounding at speed: a twelfth of the squared step, white."""
+    return motion.resolution**2 / 12.0 * 2.0 * motion.sample_period
 
 
 def _band(motion: Motion, frequency: Array) -> NDArray[np.bool_]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.signals import Array, local_parabola, usual_size
+from twin.signals import Array, usual_size
 
 GAP = 8.0  # ratio of differences between readings that only a resolution leaves empty
 WHOLE = 0.15  # of a step, RMS, by which such differences may miss whole steps
@@ -15,7 +15,6 @@ BINS = 64  # in the least step that is tried
 MULTIPLES = 3  # of a step, up to which differences gather
 GATHERED = 0.7  # mean cosine of differences in turns of a step; 0 where they do not gather
 SECOND = 0.05  # of those differences, that gather about a second multiple; one may be a speed
-SMOOTHED = 11  # readings over which a motion is smoothed before it is rounded
 
 
 def resolution_of(moved: Array) -> float:
@@ -82,15 +81,13 @@ def _gathering(apart: Array, noise: float, fewest: int) -> float:
 
 
 def rounding(readings: Array, step: float) -> Array:
-    """What rounding to a step (m) makes of a motion that readings (n,) m tell, (n,) m.
+    """What rounding to a step (m) made of the position that readings (n,) m tell, (n,) m, about.
 
-    The motion goes straight between the times at which a reading changes, where it is half way;
-    smoothed, as at speed a reading changes with every sample.
+    Where a reading changes, the position was half way; between such times it goes straight. Where
+    every reading is another, nothing of it shows.
     """
     if step == 0.0:
         return np.zeros(len(readings))
     at = np.flatnonzero(np.abs(np.diff(readings)) > 0.5 * step)
     middle = 0.5 * (readings[at] + readings[at + 1])
-    path = np.interp(np.arange(len(readings)), at + 0.5, middle)
-    path = local_parabola(path, min(SMOOTHED, 2 * ((len(path) - 1) // 2) + 1))
-    return np.asarray(step * np.rint(path / step) - path)
+    return np.asarray(readings - np.interp(np.arange(len(readings)), at + 0.5, middle))

@@ -254,6 +254,9 @@ def _graded(
         effect = step.candidate.effect
         if effect.name in sure or effect.name not in final.axis.names:
             continue
+        if step.candidate.is_noise:  # it has no force that a decoy could have; the readings show it
+            proved.add(effect.name)
+            continue
         beside = proof(less(effect, final, base, dataset), final.axis[effect.name], dataset)
         if beside is not None and beside.holds:
             proved.add(effect.name)
