@@ -150,8 +150,7 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     bend = _bend(axis, motion, frequency)
     band = _band(motion, frequency)
     force, reading = map(float, fitted_levels(np.stack([half, bend], axis=1)[band], power[band]))
-    # What else fills the band, such as a load that rings in its play, is no noise of the command.
-    if force < PLAIN * reading * bend[band][0] or force > motion.command_noise:
+    if force < PLAIN * reading * bend[band][0]:
         force = motion.command_noise
     return Noise(frequency, force, reading, bend, segment)
 

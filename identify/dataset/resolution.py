@@ -9,11 +9,11 @@ from twin.signals import Array, usual_size
 GAP = 8.0  # ratio of differences between readings that only a resolution leaves empty
 WHOLE = 0.15  # of a step, RMS, by which such differences may miss whole steps
 FEWEST = 0.01  # of the differences, that tell a step
-STEPS = (1.0, 10.0)  # times the noise of readings, that a step which makes it may be; it is 3.5
+STEPS = (1.0, 6.0)  # times the noise of readings, that a step which makes it may be; at speed 3.5
 CLOSE = 1.005  # ratio of one step that is tried to the next
 BINS = 64  # in the least step that is tried
 MULTIPLES = 3  # of a step, up to which differences gather
-GATHERED = 0.7  # mean cosine of differences in turns of a step; 0 where they do not gather
+GATHERED = 0.75  # mean cosine of differences in turns of a step; 0 where they do not gather
 SECOND = 0.05  # of those differences, that gather about a second multiple; one may be a speed
 
 
