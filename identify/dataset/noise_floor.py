@@ -10,7 +10,7 @@ taken from the command: the part that the controller did not compute from its re
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,16 +64,11 @@ def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
 
 def unrounded_floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     """The floor (N RMS) that these logs would have, had their readings not been rounded."""
-    noises = [noise_of(axis, log.motion) for log in logs]
-    parts = [
-        _passed(
-            n.power - n.bend * min(n.reading, _white_rounding(log.motion)),
-            n,
-            log.motion,
-            log.test_function,
-        )
-        for n, log in zip(noises, logs, strict=True)
-    ]
+    parts = []
+    for log in logs:
+        noise = noise_of(axis, log.motion)
+        own = max(noise.reading - _white_rounding(log.motion), 0.0)
+        parts.append(_passed(replace(noise, reading=own), log.motion, log.test_function))
     return _with_own(_together(parts, [log.motion for log in logs]), logs)
 
 
@@ -93,15 +88,20 @@ def _together(variances: Sequence[float], motions: Sequence[Motion]) -> float:
 
 def _variance(axis: AxisModel, motion: Motion, test_function: TestFunction) -> float:
     noise = noise_of(axis, motion)
-    power = noise.power
-    if any(is_noise(f.effect) for f in axis.effects):
-        power = power + noise.bend * _slow_rounding(motion, noise.segment)
-    return _passed(power, noise, motion, test_function)
+    if not any(is_noise(f.effect) for f in axis.effects):
+        return _passed(noise, motion, test_function)
+    return _passed(noise, motion, test_function, _slow_rounding(motion, noise.segment))
 
 
-def _passed(power: Array, noise: Noise, motion: Motion, test_function: TestFunction) -> float:
-    """Variance, N^2, of a power (k,) N^2/Hz that a test function passes."""
+def _passed(
+    noise: Noise, motion: Motion, test_function: TestFunction, beside: Array | float = 0.0
+) -> float:
+    """Variance, N^2, of the noise that a test function passes.
+
+    beside: (k,) m^2/Hz, of the readings, beside their white noise.
+    """
     response = test_function.response(motion.sample_period, noise.segment)
+    power = noise.power + noise.bend * beside
     return float(np.trapezoid(power * response, noise.frequency))
 
 

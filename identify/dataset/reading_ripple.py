@@ -59,8 +59,10 @@ def ripple(readings: Array, periods: tuple[float, ...]) -> Array:
     """The part (n,) m of readings (n,) m that repeats with these periods (m) along the track."""
     if not periods:
         return np.zeros(len(readings))
-    waves = np.hstack([_waves(readings, p) for p in periods])
-    return np.asarray(waves @ _gains(np.diff(waves, ORDER, axis=0), np.diff(readings, ORDER)))
+    some = readings[:ENOUGH]
+    bends = np.hstack([np.diff(_waves(some, p), ORDER, axis=0) for p in periods])
+    gains = _gains(bends, np.diff(some, ORDER)).reshape(-1, 2)
+    return np.asarray(sum(_waves(readings, p) @ g for p, g in zip(periods, gains, strict=True)))
 
 
 def _waves(readings: Array, period: float) -> Array:
