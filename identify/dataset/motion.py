@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from identify.dataset.resolution import step_of
+from identify.dataset.reading_ripple import ripple, ripple_periods
+from identify.dataset.resolution import resolution_of, rounding
 from identify.dataset.velocity import together
 from twin.errors import InputError
 from twin.log import AxisLog, Log
@@ -28,7 +29,7 @@ SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
 SHORTEST_LOG = 1.0  # s
 EQUAL = 1e-9  # relative difference by which whole samples may miss a length
 READ_BACK = 32  # readings that a controller is supposed to use
-ENOUGH = 200_000  # samples that tell the noise of a command
+ENOUGH = 200_000  # samples that tell the noise of a command, or the step of readings
 SMOOTHED = 11  # samples over which readings are smoothed to undo their errors
 FOLLOWS = 0.5  # squared correlation of position and setpoint from which the loop is closed
 
@@ -53,7 +54,8 @@ class Motion:
     the position follows a logged setpoint; None where none was logged. units, other_units: of the
     axis and of the other one, by which m, N and so on are to be read. beside: on a machine with
     more than two axes the others, by name. velocity_weight: 1, of a measured velocity beside the
-    readings (identify.dataset.velocity); 0 where there is none.
+    readings (identify.dataset.velocity); 0 where there is none. ripples: m, periods at which the
+    readings err along the track (identify.dataset.reading_ripple).
     """
 
     name: str
@@ -71,6 +73,7 @@ class Motion:
     other_units: AxisUnits = LINEAR
     beside: Mapping[str, OtherAxis] = field(default_factory=dict)
     velocity_weight: float = 0.0
+    ripples: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         return (
@@ -174,31 +177,25 @@ class Motion:
 
     @cached_property
     def resolution(self) -> float:
-        """Step between the readings, m; 0 where their noise, or the lack of one, hides it.
+        """Step between the readings, m; 0 where their noise, or the lack of one, hides it."""
+        return resolution_of(self.raw[0] * self.sample_period)
 
-        Differences of readings are then near 0 or near whole steps, with a wide gap between. Of two
-        steps, a fine one of the log's numbers and a coarse one of the encoder, the coarse counts.
-        """
-        apart = np.sort(np.abs(self.raw[0])) * self.sample_period
-        apart = apart[len(apart) // 100 :]
-        for held in (apart[apart > 0.0], np.maximum(apart, np.finfo(float).tiny)):
-            if step := step_of(held, fewest=len(apart) // 100):
-                return step
-        return 0.0
+    @property
+    def readings(self) -> Array:
+        """Readings (n + 1,) m at the log's own rate, from the first on."""
+        return np.concatenate([[0.0], np.cumsum(self.raw[0] * self.sample_period)])
+
+    @cached_property
+    def unrippled(self) -> Array:
+        """Velocity (n,) m/s of the readings less their error that repeats along the track."""
+        if not self.ripples:
+            return self.raw[0]
+        return self.raw[0] - between(ripple(self.readings, self.ripples), self.sample_period)
 
     @property
     def rounding(self) -> Array:
-        """What rounding to the readings' step made of the position, (n + 1,) m, about.
-
-        Where a reading changes, the position was half way; between such times it goes straight.
-        """
-        readings = np.concatenate([[0.0], np.cumsum(self.raw[0] * self.sample_period)])
-        step = self.resolution
-        if step == 0.0:
-            return np.zeros(len(readings))
-        at = np.flatnonzero(np.abs(np.diff(readings)) > 0.5 * step)
-        middle = 0.5 * (readings[at] + readings[at + 1])
-        return readings - np.interp(np.arange(len(readings)), at + 0.5, middle)
+        """What rounding to the readings' step made of the position, (n + 1,) m, about."""
+        return rounding(self.readings, self.resolution)
 
 
 def motion_of(
@@ -225,7 +222,8 @@ def motion_of(
         raise InputError(f"{name}: axis {axis} stands still; give a log in which it moves")
     told = together(readings, log.axes[axis].columns.get("velocity"), log.period)
     position = told.position
-    noise = white_noise(position)
+    ripples = ripple_periods(position, resolution_of(np.diff(position[:ENOUGH])))
+    noise = white_noise(position - ripple(position, ripples))
     block = _block_samples(position, noise, log.period, longest_block)
     force = log.axes[axis].force
     signals = _blocks(*_midpoints(position, force, log.period), block)
@@ -247,6 +245,7 @@ def motion_of(
         raw=np.stack([between(position, log.period), force[:-1]])[:, : block * signals.shape[1]],
         follows=_follows(log.axes[axis]),
         velocity_weight=told.weight,
+        ripples=ripples,
     )
 
 

@@ -10,7 +10,7 @@ taken from the command: the part that the controller did not compute from its re
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,36 +58,72 @@ class Noise:
 
 def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     """RMS noise floor in N of the force residual of these logs."""
-    own = [log.force_noise for log in logs]
     sensors = noise_floor(axis, [(log.motion, log.test_function) for log in logs])
-    return float(np.hypot(sensors, np.sqrt(np.mean(np.square(own)))))
+    return _with_own(sensors, logs)
+
+
+def unrounded_floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
+    """The floor (N RMS) that these logs would have, had their readings not been rounded."""
+    parts = []
+    for log in logs:
+        noise = noise_of(axis, log.motion)
+        own = max(noise.reading - _white_rounding(log.motion), 0.0)
+        parts.append(_passed(replace(noise, reading=own), log.motion, log.test_function))
+    return _with_own(_together(parts, [log.motion for log in logs]), logs)
 
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
     """RMS in N of what measurement noise alone leaves in the force residual of these logs."""
-    parts = [_variance(axis, *log) for log in logs]
-    weights = [motion.signals.shape[1] for motion, _ in logs]
-    return float(np.sqrt(np.average(parts, weights=weights)))
+    return _together([_variance(axis, *log) for log in logs], [motion for motion, _ in logs])
+
+
+def _with_own(sensors: float, logs: Sequence[PreparedLog]) -> float:
+    """Noise of sensors, N RMS, together with that which no sensor makes."""
+    return float(np.hypot(sensors, np.sqrt(np.mean([log.force_noise**2 for log in logs]))))
+
+
+def _together(variances: Sequence[float], motions: Sequence[Motion]) -> float:
+    return float(np.sqrt(np.average(variances, weights=[m.signals.shape[1] for m in motions])))
 
 
 def _variance(axis: AxisModel, motion: Motion, test_function: TestFunction) -> float:
     noise = noise_of(axis, motion)
-    passed = noise.power
-    if any(is_noise(f.effect) for f in axis.effects):
-        passed = passed + _rounding(axis, motion, noise.segment)
-    response = test_function.response(motion.sample_period, noise.segment)
-    return float(np.trapezoid(passed * response, noise.frequency))
+    if not any(is_noise(f.effect) for f in axis.effects):
+        return _passed(noise, motion, test_function)
+    return _passed(noise, motion, test_function, _slow_rounding(motion, noise.segment))
 
 
-def _rounding(axis: AxisModel, motion: Motion, segment: int) -> Array:
-    """One-sided power (segment // 2 + 1,) N^2/Hz of the apparent force of the readings' rounding.
+def _passed(
+    noise: Noise, motion: Motion, test_function: TestFunction, beside: Array | float = 0.0
+) -> float:
+    """Variance, N^2, of the noise that a test function passes.
 
-    At speed rounding is white and already in the median spectrum; its slow steps are added here.
+    beside: (k,) m^2/Hz, of the readings, beside their white noise.
     """
+    response = test_function.response(motion.sample_period, noise.segment)
+    power = noise.power + noise.bend * beside
+    return float(np.trapezoid(power * response, noise.frequency))
+
+
+def _slow_rounding(motion: Motion, segment: int) -> Array:
+    """One-sided power (segment // 2 + 1,) m^2/Hz of the slow steps of the readings' rounding.
+
+    At speed rounding is white and already in the median spectrum; its slow steps are not.
+    """
+    pieces = _less_lines(pieces_of(motion.rounding, segment))
+    return np.asarray(densities(pieces, motion.sample_period).mean(axis=0))
+
+
+def _white_rounding(motion: Motion) -> float:
+    """One-sided power, m^2/Hz, of rounding at speed: a twelfth of the squared step, white."""
+    return motion.resolution**2 / 12.0 * 2.0 * motion.sample_period
+
+
+def _band(motion: Motion, frequency: Array) -> NDArray[np.bool_]:
+    """Which frequencies (k,) Hz are above those of the effects."""
     dt = motion.sample_period
-    power = densities(_less_lines(pieces_of(motion.rounding, segment)), dt).mean(axis=0)
-    frequency = np.asarray(np.fft.rfftfreq(segment, dt), dtype=float)
-    return np.asarray(_bend(axis, motion, frequency) * power)
+    top = BAND[2] if motion.velocity_weight == 0.0 else BAND_OF_BOTH
+    return np.asarray((frequency > min(BAND[0], BAND[1] / dt)) & (frequency < top / dt))
 
 
 def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
@@ -100,7 +136,7 @@ def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
 def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     """The measurement noise of one log, from its raw residual."""
     dt = motion.sample_period
-    velocity = motion.raw[0]
+    velocity = motion.unrippled
     # Noise in the command moves the axis as well; without the actuator's delay the two would not
     # cancel and would look like measurement noise.
     command = actual_force(axis, motion)
@@ -112,8 +148,7 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     frequency, power = _median_spectrum(raw, segment, dt, _at_rest(axis, motion))
     half = np.cos(np.pi * frequency * dt) ** 2
     bend = _bend(axis, motion, frequency)
-    top = BAND[2] if motion.velocity_weight == 0.0 else BAND_OF_BOTH
-    band = (frequency > min(BAND[0], BAND[1] / dt)) & (frequency < top / dt)
+    band = _band(motion, frequency)
     force, reading = map(float, fitted_levels(np.stack([half, bend], axis=1)[band], power[band]))
     if force < PLAIN * reading * bend[band][0]:
         force = motion.command_noise

@@ -15,7 +15,7 @@ from math import exp, lgamma, log, log1p
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.spectrum import EMPTY, WIDTH, Grid, Record, level
+from identify.dataset.spectrum import EMPTY, FINEST_CYCLES, WIDTH, Grid, Record, level
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ def find_lines(
     records = [r for r in records if len(r.values) > 3 and r.span > 0.0 and np.ptp(r.values) > 0.0]
     if not records or not 0.0 <= lowest < highest:
         return ()
-    grid = Grid.of(records, highest)
+    grid = Grid.of(records, min(highest, FINEST_CYCLES / max(r.span for r in records)))
     inside = np.flatnonzero((grid.frequencies >= lowest) & (grid.frequencies <= highest))
     if len(inside) < 3:
         return ()
@@ -77,6 +77,19 @@ def find_lines(
         if (alarm := _false_alarm(height, len(records), len(inside))) < chance
     ]
     return tuple(line for _, line in sorted(out, key=lambda pair: -pair[0]))
+
+
+def strongest_line(record: Record, lowest: float, highest: float) -> tuple[float, float]:
+    """Frequency from ``lowest`` to ``highest`` of the strongest sine, and its share of variance.
+
+    In noise that is white, as its level is not looked at: one transform, for very many samples.
+    """
+    if record.span <= 0.0 or not record.values.any():
+        return lowest, 0.0
+    grid = Grid.of([record], highest)
+    inside = (grid.frequencies >= lowest) & (grid.frequencies <= highest)
+    powers = grid.powers([record])
+    return _refined([record], grid.top(powers, int(np.argmax(powers[0] * inside))), grid.step)
 
 
 @dataclass(frozen=True, eq=False)

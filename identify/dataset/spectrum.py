@@ -58,7 +58,6 @@ class Grid:
     @classmethod
     def of(cls, records: Sequence[Record], highest: float) -> Grid:
         span = max(r.span for r in records)
-        highest = min(highest, FINEST_CYCLES / span)
         spacing = _common_spacing(records)
         cell = spacing or 1.0 / (CELLS_A_PERIOD * highest)
         cells = _fast_length(int(np.ceil(span / cell)) + 1)

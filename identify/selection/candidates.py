@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import forces_lessened, is_noise
-from identify.dataset.noise_floor import floor_of
+from identify.dataset.noise_floor import floor_of, unrounded_floor_of
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import (
@@ -216,7 +216,7 @@ def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
 def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     """Evidence for a fitted larger model over the base, on the test functions both can use."""
     if is_noise(effect):
-        return _score_noise(base, fit, dataset, effect)
+        return _score_noise(fit, dataset, effect)
     shared = base.kept & fit.kept
 
     def both(left: Callable[[Fit], Array]) -> list[Array]:
@@ -283,20 +283,24 @@ def _is_plausible(fit: Fit, effect: Effect, dataset: Dataset) -> bool:
     return bool(travel > RULE.fewest_cycles * max(periods))
 
 
-def _score_noise(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
-    """Evidence for an effect that is noise: it counts where the error is noise with it."""
-    logs, own = dataset.holdout or dataset.fit, not dataset.holdout
-    error = fit.residual if own else error_on(fit.axis, logs)
-    floors = [f.floor if own else floor_of(f.axis, logs) for f in (base, fit)]
-    explained = fit.at_floor and not base.at_floor and rms(error) < RULE.at_floor * floors[1]
-    gain = noise_gain(fit.residual, base.floor, fit.floor) if explained else 0.0
-    logs_gain = effective_samples(error) * noise_gain(error, *floors) if explained else 0.0
+def _score_noise(fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
+    """Evidence for an effect that is noise, over the floor that readings without it would have.
+
+    It counts where it makes a good part of the error on all logs that choose, and no more than it.
+    """
+    logs = (*dataset.fit, *dataset.holdout)
+    error = error_on(fit.axis, logs)
+    less, floor = unrounded_floor_of(fit.axis, logs), floor_of(fit.axis, logs)
+    part = (floor**2 - less**2) / rms(error) ** 2
+    explained = part > RULE.least_part and floor < RULE.at_floor * rms(error)
+    gain = noise_gain(error, less, floor) if explained else 0.0
+    samples = effective_samples(error)
     return Candidate(
         effect=effect,
         axis=dataset.axis,
         fit=fit,
-        evidence=Evidence(gain, 1, effective_samples(fit.residual)),
-        gain=Gain(rms(error), rms(error), float(np.sqrt(max(logs_gain, 0.0)))),
+        evidence=Evidence(gain, 1, samples),
+        gain=Gain(rms(error), rms(error), float(np.sqrt(max(samples * gain, 0.0)))),
     )
 
 

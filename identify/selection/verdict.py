@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.drive import is_noise
 from identify.estimation.decision import RULE
 from identify.estimation.errors import Errors
 from identify.estimation.fit import Fit, fit_axis
@@ -86,6 +87,7 @@ def _without_small(
         return share_explained(Errors.of(without, final, dataset, dataset.chosen_on), base, dataset)
 
     named = [s for s in kept(steps) if s.proved and s.candidate.effect.name in final.axis.names]
+    named = [s for s in named if not s.candidate.is_noise]
     if len(named) < 2:
         return steps, final
     least, smallest = min(((share(s), s) for s in named), key=lambda pair: pair[0])
@@ -99,8 +101,11 @@ def _without_small(
 def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:
     """Whether an effect leaves clearly less of the held-out logs than the fit without it.
 
-    Less than its best decoy, where a shift in time makes one.
+    Less than its best decoy, where a shift in time makes one. Noise has no force; the readings
+    themselves show it.
     """
+    if is_noise(effect):
+        return True
     without = less(effect, final, base, dataset)
     beside = proof(without, final.axis[effect.name], dataset)
     if beside is not None:

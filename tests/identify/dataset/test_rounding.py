@@ -9,7 +9,7 @@ from machines import one_axis
 
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.motion import Motion
-from identify.dataset.noise_floor import noise_of
+from identify.dataset.noise_floor import floor_of, noise_of, unrounded_floor_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import finished, fit_axis
 from identify.selection.diagnosis import Verdict
@@ -96,6 +96,13 @@ def test_a_floor_with_the_resolution_is_the_error_it_makes(coarse):
     assert not base.at_floor
     assert told.at_floor
     assert 0.8 < told.ratio < 1.2
+
+
+def test_the_floor_without_rounding_is_that_of_exact_readings(coarse):
+    axis = STAGE.axes["x"]
+    exact = floor_of(axis, dataset_of(0.0).fit)
+    assert unrounded_floor_of(axis, coarse.fit) == pytest.approx(exact, rel=0.15)
+    assert floor_of(axis, coarse.fit) > 1.3 * exact
 
 
 @pytest.mark.parametrize("step", [0.0, STEP, 2e-6])

@@ -33,6 +33,7 @@ from twin.effect import Kind
 
 # The rules as they were decided.
 LEAST_BIC, LEAST_T, PROMISE, SAME_ERROR, AT_FLOOR = 10.0, 3.0, 0.3, 1.01, 1.3
+LEAST_PART = 0.4
 RNG = np.random.default_rng(5)
 
 
@@ -206,46 +207,38 @@ def test_a_cross_validated_residual_is_that_of_a_fit_without_the_block():
         np.testing.assert_allclose(out[a:b], left[a:b] + used[a:b] @ move, rtol=1e-6, atol=1e-9)
 
 
+LESS, FLOOR = 1.0, 2.0  # N, without what the noise adds and with it
+MOST = ((FLOOR**2 - LESS**2) / LEAST_PART) ** 0.5  # of an error that it makes a good part of
+
+
 @pytest.mark.parametrize(
-    ("base_error", "fit_error", "seen", "told"),
+    ("seen", "told"),
     [
-        (1.6, 1.2, 2.0, True),
-        (1.2, 1.2, 2.0, False),
-        (1.6, 1.4, 2.0, False),
-        (1.6, 1.2, 2.0 * AT_FLOOR - 0.01, True),
-        (1.6, 1.2, 2.0 * AT_FLOOR + 0.01, False),
+        (FLOOR, True),
+        (0.99 * MOST, True),
+        (1.01 * MOST, False),
+        (1.01 * FLOOR / AT_FLOOR, True),
+        (0.99 * FLOOR / AT_FLOOR, False),
     ],
 )
-def test_a_noise_is_told_where_it_alone_makes_the_error_noise(
-    monkeypatch, base_error, fit_error, seen, told
-):
+def test_a_noise_is_told_where_it_makes_a_good_part_of_the_error(monkeypatch, seen, told):
+    """On all logs that choose together, and where the error is not less than the noise."""
     noise = RNG.standard_normal(500)
     noise /= np.sqrt(np.mean(noise**2))
-    base = built_fit(base_error, 1.0)
-    fit = built_fit(0, 1.0, axis_of(), residual=fit_error * noise)
     asked = []
 
-    def floor(axis, logs):
-        asked.append((axis, logs))
-        return 1.0 if axis is base.axis else 2.0
+    def of(floor):
+        return lambda axis, logs: asked.append(logs) or floor
 
     monkeypatch.setattr(candidates, "error_on", lambda axis, logs: seen * noise)
-    monkeypatch.setattr(candidates, "floor_of", floor)
-    base.__dict__["floor"], fit.__dict__["floor"] = 1.0, 1.05
-    own = score(base, fit, dataset_stub(fit=("fit",)), NOISE)  # on the logs that it was fitted to
-    assert not asked
-    assert own.gain.after == pytest.approx(fit.error)
+    monkeypatch.setattr(candidates, "floor_of", of(FLOOR))
+    monkeypatch.setattr(candidates, "unrounded_floor_of", of(LESS))
     dataset = dataset_stub(holdout=("held",), fit=("fit",))
-    found = score(base, fit, dataset, NOISE)
-    assert {logs for _, logs in asked} == {dataset.holdout}
+    found = score(built_fit(1.6, 1.0), built_fit(0, 1.0, axis_of(), residual=noise), dataset, NOISE)
+    assert set(asked) == {("fit", "held")}
     assert (found.evidence.log_gain != 0.0) is told
-    assert (found.gain.t != 0.0) is told
     assert found.gain.before == found.gain.after == pytest.approx(seen)
-    assert found.evidence.samples == effective_samples(fit.residual)
-    if told:
-        power, before, after = fit_error**2, 1.0, 1.05
-        gain = power / before**2 - power / after**2 - 2.0 * np.log(after / before)
-        assert found.evidence.log_gain == pytest.approx(gain)
-        unseen = seen**2 - seen**2 / 4.0 - 2.0 * np.log(2.0)
-        t = np.sqrt(max(effective_samples(seen * noise) * unseen, 0.0))
-        assert found.gain.t == pytest.approx(t)
+    assert found.evidence.samples == effective_samples(noise)
+    gain = seen**2 / LESS**2 - seen**2 / FLOOR**2 - 2.0 * np.log(FLOOR / LESS) if told else 0.0
+    assert found.evidence.log_gain == pytest.approx(gain)
+    assert found.gain.t == pytest.approx(max(found.evidence.samples * gain, 0.0) ** 0.5)

@@ -1,0 +1,72 @@
+"""Errors of the reading that repeat along the track: told from its noise, and from its rounding."""
+
+import numpy as np
+import pytest
+
+from identify.dataset.reading_ripple import ripple, ripple_periods
+from identify.dataset.resolution import resolution_of
+from twin.signals import white_noise
+
+DT = 1e-4  # s
+TIME = DT * np.arange(60_000)
+NOISE = 2e-9  # m
+ANGLE = 2.0 * np.pi * 0.4 * TIME
+
+
+def noise():
+    return NOISE * np.random.default_rng(3).standard_normal(len(TIME))
+
+
+WOBBLE = 2e-5 * np.sin(2.0 * np.pi * 11.0 * TIME)  # m, of a controlled axis
+PATHS = {  # m; the first two pass several periods of a ripple in a sample
+    "turning": 0.1 * np.sin(ANGLE),
+    "two speeds": np.where(TIME < 3.0, 0.1 * TIME, 0.3 - 0.02 * (TIME - 3.0)) + WOBBLE,
+    "slow": 2e-3 * np.sin(ANGLE),
+}
+
+
+@pytest.mark.parametrize("path", ["turning", "two speeds"])
+@pytest.mark.parametrize("period", [7.3e-6, 2.2e-5])
+def test_a_ripple_is_found_at_any_speed_and_taken_off(path, period):
+    turn = 2.0 * np.pi * PATHS[path] / period
+    error = 2.3e-8 * np.sin(turn + 1.0)
+    readings = PATHS[path] + error + noise()
+    found = ripple_periods(readings, 0.0)
+    cycles = np.ptp(PATHS[path]) / period
+    assert min(abs(p / period - 1.0) for p in found) < 0.1 / cycles
+    assert white_noise(readings) > 1.5 * NOISE
+    left = readings - ripple(readings, found)
+    assert white_noise(left) == pytest.approx(NOISE, rel=0.1)
+    assert np.std(left - PATHS[path] - noise()) < 0.2 * np.std(error)
+
+
+def test_a_vibration_at_constant_speed_is_none():
+    """It repeats along the track there, but not on the way to that speed."""
+    speed = 0.05 * np.clip(TIME / 3.0, 0.0, 1.0)
+    path = DT * np.cumsum(speed)
+    shaken = path + 2e-8 * np.sin(2.0 * np.pi * 900.0 * TIME) + noise()
+    assert ripple_periods(shaken, 0.0) == ()
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("step", [0.0, 1.1e-7, 3e-6])
+def test_noise_and_rounding_are_none(path, step):
+    readings = PATHS[path] + noise()
+    if step:
+        readings = step * np.rint(readings / step)
+    assert ripple_periods(readings, step) == ()
+
+
+@pytest.mark.parametrize("fine", [1e-9, 2.1e-8, 7.7e-8])
+@pytest.mark.parametrize("path", ["turning", "slow"])
+def test_a_coarse_step_is_found_beside_a_fine_one(path, fine):
+    """The encoder rounds, its noise is added, and the log rounds again."""
+    step = 3.16e-7
+    readings = step * np.rint(PATHS[path] / step) + noise()
+    readings = fine * np.rint(readings / fine)
+    assert resolution_of(np.diff(readings)) == pytest.approx(step, rel=2e-3)
+
+
+def test_speeds_that_are_multiples_of_one_are_no_step():
+    speed = np.repeat([0.01, 0.02, 0.03, 0.04], len(TIME) // 4)
+    assert resolution_of(np.diff(DT * np.cumsum(speed) + noise())) == 0.0
