@@ -15,6 +15,7 @@ from identify.dataset.excitation import excitation
 from identify.dataset.given_logs import Given, Role, moving_in, require_apart, require_one_kind
 from identify.dataset.motion import LONGEST_BLOCK, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog
+from identify.dataset.reading_ripple import ripples_of_widest
 from identify.dataset.test_function import LEAST_BLOCKS
 from identify.dataset.time_scale import choose_length
 from twin.effect import Excitation
@@ -170,9 +171,10 @@ def _prepared(model: MachineModel, given: Given, test_function: float | None) ->
 def _of_axis(model: MachineModel, name: str, going: Given, test_function: float | None) -> Dataset:
     """The dataset of one axis from the logs in which it moves; test logs decide nothing of it."""
     axis, machine = model.axes[name], tuple(model.axes)
+    ripples = ripples_of_widest(going[Role.TRAINING].values(), name)
 
     def motions_at(*roles: Role) -> Callable[[float | None], tuple[list[Motion], ...]]:
-        made = cache(partial(_motions, [going[r] for r in roles], name, machine))
+        made = cache(partial(_motions, [going[r] for r in roles], name, machine, ripples))
         return partial(_long_enough, made)
 
     deciding = motions_at(Role.TRAINING, Role.SELECTION)
@@ -246,10 +248,14 @@ def _long_enough(
 
 
 def _motions(
-    parts: Sequence[Mapping[str, Log]], axis: str, machine: tuple[str, ...], longest: float
+    parts: Sequence[Mapping[str, Log]],
+    axis: str,
+    machine: tuple[str, ...],
+    ripples: tuple[float, ...],
+    longest: float,
 ) -> tuple[list[Motion], ...]:
-    """Motions of each part of the logs, in blocks of at most a length (s)."""
+    """Motions of each part of the logs, in blocks of at most a length (s); ripples: m."""
     return tuple(
-        [motion_of(log, axis, name, machine, longest) for name, log in some.items()]
+        [motion_of(log, axis, name, machine, longest, ripples) for name, log in some.items()]
         for some in parts
     )

@@ -204,11 +204,12 @@ def motion_of(
     name: str,
     machine: Sequence[str] = (),
     longest_block: float = LONGEST_BLOCK,
+    ripples: tuple[float, ...] | None = None,
 ) -> Motion:
     """The motion of one axis of a log.
 
     machine: the axes of the machine; on one of two axes others that were logged do not matter.
-    longest_block: s; a noisy position asks for long blocks.
+    longest_block: s; a noisy position asks for long blocks. ripples: m, sought where None.
     Raises InputError where the axis is not in the log, does not move or is shorter than 1 s.
     """
     if axis not in log.axes:
@@ -222,7 +223,7 @@ def motion_of(
         raise InputError(f"{name}: axis {axis} stands still; give a log in which it moves")
     told = together(readings, log.axes[axis].columns.get("velocity"), log.period)
     position = told.position
-    ripples = ripple_periods(position, resolution_of(np.diff(position[:ENOUGH])))
+    ripples = ripple_periods(position) if ripples is None else ripples
     noise = white_noise(position - ripple(position, ripples))
     block = _block_samples(position, noise, log.period, longest_block)
     force = log.axes[axis].force

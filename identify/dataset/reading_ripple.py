@@ -9,10 +9,14 @@ speed, but at no other; and so does the rounding of readings to a step, of step/
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
+from identify.dataset.resolution import resolution_of
 from identify.dataset.spectral_lines import strongest_line
 from identify.dataset.spectrum import Record
+from twin.log import Log
 from twin.signals import Array, usual_size
 
 ORDER = 4  # of the differences
@@ -27,12 +31,20 @@ SPEEDS = 10  # ranges of speed in which a line is looked for
 SURE = 4.0  # times its noise, that a line must have in a range of speeds to be missed there
 
 
-def ripple_periods(readings: Array, step: float) -> tuple[float, ...]:
-    """Periods (m) at which readings (n,) m err along the track, the strongest first.
+def ripples_of_widest(logs: Iterable[Log], axis: str) -> tuple[float, ...]:
+    """Periods (m) at which the readings of an axis err, by the log with the longest travel.
 
-    step: m, resolution of the readings, 0 where it does not show.
+    All logs are of one encoder. Empty where no log has the axis.
     """
+    having = [log.axes[axis] for log in logs if axis in log.axes]
+    widest = max(having, key=lambda signals: float(np.ptp(signals.position)), default=None)
+    return () if widest is None else ripple_periods(widest.position)
+
+
+def ripple_periods(readings: Array) -> tuple[float, ...]:
+    """Periods (m) at which readings (n,) m err along the track, the strongest first."""
     readings = readings[:ENOUGH]
+    step = resolution_of(np.diff(readings))
     place = readings[ORDER // 2 : len(readings) - ORDER // 2]
     bend = np.diff(readings, ORDER)
     usual = usual_size(bend)

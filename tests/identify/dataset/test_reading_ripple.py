@@ -1,9 +1,11 @@
 """Errors of the reading that repeat along the track: told from its noise, and from its rounding."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from identify.dataset.reading_ripple import ripple, ripple_periods
+from identify.dataset.reading_ripple import ripple, ripple_periods, ripples_of_widest
 from identify.dataset.resolution import resolution_of
 from twin.signals import white_noise
 
@@ -31,7 +33,7 @@ def test_a_ripple_is_found_at_any_speed_and_taken_off(path, period):
     turn = 2.0 * np.pi * PATHS[path] / period
     error = 2.3e-8 * np.sin(turn + 1.0)
     readings = PATHS[path] + error + noise()
-    found = ripple_periods(readings, 0.0)
+    found = ripple_periods(readings)
     cycles = np.ptp(PATHS[path]) / period
     assert min(abs(p / period - 1.0) for p in found) < 0.1 / cycles
     assert white_noise(readings) > 1.5 * NOISE
@@ -40,12 +42,24 @@ def test_a_ripple_is_found_at_any_speed_and_taken_off(path, period):
     assert np.std(left - PATHS[path] - noise()) < 0.2 * np.std(error)
 
 
+def test_the_log_with_the_longest_travel_tells_the_ripples_of_all():
+    """A log that hardly moves shows none, and all are of one encoder."""
+    period = 2.2e-5
+    paths = (1e-5 * np.sin(ANGLE), PATHS["turning"])
+    read = [p + 2.3e-8 * np.sin(2.0 * np.pi * p / period) + noise() for p in paths]
+    logs = [SimpleNamespace(axes={"x": SimpleNamespace(position=r)}) for r in read]
+    logs.append(SimpleNamespace(axes={"y": SimpleNamespace(position=1e3 * read[0])}))
+    assert ripple_periods(read[0]) == ()
+    assert ripples_of_widest(logs, "x") == ripple_periods(read[1]) != ()
+    assert ripples_of_widest(logs, "z") == ()
+
+
 def test_a_vibration_at_constant_speed_is_none():
     """It repeats along the track there, but not on the way to that speed."""
     speed = 0.05 * np.clip(TIME / 3.0, 0.0, 1.0)
     path = DT * np.cumsum(speed)
     shaken = path + 2e-8 * np.sin(2.0 * np.pi * 900.0 * TIME) + noise()
-    assert ripple_periods(shaken, 0.0) == ()
+    assert ripple_periods(shaken) == ()
 
 
 @pytest.mark.parametrize("path", PATHS)
@@ -54,7 +68,7 @@ def test_noise_and_rounding_are_none(path, step):
     readings = PATHS[path] + noise()
     if step:
         readings = step * np.rint(readings / step)
-    assert ripple_periods(readings, step) == ()
+    assert ripple_periods(readings) == ()
 
 
 @pytest.mark.parametrize("fine", [1e-9, 2.1e-8, 7.7e-8])
