@@ -20,10 +20,11 @@ from identify.experiment_design.plan import Plan, next_experiment, plan
 from identify.measure import cable_force, velocity_map
 from identify.output.addition import Addition, addition
 from identify.output.results import Comparison, Diagnosis, FitResult, SimulationFit
-from identify.selection.candidates import score, try_effect, usable
+from identify.selection.candidates import try_effect, usable
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone, reshaped
+from identify.selection.scoring import score
 from identify.selection.unpredictable import noise_known, with_own_noise
 from identify.selection.wrong_shape import having_shape
 from identify.validation.agreement import Agreement, agreement

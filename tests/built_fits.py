@@ -15,8 +15,8 @@ from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import Evidence, Gain
 from identify.estimation.fit import Fit, Outcome
 from identify.estimation.scaling import Scaling
-from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import SelectionState, Step
+from identify.selection.scoring import Candidate
 from twin.effect import Effect, Excitation
 from twin.effects import load_catalogue
 from twin.model.machine import AxisModel, Fitted, Hardware

@@ -15,7 +15,8 @@ from identify.estimation.fit import Fit, fit_axis, rms
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import Estimate, estimates
 from identify.experiment_design.planting import added_force, draw_effect
-from identify.selection.candidates import Candidate, try_effect
+from identify.selection.candidates import try_effect
+from identify.selection.scoring import Candidate
 from twin.effect import Effect, Kind
 from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel

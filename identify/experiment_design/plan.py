@@ -25,9 +25,10 @@ from identify.experiment_design.rival_hypotheses import (
     require_different,
     simulated_dataset,
 )
-from identify.selection.candidates import Candidate, usable
+from identify.selection.candidates import usable
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
+from identify.selection.scoring import Candidate
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError

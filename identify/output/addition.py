@@ -12,8 +12,8 @@ from identify.estimation.fit import Fit
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.output.text import add_text
 from identify.output.words.selection import addition_notes, also_chose_in_words
-from identify.selection.candidates import Candidate
 from identify.selection.confounded import MovedParameter, moved_parameters
+from identify.selection.scoring import Candidate
 from identify.selection.wrong_shape import WrongShape
 from identify.validation.free_run import errors_of_both
 from twin.model.machine import HistoryStep, MachineModel

@@ -10,10 +10,10 @@ from identify.output.as_json import plan_json, refit_json
 from identify.output.remarks import remarks_on
 from identify.output.results import Diagnosis
 from identify.output.words.selection import advice, verdict_in_words
-from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis, Step
 from identify.selection.findings import Finding
 from identify.selection.found_shape import FoundShape
+from identify.selection.scoring import Candidate
 from identify.validation.misfit_maps import Region
 
 

@@ -33,9 +33,9 @@ from identify.output.words.validation import (
     loop_in_words,
     region_in_words,
 )
-from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import Step
 from identify.selection.nonparametric import nonparametric_labels
+from identify.selection.scoring import Candidate
 from twin.experiments.file import in_short
 from twin.experiments.kinds import kind_of
 

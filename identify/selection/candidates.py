@@ -1,8 +1,8 @@
-"""One effect as a candidate: scan its shape, refit the model with it, score it against the base."""
+"""Absent effects as candidates: scan the shape of each, refit the model with it, score it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -10,24 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import forces_lessened, is_noise
-from identify.dataset.noise_floor import floor_of, unrounded_floor_of
+from identify.dataset.drive import is_noise
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import (
-    Evidence,
-    Gain,
     effective_samples,
     evidence,
-    held_out_gain,
-    left_out,
-    noise_gain,
 )
-from identify.estimation.fit import Fit, Outcome, error_on, finished, fit_axis, rms
+from identify.estimation.fit import Fit, Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
-from identify.estimation.time_origin import phases_found
 from identify.estimation.variable_projection import Start, fit_thoroughly, one_linear_step, starts
-from identify.selection.decoys import proof
+from identify.selection.scoring import Candidate, score
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel, MachineModel
@@ -36,49 +29,6 @@ Array = NDArray[np.float64]
 
 FIRST_EVALUATIONS = 12  # of a refit, after which it must show some evidence to go on
 HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
-EDGE = 1e-3  # relative distance from a bound at which a value ended there
-RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion does not excite
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Candidate:
-    """A model with one effect more: its refit, evidence and held-out gain.
-
-    plausible: whether the axis travels far enough for what repeats along the track to be seen to,
-    as one cycle over all of the travel is any smooth force of position; and no time, length or
-    frequency of the law ended at its bound, beyond which it is another law. beats_decoys: whether
-    it was set against them, and held.
-    """
-
-    effect: Effect
-    axis: str
-    fit: Fit
-    evidence: Evidence
-    gain: Gain
-    plausible: bool = True
-    beats_decoys: bool = False
-
-    def __repr__(self) -> str:
-        return f"<Candidate {self.effect.name} on {self.axis}: evidence {self.delta_bic:.4g}>"
-
-    @property
-    def delta_bic(self) -> float:
-        """BIC without minus BIC with the effect; positive supports it."""
-        return self.evidence.delta_bic
-
-    @property
-    def supported(self) -> bool:
-        """Whether evidence and held-out logs support the effect, and its values are plausible."""
-        held_out = self.gain.t > RULE.least_t or self.beats_decoys
-        return (
-            self.delta_bic > RULE.least_bic and held_out and self.plausible
-            and (self.is_noise or self.gain.after < self.gain.before)
-        )  # fmt: skip
-
-    @property
-    def is_noise(self) -> bool:
-        """Whether the effect lowers no error but raises the noise floor."""
-        return is_noise(self.effect)
 
 
 def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
@@ -211,113 +161,3 @@ def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
         return fit
     again = fit_axis(fit.axis.with_effect(replace(fitted, values=simple)), dataset.fit)
     return again if again.error < RULE.same_error * fit.error else fit
-
-
-def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
-    """Evidence for a fitted larger model over the base, on the test functions both can use."""
-    if is_noise(effect):
-        return _score_noise(fit, dataset, effect)
-    shared = base.kept & fit.kept
-
-    def both(left: Callable[[Fit], Array]) -> list[Array]:
-        # An effect that makes the motor's force small makes every force and error small with it.
-        return [left(f) / f.lessened for f in (base, fit)]
-
-    before, after = both(lambda f: f.residual[shared[f.kept]])
-    added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
-    added += phases_found(fit.axis, effect.name, dataset)
-    found = evidence(before, after, added)
-    if dataset.holdout:
-        held = moving(dataset.holdout, sticks(base.axis) or sticks(fit.axis))
-        motions = [log.motion for log in dataset.holdout]  # it may differ from the fit logs
-        pair = [
-            residual(f.axis, dataset.holdout)[held] / forces_lessened(f.axis, motions)
-            for f in (base, fit)
-        ]
-    elif found.delta_bic > RULE.least_bic:
-        pair = both(lambda f: _cross_validated(f, shared[f.kept]))
-    else:  # not supported, whatever cross-validation would give
-        pair = [before, after]
-    gain = held_out_gain(pair[0], pair[1], base.floor)
-    candidate = Candidate(effect, dataset.axis, fit, found, gain)
-    if found.delta_bic < RULE.least_bic:
-        return candidate
-    return replace(
-        candidate,
-        plausible=_is_plausible(fit, effect, dataset),
-        beats_decoys=gain.t < RULE.least_t and _beats_decoys(base, candidate, dataset),
-    )
-
-
-def _beats_decoys(base: Fit, candidate: Candidate, dataset: Dataset) -> bool:
-    """Whether a held-out gain that is large, but uneven over the blocks, is the effect's own.
-
-    Where much else is left, blocks differ by that.
-    """
-    gain = candidate.gain
-    if gain.after**2 > RULE.beside_decoys * gain.before**2:
-        return False
-    name = candidate.effect.name
-    beside = proof(base, candidate.fit.axis[name], dataset)
-    return beside is not None and beside.holds
-
-
-def _is_plausible(fit: Fit, effect: Effect, dataset: Dataset) -> bool:
-    """Whether the values that an effect was fitted with are its own; see Candidate."""
-    found = [f for f in fit.axis.effects if f.effect.name == effect.name]
-    scales = [
-        (f.values[p.name], p)
-        for f in found
-        for p in effect.parameters
-        if 0.0 < p.lower < p.upper and p.name not in f.fixed
-    ]
-    if any(v <= p.lower * (1.0 + EDGE) or v >= p.upper * (1.0 - EDGE) for v, p in scales):
-        return False
-    itself = effect.is_itself
-    if itself and not all(itself(f.values, dataset.excitation) for f in found):
-        return False
-    periods = [f.values[p.name] for f in found for p in effect.parameters if p.period]
-    if not periods:
-        return True
-    travel = np.ptp(np.concatenate([log.motion.position for log in fit.logs]))
-    return bool(travel > RULE.fewest_cycles * max(periods))
-
-
-def _score_noise(fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
-    """Evidence for an effect that is noise, over the floor that readings without it would have.
-
-    It counts where it makes a good part of the error on all logs that choose, and no more than it.
-    """
-    logs = (*dataset.fit, *dataset.holdout)
-    error = error_on(fit.axis, logs)
-    less, floor = unrounded_floor_of(fit.axis, logs), floor_of(fit.axis, logs)
-    part = (floor**2 - less**2) / rms(error) ** 2
-    explained = part > RULE.least_part and floor < RULE.at_floor * rms(error)
-    gain = noise_gain(error, less, floor) if explained else 0.0
-    samples = effective_samples(error)
-    return Candidate(
-        effect=effect,
-        axis=dataset.axis,
-        fit=fit,
-        evidence=Evidence(gain, 1, samples),
-        gain=Gain(rms(error), rms(error), float(np.sqrt(max(samples * gain, 0.0)))),
-    )
-
-
-def _cross_validated(fit: Fit, rows: NDArray[np.bool_]) -> Array:
-    columns = fit.jacobian[rows]
-    return left_out(fit.residual[rows], columns, RIDGE * np.linalg.norm(columns, axis=0))
-
-
-def on_equal_samples(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates with at most the effective sample size of the one that explains most.
-
-    Each residual has its own colour, and evidence on different sample sizes is not comparable.
-    """
-    if not candidates:
-        return []
-    most = max(candidates, key=lambda c: c.evidence.log_gain).evidence.samples
-    return [
-        replace(c, evidence=replace(c.evidence, samples=min(c.evidence.samples, most)))
-        for c in candidates
-    ]

@@ -11,7 +11,6 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
 from identify.estimation.errors import Errors
 from identify.estimation.fit import Fit
-from identify.selection.candidates import Candidate
 from identify.selection.findings import (
     Finding,
     FindingKind,
@@ -25,6 +24,7 @@ from identify.selection.ranking import less
 from identify.selection.repeating_force import Repeat, not_general
 from identify.selection.reshaping import Reshaped
 from identify.selection.residual_dependence import Dependence
+from identify.selection.scoring import Candidate
 from identify.selection.wrong_shape import wrong_shape
 from twin.effect import Kind
 

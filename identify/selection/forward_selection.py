@@ -12,7 +12,6 @@ from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.time_origin import synchronised
 from identify.estimation.variable_projection import fit_thoroughly
-from identify.selection.candidates import Candidate, score
 from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, kept
 from identify.selection.pair_search import held_at_floor, search_pairs
 from identify.selection.ranking import (
@@ -24,6 +23,7 @@ from identify.selection.ranking import (
     took_friction,
 )
 from identify.selection.reshaping import Reshaped, curve_in_place
+from identify.selection.scoring import Candidate, score
 from identify.selection.unpredictable import is_unpredictable, with_own_noise
 from identify.selection.verdict import decided
 from twin.effect import Kind

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, error_on, rms
-from identify.selection.candidates import Candidate, score
 from identify.selection.ranking import less, part_explained
+from identify.selection.scoring import Candidate, score
 
 FIRSTS = 3  # candidates for the first effect of a pair
 

@@ -16,16 +16,8 @@ from identify.estimation.decision import RULE
 from identify.estimation.evidence import evidence, held_out_gain
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import residual
-from identify.selection.candidates import (
-    Candidate,
-    Look,
-    absent_effects,
-    as_looked,
-    look_at,
-    on_equal_samples,
-    refitted,
-    score,
-)
+from identify.selection.candidates import Look, absent_effects, as_looked, look_at, refitted
+from identify.selection.scoring import Candidate, on_equal_samples, score
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.memory import give_back

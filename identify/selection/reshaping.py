@@ -17,9 +17,9 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
 from identify.estimation.errors import Errors, error_in
 from identify.estimation.fit import Fit
-from identify.selection.candidates import Candidate
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.ranking import less
+from identify.selection.scoring import Candidate
 from identify.selection.unpredictable import is_unpredictable
 from identify.selection.wrong_shape import WrongShape, wrong_shape
 

@@ -10,13 +10,13 @@ from identify.dataset.drive import is_noise
 from identify.estimation.decision import RULE
 from identify.estimation.errors import Errors
 from identify.estimation.fit import Fit, fit_axis
-from identify.selection.candidates import Candidate, score
 from identify.selection.decoys import proof
 from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, Verdict, kept
 from identify.selection.findings import share_explained
 from identify.selection.pair_search import held_at_floor
 from identify.selection.ranking import less, part_explained, tie
 from identify.selection.residual_dependence import explains, find_dependence
+from identify.selection.scoring import Candidate, score
 from twin.effect import Effect
 
 

@@ -21,8 +21,8 @@ from identify.output.words.selection import (
     verdict_in_words,
 )
 from identify.output.words.validation import region_in_words
-from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from identify.selection.scoring import Candidate
 from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
 from twin.model.units import AxisUnits

@@ -9,8 +9,8 @@ from identify.output.report.blocks import Block, Column, Heading, Picture, Row, 
 from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, number, quantity, spaced, title_case
-from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.scoring import Candidate
 
 WITH_VALUES = 3  # candidates whose parameter values are printed
 UNBROKEN = "\u00a0"  # space at which no line ends

@@ -8,7 +8,6 @@ import numpy as np
 
 from identify.dataset.given_logs import Role
 from identify.output.words.numbers import PLAIN, Numbers
-from identify.selection.candidates import Candidate
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
@@ -16,6 +15,7 @@ from identify.selection.found_shape import FoundShape
 from identify.selection.nonparametric import followed
 from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
+from identify.selection.scoring import Candidate
 from twin.effects import load_catalogue
 from twin.model.machine import Fitted, HistoryStep
 from twin.model.units import units_of

@@ -21,14 +21,9 @@ from built_fits import (
 )
 
 from identify.estimation.evidence import Evidence, Gain, effective_samples, evidence
-from identify.selection import candidates
-from identify.selection.candidates import (
-    RIDGE,
-    _cross_validated,
-    absent_effects,
-    on_equal_samples,
-    score,
-)
+from identify.selection import scoring
+from identify.selection.candidates import absent_effects
+from identify.selection.scoring import RIDGE, _cross_validated, on_equal_samples, score
 from twin.effect import Kind
 
 # The rules as they were decided.
@@ -95,7 +90,7 @@ def test_candidates_are_levelled_to_the_samples_of_what_explains_most():
 @pytest.fixture
 def quiet(monkeypatch):
     """No effect reads a clock."""
-    monkeypatch.setattr(candidates, "phases_found", lambda axis, name, dataset: 0)
+    monkeypatch.setattr(scoring, "phases_found", lambda axis, name, dataset: 0)
 
 
 def test_only_windows_that_both_fits_can_use_are_compared(quiet):
@@ -125,7 +120,7 @@ def test_evidence_counts_the_parameters_that_the_fit_has_more(quiet, name):
 
 
 def test_phases_found_count_as_parameters(monkeypatch):
-    monkeypatch.setattr(candidates, "phases_found", lambda axis, name, dataset: 3)
+    monkeypatch.setattr(scoring, "phases_found", lambda axis, name, dataset: 3)
     fit = built_fit(1.9, axis=axis_of(fitted("constant_force")))
     found = score(built_fit(2.0), fit, dataset_stub(), CATALOGUE["constant_force"])
     assert found.evidence.parameters == 4
@@ -148,10 +143,9 @@ def test_the_held_out_logs_judge_before_and_after_in_that_order(quiet):
     richer = axis_of(fitted("constant_force", F0=2.0))
     fit = built_fit(0.1, 0.02, richer)
     found = score(base, fit, dataset, CATALOGUE["constant_force"])
-    kept = candidates.moving(dataset.holdout, True)
+    kept = scoring.moving(dataset.holdout, True)
     before, after = (
-        np.sqrt(np.mean(candidates.residual(a, dataset.holdout)[kept] ** 2))
-        for a in (PLAIN, richer)
+        np.sqrt(np.mean(scoring.residual(a, dataset.holdout)[kept] ** 2)) for a in (PLAIN, richer)
     )
     assert found.gain.before == pytest.approx(before)
     assert found.gain.after == pytest.approx(after)
@@ -166,9 +160,9 @@ def test_held_out_windows_at_rest_are_left_out_where_either_friction_sticks(quie
         asked.append(either)
         return slice(None)
 
-    monkeypatch.setattr(candidates, "moving", moving)
-    monkeypatch.setattr(candidates, "residual", lambda axis, logs: RNG.standard_normal(300))
-    monkeypatch.setattr(candidates, "forces_lessened", lambda axis, motions: 1.0)
+    monkeypatch.setattr(scoring, "moving", moving)
+    monkeypatch.setattr(scoring, "residual", lambda axis, logs: RNG.standard_normal(300))
+    monkeypatch.setattr(scoring, "forces_lessened", lambda axis, motions: 1.0)
     held = SimpleNamespace(motion=None)
     dataset, lugre = dataset_stub(holdout=(held,)), PLAIN.with_effect(fitted("lugre"))
     for one, two in ((PLAIN, lugre), (lugre, PLAIN), (lugre, lugre)):
@@ -179,7 +173,7 @@ def test_held_out_windows_at_rest_are_left_out_where_either_friction_sticks(quie
 def test_blocks_are_left_out_only_where_evidence_asks(quiet, monkeypatch):
     noise = RNG.standard_normal(600)
     fit = built_fit(0, axis=axis_of(fitted("constant_force")), residual=noise)
-    monkeypatch.setattr(candidates, "_cross_validated", lambda f, rows: 3.0 * f.residual[rows])
+    monkeypatch.setattr(scoring, "_cross_validated", lambda f, rows: 3.0 * f.residual[rows])
     effect = CATALOGUE["constant_force"]
     strong = score(built_fit(0, residual=2.0 * noise), fit, dataset_stub(), effect)
     size = np.sqrt(np.mean(noise**2))
@@ -230,9 +224,9 @@ def test_a_noise_is_told_where_it_makes_a_good_part_of_the_error(monkeypatch, se
     def of(floor):
         return lambda axis, logs: asked.append(logs) or floor
 
-    monkeypatch.setattr(candidates, "error_on", lambda axis, logs: seen * noise)
-    monkeypatch.setattr(candidates, "floor_of", of(FLOOR))
-    monkeypatch.setattr(candidates, "unrounded_floor_of", of(LESS))
+    monkeypatch.setattr(scoring, "error_on", lambda axis, logs: seen * noise)
+    monkeypatch.setattr(scoring, "floor_of", of(FLOOR))
+    monkeypatch.setattr(scoring, "unrounded_floor_of", of(LESS))
     dataset = dataset_stub(holdout=("held",), fit=("fit",))
     found = score(built_fit(1.6, 1.0), built_fit(0, 1.0, axis_of(), residual=noise), dataset, NOISE)
     assert set(asked) == {("fit", "held")}

@@ -23,12 +23,7 @@ from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Outcome
 from identify.estimation.variable_projection import Start
 from identify.selection import candidates
-from identify.selection.candidates import (
-    _fitted_to_heads,
-    _promising,
-    simplified,
-    try_effect,
-)
+from identify.selection.candidates import _fitted_to_heads, _promising, simplified, try_effect
 
 # The rules as they were decided.
 FIRST_EVALUATIONS = 12

@@ -11,11 +11,11 @@ from built_fits import built, built_dataset, built_fit
 
 from identify.dataset.given_logs import Role
 from identify.estimation.evidence import Gain
-from identify.selection.candidates import _beats_decoys
 from identify.selection.decoys import Proof
 from identify.selection.findings import _linear_step
+from identify.selection.scoring import _beats_decoys
 
-module = importlib.import_module("identify.selection.candidates")
+module = importlib.import_module("identify.selection.scoring")
 LEAST_T, LEAST_BIC, PART = 3.0, 10.0, 0.8  # the rules as they were decided
 
 
