@@ -75,10 +75,12 @@ def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) 
 
     Each distorts what the other leaves, so that neither has evidence alone: what a shape of force
     leaves is smooth, and a smooth residual has few effective samples. An effect counts by what it
-    takes of the test error; both together must take nearly all.
+    takes of the test error, then by its evidence; both together must take nearly all.
     """
     likely = [c for c in ranking if c.plausible and _may_help(c)]
-    for candidate in sorted(likely, key=lambda c: c.gain.after / c.gain.before)[:MOST_TRIED]:
+    by_gain = sorted(likely, key=lambda c: c.gain.after / c.gain.before)[:MOST_TRIED]
+    by_evidence = sorted(likely, key=lambda c: -c.delta_bic)[:1]
+    for candidate in (*by_gain, *(c for c in by_evidence if c not in by_gain)):
         found = _reshaped(candidate.fit, dataset, ())
         if found is not None and _lessened(fit, found.fit, dataset) > RULE.nearly_all:
             without = less(candidate.effect, found.fit, fit, dataset)
