@@ -44,6 +44,11 @@ def test_beside_a_curve_those_effects_are_tried_first_that_take_most(monkeypatch
     ]
     assert module._beside_an_effect(BASE, DATASET, ranking) is None
     assert tried == [3.0, 5.0, 7.0]
+    # And that with most evidence, which may lower no test error before the curve is there.
+    tried.clear()
+    sure = built("actuator_lag", bic=400.0, t=0.5, before=8.0, after=8.1, fit=built_fit(8.1))
+    assert module._beside_an_effect(BASE, DATASET, [*ranking, sure]) is None
+    assert tried == [3.0, 5.0, 7.0, 8.1]
 
 
 @pytest.mark.parametrize(("gain", "refitted"), [(0.58, False), (0.6, True)])
