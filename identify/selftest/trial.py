@@ -24,6 +24,7 @@ from identify.selection.residual_dependence import dependences
 from identify.selftest.case import Case
 from identify.selftest.cases import AXIS, Machine, NotShown, machine, own_error, prepared
 from identify.selftest.laws import OUTSIDE
+from twin.curve import Coordinate
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model
@@ -163,19 +164,26 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
             right = not {*case.effects, *built.right}.isdisjoint(names)
             right |= not {*built.reshaped}.isdisjoint(finding.tied)
         case FindingKind.WRONG_SHAPE:
-            nameless = [f.effect for f in built.planted if _has_no_name(f.effect, case)]
-            over = {c.over for effect in nameless for c in effect.curves}
             right = not {*built.reshaped}.isdisjoint(names)
-            right |= finding.shape is not None and finding.shape.over in over
+            right |= any(_is_shape_of(f.effect, finding, built, case) for f in built.planted)
             right |= not {*case.effects}.isdisjoint(finding.tied)
         case FindingKind.RESEMBLES:
             right = any(e in OUTSIDE for e in case.effects)
     return Answer(names, finding.kind, right, finding.left, finding.confidence)
 
 
-def _has_no_name(planted: Effect, case: Case) -> bool:
-    """Whether another shape of a law that the model has may be all there is to say of an effect."""
-    return planted.name in OUTSIDE or not case.known or planted.kind is Kind.FRICTION
+def _is_shape_of(planted: Effect, finding: Finding, built: Machine, case: Case) -> bool:
+    """Whether another shape of a law that the model has is a right thing to say of an effect.
+
+    Of one with no name in the catalogue, over its own coordinate; of a friction, where the friction
+    that the model has in its place is told another curve over speed.
+    """
+    over = finding.shape.over if finding.shape else None
+    if planted.name in OUTSIDE or not case.known:
+        return over in {c.over for c in planted.curves}
+    axis = built.model.axes[AXIS]
+    told = finding.effect in axis.names and axis[finding.effect].effect.kind is Kind.FRICTION
+    return planted.kind is Kind.FRICTION and told and over is Coordinate.SPEED
 
 
 def _tested(found: AxisDiagnosis, built: Machine) -> float:
