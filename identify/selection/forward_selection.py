@@ -166,12 +166,11 @@ def _friction_instead(base: Fit, best: Candidate, ranking: Sequence[Candidate]) 
 
 
 def _near(best: Candidate, ranking: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """The other candidates that explain about as much as the best."""
+    """The other candidates that explain about as much as the best; dead times are all alike."""
     least = RULE.near * best.evidence.log_gain
-    return tuple(
-        c for c in ranking
-        if c.effect.name != best.effect.name and c.evidence.log_gain > least and not c.is_noise
-    )  # fmt: skip
+    others = [c for c in ranking if c.effect.name != best.effect.name and not c.is_noise]
+    late = best.effect.dead_time
+    return tuple(c for c in others if c.evidence.log_gain > least or late and c.effect.dead_time)
 
 
 def _eliminated_backwards(

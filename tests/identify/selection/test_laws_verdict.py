@@ -64,6 +64,13 @@ def test_a_rival_gains_more_than_four_fifths_of_the_best():
     assert _near(near, [best, near]) == (best,)  # the larger is always near
 
 
+def test_dead_times_are_near_whatever_they_gain():
+    """One of them may smooth the noise of the reading, and so gain more."""
+    late = [built(e, gain=g) for e, g in (("encoder_delay", 5.0), ("actuator_delay", 1.0))]
+    assert _near(late[0], [*late, built("actuator_lag", gain=3.9)]) == (late[1],)
+    assert _near(built("wear", gain=5.0), late) == (late[0],)
+
+
 # --- what stands in for a friction ----------------------------------------------------------
 
 
