@@ -170,7 +170,7 @@ def _near(best: Candidate, ranking: Sequence[Candidate]) -> tuple[Candidate, ...
     least = RULE.near * best.evidence.log_gain
     others = [c for c in ranking if c.effect.name != best.effect.name and not c.is_noise]
     late = best.effect.dead_time
-    return tuple(c for c in others if c.evidence.log_gain > least or late and c.effect.dead_time)
+    return tuple(c for c in others if c.evidence.log_gain > least or (late and c.effect.dead_time))
 
 
 def _eliminated_backwards(
