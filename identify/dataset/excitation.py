@@ -14,7 +14,6 @@ from twin.signals import Array
 
 FEWEST_CYCLES = 20  # over the travel, of an error of the reading
 MOST_RIPPLES = 8
-SAME = 1e-3  # relative difference of one period as two logs tell it
 LISTENED = 40.0  # s of all logs together, that lines are sought in before there is a model
 
 
@@ -41,7 +40,7 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
         period=motions[0].period,
         force_max=float(np.abs(command).max()),
         lines=lines(heard),
-        ripples=(*read_ripples(motions), *ripples(heard)),
+        ripples=(*motions[0].ripples, *ripples(heard)),  # the readings of all logs tell the same
         resolution=max(m.resolution for m in motions),
     )
 
@@ -57,18 +56,6 @@ def lines(motions: Sequence[Motion]) -> tuple[float, ...]:
     The force is the command less what acceleration, direction, speed and position explain.
     """
     return lines_in_time([(_rest(m), m.period) for m in motions])
-
-
-def read_ripples(motions: Sequence[Motion]) -> tuple[float, ...]:
-    """Periods (m) at which the readings of logs err along the track, as the longest way tells each.
-
-    They are told by the readings themselves; ``ripples`` by the force finds those that no axis
-    passes within a few samples.
-    """
-    found: list[float] = []
-    for motion in sorted(motions, key=lambda m: -float(np.ptp(m.position))):
-        found += [p for p in motion.ripples if all(abs(p / q - 1.0) > SAME for q in found)]
-    return tuple(found[:MOST_RIPPLES])
 
 
 def ripples(motions: Sequence[Motion]) -> tuple[float, ...]:

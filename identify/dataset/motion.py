@@ -29,7 +29,7 @@ SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
 SHORTEST_LOG = 1.0  # s
 EQUAL = 1e-9  # relative difference by which whole samples may miss a length
 READ_BACK = 32  # readings that a controller is supposed to use
-ENOUGH = 200_000  # samples that tell the noise of a command, or the step of readings
+ENOUGH = 200_000  # samples that tell the noise of a command
 SMOOTHED = 11  # samples over which readings are smoothed to undo their errors
 FOLLOWS = 0.5  # squared correlation of position and setpoint from which the loop is closed
 

@@ -13,10 +13,7 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.decision import RULE
-from identify.estimation.evidence import (
-    effective_samples,
-    evidence,
-)
+from identify.estimation.evidence import effective_samples, evidence
 from identify.estimation.fit import Fit, Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.variable_projection import Start, fit_thoroughly, one_linear_step, starts

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.estimation.decision import RULE
@@ -82,20 +84,18 @@ def _without_small(
     What a large effect's law leaves of it may be significant, and be taken by any other law.
     """
 
-    def share(step: Step) -> float:
-        without = less(step.candidate.effect, final, base, dataset)
-        return share_explained(Errors.of(without, final, dataset, dataset.chosen_on), base, dataset)
-
     named = [s for s in kept(steps) if s.proved and s.candidate.effect.name in final.axis.names]
     named = [s for s in named if not s.candidate.is_noise]
     if len(named) < 2:
         return steps, final
-    least, smallest = min(((share(s), s) for s in named), key=lambda pair: pair[0])
-    if least >= RULE.least_finding:
+    without = [less(s.candidate.effect, final, base, dataset) for s in named]
+    falls = [Errors.of(fit, final, dataset, dataset.chosen_on) for fit in without]
+    shares = [share_explained(fall, base, dataset) for fall in falls]
+    least = int(np.argmin(shares))
+    if shares[least] >= RULE.least_finding:
         return steps, final
-    rest = tuple(replace(s, proved=False) if s is smallest else s for s in steps)
-    without = less(smallest.candidate.effect, final, base, dataset)
-    return _without_small(rest, without, base, dataset)
+    rest = tuple(replace(s, proved=False) if s is named[least] else s for s in steps)
+    return _without_small(rest, without[least], base, dataset)
 
 
 def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:
