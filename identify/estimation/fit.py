@@ -24,7 +24,7 @@ from identify.estimation.levenberg_marquardt import minimise
 from identify.estimation.pitches import pitches
 from identify.estimation.scaling import Scaling
 from identify.estimation.smoothing import has_nonparametric, smoothing
-from identify.estimation.subspace import orthonormal
+from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.effect import Kind
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters, read
@@ -96,6 +96,14 @@ class Fit:
     def basis(self) -> Array:
         """Orthonormal basis (n, r) of the forces that the free parameters can add."""
         return orthonormal(self.jacobian)
+
+    @cached_property
+    def unabsorbed(self) -> Array:
+        """The residual (n,) N after a linear step of the free parameters.
+
+        Priors, smoothing and bounds keep a fit from taking it.
+        """
+        return unabsorbed(self.residual, self.basis)
 
     @cached_property
     def lines(self) -> tuple[float, ...]:

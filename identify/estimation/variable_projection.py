@@ -57,13 +57,14 @@ class Start:
         """N^2, sum over the test functions of what is left."""
         return float(self.left @ self.left)
 
+    def share(self, base: Fit) -> float:
+        """Part of the squared error that it takes, of what a linear step of the base leaves."""
+        before = float(base.unabsorbed @ base.unabsorbed)
+        return 1.0 - self.squared_error / before if before > 0.0 else 0.0
+
     def gain(self, base: Fit) -> float:
         """Twice the gain in log likelihood over the base, on all of its logs."""
-        before = float(base.residual @ base.residual)
-        if before == 0.0:
-            return 0.0
-        part = before / max(self.squared_error, 1e-12 * before)
-        return float(base.samples * np.log(part))
+        return float(-base.samples * np.log(max(1.0 - self.share(base), 1e-12)))
 
 
 def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
@@ -120,7 +121,8 @@ def _unlike(found: Sequence[Start]) -> list[Start]:
 def one_linear_step(base: Fit, start: Start) -> Fit:
     """The base with the effect at this start, as a linear step of both predicts it.
 
-    The residual is the predicted one, so that nothing is walked.
+    The residual is the predicted one, so that nothing is walked; what the base's own parameters
+    could take of it remains, or that would count for the effect.
     """
     where = base.scaling.where
     norms = np.maximum(np.linalg.norm(base.jacobian, axis=0), 1e-300)
@@ -136,7 +138,7 @@ def one_linear_step(base: Fit, start: Start) -> Fit:
         axis=axis,
         scaling=Scaling(free_parameters(axis)),
         outcome=Outcome.NOT_CONVERGED,
-        residual=start.left,
+        residual=start.left + (base.residual - base.unabsorbed),
     )
 
 
@@ -166,10 +168,10 @@ def _promises(start: Start, fit: Fit, dataset: Dataset) -> bool:
 
     On the heads where it was found on them, which a fit to all of the logs does not fit as well.
     """
-    there = fit.residual
+    there = fit.unabsorbed
     if len(start.left) != len(there):
         rows = dataset.in_heads[fit.kept]
-        there = unabsorbed(there[rows], orthonormal(fit.jacobian[rows]))
+        there = unabsorbed(fit.residual[rows], orthonormal(fit.jacobian[rows]))
     return bool(np.mean(start.left**2) < BETTER**2 * np.mean(there**2))
 
 

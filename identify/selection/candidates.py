@@ -80,7 +80,7 @@ def look_at(base: Fit, dataset: Dataset, effect: Effect) -> Look:
         fit, best = _fitted_to_heads(base, dataset, found)
         found = (best, *(s for s in found if s is not best))
     else:
-        share = 1.0 - best.squared_error / max(float(base.residual @ base.residual), 1e-300)
+        share = best.share(base)
         fit = None if _promising(base, best) else one_linear_step(base, best)
     candidate = None if fit is None else score(base, fit, dataset, effect)
     return Look(effect, found, share, candidate)
