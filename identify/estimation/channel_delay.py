@@ -19,8 +19,8 @@ from identify.estimation.decision import RULE
 from identify.estimation.evidence import evidence
 from identify.estimation.fit import Fit, Outcome, error_on, finished, fit_axis, rms
 from identify.estimation.subspace import unabsorbed
+from identify.estimation.thorough_fit import fit_thoroughly
 from identify.estimation.time_origin import depends_on_time_origin, synchronised, with_time_origins
-from identify.estimation.variable_projection import fit_thoroughly
 from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]

@@ -14,6 +14,11 @@ Array = NDArray[np.float64]
 BLOCKS = 24  # over which the standard error of a held-out gain is taken
 
 
+def rms(values: Array) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
+
+
 def effective_samples(residual: Array) -> float:
     """Effective sample size of a coloured residual.
 

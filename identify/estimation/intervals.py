@@ -24,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.estimation.evidence import left_out
-from identify.estimation.fit import Fit, is_constant
+from identify.estimation.fit import Fit
+from identify.estimation.fit_problem import is_constant
 from identify.estimation.force_balance import changes
 from twin.model.intervals import AxisIntervals
 from twin.model.parameters import ParameterReference, read, write

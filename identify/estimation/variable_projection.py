@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.fit import Fit, Outcome, finished, fit_axis
+from identify.estimation.fit import Fit, Outcome
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.levenberg_marquardt import minimise
 from identify.estimation.scaling import Scaling
@@ -29,13 +29,14 @@ from twin.model.parameters import ParameterReference, free_parameters, read, wri
 Array = NDArray[np.float64]
 
 RIDGE = 1e-4  # keeps the linear step finite along directions that the base explains already
+MANY_SHAPES = 100  # of which every other value is tried first, then what is beside the best
+BESIDE = 4  # best shapes whose neighbours are tried
 RESCORED_SHAPES = 12  # best shapes of a coarse scan that are tried with every strength
 CHANCE = 4.0  # twice the gain in log likelihood, for each strength, that a scan of noise finds
 FULL_SHAPES = 4  # best shapes on the logs' heads that are tried on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
 EXACT = 1e-13  # relative fall of the squared error below which strengths within bounds are found
 MOST_STEPS = 100
-BETTER = 0.99  # part of the error that a new start must reach to be taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,7 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     there than chance. So are the shapes that make no force on the heads, such as a stop that only a
     later move reaches. A friction's shapes are told apart by the heads.
     """
-    excitation = _with_what_repeats(base, dataset)
+    excitation = with_what_repeats(base, dataset)
     nothing, absent = np.zeros(0), Fitted.at_start(effect)
     found = [Start(shape, absent, nothing, nothing) for shape in tried_shapes(effect, excitation)]
     if len(found) <= FULL_SHAPES:
@@ -85,7 +86,7 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     coarse = [p for p in effect.strengths if p.screened]
     if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
         found = _best(head, found, coarse, RESCORED_SHAPES)
-    found = _best(head, found, effect.strengths, len(found))
+    found = _scanned(head, found, effect.strengths)
     if effect.kind is Kind.FRICTION:
         return _unlike(found)
     whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
@@ -109,6 +110,26 @@ def _best(
     return sorted(scored, key=lambda s: s.squared_error)[:count]
 
 
+def _scanned(
+    ground: _Ground, tried: Sequence[Start], strengths: Sequence[Parameter]
+) -> list[Start]:
+    """All shapes, best first; of many every other value of each, and those beside the best."""
+    if len(tried) <= MANY_SHAPES:
+        return _best(ground, tried, strengths, len(tried))
+    grids = {name: sorted({s.shape[name] for s in tried}) for name in tried[0].shape}
+
+    def places(shapes: Sequence[Start]) -> NDArray[np.int_]:
+        return np.array([[grids[n].index(v) for n, v in s.shape.items()] for s in shapes])
+
+    there = places(tried)
+    first = np.all(there % 2 == 0, axis=1)
+    found = _best(ground, list(itertools.compress(tried, first.tolist())), strengths, len(tried))
+    steps = np.abs(there[:, None] - places(found[:BESIDE])).max(axis=2)
+    beside = np.any(steps <= 1, axis=1) & ~first
+    others = _best(ground, list(itertools.compress(tried, beside.tolist())), strengths, len(tried))
+    return sorted((*found, *others), key=lambda s: s.squared_error)
+
+
 def _unlike(found: Sequence[Start]) -> list[Start]:
     """The first of some starts, and the next that shares no value of its shape, where one does.
 
@@ -121,13 +142,14 @@ def _unlike(found: Sequence[Start]) -> list[Start]:
 def one_linear_step(base: Fit, start: Start) -> Fit:
     """The base with the effect at this start, as a linear step of both predicts it.
 
-    The residual is the predicted one, so that nothing is walked; what the base's own parameters
-    could take of it remains, or that would count for the effect.
+    The residual is the predicted one, so that nothing is walked. What a linear step of the base
+    alone would take of it remains, or that would count for the effect.
     """
+    left = start.left + base.residual - base.unabsorbed
     where = base.scaling.where
     norms = np.maximum(np.linalg.norm(base.jacobian, axis=0), 1e-300)
     columns = base.jacobian / norms
-    followed = columns.T @ (start.left - start.force)
+    followed = columns.T @ (left - start.force)
     step = np.linalg.lstsq(columns.T @ columns, followed, rcond=1e-12)[0] / norms
     lower = [c.parameter.lower for c in where]
     upper = [c.parameter.upper for c in where]
@@ -138,59 +160,11 @@ def one_linear_step(base: Fit, start: Start) -> Fit:
         axis=axis,
         scaling=Scaling(free_parameters(axis)),
         outcome=Outcome.NOT_CONVERGED,
-        residual=start.left + (base.residual - base.unabsorbed),
+        residual=left,
     )
 
 
-def fit_thoroughly(axis: AxisModel, dataset: Dataset) -> Fit:
-    """Fit an axis; scan its effects' shapes again where the error is above the noise floor."""
-    best = fit_axis(axis, dataset.fit)
-    for name in axis.names:
-        effect = axis[name].effect
-        if best.at_floor or not any(p.scan for p in effect.parameters):
-            continue
-        rest = fit_without(best, dataset, name)
-        found = starts(rest, dataset, effect)[0]
-        known = _with_what_repeats(rest, dataset)
-        if not _promises(found, best, dataset) and _is_nearest(found.shape, best.axis[name], known):
-            continue
-        first = found.fitted
-        held = {n: best.axis[name].values[n] for n in best.axis[name].fixed}
-        again = replace(first, values={**first.values, **held}, fixed=best.axis[name].fixed)
-        other = fit_axis(best.axis.with_effect(again), dataset.fit)
-        if other.error < BETTER * best.error:
-            best = replace(other, begun=best.begun)
-    return best
-
-
-def _promises(start: Start, fit: Fit, dataset: Dataset) -> bool:
-    """Whether a start leaves less than a fit, both after a linear step on the same logs.
-
-    On the heads where it was found on them, which a fit to all of the logs does not fit as well.
-    """
-    there = fit.unabsorbed
-    if len(start.left) != len(there):
-        rows = dataset.in_heads[fit.kept]
-        there = unabsorbed(fit.residual[rows], orthonormal(fit.jacobian[rows]))
-    return bool(np.mean(start.left**2) < BETTER**2 * np.mean(there**2))
-
-
-def _is_nearest(shape: dict[str, float], present: Fitted, excitation: Excitation) -> bool:
-    """Whether the present values are nearer to this shape than to any other that is scanned."""
-
-    def nearest(p: Parameter) -> float:
-        value = present.values[p.name]
-        return min(p.scan(excitation) if p.scan else (), key=lambda v: abs(v - value))
-
-    return all(nearest(present.effect.parameter(n)) == v for n, v in shape.items())
-
-
-def fit_without(fit: Fit, dataset: Dataset, name: str) -> Fit:
-    """The fit with one effect removed and the values of the others unchanged."""
-    return finished(fit.axis.without(name), fit.begun, dataset.fit, fit.outcome)
-
-
-def _with_what_repeats(base: Fit, dataset: Dataset) -> Excitation:
+def with_what_repeats(base: Fit, dataset: Dataset) -> Excitation:
     """What the motion covers, with what repeats in the base's residual, and first."""
     known, (pitches, thrust) = dataset.excitation, base.pitches
     return replace(known, lines=(*base.lines, *known.lines), pitches=pitches, thrust_pitches=thrust)

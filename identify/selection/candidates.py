@@ -14,9 +14,10 @@ from identify.dataset.drive import is_noise
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples, evidence
-from identify.estimation.fit import Fit, Outcome, finished, fit_axis
+from identify.estimation.fit import Fit, Outcome, finished, fit_axis, fit_roughly
 from identify.estimation.force_balance import residual
-from identify.estimation.variable_projection import Start, fit_thoroughly, one_linear_step, starts
+from identify.estimation.thorough_fit import fit_thoroughly
+from identify.estimation.variable_projection import Start, one_linear_step, starts
 from identify.selection.scoring import Candidate, score
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
@@ -26,6 +27,7 @@ Array = NDArray[np.float64]
 
 FIRST_EVALUATIONS = 12  # of a refit, after which it must show some evidence to go on
 HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
+HOPELESS = 2.0  # times the squared error of the present friction, after a rough fit of another
 
 
 def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
@@ -131,9 +133,7 @@ def _fitted_to_heads(
     if sum(map(len, dataset.heads)) > 0.5 * sum(map(len, dataset.fit)):
         return None, found[0]
     old = _on_heads(base, dataset)
-    fits = [
-        fit_axis(base.axis.with_effect(s.fitted), dataset.heads, HEAD_EVALUATIONS) for s in found
-    ]
+    fits = [_to_heads(base.axis.with_effect(s.fitted), dataset, old) for s in found]
     new, start = min(zip(fits, found, strict=True), key=lambda pair: pair[0].error)
     either = moving(dataset.heads, sticks(old.axis) or sticks(new.axis))
     before, after = (residual(f.axis, dataset.heads)[either] for f in (old, new))
@@ -141,6 +141,14 @@ def _fitted_to_heads(
     if gain > RULE.promise * RULE.least_bic:
         return None, start
     return finished(new.axis, base.begun, dataset.fit, new.outcome), start
+
+
+def _to_heads(axis: AxisModel, dataset: Dataset, old: Fit) -> Fit:
+    """An axis with another friction fitted to the heads, to its end unless that is hopeless."""
+    fit = fit_roughly(axis, dataset.heads, HEAD_EVALUATIONS)
+    if fit.error**2 > HOPELESS * old.error**2:
+        return fit
+    return fit_axis(fit.axis, dataset.heads, HEAD_EVALUATIONS)
 
 
 @lru_cache(maxsize=1)  # every friction is compared with the same base

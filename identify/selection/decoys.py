@@ -34,6 +34,7 @@ DECOYS = 40
 SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
 SEED = 0  # of the shifts, the same for each effect
 RIDGE = 1e-4  # of a column's length, which keeps what the motion does not excite finite
+ROUNDING = 1e-12  # of a squared force, below which its remainder is not told
 TINY = 1e-100  # N per unit, length of a column that is nothing, where the motion excites none
 
 
@@ -41,7 +42,8 @@ TINY = 1e-100  # N per unit, length of a column that is nothing, where the motio
 class Proof:
     """Part of the squared test error that an effect takes, and the most that a decoy takes, 0..1.
 
-    Both may be below zero, where the test error rises.
+    Of all of it or of that of a typical block, whichever parts the two more. Both may be below
+    zero, where the test error rises.
     """
 
     gain: float
@@ -100,21 +102,30 @@ class Trial:
         return Trial(self.fit.of_power(), self.held and self.held.of_power())
 
     def proof(self, columns: Columns, *, sticking: bool, decoys: int = DECOYS) -> Proof:
+        """The one of ``proofs`` that parts columns and decoys more; without decoys the larger."""
+        either = self.proofs(columns, sticking=sticking, decoys=decoys)
+        if not decoys:
+            return max(either, key=lambda p: p.gain)
+        return min(either, key=lambda p: (1.0 - p.gain) / (1.0 - p.best_decoy))
+
+    def proofs(
+        self, columns: Columns, *, sticking: bool, decoys: int = DECOYS
+    ) -> tuple[Proof, Proof]:
         """What columns take of the fit's squared test error in one linear step, and their decoys.
 
-        columns: logs -> forces (m, j) N of each log, for strengths with a unit penalty. sticking:
-        whether test functions with standstill are left out.
+        Of all of it, and of that of a typical block. columns: logs -> forces (m, j) N of each log,
+        for strengths with a unit penalty. sticking: whether test functions with standstill are left
+        out.
         """
         fit = self.fit.with_columns(columns, sticking)
         held = self.held and self.held.with_columns(columns, sticking)
         count = len(fit.columns) + (len(held.columns) if held else 0)
-        rng = np.random.default_rng(SEED)
         before = _left(fit, held, None)
-        gain = 1.0 - _left(fit, held, np.zeros(count)) / before
-        untrue = (
-            1.0 - _left(fit, held, rng.uniform(*SHIFTS, count)) / before for _ in range(decoys)
-        )
-        return Proof(float(gain), float(max(untrue, default=-np.inf)))
+        gains = 1.0 - _left(fit, held, np.zeros(count)) / before
+        shifts = np.random.default_rng(SEED).uniform(*SHIFTS, (decoys, count))
+        untrue = [np.full(2, -np.inf), *(1.0 - _left(fit, held, s) / before for s in shifts)]
+        whole, typical = np.stack([gains, np.max(untrue, axis=0)], axis=1)
+        return Proof(*map(float, whole)), Proof(*map(float, typical))
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,22 +200,27 @@ def _ridge(columns: Array) -> Array:
     return np.where(norms > TINY, RIDGE * norms, np.inf)
 
 
-def _left(fit: _Part, held: _Part | None, shifts: Array | None) -> float:
-    """Mean squared test error N^2 after a linear step with columns so shifted.
+def _left(fit: _Part, held: _Part | None, shifts: Array | None) -> Array:
+    """Squared test error (2,) N^2 after a linear step with columns so shifted: mean and typical.
 
-    Products of columns tell it all: force is F, a column X, a step s, and what is left |F - X s|^2.
+    Typical is the geometric mean over blocks, so that a few with large errors do not decide alone,
+    as where a log creeps at speeds that the fit logs have not. Products of columns tell it all:
+    force is F, a column X, a step s, and what is left |F - X s|^2.
     """
     first = len(fit.columns)
     blocks = fit.products(None if shifts is None else shifts[:first])
     whole = blocks.sum(axis=0)
     penalty = np.eye(len(whole) - 1)
     if held is None:  # each block by the step of the others
-        others = whole - blocks
+        there, others = blocks, whole - blocks
         steps = np.linalg.solve(others[:, 1:, 1:] + penalty, others[:, 1:, :1])[..., 0]
-        return float(_squares(blocks, steps).sum() / len(fit.force))
-    step = np.linalg.solve(whole[1:, 1:] + penalty, whole[1:, 0])
-    there = held.products(None if shifts is None else shifts[first:])
-    return float(_squares(there.sum(axis=0)[None], step[None]).sum() / len(held.force))
+    else:
+        there = held.products(None if shifts is None else shifts[first:])
+        step = np.linalg.solve(whole[1:, 1:] + penalty, whole[1:, 0])
+        steps = np.broadcast_to(step, (len(there), len(step)))
+    squares = np.maximum(_squares(there, steps), ROUNDING * there[:, 0, 0] + TINY)
+    typical = len(squares) * np.exp(np.log(squares).mean())
+    return np.array([squares.sum(), typical]) / len((held or fit).force)
 
 
 def _squares(products: Array, steps: Array) -> Array:

@@ -10,8 +10,8 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.channel_delay import moved_by
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, finished, fit_axis
+from identify.estimation.thorough_fit import fit_thoroughly
 from identify.estimation.time_origin import synchronised
-from identify.estimation.variable_projection import fit_thoroughly
 from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, kept
 from identify.selection.pair_search import held_at_floor, search_pairs
 from identify.selection.ranking import (

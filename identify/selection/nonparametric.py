@@ -21,7 +21,7 @@ from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.evidence import Evidence, effective_samples, held_out_gain
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.force_balance import residual
-from identify.estimation.variable_projection import fit_without
+from identify.estimation.thorough_fit import fit_without
 from identify.selection.scoring import Candidate
 from identify.selection.smoothed import Linearised, choose_stiffness
 from identify.selection.wrong_shape import Shape, WrongShape, best_shape

@@ -71,6 +71,8 @@ def _pair(
     """
     second = seconds[0]
     both = second.fit
+    if first.effect.name not in both.axis.names:  # a friction that the second replaced
+        return None
     nearly_all = part_explained(base, both) > RULE.nearly_all  # beside noise that has no model
     if not (nearly_all or both.at_floor or held_at_floor(both, dataset)):
         return None

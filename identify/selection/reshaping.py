@@ -19,7 +19,7 @@ from identify.estimation.errors import Errors, error_in
 from identify.estimation.fit import Fit
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.ranking import less
-from identify.selection.scoring import Candidate
+from identify.selection.scoring import Candidate, score
 from identify.selection.unpredictable import is_unpredictable
 from identify.selection.wrong_shape import WrongShape, wrong_shape
 
@@ -75,15 +75,20 @@ def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) 
 
     Each distorts what the other leaves, so that neither has evidence alone: what a shape of force
     leaves is smooth, and a smooth residual has few effective samples. An effect counts by what it
-    takes of the test error, then by its evidence; both together must take nearly all.
+    takes of the test error, then by its evidence. Both together must take nearly all; or a good
+    part, where the effect has every support beside the curve.
     """
     likely = [c for c in ranking if c.plausible and _may_help(c)]
     by_gain = sorted(likely, key=lambda c: c.gain.after / c.gain.before)[:MOST_TRIED]
     by_evidence = sorted(likely, key=lambda c: -c.delta_bic)[:1]
     for candidate in (*by_gain, *(c for c in by_evidence if c not in by_gain)):
         found = _reshaped(candidate.fit, dataset, ())
-        if found is not None and _lessened(fit, found.fit, dataset) > RULE.nearly_all:
-            without = less(candidate.effect, found.fit, fit, dataset)
+        lessened = _lessened(fit, found.fit, dataset) if found else 0.0
+        if found is None or lessened < RULE.least_part:
+            continue
+        without = less(candidate.effect, found.fit, fit, dataset)
+        needed = score(without, found.fit, dataset, candidate.effect).supported
+        if needed or lessened > RULE.nearly_all:
             return Reshaped(found.shape, candidate.fit, without)
     return None
 

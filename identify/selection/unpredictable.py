@@ -89,10 +89,10 @@ def keeps_its_amplitude(force: Array) -> bool:
 
 def _foretells(trial: Trial, columns: Columns, least: float, sticking: bool) -> bool:
     """Whether columns take at least a part of the squared test error, and more than decoys do."""
-    proof = trial.proof(columns, sticking=sticking, decoys=0)
+    proof, _ = trial.proofs(columns, sticking=sticking, decoys=0)
     if proof.gain < least:
         return False
-    proof = trial.proof(columns, sticking=sticking, decoys=DECOYS)
+    proof, _ = trial.proofs(columns, sticking=sticking, decoys=DECOYS)
     return proof.gain > proof.best_decoy
 
 

@@ -10,14 +10,13 @@ from identify.dataset.prepared_log import moving
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import (
-    PRIOR_SPREAD,
     Outcome,
-    _Problem,
     error_on,
     finished,
     fit_axis,
     rms,
 )
+from identify.estimation.fit_problem import PRIOR_SPREAD, FitProblem
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.smoothing import has_nonparametric, part_rows, smoothing
 from twin.curve import Part
@@ -40,7 +39,7 @@ LOGS = [windowed(moved(np.random.default_rng(k), 1.5, 1000.0)) for k in (1, 2)]
 
 
 def test_priors_are_rows_beside_the_residual():
-    problem = _Problem(ODD, LOGS, 10)
+    problem = FitProblem(ODD, LOGS, 10)
     problem.set_priors(problem.start)
     z = problem.start + np.random.default_rng(6).normal(0.0, 0.01, len(problem.start))
     n, k = int(problem.kept.sum()), len(z)
@@ -65,7 +64,7 @@ def test_priors_weigh_by_the_noise_and_the_force_to_be_explained(quiet):
     noise = np.random.default_rng(7).normal(0.0, 1e-3, len(LOGS[0]))
     log = replace(LOGS[0], command=LOGS[0].command - residual(ODD, LOGS[:1]) + noise)
     logs = [log] if quiet else LOGS
-    problem = _Problem(ODD, logs, 10)
+    problem = FitProblem(ODD, logs, 10)
     problem.set_priors(problem.start)
     left = residual(ODD, logs)[problem.kept]
     size = rms(left) * np.sqrt(len(left) / effective_samples(left))
@@ -86,7 +85,7 @@ MAPPED = AxisModel(1.7, effects=(*ODD.effects[:2], effect("empirical_map")))
 
 
 def test_a_description_is_smoothed_and_its_columns_are_those_of_the_jacobian():
-    problem = _Problem(MAPPED, LOGS[:1], 10)
+    problem = FitProblem(MAPPED, LOGS[:1], 10)
     assert has_nonparametric(MAPPED)
     assert not has_nonparametric(ODD)
     where = problem.scaling.where

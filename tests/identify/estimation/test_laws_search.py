@@ -22,10 +22,10 @@ from identify.estimation.variable_projection import (
     _clipped,
     _Ground,
     _try,
-    _with_what_repeats,
     one_linear_step,
     starts,
     tried_shapes,
+    with_what_repeats,
 )
 from twin.effect import Excitation
 from twin.model.machine import Fitted
@@ -165,21 +165,24 @@ def test_a_ground_on_the_heads_is_that_part_of_the_whole(base, monkeypatch):
 
 
 def test_the_base_moves_along_by_one_linear_step_within_its_bounds(dataset, base):
-    effect = CATALOGUE["quadratic_drag"]
+    effect = CATALOGUE["cable_slab"]
     ground = _Ground.of(base, dataset, effect, SEEN, on_heads=False)
     start = _try(ground, {}, effect.strengths)
     found = one_linear_step(base, start)
-    assert found.axis.names == (*base.axis.names, "quadratic_drag")
-    assert found.axis["quadratic_drag"] == start.fitted
-    assert len(found.scaling.where) == len(base.scaling.where) + 1
+    assert found.axis.names == (*base.axis.names, "cable_slab")
+    assert found.axis["cable_slab"] == start.fitted
+    assert len(found.scaling.where) == len(base.scaling.where) + len(effect.strengths)
     assert (found.outcome, found.begun) == (Outcome.NOT_CONVERGED, base.begun)
-    np.testing.assert_array_equal(found.residual, start.left)
+    # What the base could take by itself is no gain of the effect: it remains.
+    own = base.residual - base.unabsorbed
+    np.testing.assert_allclose(found.residual, start.left + own, rtol=0, atol=1e-12)
     # All is linear here, so what is predicted is what a walk gives, and normal to the columns.
     np.testing.assert_allclose(
         found.residual, residual(found.axis, dataset.fit)[base.kept], atol=1e-3 * base.error
     )
     norms = np.linalg.norm(base.jacobian, axis=0)
-    np.testing.assert_allclose(base.jacobian.T @ found.residual / norms, 0.0, atol=1e-3)
+    moved = base.jacobian.T @ (found.residual - own) / norms
+    np.testing.assert_allclose(moved, 0.0, atol=1e-3)
     assert found.axis.mass != base.axis.mass
     tight = replace(base, residual=base.residual)
     tight.__dict__["jacobian"] = base.jacobian * -1e-9  # steps of a huge size, the wrong way
@@ -255,7 +258,7 @@ def test_many_shapes_are_sifted_on_the_heads_first(monkeypatch, effect, shapes, 
         assert (ground, len(strengths)) == ("whole", len(effect.strengths))
         return of_size(9.0 - shape["i"], shape)
 
-    monkeypatch.setattr(search, "_with_what_repeats", lambda base, dataset: SEEN)
+    monkeypatch.setattr(search, "with_what_repeats", lambda base, dataset: SEEN)
     monkeypatch.setattr(search, "tried_shapes", lambda e, x: ({"i": i} for i in range(shapes)))
     monkeypatch.setattr(search, "_best", best)
     monkeypatch.setattr(search, "_try", tried_on_all)
@@ -275,9 +278,29 @@ def test_many_shapes_are_sifted_on_the_heads_first(monkeypatch, effect, shapes, 
         assert [s.shape["i"] for s in found] == whole[::-1][:REFINED_STARTS]
 
 
+@pytest.mark.parametrize(("rows", "tries"), [(11, 80), (9, 99)])
+def test_of_many_shapes_every_other_is_tried_and_those_beside_the_best(monkeypatch, rows, tries):
+    """Unlike powers of two, so that the best lies between the values that are tried first."""
+    plays, tones = 1.5 ** np.arange(11.0), 1.25 ** np.arange(float(rows))
+    shapes = [{"play": p, "frequency": f} for p in plays for f in tones]
+    tried = [of_size(0.0, shape, fitted("backlash")) for shape in shapes]
+    asked = []
+
+    def score(ground, shape, strengths):
+        asked.append(shape)
+        off = np.log(shape["play"] / plays[5]), np.log(shape["frequency"] / tones[3])
+        return of_size(float(np.hypot(*off)), shape, fitted("backlash"))
+
+    monkeypatch.setattr(search, "_try", score)
+    found = search._scanned(None, tried, ())
+    assert found[0].shape == {"play": plays[5], "frequency": tones[3]}
+    assert len(asked) == len(found) <= tries
+    assert sorted(found, key=lambda s: s.squared_error) == found
+
+
 def test_more_than_one_shape_deserves_a_try_where_the_gain_is_no_chance():
     noise = RNG.standard_normal(900)
-    base = built_fit(0.0, residual=noise)
+    base = built_fit(0.0, residual=noise, jacobian=np.zeros((900, 1)))
     n, before = effective_samples(noise), float(noise @ noise)
     for effect in ("constant_force", "axis_coupling"):
         free = len(CATALOGUE[effect].strengths)
@@ -291,7 +314,7 @@ def test_a_tone_in_the_residual_is_among_the_first_lines_tried(dataset):
     tone = np.concatenate([np.sin(2.0 * np.pi * 7.3 * w.time) for w in dataset.fit])
     loud = replace(base, residual=tone[base.kept])
     known = replace(dataset, covered=lambda: replace(SEEN, lines=(3.21, 4.56)))
-    found = _with_what_repeats(loud, known)
+    found = with_what_repeats(loud, known)
     assert found.lines[-2:] == (3.21, 4.56)
     assert abs(found.lines[0] - 7.3) < 0.5
     assert len(found.lines) <= RESIDUAL_LINES + 2

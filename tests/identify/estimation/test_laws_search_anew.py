@@ -9,20 +9,17 @@ import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, built_fit, fitted
 
+from identify.estimation import thorough_fit
 from identify.estimation import variable_projection as search
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
-from identify.estimation.variable_projection import (
-    Start,
-    _Ground,
+from identify.estimation.thorough_fit import (
     _is_nearest,
     _promises,
-    _try,
-    _unlike,
     fit_thoroughly,
     fit_without,
-    starts,
 )
+from identify.estimation.variable_projection import Start, _Ground, _try, _unlike, starts
 from twin.effect import Excitation
 
 # The rules as they were decided.
@@ -62,13 +59,15 @@ def thorough(monkeypatch, again, first=4.0, floor=1.0, promises=True, nearest=Tr
         assert "cogging" not in rest.axis.names
         return [Start({}, fitted("cogging", p=0.03, a1=0.9, b1=0.5), NOTHING, NOTHING), None]
 
-    monkeypatch.setattr(search, "fit_axis", fit_axis)
-    monkeypatch.setattr(search, "_with_what_repeats", lambda rest, dataset: SEEN)
-    monkeypatch.setattr(search, "_promises", lambda start, fit, dataset: promises)
-    monkeypatch.setattr(search, "_is_nearest", lambda shape, present, known: nearest)
-    monkeypatch.setattr(search, "starts", started)
+    monkeypatch.setattr(thorough_fit, "fit_axis", fit_axis)
+    monkeypatch.setattr(thorough_fit, "with_what_repeats", lambda rest, dataset: SEEN)
+    monkeypatch.setattr(thorough_fit, "_promises", lambda start, fit, dataset: promises)
+    monkeypatch.setattr(thorough_fit, "_is_nearest", lambda shape, present, known: nearest)
+    monkeypatch.setattr(thorough_fit, "starts", started)
     monkeypatch.setattr(
-        search, "fit_without", lambda fit, dataset, name: built_fit(9.0, axis=axis.without(name))
+        thorough_fit,
+        "fit_without",
+        lambda fit, dataset, name: built_fit(9.0, axis=axis.without(name)),
     )
     return fit_thoroughly(axis, SimpleNamespace(fit=())), axes, axis
 
@@ -97,7 +96,7 @@ def test_a_shape_that_is_there_already_is_not_refitted_in_vain(
 def test_a_start_promises_what_it_leaves_less_of(dataset, base):
     shape = fitted("cogging")
     for part, promising in ((BETTER - 0.001, True), (BETTER + 0.001, False)):
-        left = part * base.residual
+        left = part * base.unabsorbed
         assert _promises(Start({}, shape, left, left), base, dataset) is promising
     few = replace(dataset, fit=dataset.fit)
     few.__dict__["in_heads"] = np.arange(len(base.kept)) < 0.2 * len(base.kept)
@@ -169,7 +168,7 @@ def test_what_is_silent_on_the_heads_is_tried_on_all_of_the_logs(monkeypatch, wo
         assert ground == "whole"
         return of_shape(left.get(shape["low"], 7.0 + 0.1 * shape["low"]), shape)
 
-    monkeypatch.setattr(search, "_with_what_repeats", lambda base, dataset: SEEN)
+    monkeypatch.setattr(search, "with_what_repeats", lambda base, dataset: SEEN)
     monkeypatch.setattr(search, "tried_shapes", lambda e, x: ({"low": i} for i in range(6)))
     monkeypatch.setattr(search, "_best", lambda *_: on_heads)
     monkeypatch.setattr(search, "_try", tried)

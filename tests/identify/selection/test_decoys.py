@@ -11,7 +11,8 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, fitted
 
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import averaged_force
-from identify.selection.decoys import DECOYS, Proof, _left, _Part, _ridge, proof
+from identify.selection import decoys
+from identify.selection.decoys import DECOYS, Proof, Trial, _left, _Part, _ridge, proof
 from twin.model.machine import AxisModel
 
 BESIDE_DECOYS = 0.8  # the rule as it was decided
@@ -108,16 +109,39 @@ def test_what_is_left_is_that_of_fits_to_the_other_blocks_and_on_other_logs() ->
     there = np.array([0.25, 0.4])
     columns = all_columns(part, there)
     edges = np.linspace(0, 150, 25).astype(int)
-    squares = 0.0
+    squares = []
     for a, b in pairwise(edges):
         others = np.r_[0:a, b:150]
         step = step_of(columns[others], part.force[others])
-        squares += np.sum((part.force[a:b] - columns[a:b] @ step) ** 2)
-    assert _left(part, None, there) == pytest.approx(squares / 150, rel=1e-9)
+        squares.append(np.sum((part.force[a:b] - columns[a:b] @ step) ** 2))
+    typical = 24 * np.prod(np.array(squares) ** (1 / 24))
+    expected = np.array([sum(squares), typical]) / 150
+    assert _left(part, None, there) == pytest.approx(expected, rel=1e-9)
 
     both = np.array([*there, 0.1, 0.9])
     left = held.force - all_columns(held, both[2:]) @ step_of(columns, part.force)
-    assert _left(part, held, both) == pytest.approx(np.mean(left**2), rel=1e-9)
+    assert _left(part, held, both)[0] == pytest.approx(np.mean(left**2), rel=1e-9)
+
+
+def test_one_part_of_a_log_that_nothing_explains_does_not_decide_alone() -> None:
+    """As where a held-out log creeps at a speed that the fit logs do not hold."""
+    rng = np.random.default_rng(8)
+    shapes = [rng.standard_normal((240, 1)) for _ in range(2)]
+    forces = [c[:, 0] + 0.1 * rng.standard_normal(240) for c in shapes]
+    forces[1][:30] = -9.0 * shapes[1][:30, 0]  # an eighth of it asks for the contrary
+    kept, base = np.ones(240, dtype=bool), rng.standard_normal((240, 1))
+    fit, held = (_Part((None,), f, base, kept) for f in forces)
+    trial = Trial(replace(fit, logs=("fit",)), replace(held, logs=("held",)))
+
+    def columns(logs):
+        return [100.0 * shapes[0 if logs == ("fit",) else 1]]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(decoys, "moving", lambda logs, sticking: kept)
+        whole, typical = trial.proofs(columns, sticking=False)
+        assert not whole.holds
+        assert typical.holds
+        assert trial.proof(columns, sticking=False) == typical
 
 
 def test_a_strength_that_the_fit_logs_do_not_excite_stays_whatever_it_does_in_others() -> None:

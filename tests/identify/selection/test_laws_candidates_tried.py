@@ -42,7 +42,7 @@ def of_size(squared, at):
 
 def test_a_first_look_must_show_a_part_of_the_evidence_asked_for():
     noise = RNG.standard_normal(500)
-    base = built_fit(0, residual=noise)
+    base = built_fit(0, residual=noise, jacobian=np.zeros((500, 1)))
     n, before = effective_samples(noise), float(np.sum(noise**2))
     for effect, free in (("constant_force", 1), ("cogging", 7)):
         wanted = PROMISE * (LEAST_BIC + free * np.log(n))
@@ -52,7 +52,19 @@ def test_a_first_look_must_show_a_part_of_the_evidence_asked_for():
     held = replace(fitted("cogging"), fixed=frozenset({"p", "a1", "b1", "a2", "b2", "a3"}))
     one = PROMISE * (LEAST_BIC + np.log(n))
     assert _promising(base, of_size(before * np.exp(-1.01 * one / n), held))
-    assert not _promising(built_fit(0.0), of_size(0.0, fitted("cogging")))
+    nothing = built_fit(0.0, jacobian=np.zeros((16, 1)))
+    assert not _promising(nothing, of_size(0.0, fitted("cogging")))
+
+
+def test_what_the_base_could_take_by_itself_promises_nothing_for_an_effect():
+    """Priors and smoothing keep a fit from taking all that its parameters could."""
+    noise, column = RNG.standard_normal(500), np.full((500, 1), 2.0)
+    base = built_fit(0, residual=noise + 0.4, jacobian=column)
+    left = noise - noise.mean()
+    np.testing.assert_allclose(base.unabsorbed, left, atol=1e-9)
+    useless = Start({}, fitted("constant_force"), left, left)
+    assert useless.share(base) == pytest.approx(0.0, abs=1e-9)
+    assert not _promising(base, useless)
 
 
 @pytest.mark.parametrize(("error", "simpler"), [(0.99, True), (1.01, False)])
@@ -83,7 +95,8 @@ def tried(
     begun, left = [], list(errors)
     starts = [of_size(float(i), fitted(effect)) for i in (1, 2)]
     other = axis_of(mass=9.9)
-    base, dataset = built_fit(2.0, 0.1, begun=other), dataset_stub()
+    base = built_fit(2.0, 0.1, begun=other, jacobian=np.zeros((16, 1)))
+    dataset = dataset_stub()
 
     def given(fit):
         """A part that is asked about this base, dataset and start, in that order."""
@@ -183,6 +196,7 @@ def auditioned(monkeypatch, *, after, head=40, whole=100):
     base = built_fit(2.0)
     monkeypatch.setattr(candidates, "_on_heads", on_heads)
     monkeypatch.setattr(candidates, "fit_axis", fit_axis)
+    monkeypatch.setattr(candidates, "fit_roughly", fit_axis)
     monkeypatch.setattr(candidates, "moving", lambda logs, either: np.full(400, either))
     monkeypatch.setattr(
         candidates, "residual",
@@ -206,6 +220,17 @@ def test_a_friction_passes_where_the_heads_show_it_better(monkeypatch, part, pas
     assert passed or found.axis is axis
     assert auditioned(monkeypatch, after=after, head=50)[0] is None or not passed
     assert auditioned(monkeypatch, after=after, head=51)[0] is None
+
+
+@pytest.mark.parametrize(("error", "goes_on"), [(1.41, True), (1.42, False)])
+def test_a_friction_far_worse_on_the_heads_is_fitted_no_further(monkeypatch, error, goes_on):
+    """Twice the squared error of the present friction; a rough fit's end is no more than near."""
+    dataset, rough, fine = dataset_stub(), built_fit(error), built_fit(0.3)
+    monkeypatch.setattr(candidates, "fit_roughly", lambda axis, logs, most: rough)
+    monkeypatch.setattr(candidates, "fit_axis", lambda axis, logs, most: fine)
+    dataset.heads = ()
+    found = candidates._to_heads(PLAIN, dataset, built_fit(1.0))
+    assert found is (fine if goes_on else rough)
 
 
 def test_the_heads_are_fitted_once_for_all_frictions(monkeypatch):

@@ -104,6 +104,14 @@ def test_a_pair_brings_the_error_to_the_floor_and_needs_both(monkeypatch):
     assert ahead(monkeypatch, made, {})[0] == []
 
 
+def test_a_friction_that_takes_the_place_of_another_makes_no_pair_with_it(monkeypatch):
+    alone, other = (
+        built(name, t=9.0, fit=built_fit(error, axis=axis_of().with_effect(fitted(name))))
+        for name, error in (("dahl", 3.0), ("gms", 1.1))
+    )
+    assert ahead(monkeypatch, [alone], {"dahl": [other]})[0] == []
+
+
 def test_a_pair_far_above_the_floor_must_explain_nearly_all(monkeypatch):
     """What stood above a floor of 1 N beside noise that no model foretells."""
     base = built_fit(40.0)

@@ -51,6 +51,30 @@ def test_beside_a_curve_those_effects_are_tried_first_that_take_most(monkeypatch
     assert tried == [3.0, 5.0, 7.0, 8.1]
 
 
+@pytest.mark.parametrize(
+    ("lessened", "supported", "goes_on"),
+    [(0.96, False, True), (0.94, False, False), (0.41, True, True), (0.39, True, False)],
+)
+def test_effect_and_curve_take_nearly_all_or_a_good_part_with_every_support(
+    monkeypatch, lessened, supported, goes_on
+):
+    """Where bumps have another form too, an effect and the cable's curve leave their share."""
+    effect = built("cogging", bic=40.0, t=9.0, before=8.0, after=3.0, fit=built_fit(3.0))
+    found = module.Reshaped(object.__new__(WrongShape), effect.fit, CURVED)
+    without = built_fit(4.0)
+
+    def score(smaller, fit, dataset, what):
+        assert (smaller, fit, what) == (without, CURVED, effect.effect)
+        return built(bic=90.0 if supported else 0.0)
+
+    monkeypatch.setattr(module, "_reshaped", lambda fit, dataset, ranking: found)
+    monkeypatch.setattr(module, "_lessened", lambda before, after, dataset: lessened)
+    monkeypatch.setattr(module, "less", lambda what, fit, base, dataset: without)
+    monkeypatch.setattr(module, "score", score)
+    answer = module._beside_an_effect(BASE, DATASET, [effect])
+    assert (answer is not None and answer.fit is without) is goes_on
+
+
 @pytest.mark.parametrize(("gain", "refitted"), [(0.58, False), (0.6, True)])
 def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypatch, gain, refitted):
     # Of the best effect's squared error, 0.8 is what a curve may leave; a refit may leave 0.3 of

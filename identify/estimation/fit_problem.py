@@ -1,0 +1,132 @@
+"""The least-squares problem of a fit: residual and Jacobian in internal variables, with priors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.estimation.evidence import effective_samples, rms
+from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.levenberg_marquardt import minimise
+from identify.estimation.scaling import Scaling
+from identify.estimation.smoothing import has_nonparametric, smoothing
+from twin.effect import Kind
+from twin.model.machine import AxisModel
+from twin.model.parameters import ParameterReference, free_parameters
+
+Array = NDArray[np.float64]
+
+PRIOR_FORCE = 0.1  # expected force of an effect beside the friction, over the force to explain
+PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
+
+
+def _is_added(axis: AxisModel, c: ParameterReference) -> bool:
+    """Whether it is a strength of a physical effect other than mass and friction."""
+    if not (c.effect and c.parameter.strength):
+        return False
+    effect = axis[c.effect].effect
+    return effect.kind is not Kind.FRICTION and not effect.is_nonparametric
+
+
+def is_constant(axis: AxisModel, c: ParameterReference) -> bool:
+    """Whether it is a strength whose column no free parameter changes: of a force with no other."""
+    if not (c.effect and c.parameter.strength):
+        return False
+    own, sensed = axis[c.effect], any(f.effect.kind is Kind.SENSING for f in axis.effects)
+    alone = all(p.strength or p.name in own.fixed for p in own.effect.parameters)
+    return own.effect.is_nonparametric or (own.effect.kind is Kind.FORCE and alone and not sensed)
+
+
+class FitProblem:
+    """Residual and Jacobian of one fit in internal variables, with priors as extra rows.
+
+    The prior on an effect beside the friction is a force of a tenth of the force to be explained.
+    It matters only for parameters that the data cannot separate, such as a constant force and a
+    Coulomb asymmetry: it keeps both small, where they could be large and opposite. Beside a
+    nonparametric effect the prior of the physical effects is centred where the fit starts, so that
+    a force that both could explain stays with the physics. The nonparametric effect is smoothed.
+    """
+
+    def __init__(self, axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int) -> None:
+        self.axis = axis
+        self.most_evaluations = most_evaluations
+        self.logs = logs
+        self.scaling = Scaling(free_parameters(axis))
+        self.kept = moving(logs, sticks(axis))
+        self.bounds = self.scaling.bounds()
+        self.start = np.clip(self.scaling.inside(axis), *self.bounds)
+        self.added = np.array([_is_added(axis, c) for c in self.scaling.where], dtype=bool)
+        self.centre = np.where(self.added & (not has_nonparametric(axis)), 0.0, self.start)
+        self.pull = np.zeros(len(self.start))
+        self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
+        # A force is linear in its strengths, so their columns are computed once.
+        self.constant = np.array([is_constant(axis, c) for c in self.scaling.where], dtype=bool)
+        self.constant_columns = jacobian(axis, logs, self._where(self.constant))
+        self._last: tuple[bytes, Array] = b"", np.zeros((0, 0))
+        self._last_force: tuple[bytes, Array] = b"", np.zeros(0)
+
+    def set_priors(self, internal: Array) -> float:
+        """Weigh the priors by the residual's size, its colour, and the force to be explained.
+
+        Returns the effective sample size of the residual there.
+        """
+        axis = self.scaling.outside(self.axis, internal)
+        left = self.force(internal)
+        inertia = axis.mass * np.concatenate([log.acceleration for log in self.logs])
+        command = np.concatenate([log.command for log in self.logs])
+        explained = rms((command - inertia)[self.kept])
+        samples = effective_samples(left)
+        noise = rms(left) * np.sqrt(len(left) / samples)
+        columns = self.columns(internal)
+        size = np.linalg.norm(columns, axis=0) / np.sqrt(max(len(left), 1))
+        expected = max(PRIOR_FORCE * explained, noise)
+        self.pull = np.where(self.added, noise * size / expected, 0.0)
+        self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD
+        return samples
+
+    def _where(self, mask: NDArray[np.bool_]) -> list[ParameterReference]:
+        return [c for c, wanted in zip(self.scaling.where, mask, strict=True) if wanted]
+
+    def jacobian(self, axis: AxisModel) -> Array:
+        """Derivative of the residual by the free parameters, (n, k) N per unit."""
+        columns = np.empty((len(self.kept), len(self.constant)))
+        columns[:, self.constant] = self.constant_columns
+        columns[:, ~self.constant] = jacobian(axis, self.logs, self._where(~self.constant))
+        return columns
+
+    def columns(self, internal: Array) -> Array:
+        """Derivative of the kept residual by the internal variables, (n, k) N per unit.
+
+        Those of the last place are kept: the priors and the search that follows ask for the same.
+        """
+        place = internal.tobytes()
+        if self._last[0] != place:
+            axis = self.scaling.outside(self.axis, internal)
+            self._last = place, self.scaling.chain(axis, self.jacobian(axis))[self.kept]
+        return self._last[1]
+
+    def force(self, internal: Array) -> Array:
+        """The kept residual (n,) N; that of the last place is kept, as the columns are."""
+        place = internal.tobytes()
+        if self._last_force[0] != place:
+            axis = self.scaling.outside(self.axis, internal)
+            self._last_force = place, residual(axis, self.logs)[self.kept]
+        return self._last_force[1]
+
+    def rows(self, internal: Array) -> Array:
+        pulled = self.pull * (internal - self.centre)
+        return np.concatenate([self.force(internal), pulled, self.smooth @ internal])
+
+    def slopes(self, internal: Array) -> Array:
+        return np.vstack([self.columns(internal), np.diag(self.pull), self.smooth])
+
+    def solve(self, internal: Array, tolerance: float) -> tuple[Array, bool]:
+        """Least squares from these values; the solution and whether it converged."""
+        solution = minimise(
+            self.rows, self.slopes, internal, self.bounds,
+            tolerance=tolerance, most_evaluations=self.most_evaluations,
+        )  # fmt: skip
+        return solution.x, solution.converged
