@@ -22,7 +22,7 @@ def fitted_viscous(viscous: float, seed: int) -> Fit:
     speed, acceleration = speed / 2e-4, (acceleration + PLACE(s - 1e-4)) / 1e-8
     force = 1.7 * acceleration + 0.4 * np.sign(speed) + viscous * speed
     force += np.random.default_rng(seed).normal(0.0, 0.02, len(t))
-    log = windowed(motion_of(log_of(RATE, PLACE(t), force), "x", "log"))
+    log = windowed(motion_of(log_of(RATE, PLACE(t), force), "x", "log", ripples=()))
     axis = AxisModel(1.7, effects=(effect("coulomb_viscous", {"Fc": 0.3, "sigma2": 0.1}),))
     return fit_axis(axis, [log])
 

@@ -41,7 +41,7 @@ def noisy(seed: int, force: float, reading: float = 0.0, duration: float = 8.0, 
     t = np.arange(round(duration * RATE)) / RATE
     u = MASS * PUSH(t + 0.5 / RATE) + rng.normal(0.0, force, len(t))
     x = PLACE(t) + rng.normal(0.0, reading, len(t))
-    return windowed(motion_of(log_of(RATE, x, u), "x", f"log {seed}"), length)
+    return windowed(motion_of(log_of(RATE, x, u), "x", f"log {seed}", ripples=()), length)
 
 
 def passed(window: TestFunction, force: float, reading: float) -> float:
