@@ -161,7 +161,8 @@ def test_each_place_and_direction_has_its_own_map_fit_and_planted_curve(monkeypa
 
     for name, stub in (
         ("_logs", lambda model, name, place, size, rng: {"one": place, "two": place}),
-        ("motion_of", lambda log, name, label, ripples: (label, log)), ("velocity_map", velocity_map),
+        ("motion_of", lambda log, name, label, ripples: (label, log)),
+        ("velocity_map", velocity_map),
         ("_local_fit", lambda model, name, logs, found: logs["one"]),
         ("_through", lambda m: (100.0 + sign(m.velocity) + np.arange(4.0), np.full(4, 0.1))),
         ("_of_law", lambda fit, place, v: (
