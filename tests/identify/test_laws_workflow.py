@@ -18,7 +18,6 @@ from identify.output.words.selection import moved_in_words
 from identify.selection import confounded
 from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import Verdict
-from twin.errors import CannotRun
 
 # The rules as they were decided.
 LEAST_FORCE, AT_FLOOR, MOST_TOLD = 0.1, 1.3, 3
@@ -174,7 +173,7 @@ def test_a_comparison_is_of_the_axes_that_move(monkeypatch):
 def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
     described = made.MODEL.with_axis("x", axis_of(fitted("empirical_map")))
     result = made.fit_result()
-    asked, plans = {}, {"x": None, "y": "plan y"}
+    asked = {}
 
     def fit(*given, **named):
         asked.update(given=given, named=named)
@@ -192,9 +191,7 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
     monkeypatch.setattr(workflow, "fit", fit)
     monkeypatch.setattr(workflow, "diagnose_axis", diagnose_axis)
     monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
-    monkeypatch.setattr(
-        workflow, "next_experiment", lambda d, model, length: plans[d.axis] and (d, model, length)
-    )
+    monkeypatch.setattr(workflow, "next_experiments", lambda *given: (given, "not planned"))
     monkeypatch.setattr(workflow, "_compared", lambda *given: given)
     monkeypatch.setattr(workflow, "worst_region", lambda *given: given)
     progress = lambda *done: bars.append(done)  # noqa: E731
@@ -213,23 +210,11 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
         d = found.axes[axis]
         assert (d.axis, d.fit, d.catalogue) == (axis, result.fits[axis], "known")
     assert bars == [(f"trying effects on {a}", 1, 2) for a in "xy"]
-    assert found.next_experiments == {"y": (found.axes["y"], result.model, 0.07)}
+    assert found.next_experiments == (found.axes, result.model, 0.07)
+    assert found.not_planned == "not planned"
     assert found.comparison == (result.model, result.datasets, progress)
     assert found.refits is result.refits
     assert found.left_over == {"y": ("fit of y", result.datasets["y"])}
-
-
-def test_an_axis_whose_experiment_cannot_run_says_why(monkeypatch):
-    def next_experiment(found, model, window):
-        if found == "refused":
-            raise CannotRun("axis x has no travel")
-        return {"ambiguous": "the plan"}.get(found)
-
-    monkeypatch.setattr(workflow, "next_experiment", next_experiment)
-    axes = {"x": "refused", "y": "ambiguous", "z": "nothing missing"}
-    assert workflow._next_experiments(axes, made.MODEL, None) == (
-        {"y": "the plan"}, {"x": "axis x has no travel"},
-    )  # fmt: skip
 
 
 def test_what_a_diagnosis_names_is_added_as_it_was_fitted(monkeypatch):
