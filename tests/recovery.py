@@ -48,12 +48,12 @@ class Setting:
     velocity: float = 0.25
     mass_known: bool = False
 
-    def stage(self, pair: bool) -> MachineModel:
-        """An axis with that friction, beside another for what depends on it."""
+    def stage(self) -> MachineModel:
+        """Two axes with that friction."""
         fitted = Fitted.at_start(CATALOGUE[self.friction], self.values)
         hardware = replace(HARDWARE, velocity=self.velocity)
         x, y = (AxisModel(m, hardware, (fitted,), self.mass_known) for m in (15.0, 6.0))
-        return MachineModel("stage", {"x": x, "y": y} if pair else {"x": x}, RATE)
+        return MachineModel("stage", {"x": x, "y": y}, RATE)
 
     def dataset(self, model: MachineModel, seed: int) -> Dataset:
         """Its motion on that stage, as a dataset of x."""
@@ -76,9 +76,9 @@ SETTINGS = (
 
 
 @cache
-def ordinary(number: int, pair: bool, seed: int) -> Dataset:
+def ordinary(number: int, seed: int) -> Dataset:
     """The dataset of the stage of that setting as it is, which effects are drawn along."""
-    return SETTINGS[number].dataset(SETTINGS[number].stage(pair), seed)
+    return SETTINGS[number].dataset(SETTINGS[number].stage(), seed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,10 +150,9 @@ def attempts(effect: Effect, seed: int, lie: Change = lambda axis: axis) -> Iter
 
     lie: changes the axis that is logged, against the one that is claimed.
     """
-    pair = effect.reads_other_axis
     for number, setting in enumerate(SETTINGS):
-        model = setting.stage(pair)
-        drawn = planted(effect, model.axes["x"], ordinary(number, pair, seed), seed)
+        model = setting.stage()
+        drawn = planted(effect, model.axes["x"], ordinary(number, seed), seed)
         if drawn is None:
             continue
         truth = model.axes["x"].with_effect(drawn)
