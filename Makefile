@@ -8,6 +8,9 @@ else
 BIN := $(VENV)/bin
 endif
 
+# What Python compiles is kept for its next start: the tests start it fifty times.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo check test bench clean
 
 demo: $(VENV)/runtime

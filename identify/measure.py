@@ -9,6 +9,7 @@ import numpy as np
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.excitation import excitation
 from identify.dataset.motion import Motion, motion_of
+from identify.dataset.reading_ripple import ripples_of_widest
 from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import inertia
 from identify.estimation.cable_force import CableForce
@@ -71,7 +72,8 @@ def first_model(logs: Mapping[str, Log], name: str, catalogue: Catalogue) -> Mac
     for axis in names:
         going = {n: log for n, log in logs.items() if axis in log.axes and moves(log, axis)}
         if going:
-            motions = [motion_of(log, axis, n) for n, log in going.items()]
+            ripples = ripples_of_widest(going.values(), axis)
+            motions = [motion_of(log, axis, n, ripples=ripples) for n, log in going.items()]
             constant = next(iter(going.values())).axes[axis].force_constant
             axes[axis] = _first_axis(motions, constant, _simplest_friction(catalogue))
     if not axes:

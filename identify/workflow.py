@@ -16,12 +16,11 @@ from identify.estimation.force_balance import require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.estimation.replay import simulated_error
 from identify.estimation.simulated_motion import fit_simulated_motion
-from identify.experiment_design.plan import Plan, next_experiment, plan
+from identify.experiment_design.plan import next_experiments, plan
 from identify.measure import cable_force, velocity_map
 from identify.output.addition import Addition, addition
 from identify.output.results import Comparison, Diagnosis, FitResult, SimulationFit
 from identify.selection.candidates import try_effect, usable
-from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone, reshaped
 from identify.selection.scoring import score
@@ -31,7 +30,7 @@ from identify.validation.agreement import Agreement, agreement
 from identify.validation.misfit_maps import compare_axis, position_errors, worst_region
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
-from twin.errors import CannotRun, InputError
+from twin.errors import InputError
 from twin.log import Log
 from twin.memory import give_back
 from twin.model.machine import MachineModel
@@ -153,7 +152,7 @@ def diagnose(
         ).with_findings()
         for axis, fitted in result.fits.items()
     }
-    plans, not_planned = _next_experiments(axes, result.model, test_function)
+    plans, not_planned = next_experiments(axes, result.model, test_function)
     regions = {
         axis: worst_region(d.with_named, d.dataset) for axis, d in axes.items() if d.unexplained
     }
@@ -162,22 +161,6 @@ def diagnose(
         result.refits, tuple(name for name in catalogue if name not in known), not_planned,
         {axis: region for axis, region in regions.items() if region},
     )  # fmt: skip
-
-
-def _next_experiments(
-    axes: Mapping[str, AxisDiagnosis], model: MachineModel, test_function: float | None
-) -> tuple[dict[str, Plan], dict[str, str]]:
-    """By axis, the experiment that decides an ambiguous diagnosis, or why there is none."""
-    plans, not_planned = {}, {}
-    for axis, found in axes.items():
-        try:
-            following = next_experiment(found, model, test_function)
-        except CannotRun as why:
-            not_planned[axis] = str(why)
-        else:
-            if following is not None:
-                plans[axis] = following
-    return plans, not_planned
 
 
 def add(

@@ -55,7 +55,7 @@ def moved(
     x = 0.02 + waves((0.03, 2.3, phase[0]), (0.004, 9.1, phase[1]))(t)
     force = waves((3.0, 3.7, phase[2]), (1.1, 17.0, phase[3]))(t)
     other = 0.05 + waves((0.02, 3.1, phase[3]), (0.003, 7.9, phase[2]))(t)
-    return motion_of(log_of(rate, x, force, other), "x", name)
+    return motion_of(log_of(rate, x, force, other), "x", name, ripples=())
 
 
 def ridden(command: Callable[[Motion], Array], duration: float = 6.0) -> Motion:

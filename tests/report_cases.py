@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from identify import workflow
 from identify.output.addition import Addition
-from identify.output.report import sections, write_report
+from identify.output.report import answer, sections, write_report
 from identify.output.report.blocks import Answer, Picture, Section
 from identify.output.report.drawing import drawing_style
 from identify.output.report.subject import Subject
@@ -137,7 +137,9 @@ def figures(subject: Subject) -> Iterator[Figure]:
 
 
 def answers(subject: Subject) -> list[Answer]:
-    return [b for b in made(subject)["answer"].blocks if isinstance(b, Answer)]
+    section = answer.section(subject)
+    assert section
+    return [b for b in section.blocks if isinstance(b, Answer)]
 
 
 def readable(figure: Figure) -> None:

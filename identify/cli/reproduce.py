@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,6 +17,9 @@ from identify.cli.shared import (
     say,
 )
 from twin.errors import InputError
+
+if TYPE_CHECKING:
+    from identify.thesis.chapters import Reproduction
 
 REPORT, RESULTS = "thesis.html", "thesis.json"
 SEED = 1
@@ -48,14 +51,9 @@ def reproduce(
     as_json_: Json = False,
 ) -> None:
     """Run the thesis's study on the twin; its printed numbers stand beside ours."""
-    import json
-
     from identify import workflow
-    from identify.output.plain import plain
-    from identify.output.report.thesis import write_reproduction
-    from identify.output.reproduction import reproduction_json, reproduction_text
     from identify.thesis.chapters import reproduce_on_logs
-    from twin.files import make_folder, write_atomically
+    from twin.files import make_folder
 
     _require_one_source(log, model, small=small, seed=seed, axis=axis)
     make_folder(out)
@@ -66,6 +64,18 @@ def reproduce(
         with bars_on_stderr() as bars:
             drawn = SEED if seed is None else seed
             result = workflow.reproduce(chapter or (), small=small, seed=drawn, progress=bars)
+    _write(out, result, as_json_)
+
+
+def _write(out: Path, result: Reproduction, as_json_: bool) -> None:
+    """Write the report and the numbers into a folder, and say them."""
+    import json
+
+    from identify.output.plain import plain
+    from identify.output.report.thesis import write_reproduction
+    from identify.output.reproduction import reproduction_json, reproduction_text
+    from twin.files import write_atomically
+
     found = reproduction_json(result)
     write_reproduction(out / REPORT, result)
     write_atomically(out / RESULTS, json.dumps(plain(found)).encode())

@@ -133,6 +133,25 @@ def next_experiment(
     )
 
 
+def next_experiments(
+    axes: Mapping[str, AxisDiagnosis], model: MachineModel, test_function: float | None
+) -> tuple[dict[str, Plan], dict[str, str]]:
+    """By axis, the experiment that decides an ambiguous diagnosis, and why there is none.
+
+    Both are empty for an axis with nothing to decide. test_function: as in `next_experiment`.
+    """
+    plans, not_planned = {}, {}
+    for axis, found in axes.items():
+        try:
+            following = next_experiment(found, model, test_function)
+        except CannotRun as why:
+            not_planned[axis] = str(why)
+        else:
+            if following is not None:
+                plans[axis] = following
+    return plans, not_planned
+
+
 def _planned(
     arena: Arena,
     duration: float,

@@ -16,7 +16,8 @@ from identify.selection.confounded import MovedParameter, moved_parameters
 from identify.selection.scoring import Candidate
 from identify.selection.wrong_shape import WrongShape
 from identify.validation.free_run import errors_of_both
-from twin.model.machine import HistoryStep, MachineModel
+from twin.model.history import HistoryStep
+from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits
 
 

@@ -220,7 +220,8 @@ def _slow(model: MachineModel, size: Size, rng: np.random.Generator, progress: P
         progress("near zero speed", i, len(size.slow))
         moves = Staircase(name, speeds=(speed,), span=SLOW_SPAN, longest_plateau=size.plateau)
         log = simulate(model, moves, seed=int(rng.integers(2**31)), simulator=FineSimulator)
-        found = velocity_map(axis, motion_of(log, name, f"{speed:g} m/s")).towards(1.0)
+        motion = motion_of(log, name, f"{speed:g} m/s", ripples=())  # a simulated reading has none
+        found = velocity_map(axis, motion).towards(1.0)
         maps.append(float(found.friction.mean()))
         logs[f"{speed:g} m/s"] = log
     prepared = datasets(model, logs, {})[name]

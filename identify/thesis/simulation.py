@@ -145,7 +145,7 @@ def _map(model: MachineModel, name: str, size: Size, progress: Progress) -> Velo
         progress("moves at constant speed", i, len(size.speeds))
         moves = Staircase(name, speeds=(speed,), span=size.span, longest_plateau=1e4)
         log = simulate(model, moves, simulator=size.simulator)
-        maps.append(velocity_map(model.axes[name], motion_of(log, name, f"{speed:g}")))
+        maps.append(velocity_map(model.axes[name], motion_of(log, name, f"{speed:g}", ripples=())))
     return VelocityMap.joined(maps)
 
 

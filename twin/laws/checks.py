@@ -14,7 +14,7 @@ import numpy as np
 
 from twin import effect as slots
 from twin.core.user_effect import RESULT, Guarded, Outside, outside_words
-from twin.effect import DRY, IO_SIZE, OUT, READING, STATIC, VISCOUS, Effect, Kind, U
+from twin.effect import DRY, OUT, READING, STATIC, VISCOUS, Effect, Kind, U
 from twin.laws.motion import Array, Motion
 from twin.laws.stepping import Trace, Values, forces, sampled, trace
 from twin.laws.values import absent, action, companion, extremes, legal, moderate, of_kind
@@ -57,16 +57,15 @@ def check_declared(effect: Effect) -> None:
     is not finite's business here.
     """
     rng = np.random.default_rng(10)
-    motion = Motion.random(rng, GUARDED_SAMPLES)
+    samples = sampled(Motion.random(rng, GUARDED_SAMPLES)).tolist()
     present = {p.name: p.start or 0.1 if p.strength else p.start for p in effect.parameters}
     for values in (legal(effect, present), *extremes(effect, rng)):
         p = Guarded("p", [values[q.name] for q in effect.parameters])
-        s, io = Guarded("s", [0.0] * len(effect.states)), np.zeros(IO_SIZE)
+        s = Guarded("s", [0.0] * len(effect.states))
         try:
             with suppress(ArithmeticError, ValueError):
-                for k in range(len(motion)):
-                    sampled(io, k, motion)
-                    effect.law(p, s, Guarded("io", io.tolist()))
+                for sample in samples:
+                    effect.law(p, s, Guarded("io", list(sample)))
         except Outside as touched:
             said = outside_words(effect, str(touched))
             raise LawBroken(f"{said} (seen {with_values(effect, values)})") from None

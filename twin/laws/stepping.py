@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -47,16 +48,18 @@ def forces(effects: Sequence[Fitted], motion: Motion) -> dict[str, Array]:
     return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
 
 
-def sampled(io: Array, k: int, motion: Motion) -> None:
-    """Fill io as a simulation does before a law."""
-    io[:] = 0.0
-    io[INDEX], io[TIME], io[DT], io[MASS] = k, k * motion.dt, motion.dt, 1.0
-    io[X], io[V], io[U] = motion.x[k], motion.v[k], motion.u[k]
-    io[X_OTHER], io[V_OTHER] = 0.5 * io[X], -0.5 * io[V]
-    io[DRY] = io[STATIC] = io[VISCOUS] = 1.0
-    io[HOLD] = io[V] / motion.dt + io[U]
-    io[READING] = io[X]
-    io[WHEN] = 1.0
+def sampled(motion: Motion) -> Array:
+    """What a simulation fills io with before a law, (n, IO_SIZE)."""
+    io = np.zeros((len(motion), IO_SIZE))
+    index = np.arange(len(motion))
+    io[:, INDEX], io[:, TIME], io[:, DT], io[:, MASS] = index, index * motion.dt, motion.dt, 1.0
+    io[:, X], io[:, V], io[:, U] = motion.x, motion.v, motion.u
+    io[:, X_OTHER], io[:, V_OTHER] = 0.5 * motion.x, -0.5 * motion.v
+    io[:, [DRY, STATIC, VISCOUS]] = 1.0
+    io[:, HOLD] = motion.v / motion.dt + motion.u
+    io[:, READING] = motion.x
+    io[:, WHEN] = 1.0
+    return io
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,25 +80,24 @@ class Trace:
 _MARK = 0.123456789  # in the memory behind a law's own parameters and states
 
 
-def compiled(effect: Effect) -> Callable[[Array, Array, Array], None]:
-    """The effect's native law as a function of three arrays."""
+def compiled(effect: Effect, *arrays: Array) -> Callable[[], object]:
+    """The effect's native law on these arrays of parameters, states and io."""
     pointer = ctypes.POINTER(ctypes.c_double)
     native = ctypes.CFUNCTYPE(None, pointer, pointer, pointer)(law_address(effect))
-    return lambda p, s, io: native(*(a.ctypes.data_as(pointer) for a in (p, s, io)))
+    return partial(native, *(a.ctypes.data_as(pointer) for a in arrays))
 
 
 def trace(effect: Effect, values: Values, motion: Motion, law: Callable | None = None) -> Trace:
     """Step the compiled law, or the one given, over a motion."""
-    step = law or compiled(effect)
     given = np.array([values[p.name] for p in effect.parameters] + [_MARK])
     p, own = given.copy(), len(effect.states)
     s = np.concatenate([np.zeros(own), [_MARK]])
     io = np.zeros(IO_SIZE)
-    before, after = np.empty((2, len(motion), IO_SIZE))
-    states = np.empty((len(motion), own))
-    for k in range(len(motion)):
-        sampled(io, k, motion)
-        before[k] = io
-        step(p, s, io)
+    step = partial(law, p, s, io) if law else compiled(effect, p, s, io)
+    before = sampled(motion)
+    after, states = np.empty_like(before), np.empty((len(motion), own))
+    for k, row in enumerate(before):
+        io[:] = row
+        step()
         after[k], states[k] = io, s[:own]
     return Trace(before, after, states, s[own] != _MARK, not np.array_equal(p, given))

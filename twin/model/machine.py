@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, Effect, Kind, Parameter
 from twin.errors import CannotRun, InputError
+from twin.model.history import HistoryStep
 from twin.model.intervals import AxisIntervals
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 from twin.numbers import is_number
@@ -189,27 +190,6 @@ class AxisModel:
                 f"the axis has no effect '{effect}' to remove; it has {', '.join(self.names)}"
             )
         return replace(self, effects=tuple(f for f in self.effects if f.effect.name != effect))
-
-
-@dataclass(frozen=True)
-class HistoryStep:
-    """One step of the model's growth.
-
-    Errors are RMS force errors in ``unit``; None where not measured. The held-out logs may have
-    taken part in the choice of the effect; on the test logs nothing was decided.
-    """
-
-    action: str
-    effect: str
-    axis: str
-    fit_error_before: float
-    fit_error_after: float
-    holdout_error_before: float | None
-    holdout_error_after: float | None
-    unit: str = LINEAR.force
-    notes: tuple[str, ...] = ()
-    test_error_before: float | None = None
-    test_error_after: float | None = None
 
 
 @dataclass(frozen=True)

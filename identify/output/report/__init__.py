@@ -29,7 +29,7 @@ from identify.output.report.subject import Subject
 from identify.output.report.units import quantity
 from identify.output.results import Comparison, Diagnosis
 from twin.files import require_writable, write_atomically
-from twin.model.machine import HistoryStep
+from twin.model.history import HistoryStep
 
 SECTIONS: tuple[Callable[[Subject], Section | None], ...] = (
     answer.section,

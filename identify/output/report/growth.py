@@ -15,7 +15,7 @@ from identify.output.report.blocks import Block, Column, Heading, Picture, Row, 
 from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, number, spaced, title_case
-from twin.model.machine import HistoryStep
+from twin.model.history import HistoryStep
 from twin.model.units import units_of
 
 Array = NDArray[np.float64]

@@ -18,7 +18,8 @@ from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.scoring import Candidate
 from identify.validation.misfit_maps import AxisComparison, Region
-from twin.model.machine import AxisModel, HistoryStep
+from twin.model.history import HistoryStep
+from twin.model.machine import AxisModel
 from twin.model.units import LINEAR
 
 Array = NDArray[np.float64]

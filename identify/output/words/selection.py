@@ -17,7 +17,8 @@ from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
 from identify.selection.scoring import Candidate
 from twin.effects import load_catalogue
-from twin.model.machine import Fitted, HistoryStep
+from twin.model.history import HistoryStep
+from twin.model.machine import Fitted
 from twin.model.units import units_of
 
 VERDICTS = {

@@ -23,7 +23,7 @@ def aligned(samples: float, seed: int = 5, noise: float = 1e-3, duration: float 
     s = t + (0.5 - samples) / RATE
     push = MASS * (PLACE(s + 1e-4) - 2.0 * PLACE(s) + PLACE(s - 1e-4)) / 1e-8
     force = push + np.random.default_rng(seed).normal(0.0, noise, len(t))
-    return windowed(motion_of(log_of(RATE, PLACE(t), force), "x", f"log {seed}"), 0.02)
+    return windowed(motion_of(log_of(RATE, PLACE(t), force), "x", f"log {seed}", ripples=()), 0.02)
 
 
 def test_a_fit_moves_the_force_by_as_much_as_it_is_off():

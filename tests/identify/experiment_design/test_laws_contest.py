@@ -235,7 +235,7 @@ def test_what_cannot_run_or_is_too_slow_has_no_record(monkeypatch):
     monkeypatch.setattr(
         module, "simulate", lambda machine, e, **k: seen.append((machine, e, k)) or log
     )
-    monkeypatch.setattr(module, "motion_of", lambda log, axis, name, axes: MOTION)
+    monkeypatch.setattr(module, "motion_of", lambda log, axis, name, axes, ripples: MOTION)
     monkeypatch.setattr(module, "moves", lambda log, axis: True)
     monkeypatch.setattr(module, "require_within_limits", lambda stage, log: None)
     assert arena(FIRST).record(FIRST, "e") is MOTION
@@ -249,6 +249,19 @@ def test_what_cannot_run_or_is_too_slow_has_no_record(monkeypatch):
     monkeypatch.setattr(module, "moves", lambda log, axis: False)
     with pytest.raises(CannotRun, match="hardly moves"):
         arena(FIRST).record(FIRST, "e")
+
+
+@pytest.mark.parametrize(("effects", "sought"), [((), ()), (("encoder_ripple",), None)])
+def test_a_ripple_is_sought_where_the_simulated_encoder_may_have_one(monkeypatch, effects, sought):
+    asked = []
+    log = Log(100.0, {"x": AxisLog({"position": np.zeros(300)})})
+    monkeypatch.setattr(module, "simulate", lambda *_, **__: log)
+    monkeypatch.setattr(module, "moves", lambda log, axis: True)
+    monkeypatch.setattr(module, "require_within_limits", lambda stage, log: None)
+    monkeypatch.setattr(module, "motion_of", lambda *_, ripples: asked.append(ripples) or MOTION)
+    truth = Explanation("one", axis_of(*map(fitted, effects)))
+    arena(truth).record(truth, "e")
+    assert asked == [sought]
 
 
 def test_logs_are_windowed_alike():

@@ -138,6 +138,19 @@ def test_an_ambiguous_diagnosis_asks_for_an_experiment_between_its_rivals(monkey
         plans.next_experiment(x, STAGE)
 
 
+def test_an_axis_whose_experiment_cannot_run_says_why(monkeypatch):
+    def next_experiment(found, model, window):
+        if found == "refused":
+            raise CannotRun("axis x has no travel")
+        return {"ambiguous": "the plan"}.get(found)
+
+    monkeypatch.setattr(plans, "next_experiment", next_experiment)
+    axes = {"x": "refused", "y": "ambiguous", "z": "nothing missing"}
+    assert plans.next_experiments(axes, STAGE, None) == (
+        {"y": "the plan"}, {"x": "axis x has no travel"},
+    )  # fmt: skip
+
+
 def planned(monkeypatch):
     """plan with every part given: what the arena and the choice were."""
     asked = {}

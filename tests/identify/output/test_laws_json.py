@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 
 import built_results as made
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, NOISE, built_fit
+from built_fits import CATALOGUE, NOISE
+from strict_json import expected_refit, strict
 
 from identify.output import remarks
 from identify.output.as_json import (
@@ -18,14 +18,10 @@ from identify.output.as_json import (
     fit_json,
     plan_json,
 )
-from identify.output.diagnosis_json import diagnose_json
 from identify.output.machine_json import check_json, effect_json
-from identify.output.plain import plain
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
 from identify.output.words.experiment_design import gap_in_words
-from identify.output.words.selection import SEVERAL, advice
 from identify.output.words.validation import loop_in_words, region_in_words
-from identify.selection.diagnosis import Verdict
 from twin.log.check import CheckReport, Fault, Finding, Severity
 
 
@@ -33,15 +29,6 @@ from twin.log.check import CheckReport, Fault, Finding, Severity
 def nothing_moved(monkeypatch):
     """Parameters that moved are another test's."""
     monkeypatch.setattr(remarks, "moved_parameters", lambda before, after: ())
-
-
-def strict(found):
-    """The object after its way through text, which knows no NaN and no infinity."""
-
-    def refuse(constant):
-        raise AssertionError(f"{constant} is no JSON")
-
-    return json.loads(json.dumps(plain(found)), parse_constant=refuse)
 
 
 def test_what_is_not_finite_is_null_at_any_depth():
@@ -82,19 +69,6 @@ def test_a_fit():
             for e in result.estimates[axis]
         }  # fmt: skip
         assert refit == expected_refit(result.refits[axis])
-
-
-def expected_refit(changed):
-    return {
-        "force_error_as_given": changed.given, "force_error": changed.refitted, "force_unit": "N",
-        "changed": [
-            {
-                "parameter": c.label, "before": c.before, "after": c.after, "unit": c.unit,
-                "force": c.force, "force_unit": "N", "same_force_as": list(c.alike),
-            }
-            for c in changed.changes
-        ],
-    }  # fmt: skip
 
 
 def test_a_comparison():
@@ -145,104 +119,6 @@ def test_a_position_without_noise_has_a_finite_ratio_or_none():
     result = made.Comparison(made.MODEL, {"x": c})
     ratio = strict(compare_json(result))["axes"]["x"]["logs"]["run 1"]["position_ratio"]
     assert ratio is None or ratio > 1e200
-
-
-def expected_candidate(c):
-    return {
-        "effect": c.effect.name, "delta_bic": c.delta_bic, "holdout_error_before": c.gain.before,
-        "holdout_error_after": c.gain.after, "unit": "N", "supported": c.supported,
-        "parameters": dict(c.fit.axis[c.effect.name].values),
-    }  # fmt: skip
-
-
-def test_a_diagnosis():
-    x = made.diagnosis_of(Verdict.MISSING_EFFECTS, unexplained=made.STRUCTURE, findings=made.FOUND)
-    x.__dict__["repeat"] = made.REPEAT
-    result = made.diagnosed(x)
-    found = strict(diagnose_json(result, ["run 1: a gap", "held 1: late"]))
-    axes = found.pop("axes")
-    assert list(axes) == ["y", "x"]
-    assert found.pop("data_faults") == ["run 1: a gap", "held 1: late"]
-    assert found == axes["x"]
-    assert found == {
-        "verdict": "missing_effects", "explanation": SEVERAL, "axis": "x",
-        "effect": "cogging", "ranking": [expected_candidate(c) for c in x.ranking],
-        "ambiguous_with": ["quadratic_drag"], "missing": ["cogging", "lugre"],
-        "steps": [
-            {
-                **expected_candidate(s.candidate), "ambiguous_with": list(s.tied),
-                "dropped": list(s.dropped), "beside": s.beside,
-            }
-            for s in x.steps
-        ],
-        "unexplained": {
-            "share_of_error": 0.631, "depends_on": "other_axis_position", "period": 0.0273,
-            "unit": "m",
-        },
-        "findings": [
-            {
-                "effect": "cogging", "kind": "missing", "explains": 0.871,
-                "indistinguishable_from": ["quadratic_drag"], "test_error_before": 7.17,
-                "test_error_after": 2.19, "test_error_on": "selection", "unit": "N",
-                "parameters": {"p": 0.0261},
-                "gain": 0.813, "best_decoy": 0.137, "shape": None,
-                "confidence": made.FOUND[0].confidence,
-            },
-            {
-                "effect": "lugre", "kind": "missing", "explains": 0.119,
-                "indistinguishable_from": [], "test_error_before": 3.23, "test_error_after": 2.19,
-                "test_error_on": "selection", "unit": "N", "parameters": {"Fc": 0.31},
-                "gain": None, "best_decoy": None, "shape": None,
-                "confidence": made.FOUND[1].confidence,
-            },
-        ],
-        "remainder": {
-            "error": pytest.approx(3.19), "over_noise_floor": pytest.approx(3.19 / 2.03),
-            "unit": "N", "depends_on": "other_axis_position", "share_of_error": 0.631,
-            "period": 0.0273, "period_unit": "m", "advice": advice(),
-            "where": {
-                "coordinate": "speed", "low": 0.0137, "high": 0.0291, "coordinate_unit": "m/s",
-                "error": 4.71, "unit": "N", "over_noise_floor": 2.32, "share_of_error": 0.417,
-            },
-        },
-        "force_error": pytest.approx(8.37), "noise_floor": 2.11, "unit": "N",
-        "test_error_before": x.tested.before, "test_error_after": x.tested.after,
-        "test_error_on": "selection",
-        "force_shift": 0.000217, "force_shift_unit": "s",
-        "repeats_not_general": {
-            "period": 0.00253, "period_unit": "m", "amplitude": {"run 1": 1.07, "run 2": 0.93},
-            "unit": "N", "phase": {"run 1": 0.31, "run 2": 2.13}, "phase_unit": "rad",
-        },
-        "refit": expected_refit(result.refits["x"]),
-        "not_tried": [],
-        "notes": list(remarks.remarks(x, result.refits["x"])),
-        "next_experiment": strict(plan_json(result.next_experiments["x"])),
-        "next_experiment_refused": None,
-    }  # fmt: skip
-    quiet = axes["y"]
-    assert (quiet["verdict"], quiet["effect"], quiet["missing"]) == ("nothing_missing", None, [])
-    assert (quiet["findings"], quiet["remainder"]) == ([], None)
-    lost = made.diagnosis_of(Verdict.UNEXPLAINED, unexplained=made.STRUCTURE)
-    left = strict(diagnose_json(made.diagnosed(lost)))["remainder"]  # of the model as it was given
-    assert left["error"] == pytest.approx(8.37)
-    assert left["over_noise_floor"] == pytest.approx(8.37 / 2.11)
-    assert (quiet["unexplained"], quiet["next_experiment"], quiet["steps"]) == (None, None, [])
-    assert (quiet["repeats_not_general"], quiet["force_shift"]) == (None, 0.0)
-    assert quiet["refit"] == expected_refit(result.refits["y"])
-    bare = replace(result, refits={}, next_experiments={})
-    assert strict(diagnose_json(bare))["refit"] is None
-    assert strict(diagnose_json(bare))["next_experiment"] is None
-    refused = strict(diagnose_json(replace(bare, not_planned={"x": "no travel"})))
-    assert refused["next_experiment"] is None
-    assert refused["next_experiment_refused"] == "no travel"
-    assert any("is proposed: no travel" in note for note in refused["notes"])
-    assert refused["axes"]["y"]["next_experiment_refused"] is None
-
-
-def test_a_residual_of_nothing_is_null_in_a_diagnosis():
-    empty = built_fit(0.0, 1.0, residual=np.zeros(0))
-    found = strict(diagnose_json(made.diagnosed(made.diagnosis_of(base=empty))))
-    assert found["force_error"] is None
 
 
 def expected_trial(t, gain):

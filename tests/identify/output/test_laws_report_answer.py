@@ -1,4 +1,4 @@
-"""The report's answer, notes and units: each number beside its label."""
+"""The report's answer and notes: each number beside its label."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from identify.output.report import (
 )
 from identify.output.report.blocks import Heading, Picture, Table, Tone
 from identify.output.report.subject import Subject
-from identify.output.report.units import SCALED, Scale, number, quantity, spaced, title_case
+from identify.output.report.units import SCALED, number, quantity
 from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import SEVERAL, VERDICTS, advice, refit_in_words
@@ -218,19 +218,6 @@ def test_regions_have_headings_only_among_several_axes():
         assert (found.anchor, found.title) == ("regions", "Where the error is")
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (1.234e-4, "0.000123"),
-        (9.87e-5, "9.87×10⁻⁵"),
-        (-1.234e7, "−1.23×10⁷"),
-        (1234567.0, "1234567"),
-    ],
-)
-def test_very_large_and_small_numbers_have_a_power_of_ten(value, text):
-    assert number(value) == text
-
-
 @pytest.mark.parametrize(("ratio", "shown"), [(1.29, False), (1.31, True)])
 def test_regions_are_shown_above_the_noise(ratio, shown):
     c = made.comparison_of()
@@ -283,27 +270,3 @@ def test_only_sections_with_something_to_show_are_made(monkeypatch):
 
     monkeypatch.setattr("identify.output.report.SECTIONS", (empty, one, empty))
     assert [s.anchor for s in sections(subject_of())] == ["one"]
-
-
-# --- units ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("unit", ["N", "m", "kg"])
-def test_a_scale_keeps_the_value(unit):
-    for value in (3.21e-8, 4.9e-4, 5.1e-4, 0.49, 0.51, 23.0):
-        scale = Scale.of(unit, [value, -value / 3.0])
-        assert scale(value) * scale.size == pytest.approx(value)
-        prefixed = {1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}[scale.size]
-        assert scale.unit == prefixed + unit
-        assert unit == "kg" or scale(value) >= 0.5
-        assert unit == "kg" or scale.size == 1.0 or scale(value) < 500.0
-    assert Scale.of(unit, []).size == 1.0
-
-
-def test_an_interval_has_two_digits_of_its_half_width():
-    scale = Scale(1e-3, "mN")
-    assert scale.within(0.01, 0.05, -0.0314159) == ["−31"]
-    assert scale.within(0.01, 0.014, 0.0123456) == ["12.3"]
-    assert scale.within(0.0, 5.0, 1.2345) == ["1234"] or scale.within(0.0, 5.0, 1.2345) == ["1235"]
-    assert spaced("a_b_c") == "a b c"
-    assert title_case("a_b_c") == "A b c"

@@ -14,12 +14,12 @@ from report_cases import (
     Outline,
     answers,
     cogging_case,
-    made,
     pictures_in,
     without_drawing,
 )
 
 from identify import workflow
+from identify.output.report import equations
 from identify.output.report.blocks import Heading
 from identify.output.report.drawing import binned_mean
 from identify.output.report.overlay import representative
@@ -84,12 +84,13 @@ def test_every_verdict_has_its_words(case: Case) -> None:
 
 def test_only_named_effects_have_their_law_printed(case: Case) -> None:
     tied = ambiguous(case)
-    blocks = made(case.subject(case.concluding(tied)))["equations"].blocks
-    assert [b.text for b in blocks if isinstance(b, Heading)] == [
+    section = equations.section(case.subject(case.concluding(tied)))
+    assert section
+    assert [b.text for b in section.blocks if isinstance(b, Heading)] == [
         "Cogging on x", "Quadratic drag on x",
     ]  # fmt: skip
     done = replace(case.x, verdict=Verdict.NOTHING_MISSING)
-    assert "equations" not in made(case.subject(case.concluding(done)))
+    assert equations.section(case.subject(case.concluding(done))) is None
 
 
 def test_the_axis_of_the_answer_comes_first(case: Case) -> None:

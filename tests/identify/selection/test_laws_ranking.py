@@ -20,12 +20,11 @@ from built_fits import (
 from identify.estimation.evidence import Evidence, effective_samples, held_out_gain
 from identify.selection import ranking
 from identify.selection.candidates import Look
-from identify.selection.ranking import _ranked, less, rank, tie, took_friction
+from identify.selection.ranking import _ranked, less, rank, tie
 from twin.effects import Catalogue
-from twin.model.machine import Fitted
 
 # The rules as they were decided.
-AT_FLOOR, COLLAPSE, SETTLED, FIRSTS, LEAST_PART = 1.3, 0.3, 0.999, 3, 0.1
+AT_FLOOR, SETTLED, FIRSTS, LEAST_PART = 1.3, 0.999, 3, 0.1
 CONTENDER = 0.1
 DATASET = dataset_stub()
 NAMES = ("cogging", "end_stop", "gms", "quadratic_drag", "wear")
@@ -277,32 +276,3 @@ def test_what_only_makes_noise_ties_with_nothing(monkeypatch):
     monkeypatch.setattr(ranking, "residual", lambda *_: pytest.fail("compared"))
     assert not tie(DATASET, built(NOISE), built("wear"))
     assert not tie(DATASET, built("wear"), built(NOISE))
-
-
-# --- friction -------------------------------------------------------------------------------
-
-
-def friction(**values: float) -> Fitted:
-    own = PLAIN.effects[0]
-    return replace(own, values={**own.values, **values})
-
-
-@pytest.mark.parametrize(
-    ("after", "taken"),
-    [
-        (friction(Fc=0.31 * COLLAPSE + 1e-4), False),
-        (friction(Fc=0.31 * COLLAPSE - 1e-4), True),
-        (friction(sigma2=0.001), False),
-        (friction(Fs=0.001), False),  # held by the fit
-    ],
-)
-def test_a_friction_is_taken_where_its_dry_part_collapses(after, taken):
-    assert took_friction(PLAIN, PLAIN.with_effect(after)) is taken
-
-
-def test_a_friction_that_was_replaced_was_not_taken_over():
-    assert not took_friction(PLAIN, PLAIN.with_effect(fitted("lugre")))
-    assert not took_friction(replace(PLAIN, effects=()), PLAIN)
-    other = fitted("constant_force", F0=2.0)
-    gone = fitted("constant_force", F0=1e-3)
-    assert not took_friction(axis_of(other), axis_of(gone))

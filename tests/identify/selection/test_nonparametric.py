@@ -84,7 +84,7 @@ def mapped(chirping: tuple[Logs, Logs]) -> Addition:
 @cache
 def honest(seed: int) -> FitResult:
     """The stage's fit to logs of a machine that lacks nothing."""
-    return fit(STAGE, recorded(STAGE, (seed, seed + 1), 10.0), recorded(STAGE, (seed + 2,), 10.0))
+    return fit(STAGE, recorded(STAGE, (seed, seed + 1), SHORT), recorded(STAGE, (seed + 2,), SHORT))
 
 
 @pytest.mark.parametrize(

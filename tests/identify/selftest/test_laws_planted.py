@@ -117,20 +117,39 @@ def test_an_effect_must_show_and_the_mass_is_held_where_it_would_hide(
     assert weighed == ([5.7] if held else [])
 
 
+FLOOR, OTHER = 0.01, 0.03  # N RMS; the second is left by the right friction too, of the bumps, say
+
+
+def stub_trials(monkeypatch, excess_of):
+    """Trials whose error is made by the dry friction, both in N."""
+
+    def trial(drawn, seed):
+        excess = excess_of(drawn.true.axes["x"].effects[-1].values["Fc"])
+        base = built_fit(float(np.hypot(excess, OTHER)), FLOOR, drawn.model.axes["x"])
+        return cases._Trial(SimpleNamespace(fit="logs", excitation=EXCITATION), base, FLOOR)
+
+    monkeypatch.setattr(cases._Trial, "of", trial)
+    monkeypatch.setattr(cases, "fit_axis", lambda axis, logs: built_fit(OTHER, FLOOR, axis))
+
+
+@pytest.mark.parametrize(("wanted", "times"), [(0.8, 10.0), (30.0, 0.1)])
+def test_a_friction_stays_within_ten_times_the_machines_own(monkeypatch, wanted, times):
+    """At ten times the level it shows 0.8 of the strength, and at a tenth still 30 of it."""
+    own, strength = LUGRE.values["Fc"], 5.0
+    stub_trials(monkeypatch, lambda dry: dry / (times * own) * wanted * strength * FLOOR)
+    drawn = Drawn(STAGE, STAGE, reshaped=frozenset({"lugre"}))
+    _, planted = cases._with_friction(
+        drawn, CATALOGUE["gms"], strength, 1, np.random.default_rng(2)
+    )
+    assert planted.values["Fc"] == pytest.approx(times * own)
+
+
 @pytest.mark.parametrize(("level", "shown"), [(1.0, True), (0.1, False)])
 def test_a_friction_is_scaled_until_the_model_falls_short_by_the_strength(
     monkeypatch, level, shown
 ):
     """Its error grows with the dry level; what the right friction leaves too does not count."""
-    floor, other = 0.01, 0.03  # N; other: of the bumps, say
-
-    def trial(drawn, seed):
-        excess = level * drawn.true.axes["x"].effects[-1].values["Fc"] if shown else 0.05 * floor
-        base = built_fit(float(np.hypot(excess, other)), floor, drawn.model.axes["x"])
-        return cases._Trial(SimpleNamespace(fit="logs", excitation=EXCITATION), base, floor)
-
-    monkeypatch.setattr(cases._Trial, "of", trial)
-    monkeypatch.setattr(cases, "fit_axis", lambda axis, logs: built_fit(other, floor, axis))
+    stub_trials(monkeypatch, lambda dry: level * dry if shown else 0.05 * FLOOR)
     rng = np.random.default_rng(2)
     drawn = Drawn(STAGE, STAGE, reshaped=frozenset({"lugre"}))
     if not shown:
@@ -142,7 +161,7 @@ def test_a_friction_is_scaled_until_the_model_falls_short_by_the_strength(
     assert found.true.axes["x"]["gms"] is planted
     assert found.model.axes["x"].names == ("coulomb_viscous",)
     assert not found.reshaped
-    assert level * planted.values["Fc"] / floor == pytest.approx(5.0, rel=1e-3)
+    assert level * planted.values["Fc"] / FLOOR == pytest.approx(5.0, rel=1e-3)
 
 
 # --- the demonstration ----------------------------------------------------------------------

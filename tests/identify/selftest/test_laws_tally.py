@@ -3,31 +3,20 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import Future
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, built, built_dataset, built_fit, fitted
-from built_results import errors
 from scipy.stats import binomtest
 
-from identify.estimation.fit import Outcome, finished
-from identify.estimation.force_balance import residual
-from identify.estimation.intervals import half_widths
 from identify.output.words.selftest import (
     failure_in_words,
     rate_in_words,
     target_in_words,
     trial_in_words,
 )
-from identify.selection.decoys import Proof
-from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.findings import Finding, FindingKind
-from identify.selftest import cases, design, trial
+from identify.selection.findings import FindingKind
 from identify.selftest.case import Case
-from identify.selftest.design import FULL, QUICK, STRONG, WEAK, Design, plantable, release_seed
 from identify.selftest.laws import OUTSIDE
 from identify.selftest.tally import (
     CONFIDENT,
@@ -40,9 +29,7 @@ from identify.selftest.tally import (
     failures,
     rates,
 )
-from identify.selftest.trial import Answer, Held, TrialResult, _held, _right_coordinates
-from identify.selftest.variations import VARIATIONS
-from twin.effect import Kind
+from identify.selftest.trial import Answer, Held, TrialResult
 
 FOREIGN = next(iter(OUTSIDE))
 
@@ -211,195 +198,3 @@ def test_an_outcome_in_words():
     assert "a@5/plain/1: cannot reach 5 times the noise floor" in trial_in_words(HIDDEN)
     assert failure_in_words(LEFT_OUT) == "wrong: twin selftest --case a@5/plain/1/out: b (60 %)"
     assert failure_in_words(MISSED) == "missed: twin selftest --case a@5/plain/1: unexplained"
-
-
-# --- the design -----------------------------------------------------------------------------
-
-
-def test_a_design_makes_the_same_cases_from_the_same_seed_only():
-    drawn = Design(empty=9, strong=90, weak=60, outside=11, pairs=6, left_out=5)
-    made = drawn.cases(5)
-    assert made == drawn.cases(5)
-    assert not set(made) & set(drawn.cases(6))
-    assert len(set(made)) == len(made) == 9 + 90 + 60 + 11 + 6 + 5
-    names = set(plantable(CATALOGUE))
-    assert "lugre" not in names
-    assert not any(CATALOGUE[n].is_nonparametric for n in names)
-    empty = [c for c in made if not c.effects]
-    assert [(c.strength, c.known) for c in empty] == [(0.0, True)] * 9
-    assert {c.variation for c in empty} == set(VARIATIONS)  # in turn
-    inside = [c for c in made if len(c.effects) == 1 and c.known and c.effects[0] in names]
-    for strength, count in ((STRONG, 90), (WEAK, 60)):
-        own = [c.effects[0] for c in inside if c.strength == strength]
-        assert len(own) == count
-        assert set(own) == names  # in turn
-    outside = [c.effects[0] for c in made if c.effects and c.effects[0] in OUTSIDE]
-    assert (len(outside), set(outside)) == (11, set(OUTSIDE))
-    assert sum(len(c.effects) == 2 for c in made) == 6
-    assert sum(not c.known for c in made) == 5
-
-
-def test_a_quick_design_and_the_full_one():
-    quick, full = QUICK.cases(1), FULL.cases(1)
-    assert len(quick) == 10  # two minutes of one core at twelve seconds each
-    assert 200 < len(full) <= 300  # half an hour of two cores
-    assert {c.variation for c in full} == set(VARIATIONS)
-
-
-def test_development_and_release_are_drawn_apart():
-    assert release_seed() != design.DEVELOPMENT
-    assert release_seed() >= design.FIRST_RELEASE > design.DEVELOPMENT
-    assert not set(FULL.cases(release_seed())) & set(FULL.cases(design.DEVELOPMENT))
-
-
-class Inline:
-    """A pool that runs each job at once, in this process."""
-
-    def __init__(self, workers, mp_context) -> None:
-        self.workers = workers
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_) -> None:
-        pass
-
-    def submit(self, function, case):
-        future = Future()
-        future.set_result(function(case))
-        return future
-
-
-def test_outcomes_come_in_the_order_of_the_cases_with_their_progress(monkeypatch):
-    monkeypatch.setattr(design, "ProcessPoolExecutor", Inline)
-    monkeypatch.setattr(design, "as_completed", lambda jobs: reversed(list(jobs)))
-    monkeypatch.setattr(design, "run", lambda case: TrialResult(case, str(case.seed)))
-    wanted = [Case(("a",), 5.0, seed) for seed in (3, 1, 2)]
-    told = []
-    found = design.run_all(wanted, progress=lambda *given: told.append(given))
-    assert [o.case for o in found] == wanted
-    assert [(o.verdict, done, total) for o, done, total in told] == [
-        ("2", 1, 3), ("1", 2, 3), ("3", 3, 3),
-    ]  # fmt: skip
-    assert design.run_all(wanted) == found
-
-
-def test_two_frictions_are_never_planted_together():
-    frictions = [n for n in plantable(CATALOGUE) if CATALOGUE[n].kind is Kind.FRICTION]
-    assert len(frictions) > 2
-    alone = Design(pairs=3).cases(1, frictions)
-    assert not any(len(c.effects) == 2 for c in alone)
-    mixed = Design(pairs=40).cases(1, [*frictions, "wear"])
-    pairs = [c.effects for c in mixed if len(c.effects) == 2]
-    assert len(pairs) == 40
-    assert all("wear" in pair for pair in pairs)
-
-
-# --- one trial ------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def dataset():
-    return built_dataset("run")
-
-
-def test_the_right_coordinates_are_those_near_the_strongest_dependence(monkeypatch, dataset):
-    base = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
-    planted = (fitted("constant_force", F0=0.7), fitted("quadratic_drag", c=2.0))
-    built_machine = SimpleNamespace(planted=planted)
-    seen = []
-
-    def shares(force, fit, where):
-        seen.append(force)
-        return {"time": 0.5, "position": 0.41, "velocity": 0.4, "direction": 0.39}
-
-    monkeypatch.setattr(trial, "dependences", shares)
-    found = _right_coordinates(built_machine, base, dataset)
-    assert found == ("time", "position", "velocity")
-    with_both = base.axis.with_effect(planted[0]).with_effect(planted[1])
-    change = base.residual - residual(with_both, dataset.fit)[base.kept]
-    columns = base.jacobian / np.linalg.norm(base.jacobian, axis=0)
-    left = change - columns @ np.linalg.lstsq(columns, change, rcond=None)[0]
-    np.testing.assert_allclose(seen[0], left, atol=1e-6)
-    assert _right_coordinates(SimpleNamespace(planted=()), base, dataset) == ()
-    silent = SimpleNamespace(planted=(fitted("cogging"),))
-    assert _right_coordinates(silent, base, dataset) == ()
-
-
-def test_the_truth_lies_so_many_half_widths_from_a_value(dataset):
-    fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
-    half = dict(zip([c.label for c in fit.scaling.where], half_widths(fit), strict=True))
-    assert list(half) == ["mass", "coulomb_viscous.Fc", "coulomb_viscous.sigma2"]
-    true = replace(fit.axis, mass=fit.axis.mass + 0.5 * half["mass"])
-    machine = SimpleNamespace(
-        true=SimpleNamespace(axes={"x": true}), reshaped=frozenset({"coulomb_viscous"})
-    )
-    (mass,) = _held(machine, fit)  # a reshaped law has no true values
-    assert mass.label == "mass"
-    assert mass.off == pytest.approx(0.5, rel=1e-6)
-    machine.reshaped = frozenset()
-    assert [h.label for h in _held(machine, fit)] == list(half)
-
-
-@pytest.mark.parametrize("known", [True, False])
-def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
-    base, final = built_fit(4.0, 0.5), built_fit(1.1, 1.0)
-    machine = SimpleNamespace(
-        planted=(), model=SimpleNamespace(axes={"x": PLAIN}), reshaped={"lugre"}, right={"gms"},
-    )  # fmt: skip
-    asked = {}
-    finding = Finding("wear", ("cogging",), 0.9, *errors(2.0, 1.0), "N", {}, Proof(0.9, 0.1))
-    findings = (
-        finding, replace(finding, effect="gms"), replace(finding, effect="wear", tied=()),
-        replace(finding, effect="lugre", kind=FindingKind.WRONG_SHAPE),
-        replace(finding, effect="cable", kind=FindingKind.WRONG_SHAPE, tied=(), proof=None),
-    )  # fmt: skip
-    found = AxisDiagnosis(
-        dataset, base, tuple(built(n, bic=b) for n, b in (("wear", 90.0), ("gms", 80.0))), (),
-        final, Verdict.UNEXPLAINED, SimpleNamespace(depends_on="time"),
-    )  # fmt: skip
-
-    def build(stage, effects, strength, variation, rng):
-        asked.update(
-            effects=[e.name for e in effects], strength=strength, varied=variation,
-            draw=rng.random(),
-        )  # fmt: skip
-        return machine
-
-    def diagnose(given, where, catalogue, workers):
-        asked.update(catalogue=set(catalogue), workers=workers)
-        return SimpleNamespace(with_findings=lambda: replace(found, findings=findings))
-
-    monkeypatch.setattr(trial, "machine", build)
-    monkeypatch.setattr(trial, "prepared", lambda built: "dataset")
-    monkeypatch.setattr(trial, "fit_aligned", lambda axis, given: (given, base))
-    monkeypatch.setattr(trial, "diagnose_axis", diagnose)
-    monkeypatch.setattr(trial, "_tested", lambda found, built: 1.2)
-    monkeypatch.setattr(trial, "_held", lambda built, base: (OFF[0],))
-    out = trial.run(Case(("cogging",), 3.0, 7, "bumps", known))
-    first = asked["draw"]
-    assert (asked["effects"], asked["strength"], asked["workers"]) == (["cogging"], 3.0, 1)
-    assert asked["varied"] == "bumps"
-    assert ("cogging" in asked["catalogue"]) is known
-    assert len(asked["catalogue"]) == len(CATALOGUE) - (not known)
-    assert (out.verdict, out.ratio, out.left) == ("UNEXPLAINED", 8.0, pytest.approx(1.1))
-    assert out.ranking == (("wear", 90.0), ("gms", 80.0))
-    assert (out.depends_on, out.held, out.shown) == ("time", (OFF[0],), True)
-    assert out.tested == 1.2
-    # Planted; right besides; neither; its law is another; it is not.
-    assert [a.right for a in out.answers] == [True, True, False, True, False]
-    assert out.answers[0].names == ("wear", "cogging")
-    assert (out.answers[0].left, out.answers[0].confidence) == (
-        finding.left, finding.confidence,
-    )  # fmt: skip
-    trial.run(Case(("cogging",), 3.0, 7, "bumps", known))
-    assert asked["draw"] == first
-    trial.run(Case((FOREIGN,), 3.0, 8))
-    assert asked["effects"] == [FOREIGN]
-    assert asked["draw"] != first
-
-    def refused(*_):
-        raise cases.NotShown("cogging")
-
-    monkeypatch.setattr(trial, "machine", refused)
-    assert not trial.run(Case(("cogging",), 3.0, 7)).shown

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from cli_runs import twin
+from report_cases import without_drawing
 
 import identify
 from twin.errors import InputError
@@ -18,7 +19,8 @@ QUICK = ("simulation", "cable", "twin")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("thesis")
     asked = [part for name in QUICK for part in ("--chapter", name)]
-    done = twin("reproduce", "-o", "out", "--small", "--json", *asked, folder=folder)
+    with without_drawing():  # tests/identify/output/test_laws_thesis_pictures.py draws
+        done = twin("reproduce", "-o", "out", "--small", "--json", *asked, folder=folder)
     assert done.returncode == 0, done.stderr
     (folder / "printed.json").write_text(done.stdout)
     return folder

@@ -1,4 +1,4 @@
-"""The chapters "track", "twin" and "residuals" in parts, and how a chapter is run."""
+"""The chapters "track", "twin", "residuals" and "future" in parts."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ from scipy.stats import t as student
 from identify.estimation.intervals import half_widths_of
 from identify.estimation.stribeck_curve import StribeckCurve
 from identify.estimation.velocity_map import VelocityMap
-from identify.thesis import chapters, future, residuals, track, twin
-from identify.thesis.chapter import Chapter
-from twin.errors import InputError
+from identify.thesis import future, residuals, track, twin
 from twin.model.file import load_model
 from twin.model.parameters import read
 
@@ -163,7 +161,8 @@ def test_each_place_and_direction_has_its_own_map_fit_and_planted_curve(monkeypa
 
     for name, stub in (
         ("_logs", lambda model, name, place, size, rng: {"one": place, "two": place}),
-        ("motion_of", lambda log, name, label: (label, log)), ("velocity_map", velocity_map),
+        ("motion_of", lambda log, name, label, ripples: (label, log)),
+        ("velocity_map", velocity_map),
         ("_local_fit", lambda model, name, logs, found: logs["one"]),
         ("_through", lambda m: (100.0 + sign(m.velocity) + np.arange(4.0), np.full(4, 0.1))),
         ("_of_law", lambda fit, place, v: (
@@ -255,7 +254,7 @@ def test_friction_near_zero_speed_is_read_in_both_ways(monkeypatch):
     ))  # fmt: skip
     for name, stub in (
         ("simulate", simulate), ("velocity_map", velocity_map),
-        ("motion_of", lambda log, name, label: log),
+        ("motion_of", lambda log, name, label, ripples: log),
         ("datasets", lambda model, logs, held: {"x": prepared}),
         ("fit_axis", lambda a, logs: SimpleNamespace(axis=changed)),
         ("steady_friction", lambda a, place, v: a["lugre"].values["Fs"] + v),
@@ -270,47 +269,3 @@ def test_friction_near_zero_speed_is_read_in_both_ways(monkeypatch):
     np.testing.assert_allclose(found.mapped, 2.0 * np.array(speeds))
     np.testing.assert_allclose(found.planted, 0.335 + np.array(speeds))
     np.testing.assert_allclose(found.fitted, 0.5 + np.array(speeds))
-
-
-# --- chapters -------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def told(monkeypatch):
-    """Two chapters that say with what they were run; the second runs on logs too."""
-
-    def run(models, catalogue, size, rng, progress):
-        return [m.name for m in models], size, float(rng.uniform())
-
-    known = {
-        "one": Chapter(("thesis_track",), "full", "small", run),
-        "two": Chapter(("thesis_aging",), "full", "small", run, lambda model, logs: (model, logs)),
-    }
-    monkeypatch.setattr(chapters, "CHAPTERS", known)
-
-
-def test_a_chapter_is_run_in_the_size_asked_for_and_draws_for_itself(told):
-    both = chapters.reproduce(CATALOGUE, progress=silent)
-    assert list(both.chapters) == ["one", "two"] == list(both.seconds)
-    assert [r[:2] for r in both.chapters.values()] == [
-        ([load_model(name, CATALOGUE).name], "full") for name in ("thesis_track", "thesis_aging")
-    ]
-    one, two = (r[2] for r in both.chapters.values())
-    assert one != two
-    alone = chapters.reproduce(CATALOGUE, ["two"], small=True, progress=silent)
-    assert alone.chapters == {"two": (both.chapters["two"][0], "small", two)}
-    assert (both.small, alone.small) == (False, True)
-    other = chapters.reproduce(CATALOGUE, ["two"], seed=2, progress=silent)
-    assert other.chapters["two"][2] != two
-    assert repr(both) == "<Reproduction of one, two>"
-
-
-def test_chapters_on_logs_are_those_that_need_no_twin(told):
-    assert chapters.reproduce_on_logs([], "model", "logs").chapters == {"two": ("model", "logs")}
-    assert not chapters.reproduce_on_logs(["two"], "model", "logs").small
-    with pytest.raises(InputError, match=r"chapter 'one' needs the twin.*there is two"):
-        chapters.reproduce_on_logs(["one"], "model", "logs")
-    with pytest.raises(InputError, match="unknown chapter 'tow'; did you mean 'two'"):
-        chapters.reproduce_on_logs(["tow"], "model", "logs")
-    with pytest.raises(InputError, match="unknown chapter '9'; there are one, two"):
-        chapters.reproduce(CATALOGUE, ["9"], progress=silent)

@@ -36,7 +36,7 @@ SIDE, COUNT = round(START_FIT * RATE), round(HORIZON * RATE)
 
 
 def prepared(x=X, force=FORCE, name="log"):
-    return windowed(motion_of(log_of(RATE, x, force), "x", name), 0.02)
+    return windowed(motion_of(log_of(RATE, x, force), "x", name, ripples=()), 0.02)
 
 
 def stage(mass: float = MASS, hardware: Hardware | None = None) -> MachineModel:

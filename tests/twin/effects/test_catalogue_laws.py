@@ -3,18 +3,15 @@
 No effect is named here: one that is added later is held to the same laws.
 """
 
-import ast
 from collections.abc import Callable
 from functools import cache
 from math import copysign, sin
-from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 from effect_runs import CATALOGUE, FRICTIONS
 
-from twin import effects
 from twin.effect import DRY, INDEX, OUT, READING, TIME, VISCOUS, Effect, Kind, Parameter, V, X
 from twin.experiments.named import simulate
 from twin.laws import checks, physics
@@ -28,9 +25,6 @@ from twin.mujoco.callback import passive_callback
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
 STAGE = load_model("proton_xy", CATALOGUE)
-SOURCES = Path(effects.__file__).parent.parent
-# The thesis asks for a mixture of two laws that it names.
-MIXTURES = {SOURCES.parent / "identify" / "thesis" / "mixed_friction.py"}
 EVERY = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda e: e.name)
 # What a modifier does to the work of every friction is tried from the friction's side.
 PAIRS = [
@@ -132,27 +126,6 @@ def test_state_saved_and_restored_continues_to_the_bit(effect: Effect) -> None:
         mujoco.mj_getState(stage.model, stage.data, second, spec)
     np.testing.assert_array_equal(first, second)
     assert not np.array_equal(first, saved)
-
-
-@EVERY
-def test_no_other_file_of_the_product_names_an_effect(effect: Effect) -> None:
-    """Adding or removing one file is all it takes."""
-    own = SOURCES / "effects" / f"{effect.name}.py"
-    naming = {path for path, words in words_of_the_product().items() if effect.name in words}
-    assert naming - MIXTURES <= {own}
-
-
-@cache
-def words_of_the_product() -> dict[Path, set[object]]:
-    """Constants and imported names of every file of the product."""
-    found = {}
-    for path in [*SOURCES.rglob("*.py"), *(SOURCES.parent / "identify").rglob("*.py")]:
-        nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
-        words = {n.value for n in nodes if isinstance(n, ast.Constant)}
-        words |= {n.name.split(".")[-1] for n in nodes if isinstance(n, ast.alias)}
-        words |= {(n.module or "").split(".")[-1] for n in nodes if isinstance(n, ast.ImportFrom)}
-        found[path] = words
-    return found
 
 
 # --- planted faults: each law must fail on the effect that breaks it ------------------------------

@@ -110,15 +110,18 @@ def columns(when: float, friction: bool) -> Columns:
 
 def stepped(effect: Effect, values: Values, q: Columns) -> tuple[Array, Array]:
     """io before and after the law, (n, IO_SIZE) each, along the columns."""
-    law = compiled(effect)
     p, s = np.array([values[p.name] for p in effect.parameters]), np.zeros(len(effect.states) + 1)
+    io = np.zeros(IO_SIZE)
+    law = compiled(effect, p, s, io)
     before = np.zeros((len(q), IO_SIZE))
     for f in fields(Columns):
         before[:, getattr(slots, f.name.upper())] = getattr(q, f.name)
     before[:, slots.INDEX] = np.arange(len(q))
-    after = before.copy()
-    for io in after:
-        law(p, s, io)
+    after = np.empty_like(before)
+    for k, row in enumerate(before):
+        io[:] = row
+        law()
+        after[k] = io
     return before, after
 
 

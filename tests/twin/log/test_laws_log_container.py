@@ -10,7 +10,19 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-import zstandard
+from container_log import (
+    COUNT,
+    FIRST_NUMBER,
+    LOG,
+    PER_CHUNK,
+    RATE,
+    ROW,
+    TRUTH,
+    in_chunks,
+    messages,
+    of,
+    payload,
+)
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message_factory import GetMessages
 from mcap.reader import NonSeekingReader, make_reader
@@ -22,7 +34,6 @@ from mcap.records import (
     ChunkIndex,
     DataEnd,
     Footer,
-    Message,
     MessageIndex,
     Metadata,
     MetadataIndex,
@@ -53,32 +64,7 @@ from mcap_bytes import (
 )
 
 from twin.errors import InputError
-from twin.log import FIELDS, AxisLog, Log, encode, read_log, write_log
-
-RATE, COUNT = 3000.0, 45
-TRUTH = tuple(f"state{k}" for k in range(18))
-
-
-def distinct(name: str, axis: str) -> np.ndarray:
-    """A column whose values occur in no other column."""
-    number = 100.0 * (1 + (*FIELDS, *TRUTH).index(name)) + 10_000.0 * (1 + "xyzt".index(axis))
-    return number + np.arange(COUNT) / 64.0
-
-
-LOG = Log(
-    RATE,
-    {
-        "x": AxisLog({f: distinct(f, "x") for f in FIELDS}, force_constant=7.25),
-        "y": AxisLog({f: distinct(f, "y") for f in ("position", "current")}, force_constant=3.5),
-        "z": AxisLog({f: distinct(f, "z") for f in ("position", "current")}, force_constant=2.0),
-    },
-    {"source": "a test"},
-    {"x": {f: distinct(f, "t") for f in TRUTH}},
-    {"model.toml": b"mass = 1\n", "stage.xml": b"<mujoco/>", "raw": bytes(range(200))},
-)
-FIRST_NUMBER = 1 << 18  # of the fields: their tags have four bytes
-ROW = (31 + 7 * 12) + 2 * (31 + 2 * 12) + (31 + 18 * 12)  # bytes of a sample on four topics
-PER_CHUNK = 7
+from twin.log import FIELDS, encode, read_log, write_log
 
 
 @pytest.fixture(scope="module")
@@ -88,30 +74,6 @@ def data(tmp_path_factory) -> bytes:
         patch.setattr(encode, "CHUNK_BYTES", PER_CHUNK * ROW + ROW - 1)
         write_log(LOG, path)
     return path.read_bytes()
-
-
-def of(data: bytes, opcode: int):
-    return [p for p in records(data) if p.opcode == opcode]
-
-
-def payload(chunk: Chunk) -> bytes:
-    return zstandard.ZstdDecompressor().decompress(chunk.data)
-
-
-def in_chunks(data: bytes) -> list[list]:
-    """(record, bytes) of every chunk's content, chunk by chunk."""
-    contents = [payload(parsed(Chunk, p)) for p in of(data, CHUNK)]
-    return [pieces(content, 0, len(content)) for content in contents]
-
-
-def messages(data: bytes) -> dict[int, list[Message]]:
-    found: dict[int, list[Message]] = {}
-    for chunk in in_chunks(data):
-        for piece in chunk:
-            if piece.opcode == MESSAGE:
-                message = parsed_message(piece)
-                found.setdefault(message.channel_id, []).append(message)
-    return found
 
 
 def exact(k: int, rate: float) -> int:

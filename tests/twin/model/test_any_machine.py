@@ -6,12 +6,21 @@ import base64
 import json
 import re
 import tomllib
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 import pytest
+from axis_kinds import (
+    CATALOGUE,
+    LINEAR_AXIS,
+    MACHINES,
+    OF_A_HINGE,
+    OF_A_SLIDE,
+    ROUNDING,
+    THREE,
+    machine,
+    stated_units,
+)
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -23,69 +32,19 @@ from identify.output.plain import plain
 from identify.output.report import write_report
 from identify.output.results import Comparison, Diagnosis, FitResult
 from identify.selection.residual_dependence import coordinates_of, unit_of
-from twin.effects import Catalogue, load_catalogue
+from twin.effects import Catalogue
 from twin.errors import InputError
-from twin.experiments.experiment import driven_units
-from twin.experiments.file import format_experiment
 from twin.experiments.kinds import Passes
 from twin.experiments.named import outside_travel, simulate
 from twin.log import Log, read_log, write_log
 from twin.log.check import check_log
 from twin.model.file import format_model, parse_model
 from twin.model.machine import MachineModel
-from twin.model.units import LINEAR, ROTARY, AxisUnits, rotary_unit, units_of
-from twin.mujoco.mjcf import machine_spec
+from twin.model.units import LINEAR, ROTARY, AxisUnits
 from twin.simulator import ReducedSimulator
 
-CATALOGUE = load_catalogue()
 TRIED = ("cogging", "constant_force", "quadratic_drag", "axis_coupling")
 DURATION = 4.0  # s of each log
-ROUNDING = 1e-13  # of the travel, over a log
-
-LINEAR_AXIS = """
-[axes.{name}]
-mass = {mass}
-travel = [-0.2, 0.2]
-force_limit = 400.0
-encoder_noise = 2e-8
-current_noise = 2e-4
-velocity = 0.4
-acceleration = 4.0
-jerk = 200.0
-[axes.{name}.effects.coulomb_viscous]
-Fc = {dry}
-sigma2 = 2.0
-"""
-ROTARY_AXIS = """
-[axes.c]
-inertia = 0.02
-travel = [-2.0, 2.0]
-force_limit = 5.0
-encoder_noise = 1e-6
-current_noise = 2e-4
-velocity = 3.0
-acceleration = 40.0
-jerk = 2000.0
-[axes.c.effects.coulomb_viscous]
-Fc = 0.05
-sigma2 = 0.01
-"""
-RATE = "sample_rate = 1000.0\n"
-THREE = [("x", 3.0, 1.0), ("y", 5.0, 2.0), ("z", 2.0, 0.5)]
-SLIDE = LINEAR_AXIS.format(name="x", mass=3.0, dry=1.0)
-MACHINES = {
-    "linear": (SLIDE, "x", "[axes.x.effects.cogging]\np = 0.04\na1 = 0.5\n"),
-    "rotary": (ROTARY_AXIS, "c", "[axes.c.effects.cogging]\np = 0.7\na1 = 0.02\n"),
-    "three": (
-        "".join(LINEAR_AXIS.format(name=n, mass=m, dry=f) for n, m, f in THREE),
-        "y",
-        "[axes.y.effects.quadratic_drag]\nc = 20.0\n",
-    ),
-}
-
-
-def machine(toml: str) -> MachineModel:
-    return parse_model(tomllib.loads(RATE + toml), CATALOGUE, None, "machine.toml")
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,14 +119,6 @@ def texts(r: Round) -> str:
     )  # fmt: skip
 
 
-def stated_units(value: Any) -> set[str]:
-    """Every unit that a JSON object states."""
-    if isinstance(value, dict):
-        own = {v for k, v in value.items() if k.endswith("unit") and isinstance(v, str)}
-        return own.union(*map(stated_units, value.values()))
-    return set().union(*map(stated_units, value)) if isinstance(value, list) else set()
-
-
 def test_both_simulations_agree_to_rounding(gone_round: Round) -> None:
     reduced = simulate(
         gone_round.truth, "tracking", seed=1, duration=DURATION, simulator=ReducedSimulator
@@ -221,14 +172,6 @@ def test_the_hidden_effect_is_named_and_added(gone_round: Round) -> None:
     )
     assert again.axes[gone_round.axis] == gone_round.added.model.axes[gone_round.axis]
     assert again.history == gone_round.added.model.history
-
-
-# A number, a label or a comment in metres, newtons or kilograms.
-OF_A_SLIDE = re.compile(
-    r"(?:[\d)] ?|\(|# |\b1/)[mµn]?"
-    r"(?:N(?! ?[·m]|\w)|kg(?! ?[·m]|\w)|m(?:/s(?:\^?[23²³])?)?(?![\w·/]))"
-)
-OF_A_HINGE = re.compile(r"\b[mµn]?rad\b|N·m|N m\b|kg·m|kg m\^")
 
 
 # What the same quantities are called on the other kind of axis, names of effects apart.
@@ -342,158 +285,3 @@ def test_one_axis_moves_while_two_rest() -> None:
     assert compared.position_error["passes"] < 1e-3
     with pytest.raises(InputError, match="has 3 axes, not two"):
         simulate(model, Passes("z", span=0.3, speed=0.2, repeats=1, other=0.1))
-
-
-def test_a_plan_is_in_units_of_the_axis() -> None:
-    model = machine(ROTARY_AXIS)
-    chosen = workflow.plan(
-        model, catalogue=CATALOGUE, duration=2.0, axis="c",
-        between=(CATALOGUE["cogging"], CATALOGUE["quadratic_drag"]),
-    )  # fmt: skip
-    shown = text.plan_text(chosen)
-    assert not (wrong := OF_A_SLIDE.search(shown)), wrong
-    assert "N m unexplained by the rival" in shown
-    assert stated_units(as_json.plan_json(chosen)) == {"N m", "s"}
-    planned = Passes("c", span=0.3, speed=0.2, repeats=1)
-    file = format_experiment(planned, units=driven_units(planned, model))
-    assert "# rad, length of a pass" in file
-    assert "# rad/s, held" in file
-
-
-@pytest.mark.parametrize(
-    ("log_of", "model_of", "message"),
-    [
-        ("rotary", SLIDE.replace("axes.x", "axes.c"), r"is rotary \(position in rad\), .* in m\)"),
-        ("linear", ROTARY_AXIS.replace("axes.c", "axes.x"), r"is linear \(position in m\), .* rad"),
-    ],
-)  # fmt: skip
-def test_a_log_of_the_other_kind_is_refused(log_of: str, model_of: str, message: str) -> None:
-    log = simulate(machine(MACHINES[log_of][0]), "tracking", duration=1.0)
-    for act in (workflow.fit, workflow.compare):
-        with pytest.raises(InputError, match=message) as told:
-            act(machine(model_of), {"run": log})
-        assert "\n" not in str(told.value)
-
-
-@pytest.mark.parametrize(
-    ("toml", "message"),
-    [
-        (ROTARY_AXIS.replace("inertia", "mass = 1.0\ninertia"), "both mass and inertia"),
-        (ROTARY_AXIS.replace("inertia = 0.02", ""), "no mass; .* kg m.2 for a rotary axis"),
-        (ROTARY_AXIS.replace("0.02", "-1.0"), "inertia = -1.0: give a number from 1e-12 .* kg m.2"),
-        (ROTARY_AXIS.replace("0.02", "'big'"), "inertia = 'big': give a number .* kg m.2"),
-        (
-            ROTARY_AXIS.replace("5.0", "'big'"),
-            "force_limit = 'big': give a number .*N m on a rotary",
-        ),
-        (ROTARY_AXIS.replace("= 0.01\n", "= -1.0\n"), r"sigma2 = -1 N m s/rad: outside"),
-        (ROTARY_AXIS.replace("inertia", "inertja"), "did you mean 'inertia'"),
-    ],
-)
-def test_a_wrong_rotary_axis_is_refused_in_its_units(toml: str, message: str) -> None:
-    with pytest.raises(InputError, match=message) as told:
-        machine(toml)
-    assert "\n" not in str(told.value)
-
-
-def test_a_held_inertia_is_said_and_kept() -> None:
-    model = machine(ROTARY_AXIS.replace("0.02", "0.02\nfixed = ['inertia']"))
-    assert model.axes["c"].mass_fixed
-    assert "inertia = 0.02 # kg m^2" in format_model(model)
-    assert machine(format_model(model).partition("Hz\n")[2]).axes == model.axes
-
-
-def test_a_stage_mounts_on_slides_and_hinges_of_its_own() -> None:
-    mixed = machine(SLIDE + ROTARY_AXIS)
-    spec = machine_spec(mixed)
-    assert spec.joint("x").type == mujoco.mjtJoint.mjJNT_SLIDE
-    assert spec.joint("c").type == mujoco.mjtJoint.mjJNT_HINGE
-    log = simulate(mixed, "tracking", duration=1.0)
-    assert (log.axes["x"].kind, log.axes["c"].kind) == (LINEAR, ROTARY)
-    reduced = simulate(mixed, "tracking", duration=1.0, simulator=ReducedSimulator)
-    for axis in "xc":
-        gone = log.truth[axis]["position"] - reduced.truth[axis]["position"]
-        assert np.abs(gone).max() < ROUNDING
-    motion = datasets(mixed, {"run": log}, {})["x"].fit[0].motion
-    assert unit_of("other_axis_velocity", motion) == "rad/s"
-    assert unit_of("velocity", motion) == "m/s"
-
-
-def test_what_repeats_may_repeat_once_a_turn() -> None:
-    for effect in CATALOGUE.values():
-        for p in effect.parameters:
-            assert not p.period or p.upper > 2.0 * np.pi, f"{effect.name}.{p.name}"
-
-
-@pytest.mark.parametrize("effect", ["flexible_mode", "base_vibration", "backlash", "payload_mass"])
-def test_attached_inertias_agree_on_a_hinge(effect: str) -> None:
-    values = {"flexible_mode": "load = 0.3", "base_vibration": "recoil = 0.2",
-              "backlash": "load = 0.3\nplay = 1e-3", "payload_mass": "ratio = 0.3"}  # fmt: skip
-    model = machine(f"{ROTARY_AXIS}[axes.c.effects.{effect}]\n{values[effect]}\n")
-    runs = [
-        simulate(model, "tracking", duration=1.0, **more).truth["c"]["position"]
-        for more in ({}, {"simulator": ReducedSimulator})
-    ]
-    assert np.abs(runs[0] - runs[1]).max() < 1e-12
-
-
-def test_a_joint_of_the_other_kind_is_refused() -> None:
-    spec = machine_spec(machine(ROTARY_AXIS))
-    spec.compile()
-    slide = replace(
-        machine(SLIDE.replace("axes.x", "axes.c")), mjcf=spec.to_xml(), mjcf_name="c.xml"
-    )
-    with pytest.raises(InputError, match=r"joint 'c' is not a slide, but the axis is linear"):
-        machine_spec(slide)
-
-
-@pytest.mark.parametrize(
-    ("linear", "rotary"),
-    [
-        ("m", "rad"),
-        ("m/s", "rad/s"),
-        ("m/s^2", "rad/s^2"),
-        ("m/s^3", "rad/s^3"),
-        ("N", "N m"),
-        ("kg", "kg m^2"),
-        ("N s/m", "N m s/rad"),
-        ("N/m", "N m/rad"),
-        ("N/m^2", "N m/rad^2"),
-        ("N/m^3", "N m/rad^3"),
-        ("N s^2/m^2", "N m s^2/rad^2"),
-        ("N/A", "N m/A"),
-        ("N/s", "N m/s"),
-        ("N/(m s)", "N m/(rad s)"),
-        ("1/m", "1/rad"),
-        ("1/N", "1/(N m)"),
-        ("s^2/m", "s^2/rad"),
-        ("N^2", "(N m)^2"),
-        ("m rms", "rad rms"),
-        ("A rms", "A rms"),
-        ("1", "1"),
-        ("s", "s"),
-        ("Hz", "Hz"),
-        ("1/J", "1/J"),
-        ("", ""),
-    ],
-)
-def test_a_linear_unit_has_a_rotary_counterpart(linear: str, rotary: str) -> None:
-    assert rotary_unit(linear) == rotary
-    assert (LINEAR(linear), ROTARY(linear)) == (linear, rotary)
-
-
-def test_no_unit_of_the_catalogue_keeps_a_length_a_force_or_a_mass() -> None:
-    for effect in CATALOGUE.values():
-        for p in effect.parameters:
-            told = rotary_unit(p.unit)
-            rest = told.replace("N m", "").replace("kg m^2", "")
-            assert not set(re.findall(r"[A-Za-z]+", rest)) & {"m", "N", "kg"}, (effect.name, told)
-
-
-def test_words_have_a_rotary_counterpart_and_names_have_none() -> None:
-    said = "Force error, free-running position error; forces at two Positions of constant_force"
-    turned = "Torque error, free-running angle error; torques at two Angles of constant_force"
-    assert (LINEAR.words(said), ROTARY.words(said)) == (said, turned)
-    assert [units_of(u).kind for u in ("rad", "rad/s", "N m", "m", "s", None)] == (
-        ["rotary"] * 3 + ["linear"] * 3
-    )

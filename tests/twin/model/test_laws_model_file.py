@@ -17,7 +17,8 @@ from twin.model.file import (
     parse_model,
     save_model,
 )
-from twin.model.machine import AxisModel, Fitted, Hardware, HistoryStep, MachineModel
+from twin.model.history import HistoryStep
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 
 CATALOGUE = load_catalogue()
 HARDWARE = Hardware(

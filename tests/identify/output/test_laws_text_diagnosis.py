@@ -1,0 +1,158 @@
+"""The text of a diagnosis: each line holds the numbers that it names, in their order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import built_results as made
+import pytest
+from built_fits import NOISE, built, built_fit
+
+from identify.dataset.given_logs import Role
+from identify.estimation.fit import Outcome
+from identify.output import remarks as remarks_module
+from identify.output.diagnosis_json import diagnose_json
+from identify.output.remarks import remarks
+from identify.output.text import (
+    _step_line,
+    diagnose_text,
+    plan_text,
+)
+from identify.output.words.estimation import outcome_in_words
+from identify.output.words.selection import (
+    SEVERAL,
+    advice,
+    change_in_words,
+    moved_in_words,
+    named_errors_in_words,
+    refit_in_words,
+    repeat_in_words,
+)
+from identify.output.words.validation import region_in_words
+from identify.selection.confounded import Change, Refit
+from identify.selection.diagnosis import Step, Verdict
+
+
+@pytest.fixture(autouse=True)
+def nothing_moved(monkeypatch):
+    monkeypatch.setattr(remarks_module, "moved_parameters", lambda before, after: ())
+
+
+def test_a_diagnosis():
+    x = made.diagnosis_of(Verdict.MISSING_EFFECTS, unexplained=made.STRUCTURE, findings=made.FOUND)
+    x.__dict__["repeat"] = made.REPEAT
+    result = made.diagnosed(x)
+    text = diagnose_text(result)
+    y, lines = text.split("axis x: ", 1)
+    lines = lines.splitlines()
+    assert lines[0] == f"{SEVERAL} cogging."
+    assert lines[1] == "  force error 8.37 N, noise floor 2.11 N (ratio 3.97)"
+    tested = x.tested
+    assert lines.pop(2) == (
+        f"  force error on the selection logs {tested.before:.3g} N, with what is named "
+        f"{tested.after:.3g} N"
+    )
+    assert lines[2] == "  these data cannot separate it from: quadratic_drag"
+    planned = [f"  {line}" for line in plan_text(result.next_experiments["x"]).splitlines()]
+    assert lines[3 : 3 + len(planned)] == planned
+    rest = [" ".join(line.split()) for line in lines[3 + len(planned) :]]
+    sure = [f"confidence {100.0 * f.confidence:.0f} %" for f in made.FOUND]
+    assert rest[:3] == [
+        "cogging explains 87 % of the squared error above the noise floor: without it the error "
+        "on the selection logs is 7.17 N, with it 2.19 N; in one linear step it takes 81 % of it, "
+        f"its best decoy 14 %; {sure[0]}",
+        "lugre explains 12 % of the squared error above the noise floor: without it the error on "
+        f"the selection logs is 3.23 N, with it 2.19 N; {sure[1]}",
+        "what remains beside the named effects is 3.19 N, 1.6 times the noise floor",
+    ]
+    rest = rest[3:]
+    assert rest[:3] == [
+        "The error depends most on other axis position, which accounts for 63 % of the squared "
+        "error, with a period of 0.0273 m.",
+        f"it is largest at {region_in_words(made.LEFT_OVER)}",
+        advice(),
+    ]  # fmt: skip
+    rest = rest[1:]
+    assert rest[2:5] == [
+        "cogging evidence 510.0 held-out error 7.13 -> 2.17 N",
+        "quadratic_drag evidence 423.0 held-out error 7.34 -> 2.38 N",
+        "constant_force evidence 66.0 held-out error 7.46 -> 2.5 N not supported",
+    ]
+    assert rest[5:7] == [
+        "step 1: with cogging the held-out error falls from 7.13 to 2.17 N",
+        "step 2: with lugre beside cogging the held-out error falls from 7.57 to 2.61 N; no "
+        "longer needed: wear",
+    ]
+    assert rest[7:] == [f"note: {r}" for r in remarks(x, result.refits["x"])]
+    assert "axis y: Nothing is missing" in y
+    refused = diagnose_text(replace(result, next_experiments={}, not_planned={"x": "no travel"}))
+    assert "\n  note: no experiment that would tell them apart is proposed: no travel" in refused
+    assert "cannot be told" not in y
+    assert "squared error" not in y
+
+
+def test_what_decided_nothing_is_told_apart_from_what_also_chose():
+    """The error of test logs is a result; that of logs that chose says that they did."""
+    dataset = replace(made.DATASET, test=made.DATASET.holdout)
+    finding = replace(made.FOUND[0], tested=made.errors(7.17, 2.19, Role.TEST)[0])
+    tested = made.diagnosis_of(dataset=dataset, findings=(finding,))
+    assert "without it the test error is 7.17 N" in diagnose_text(made.diagnosed(tested))
+    told = made.diagnosis_of(findings=made.FOUND)
+    for on, d in (("test", tested), ("selection", told)):
+        errors = f"force error on the {on} logs {d.tested.before:.3g} N, with what is named"
+        assert named_errors_in_words(d).startswith(errors)
+        flatters = [r for r in remarks(d, None) if "which took part in the choice" in r]
+        assert [f"are of the {on} logs" in r for r in flatters] == [True] * (on != "test")
+    assert diagnose_json(made.diagnosed(tested))["axes"]["x"]["test_error_on"] == "test"
+
+
+def test_a_step_that_makes_the_rest_noise_has_no_errors():
+    line = _step_line(3, Step(built(NOISE), ()))
+    assert line.strip() == f"step 3: {NOISE.name} explains the remaining error as noise"
+
+
+def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
+    moved = (made.MOVED, replace(made.MOVED, label="b"))
+    asked = []
+    monkeypatch.setattr(
+        remarks_module, "moved_parameters", lambda *fits: asked.append(fits) or moved
+    )
+    x = made.diagnosis_of()
+    found = remarks(x, made.refit_of(0.0))
+    assert asked == [(x.base, made.BEST.fit)]
+    assert found[0] == refit_in_words(made.refit_of(0.0))
+    assert "217 us" in found[1]
+    assert found[2:] == tuple(f"with cogging, {moved_in_words(m)}" for m in moved)
+    bad = built_fit(2.0, outcome=Outcome.NOT_CONVERGED)
+    best = replace(made.BEST, fit=replace(made.BEST.fit, outcome=Outcome.AT_BOUND))
+    steps = (Step(best, ()),)
+    loose = replace(
+        x, base=bad, steps=steps, dataset=replace(made.DATASET, channel_delay=0.0, holdout=())
+    )
+    loose.__dict__["repeat"] = made.REPEAT
+    found = remarks(loose, None)
+    assert found[:2] == (
+        outcome_in_words(Outcome.NOT_CONVERGED),
+        f"with cogging: {outcome_in_words(Outcome.AT_BOUND)}",
+    )
+    assert found[-2] == repeat_in_words(made.REPEAT)
+    assert "no log was held out" in found[-1]
+    quiet = made.diagnosed().axes["y"]
+    assert remarks(quiet, None) == ()
+    assert remarks(quiet, Refit(1.0, 1.0, ())) == ()
+
+
+def test_a_change_has_its_values_and_force_in_place():
+    change = Change("mass", 15.1, 15.7, "kg", 0.572, ("payload_mass", "cogging"))
+    assert change_in_words(change) == (
+        "mass 15.1 -> 15.7 kg changes the force by 0.572 N (payload_mass and cogging give the same "
+        "force)"
+    )
+    one = change_in_words(replace(change, alike=("payload_mass",)))
+    assert one.endswith("(payload_mass gives the same force)")
+    refit = Refit(0.913, 0.127, (change, replace(change, alike=())))
+    assert refit_in_words(refit) == (
+        "with the given values the force error is 0.913 N, after the fit 0.127 N: "
+        f"{change_in_words(change)}, mass 15.1 -> 15.7 kg changes the force by 0.572 N"
+    )
+    assert refit_in_words(Refit(0.913, 0.127, ())) is None
