@@ -41,11 +41,12 @@ def fit_thoroughly(axis: AxisModel, dataset: Dataset) -> Fit:
 
 
 def _promises(start: Start, fit: Fit, dataset: Dataset) -> bool:
-    """Whether a start leaves less than a fit, both after a linear step on the same logs.
+    """Whether a start, after its linear step, leaves less than a fit on the same logs.
 
-    On the heads where it was found on them, which a fit to all of the logs does not fit as well.
+    A fit that ended early is worth another, whatever leads to it. On the heads, where a start was
+    found on them, after a linear step too: a fit to all of the logs does not fit them as well.
     """
-    there = fit.unabsorbed
+    there = fit.residual
     if len(start.left) != len(there):
         rows = dataset.in_heads[fit.kept]
         there = unabsorbed(fit.residual[rows], orthonormal(fit.jacobian[rows]))

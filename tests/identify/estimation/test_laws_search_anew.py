@@ -96,7 +96,7 @@ def test_a_shape_that_is_there_already_is_not_refitted_in_vain(
 def test_a_start_promises_what_it_leaves_less_of(dataset, base):
     shape = fitted("cogging")
     for part, promising in ((BETTER - 0.001, True), (BETTER + 0.001, False)):
-        left = part * base.unabsorbed
+        left = part * base.residual
         assert _promises(Start({}, shape, left, left), base, dataset) is promising
     few = replace(dataset, fit=dataset.fit)
     few.__dict__["in_heads"] = np.arange(len(base.kept)) < 0.2 * len(base.kept)
