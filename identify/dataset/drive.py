@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.motion import Motion
+from identify.dataset.motion import SMOOTHED, Motion
 from twin.core.native import walk, walk_sensing
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, axis_table
-from twin.signals import between
+from twin.signals import between, local_parabola
 
 Array = NDArray[np.float64]
 
@@ -92,8 +92,8 @@ def reading_error(
 
     The error depends on the true position, which is the reading less the error: a fixed-point
     iteration that starts from the reading, of which one pass is exact to first order in the error.
-    The readings are smoothed first, because inverting a delay would amplify their noise: path,
-    (n,) m, made of the motion where it is not at hand.
+    The readings less their error are smoothed, because inverting a delay would amplify their noise:
+    path, (n,) m, is that of the readings, made of the motion where it is not at hand.
     """
     table = axis_table({motion.axis: sensing})
     _, _, _, first, last = table.axes[0]
@@ -105,5 +105,5 @@ def reading_error(
             motion.sample_period, reading,
         )  # fmt: skip
         error = reading - true[0]
-        true[0] = path - error
+        true[0] = path - local_parabola(error, SMOOTHED)
     return error, np.append(between(error, motion.sample_period), 0.0)

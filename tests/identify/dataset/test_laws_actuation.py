@@ -15,7 +15,14 @@ from constructed import (
     windowed,
 )
 
-from identify.dataset.drive import actual_force, forces_lessened, is_noise, parts_of, true_motion
+from identify.dataset.drive import (
+    actual_force,
+    forces_lessened,
+    is_noise,
+    parts_of,
+    reading_error,
+    true_motion,
+)
 from identify.dataset.motion import motion_of
 from identify.estimation.force_balance import averaged_force, residual
 from twin.effect import Kind
@@ -103,21 +110,24 @@ def test_the_residual_of_late_readings_is_none_with_the_delay_and_not_without():
     assert np.std(knowing) < 0.1 * np.std(bare)
 
 
-def test_a_ripple_of_the_encoder_is_undone():
-    """reading = x + e(x), inverted by Newton's method here and by repetition there."""
-    values = SENSING[1].values
-    true, _ = true_motion(AxisModel(1.0, effects=SENSING[1:]), SHORT)
-    seen = SHORT.smoothed_position
-    x = seen.copy()
-    for _ in range(6):
-        turn = 2.0 * np.pi / values["period"] * x
-        e = sum(
-            values[f"a{k}"] * np.sin(k * turn) + values[f"b{k}"] * np.cos(k * turn) for k in (1, 2)
-        )
-        x = seen - e
-    blocks = (seen - x).reshape(len(SHORT.time), -1).mean(axis=1)
-    found = SHORT.position - true.position
-    np.testing.assert_allclose(found, blocks, atol=1e-2 * np.abs(blocks).max())
+@pytest.mark.parametrize("samples", [60.0, 12.0])  # in a period at the highest speed
+def test_a_ripple_of_the_encoder_is_undone(samples):
+    """reading = x + e(x) of a known x gives e(x) back, also where smoothing takes a ripple off."""
+    rate = 2000.0
+    x = waves((3e-3, 1.3, 0.4), (6e-4, 5.1, 1.0))
+    t = np.arange(3000) / rate
+    fastest = np.abs(np.diff(x(t))).max()
+    period = float(samples * fastest)
+    sizes = {n: period * v / 15 for n, v in {"a1": 0.4, "b1": -0.3, "a2": 0.2, "b2": 0.1}.items()}
+    ripple = effect("encoder_ripple", {"period": period, **sizes})
+    turn = 2.0 * np.pi * x(t) / period
+    error = sum(
+        sizes[f"a{k}"] * np.sin(k * turn) + sizes[f"b{k}"] * np.cos(k * turn) for k in (1, 2)
+    )
+    motion = motion_of(log_of(rate, x(t) + error, 0.0 * t), "x", "")
+    found, _ = reading_error(AxisModel(1.0, effects=(ripple,)), motion)
+    inner = slice(30, len(found) - 30)
+    np.testing.assert_allclose(found[inner], error[inner], atol=0.03 * np.abs(error).max())
 
 
 def test_rounding_moves_no_motion_and_is_noise_alone():
