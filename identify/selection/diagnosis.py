@@ -197,6 +197,7 @@ class AxisDiagnosis:
         """Steps that are named; also those of effects whose law a free curve has replaced.
 
         Of an effect that the model has, the law beside its own free curve is part of that shape.
+        What was added in a step of its own is no alternative to another.
         """
         reshaped = {c.shape.effect for c in self.curves}
 
@@ -204,7 +205,12 @@ class AxisDiagnosis:
             name = step.candidate.effect.name
             return name not in self.base.axis.names if name in reshaped else step.proved
 
-        return list(filter(is_named, kept(self.steps)))
+        own = {s.candidate.effect.name for s in self.steps}
+        return [
+            replace(s, tied=tuple(name for name in s.tied if name not in own))
+            for s in kept(self.steps)
+            if is_named(s)
+        ]
 
 
 def kept(steps: Sequence[Step]) -> list[Step]:

@@ -10,6 +10,7 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.channel_delay import moved_by
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, finished, fit_axis
+from identify.estimation.scaling import Scaling
 from identify.estimation.thorough_fit import fit_thoroughly
 from identify.estimation.time_origin import synchronised
 from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, kept
@@ -26,8 +27,10 @@ from identify.selection.reshaping import Reshaped, curve_in_place
 from identify.selection.scoring import Candidate, score
 from identify.selection.unpredictable import is_unpredictable, with_own_noise
 from identify.selection.verdict import decided
-from twin.effect import Kind
+from twin.effect import Effect, Kind
 from twin.effects import Catalogue
+from twin.model.machine import AxisModel
+from twin.model.parameters import free_parameters
 
 
 def diagnose_axis(
@@ -176,7 +179,10 @@ def _near(best: Candidate, ranking: Sequence[Candidate]) -> tuple[Candidate, ...
 def _eliminated_backwards(
     base: Fit, fit: Fit, dataset: Dataset, earlier: Sequence[Candidate]
 ) -> tuple[Fit, tuple[str, ...]]:
-    """The fit without the earlier effects that are not needed any more, and their names."""
+    """The fit without the earlier effects that are not needed any more, and their names.
+
+    Where a first of several is not, the second takes its place.
+    """
     dropped = []
     for candidate in earlier:
         if candidate.effect.name not in fit.axis.names:  # a friction that another one replaced
@@ -189,6 +195,21 @@ def _eliminated_backwards(
             without = fit_thoroughly(without.axis, dataset)
             needed = score(without, fit, dataset, candidate.effect).supported
         if not needed:
-            fit = without
-            dropped.append(candidate.effect.name)
+            fit, gone = _in_its_place(without, candidate.effect)
+            dropped.append(gone)
     return fit, tuple(dropped)
+
+
+def _in_its_place(fit: Fit, effect: Effect) -> tuple[Fit, str]:
+    """A fit without an effect, the next of several in its place, and the name that is gone."""
+    later = effect.numbered(effect.number + 1).name
+    if later not in fit.axis.names:
+        return fit, effect.name
+
+    def renamed(axis: AxisModel) -> AxisModel:
+        own = (replace(f, effect=effect) if f.effect.name == later else f for f in axis.effects)
+        return replace(axis, effects=tuple(own))
+
+    axis = renamed(fit.axis)
+    scaling = Scaling(free_parameters(axis))
+    return replace(fit, axis=axis, scaling=scaling, begun=renamed(fit.begun)), later

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 from machines import one_axis
 
 from identify.dataset.dataset import datasets
-from identify.estimation.fit import fit_axis
-from identify.selection.forward_selection import _eliminated_backwards
+from identify.estimation.fit import Outcome, finished, fit_axis
+from identify.selection.forward_selection import _eliminated_backwards, _in_its_place
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.model.file import load_model
@@ -24,3 +24,21 @@ def test_a_friction_that_another_one_replaced_is_dropped():
     fit, dropped = _eliminated_backwards(base, richer, dataset, earlier)
     assert dropped == ("stribeck",)
     assert fit is richer
+
+
+def test_a_second_of_several_takes_the_place_of_a_first_that_is_not_needed():
+    """A machine whose poles alone are found has one cogging, not a second without a first."""
+    dataset = datasets(STAGE, {"log": simulate(STAGE, "tracking", seed=1, duration=3.0)}, {})["x"]
+    first, second = (CATALOGUE["cogging"].numbered(n) for n in (1, 2))
+    pole = Fitted.at_start(second, {"p": 0.024, "a1": 0.3})
+    plain = STAGE.axes["x"]
+    only = finished(
+        plain.with_effect(pole), plain.with_effect(pole), dataset.fit, Outcome.CONVERGED
+    )
+    found, gone = _in_its_place(only, first)
+    assert gone == "cogging_2"
+    for axis in (found.axis, found.begun):
+        assert axis.names == (*plain.names, "cogging")
+        assert axis["cogging"].values == pole.values
+    assert {c.effect for c in found.scaling.where} == {"", *plain.names, "cogging"}
+    assert _in_its_place(only, CATALOGUE["wear"]) == (only, "wear")

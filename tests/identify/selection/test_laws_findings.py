@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from built_fits import built_dataset, built_fit
+from built_fits import built_dataset, built_fit, dataset_stub, step
 
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import share_explained
 
 
@@ -28,3 +29,15 @@ def test_a_share_is_of_the_squared_error_above_the_noise_floor():
     assert share_explained(replace(more, after=0.1), base, without) == 1.0
     base.__dict__["floor"] = 0.8  # the base is at the floor: nothing is left to share
     assert share_explained(fall, base, without) == 0.0
+
+
+def test_what_was_added_in_a_step_of_its_own_is_no_alternative_to_another():
+    """Both were needed beside each other then, although a curve replaced one of them later."""
+    steps = (
+        step("cogging", tied=("end_stop", "wear")),
+        step("end_stop", dropped=("end_stop",)),
+    )
+    fit = built_fit(1.0)
+    told = AxisDiagnosis(dataset_stub(), fit, (), steps, fit, Verdict.MISSING_EFFECTS, None)
+    assert told.answers == (("cogging", "wear"),)
+    assert told.ambiguous_with == ("wear",)
