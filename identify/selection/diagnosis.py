@@ -25,7 +25,7 @@ from identify.selection.repeating_force import Repeat, not_general
 from identify.selection.reshaping import Reshaped
 from identify.selection.residual_dependence import Dependence
 from identify.selection.scoring import Candidate
-from identify.selection.wrong_shape import wrong_shape
+from identify.selection.wrong_shape import likely_shape, wrong_shape
 from twin.effect import Kind
 
 
@@ -177,13 +177,15 @@ class AxisDiagnosis:
         """The findings after a free curve of a law that the model has competed with one of them.
 
         It is the answer in its place where it leaves clearly less error, and beside it where it
-        leaves about as little. Not of friction, whose curves hold its modifiers. without: the fit
-        without what was found.
+        leaves about as little; one that is not proved by itself must take as much of the error.
+        Not of friction, whose curves hold its modifiers. without: the fit without what was found.
         """
-        shape = wrong_shape(without, self.dataset)
+        shape = likely_shape(without, self.dataset)
         if shape is None or shape.shape.curve.rubs or shape.effect not in self.base.axis.names:
             return findings
         wrong = found_wrong(shape, self.base, without, self.dataset)
+        if not (shape.proof.holds or _takes_as_much(wrong, finding)):
+            return findings
         if RULE.near * squared_left(wrong) > squared_left(finding):
             return findings
         others = tuple(f for f in findings if f is not finding)
@@ -211,6 +213,13 @@ class AxisDiagnosis:
             for s in kept(self.steps)
             if is_named(s)
         ]
+
+
+def _takes_as_much(wrong: Finding, finding: Finding) -> bool:
+    """Whether a curve beats its decoys, and takes about as much error on the logs that chose."""
+    taken, needed = (f.chosen.before**2 - f.chosen.after**2 for f in (wrong, finding))
+    beats = wrong.proof is not None and wrong.proof.gain > wrong.proof.best_decoy
+    return beats and taken > RULE.near * needed > 0.0
 
 
 def kept(steps: Sequence[Step]) -> list[Step]:

@@ -78,9 +78,15 @@ class WrongShape:
         return self.shape.effect
 
 
-@lru_cache(maxsize=4)  # in the selection, and beside what it named
 def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
-    """The law whose free curve takes most of a fit's squared test error, if it is proved.
+    """The law whose free curve takes most of a fit's squared test error, if it is proved."""
+    likely = likely_shape(fit, dataset)
+    return likely if likely and likely.proof.holds else None
+
+
+@lru_cache(maxsize=4)  # in the selection, and beside what it named
+def likely_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
+    """The same, proved or not; None where no curve takes anything.
 
     Of those that leave about as little, the one with fewer parts.
     """
@@ -92,8 +98,7 @@ def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
     least = min(1.0 - gain for _, gain in found)
     near = [s for s, gain in found if RULE.near * (1.0 - gain) <= least]
     best = min(near, key=lambda s: len(s.stiffness))
-    proof = _proof(trial, best, fit, dataset, decoys=DECOYS)
-    return WrongShape(best, proof) if proof.holds else None
+    return WrongShape(best, _proof(trial, best, fit, dataset, decoys=DECOYS))
 
 
 def best_shape(fit: Fit, dataset: Dataset, effect: str) -> WrongShape | None:

@@ -98,6 +98,39 @@ def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypat
 # --- a finding against the curve of a law that the model has ---------------------------------
 
 
+def against(monkeypatch, proof, *, left, before=8.0):
+    """What is found after a missing effect, which leaves 2 N, competed with the cable's curve."""
+    diagnoses = importlib.import_module("identify.selection.diagnosis")
+    missing = replace(made.FOUND[0], tied=())
+    missing = replace(missing, chosen=replace(missing.chosen, before=before, after=2.0))
+    wrong = replace(missing, effect="cable_slab", kind=FindingKind.WRONG_SHAPE, proof=proof)
+    wrong = replace(wrong, chosen=replace(wrong.chosen, after=left))
+    shape = SimpleNamespace(
+        shape=SimpleNamespace(curve=SimpleNamespace(rubs=False)), effect="cable_slab", proof=proof
+    )
+    monkeypatch.setattr(diagnoses, "likely_shape", lambda fit, dataset: shape)
+    monkeypatch.setattr(diagnoses, "found_wrong", lambda *_: wrong)
+    base = built_fit(8.0, axis=axis_of(fitted("cable_slab")))
+    whole = AxisDiagnosis(DATASET, base, (), (), base, Verdict.MISSING_EFFECTS, None)
+    return whole._against_shapes(missing, base, (missing,))
+
+
+@pytest.mark.parametrize(
+    ("left", "best_decoy", "kinds"),
+    [
+        (2.04, 0.01, ["missing", "wrong_shape"]),  # 0.81 of what the effect takes
+        (2.05, 0.01, ["missing"]),
+        (2.04, 0.16, ["missing"]),  # no more than a decoy
+    ],
+)
+def test_a_curve_that_is_not_proved_must_take_as_much_as_the_effect(
+    monkeypatch, left, best_decoy, kinds
+):
+    """In coloured noise both take little of the error, and the curve's proof falls just short."""
+    found = against(monkeypatch, Proof(0.15, best_decoy), left=left, before=2.2)
+    assert [f.kind.value for f in found] == kinds
+
+
 @pytest.mark.parametrize(
     ("left", "kinds", "ties"),
     [
@@ -109,17 +142,6 @@ def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypat
 def test_a_curve_that_leaves_as_little_is_an_ambiguity_on_both_sides(
     monkeypatch, left, kinds, ties
 ):
-    diagnoses = importlib.import_module("identify.selection.diagnosis")
-    missing = replace(made.FOUND[0], tied=())
-    wrong = replace(missing, effect="cable_slab", kind=FindingKind.WRONG_SHAPE)
-    wrong = replace(wrong, chosen=replace(wrong.chosen, after=left))
-    shape = SimpleNamespace(
-        shape=SimpleNamespace(curve=SimpleNamespace(rubs=False)), effect="cable_slab"
-    )
-    monkeypatch.setattr(diagnoses, "wrong_shape", lambda fit, dataset: shape)
-    monkeypatch.setattr(diagnoses, "found_wrong", lambda *_: wrong)
-    base = built_fit(8.0, axis=axis_of(fitted("cable_slab")))
-    whole = AxisDiagnosis(DATASET, base, (), (), base, Verdict.MISSING_EFFECTS, None)
-    found = whole._against_shapes(missing, base, (missing,))
+    found = against(monkeypatch, Proof(0.5, 0.0), left=left)
     assert [f.kind.value for f in found] == kinds
     assert [f.tied for f in found] == ties
