@@ -123,10 +123,22 @@ def less(effect: Effect, fit: Fit, base: Fit, dataset: Dataset) -> Fit:
 
 
 def _ranked(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Supported first, and among these the effects that lower the error before noise."""
+    """Supported first, and among these the effects that lower the error before noise.
+
+    Noise that is as large as the error goes first where no effect leaves as little: its size is
+    seen in the readings, and what follows them lowers it by the way.
+    """
     lowers = _ordered(on_equal_samples([c for c in candidates if not c.is_noise]))
     noise = _ordered([c for c in candidates if c.is_noise])
-    return tuple(sorted([*lowers, *noise], key=lambda c: not c.supported))
+    explained = any(c.supported and c.fit.at_floor for c in lowers)
+    alone = [] if explained else [c for c in noise if c.supported and _is_all(c.fit)]
+    rest = [c for c in (*lowers, *noise) if c not in alone]
+    return (*alone, *sorted(rest, key=lambda c: not c.supported))
+
+
+def _is_all(fit: Fit) -> bool:
+    """Whether the error is as large as noise, within what an estimate of noise is sure of."""
+    return RULE.floor_sure[0] < fit.ratio < RULE.floor_sure[1]
 
 
 def _ordered(candidates: list[Candidate]) -> list[Candidate]:

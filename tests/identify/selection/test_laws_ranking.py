@@ -57,6 +57,24 @@ def test_within_no_evidence_of_the_best_the_catalogue_decides(behind, level):
     assert names(_ranked(mixed)) == ["wear", "gms", "cogging"]
 
 
+@pytest.mark.parametrize(
+    ("ratio", "left", "first"),
+    [
+        (0.93, 1.36, True),  # as large as the error, which a static friction lowers by the way
+        (0.84, 1.36, False),
+        (1.16, 1.36, False),
+        (0.93, 1.29, False),  # an effect that leaves noise
+    ],
+)
+def test_a_noise_as_large_as_the_error_comes_first_where_no_effect_leaves_as_little(
+    ratio, left, first
+):
+    noise = built(NOISE, bic=900.0, fit=built_fit(ratio))
+    lowers = built("wear", bic=3000.0, fit=built_fit(left))
+    found = names(_ranked([lowers, noise]))
+    assert found == ([NOISE.name, "wear"] if first else ["wear", NOISE.name])
+
+
 def test_a_noise_comes_after_what_lowers_the_error_if_both_are_supported():
     noise, weak = built(NOISE, bic=900.0), built("wear", bic=20.0)
     assert names(_ranked([noise, weak])) == ["wear", NOISE.name]
