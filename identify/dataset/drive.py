@@ -99,11 +99,13 @@ def reading_error(
     _, _, _, first, last = table.axes[0]
     path = motion.smoothed_position if path is None else path
     true, reading = np.stack([path, motion.raw[0]]), np.empty(len(path))
-    for _ in range(passes):
+    error = np.zeros(len(path))
+    for k in range(passes):
+        if k:
+            true[0] = path - local_parabola(error, SMOOTHED)
         walk_sensing(
             table.entries, first, last, table.parameters, np.zeros(table.n_states), true,
             motion.sample_period, reading,
         )  # fmt: skip
         error = reading - true[0]
-        true[0] = path - local_parabola(error, SMOOTHED)
     return error, np.append(between(error, motion.sample_period), 0.0)

@@ -86,6 +86,7 @@ def _finding(f: Finding) -> dict[str, Any]:
         "parameters": f.parameters,
         "gain": f.proof and f.proof.gain,
         "best_decoy": f.proof and f.proof.best_decoy,
+        "of_typical_block": f.proof and f.proof.typical,
         "shape": f.shape and _shape(f.shape),
     }
 

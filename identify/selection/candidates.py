@@ -146,7 +146,9 @@ def _fitted_to_heads(
 def _to_heads(axis: AxisModel, dataset: Dataset, old: Fit) -> Fit:
     """An axis with another friction fitted to the heads, to its end unless that is hopeless."""
     fit = fit_roughly(axis, dataset.heads, HEAD_EVALUATIONS)
-    if fit.error**2 > HOPELESS * old.error**2:
+    both = fit.kept & old.kept
+    left, present = (f.residual[both[f.kept]] for f in (fit, old))
+    if left @ left > HOPELESS * (present @ present):
         return fit
     return fit_axis(fit.axis, dataset.heads, HEAD_EVALUATIONS)
 

@@ -35,19 +35,20 @@ SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
 SEED = 0  # of the shifts, the same for each effect
 RIDGE = 1e-4  # of a column's length, which keeps what the motion does not excite finite
 ROUNDING = 1e-12  # of a squared force, below which its remainder is not told
-TINY = 1e-100  # N per unit, length of a column that is nothing, where the motion excites none
+TINY = 1e-100  # of anything that is nothing, as a column where the motion excites none
 
 
 @dataclass(frozen=True)
 class Proof:
     """Part of the squared test error that an effect takes, and the most that a decoy takes, 0..1.
 
-    Of all of it or of that of a typical block, whichever parts the two more. Both may be below
-    zero, where the test error rises.
+    Both may be below zero, where the test error rises. typical: whether of that of a typical block,
+    not of all of it.
     """
 
     gain: float
     best_decoy: float
+    typical: bool = False
 
     @property
     def holds(self) -> bool:
@@ -77,36 +78,35 @@ def proof(without: Fit, fitted: Fitted, dataset: Dataset) -> Proof | None:
         ends = np.cumsum([len(log) for log in logs])[:-1]
         return np.split(jacobian(axis, logs, where) / size, ends)
 
-    return Trial.of(without, dataset).proof(columns, sticking=sticks(axis))
+    return clearer(Trial.of(without, dataset).proofs(columns, sticking=sticks(axis)))
+
+
+def clearer(proofs: tuple[Proof, Proof]) -> Proof:
+    """The one that parts an effect and its decoys more."""
+    return min(proofs, key=lambda p: (1.0 - p.gain) / (1.0 - p.best_decoy))
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
     """A fit beside which forces and their decoys are tried, on its own logs and the held-out ones.
 
-    held: None where blocks of the fit logs are left out instead.
+    held: None where blocks of the fit logs are left out instead. quiet: N^2, squared noise floor.
     """
 
     fit: _Part
     held: _Part | None
+    quiet: float = 0.0
 
     @classmethod
     def of(cls, base: Fit, dataset: Dataset) -> Trial:
         """The trial on the logs of a dataset."""
         size = _ridge(base.jacobian)
         held = _Part.of(base, dataset.holdout, size) if dataset.holdout else None
-        return cls(_Part.of(base, dataset.fit, size), held)
+        return cls(_Part.of(base, dataset.fit, size), held, base.floor**2)
 
     def of_power(self) -> Trial:
         """The same of the residual's square beside a constant, which of steady noise is all."""
         return Trial(self.fit.of_power(), self.held and self.held.of_power())
-
-    def proof(self, columns: Columns, *, sticking: bool, decoys: int = DECOYS) -> Proof:
-        """The one of ``proofs`` that parts columns and decoys more; without decoys the larger."""
-        either = self.proofs(columns, sticking=sticking, decoys=decoys)
-        if not decoys:
-            return max(either, key=lambda p: p.gain)
-        return min(either, key=lambda p: (1.0 - p.gain) / (1.0 - p.best_decoy))
 
     def proofs(
         self, columns: Columns, *, sticking: bool, decoys: int = DECOYS
@@ -120,12 +120,17 @@ class Trial:
         fit = self.fit.with_columns(columns, sticking)
         held = self.held and self.held.with_columns(columns, sticking)
         count = len(fit.columns) + (len(held.columns) if held else 0)
-        before = _left(fit, held, None)
-        gains = 1.0 - _left(fit, held, np.zeros(count)) / before
+
+        def left(shifts: Array | None) -> Array:
+            return _left(fit, held, shifts, self.quiet)
+
+        before = left(None)
+        gains = 1.0 - left(np.zeros(count)) / before
         shifts = np.random.default_rng(SEED).uniform(*SHIFTS, (decoys, count))
-        untrue = [np.full(2, -np.inf), *(1.0 - _left(fit, held, s) / before for s in shifts)]
+        untrue = [np.full(2, -np.inf), *(1.0 - left(s) / before for s in shifts)]
         whole, typical = np.stack([gains, np.max(untrue, axis=0)], axis=1)
-        return Proof(*map(float, whole)), Proof(*map(float, typical))
+        (gain, decoy), (usual, usual_decoy) = whole.tolist(), typical.tolist()
+        return Proof(gain, decoy), Proof(usual, usual_decoy, typical=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,12 +205,13 @@ def _ridge(columns: Array) -> Array:
     return np.where(norms > TINY, RIDGE * norms, np.inf)
 
 
-def _left(fit: _Part, held: _Part | None, shifts: Array | None) -> Array:
+def _left(fit: _Part, held: _Part | None, shifts: Array | None, quiet: float = 0.0) -> Array:
     """Squared test error (2,) N^2 after a linear step with columns so shifted: mean and typical.
 
     Typical is the geometric mean over blocks, so that a few with large errors do not decide alone,
-    as where a log creeps at speeds that the fit logs have not. Products of columns tell it all:
-    force is F, a column X, a step s, and what is left |F - X s|^2.
+    as where a log creeps at speeds that the fit logs have not; quiet, N^2, is added to it, so that
+    a few that hold next to nothing do not either. Products of columns tell it all: force is F, a
+    column X, a step s, and what is left |F - X s|^2.
     """
     first = len(fit.columns)
     blocks = fit.products(None if shifts is None else shifts[:first])
@@ -218,9 +224,10 @@ def _left(fit: _Part, held: _Part | None, shifts: Array | None) -> Array:
         there = held.products(None if shifts is None else shifts[first:])
         step = np.linalg.solve(whole[1:, 1:] + penalty, whole[1:, 0])
         steps = np.broadcast_to(step, (len(there), len(step)))
+    samples = len((held or fit).force)
     squares = np.maximum(_squares(there, steps), ROUNDING * there[:, 0, 0] + TINY)
-    typical = len(squares) * np.exp(np.log(squares).mean())
-    return np.array([squares.sum(), typical]) / len((held or fit).force)
+    logs = np.log(squares * (len(squares) / samples) + quiet)
+    return np.array([squares.sum() / samples, np.exp(logs.mean())])
 
 
 def _squares(products: Array, steps: Array) -> Array:

@@ -189,7 +189,8 @@ class AxisDiagnosis:
         if RULE.near * squared_left(wrong) > squared_left(finding):
             return findings
         others = tuple(f for f in findings if f is not finding)
-        if squared_left(wrong) < RULE.beside_decoys * squared_left(finding):
+        clearly = squared_left(wrong) < RULE.beside_decoys * squared_left(finding)
+        if clearly and shape.proof.holds:
             return with_shape(others, wrong)
         tied = replace(finding, tied=(*finding.tied, wrong.effect))
         return with_shape((*others, tied), replace(wrong, tied=(finding.effect,)))
@@ -199,7 +200,8 @@ class AxisDiagnosis:
         """Steps that are named; also those of effects whose law a free curve has replaced.
 
         Of an effect that the model has, the law beside its own free curve is part of that shape.
-        What was added in a step of its own is no alternative to another.
+        Nor is an effect an alternative to another that was needed beside it, until a curve took its
+        place.
         """
         reshaped = {c.shape.effect for c in self.curves}
 
@@ -207,7 +209,7 @@ class AxisDiagnosis:
             name = step.candidate.effect.name
             return name not in self.base.axis.names if name in reshaped else step.proved
 
-        own = {s.candidate.effect.name for s in self.steps}
+        own = {s.candidate.effect.name for s in self.steps if s.proved} if self.curves else ()
         return [
             replace(s, tied=tuple(name for name in s.tied if name not in own))
             for s in kept(self.steps)
@@ -223,6 +225,6 @@ def _takes_as_much(wrong: Finding, finding: Finding) -> bool:
 
 
 def kept(steps: Sequence[Step]) -> list[Step]:
-    """The steps whose effects were not dropped later."""
-    dropped = {name for s in steps for name in s.dropped}
-    return [s for s in steps if s.candidate.effect.name not in dropped]
+    """The steps whose effects were not dropped then or later; a name may come again."""
+    gone = [{name for s in steps[i:] for name in s.dropped} for i in range(len(steps))]
+    return [s for s, names in zip(steps, gone, strict=True) if s.candidate.effect.name not in names]

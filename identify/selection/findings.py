@@ -81,7 +81,7 @@ def found(
 
 def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> Finding:
     """The finding of a law with the wrong shape in a final fit."""
-    chosen = tested = _linear_step(final, dataset, dataset.chosen_on, shape.proof.gain)
+    chosen = tested = _linear_step(final, dataset, dataset.chosen_on, shape.taken)
     if dataset.test:
         gain = gain_on_test_logs(shape, final, dataset)
         tested = _linear_step(final, dataset, Role.TEST, gain)
@@ -126,10 +126,11 @@ def squared_left(finding: Finding) -> float:
 def _linear_step(fit: Fit, dataset: Dataset, on: Role, gain: float) -> Errors:
     """The errors of a fit before and after a linear step that takes this part of the square.
 
-    Of noise it takes none, whatever it takes of the few test functions that a curve is tried on.
+    Of noise it takes none, whatever it takes of the few test functions that a curve is tried on;
+    nor does it add any, where a part of a log is beyond what it was fitted to.
     """
     before = error_in(on, fit, dataset)
-    return Errors(before, max(before * (1.0 - gain) ** 0.5, min(fit.floor, before)), on)
+    return Errors(before, max(before * (1.0 - max(gain, 0.0)) ** 0.5, min(fit.floor, before)), on)
 
 
 def share_explained(errors: Errors, base: Fit, dataset: Dataset) -> float:

@@ -17,6 +17,7 @@ from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, ke
 from identify.selection.pair_search import held_at_floor, search_pairs
 from identify.selection.ranking import (
     Progress,
+    is_all_noise,
     less,
     part_explained,
     rank,
@@ -28,7 +29,7 @@ from identify.selection.scoring import Candidate, score
 from identify.selection.unpredictable import is_unpredictable, with_own_noise
 from identify.selection.verdict import decided
 from twin.effect import Effect, Kind
-from twin.effects import Catalogue
+from twin.effects import MOST_OF_ONE, Catalogue
 from twin.model.machine import AxisModel
 from twin.model.parameters import free_parameters
 
@@ -69,7 +70,7 @@ def diagnose_axis(
         )
         steps += [*more[:-1], replace(more[-1], dropped=dropped)]
         states.append(SelectionState(tuple(steps), final))
-        if final.at_floor and RULE.floor_sure[0] < final.ratio < RULE.floor_sure[1]:
+        if final.at_floor and is_all_noise(final):
             break
         if shifts and (moved := moved_by(final, dataset)):
             again = fit_axis(base.axis, moved.fit)
@@ -195,15 +196,20 @@ def _eliminated_backwards(
             without = fit_thoroughly(without.axis, dataset)
             needed = score(without, fit, dataset, candidate.effect).supported
         if not needed:
-            fit, gone = _in_its_place(without, candidate.effect)
-            dropped.append(gone)
+            fit = without
+            dropped.append(candidate.effect.name)
+    for candidate in earlier:
+        fit, later = _in_its_place(fit, candidate.effect)
+        dropped = [later if name == candidate.effect.name else name for name in dropped]
     return fit, tuple(dropped)
 
 
 def _in_its_place(fit: Fit, effect: Effect) -> tuple[Fit, str]:
-    """A fit without an effect, the next of several in its place, and the name that is gone."""
-    later = effect.numbered(effect.number + 1).name
-    if later not in fit.axis.names:
+    """The fit with the next of several in the place of a first that is gone; who is gone then."""
+    present = [f.effect.name for f in fit.axis.effects if f.effect.several]
+    after = (effect.numbered(n).name for n in range(effect.number + 1, MOST_OF_ONE + 1))
+    later = next((name for name in after if name in present), effect.name)
+    if effect.name in fit.axis.names or later == effect.name:
         return fit, effect.name
 
     def renamed(axis: AxisModel) -> AxisModel:

@@ -125,18 +125,24 @@ def less(effect: Effect, fit: Fit, base: Fit, dataset: Dataset) -> Fit:
 def _ranked(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """Supported first, and among these the effects that lower the error before noise.
 
-    Noise that is as large as the error goes first where no effect leaves as little: its size is
-    seen in the readings, and what follows them lowers it by the way.
+    Noise that is as large as the error goes first where they leave less than it, and more than
+    their own: its size is seen in the readings, so they lower what the model makes of it.
     """
     lowers = _ordered(on_equal_samples([c for c in candidates if not c.is_noise]))
     noise = _ordered([c for c in candidates if c.is_noise])
-    explained = any(c.supported and c.fit.at_floor for c in lowers)
-    alone = [] if explained else [c for c in noise if c.supported and _is_all(c.fit)]
+    helping = [c for c in lowers if c.supported]
+    alone = [c for c in noise if c.supported and is_all_noise(c.fit) and _below(helping, c.fit)]
     rest = [c for c in (*lowers, *noise) if c not in alone]
     return (*alone, *sorted(rest, key=lambda c: not c.supported))
 
 
-def _is_all(fit: Fit) -> bool:
+def _below(helping: Sequence[Candidate], noisy: Fit) -> bool:
+    """Whether the best of these effects leaves less than a noise floor, but not noise alone."""
+    least = RULE.floor_sure[0] * noisy.floor
+    return all(c.fit.error < least and not c.fit.at_floor for c in helping[:1])
+
+
+def is_all_noise(fit: Fit) -> bool:
     """Whether the error is as large as noise, within what an estimate of noise is sure of."""
     return RULE.floor_sure[0] < fit.ratio < RULE.floor_sure[1]
 

@@ -83,8 +83,10 @@ def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) 
     by_evidence = sorted(likely, key=lambda c: -c.delta_bic)[:1]
     for candidate in (*by_gain, *(c for c in by_evidence if c not in by_gain)):
         found = _reshaped(candidate.fit, dataset, ())
-        lessened = _lessened(fit, found.fit, dataset) if found else 0.0
-        if found is None or lessened < RULE.least_part:
+        if found is None or found.shape.effect == candidate.effect.name:
+            continue
+        lessened = _lessened(fit, found.fit, dataset)
+        if lessened < RULE.least_part:
             continue
         without = less(candidate.effect, found.fit, fit, dataset)
         needed = score(without, found.fit, dataset, candidate.effect).supported

@@ -108,9 +108,9 @@ def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:
         return True
     without = less(effect, final, base, dataset)
     beside = proof(without, final.axis[effect.name], dataset)
-    if beside is not None:
-        return beside.holds
     chosen = Errors.of(without, final, dataset, dataset.chosen_on)
+    if beside is not None:
+        return beside.holds and chosen.after < chosen.before
     return chosen.after**2 < RULE.beside_decoys * chosen.before**2
 
 

@@ -20,7 +20,7 @@ from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian
-from identify.selection.decoys import Proof, Trial
+from identify.selection.decoys import Proof, Trial, clearer
 from identify.selection.smoothed import STIFFNESS, Linearised, choose_stiffness
 from twin.curve import Curve
 from twin.effect import Effect, Kind
@@ -67,10 +67,14 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class WrongShape:
-    """A free curve in whose place a law has another shape, with the proof."""
+    """A free curve in whose place a law has another shape, with the proof.
+
+    taken: part of the whole squared error that one linear step takes on the logs that chose.
+    """
 
     shape: Shape
     proof: Proof
+    taken: float
 
     @property
     def effect(self) -> str:
@@ -92,27 +96,27 @@ def likely_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
     """
     trial = Trial.of(fit, dataset)
     shapes = [s for s in _shapes(fit, dataset) if _rubs(trial, s, fit, dataset)]
-    found = [(s, _proof(trial, s, fit, dataset, decoys=0).gain) for s in shapes]
+    found = [(s, max(p.gain for p in _proofs(trial, s, fit, dataset))) for s in shapes]
     if not found:
         return None
     least = min(1.0 - gain for _, gain in found)
     near = [s for s, gain in found if RULE.near * (1.0 - gain) <= least]
     best = min(near, key=lambda s: len(s.stiffness))
-    return WrongShape(best, _proof(trial, best, fit, dataset, decoys=DECOYS))
+    return _with_proof(trial, best, fit, dataset)
 
 
 def best_shape(fit: Fit, dataset: Dataset, effect: str) -> WrongShape | None:
     """The free curve for one law that takes most; None where the data ask for none."""
     trial = Trial.of(fit, dataset)
     shapes = [s for s in _shapes(fit, dataset) if s.effect == effect]
-    tried = [WrongShape(s, _proof(trial, s, fit, dataset, decoys=DECOYS)) for s in shapes]
+    tried = [_with_proof(trial, s, fit, dataset) for s in shapes]
     return max(tried, key=lambda w: w.proof.gain, default=None)
 
 
 def gain_on_test_logs(found: WrongShape, fit: Fit, dataset: Dataset) -> float:
     """Part of a fit's squared error that a free curve takes on the test logs in one linear step."""
     trial = Trial.of(fit, replace(dataset, holdout=dataset.test))
-    return _proof(trial, found.shape, fit, dataset, decoys=0).gain
+    return _proofs(trial, found.shape, fit, dataset)[0].gain
 
 
 def having_shape(effect: Effect, model: MachineModel, axis: str | None) -> list[str]:
@@ -211,13 +215,21 @@ def _rubs(trial: Trial, shape: Shape, fit: Fit, dataset: Dataset) -> bool:
         return True
     turned = shape.empty.effect.parts[1].name
     alone = replace(shape, stiffness={turned: shape.stiffness[turned]})
-    return _proof(trial, alone, fit, dataset, decoys=DECOYS).holds
+    return clearer(_proofs(trial, alone, fit, dataset, decoys=DECOYS)).holds
 
 
-def _proof(trial: Trial, shape: Shape, fit: Fit, dataset: Dataset, *, decoys: int) -> Proof:
+def _with_proof(trial: Trial, shape: Shape, fit: Fit, dataset: Dataset) -> WrongShape:
+    proofs = _proofs(trial, shape, fit, dataset, decoys=DECOYS)
+    return WrongShape(shape, clearer(proofs), taken=proofs[0].gain)
+
+
+def _proofs(
+    trial: Trial, shape: Shape, fit: Fit, dataset: Dataset, decoys: int = 0
+) -> tuple[Proof, Proof]:
+    """Of the whole error and of that of a typical block."""
     resting = sticking(fit, shape)
     samples = int(np.count_nonzero(moving(dataset.fit, resting)))
-    return trial.proof(_columns(fit.axis, shape, samples), sticking=resting, decoys=decoys)
+    return trial.proofs(_columns(fit.axis, shape, samples), sticking=resting, decoys=decoys)
 
 
 def _columns(

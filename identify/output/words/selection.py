@@ -72,7 +72,8 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     if finding.proof is None:
         return f"{text}; {sure}"
     gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.best_decoy))
-    step = f"in one linear step it takes {gain:.0f} % of it, its best decoy {decoy:.0f} %"
+    of_it = "that of a typical part" if finding.proof.typical else "it"
+    step = f"in one linear step it takes {gain:.0f} % of {of_it}, its best decoy {decoy:.0f} %"
     return f"{text}; {step}; {sure}"
 
 

@@ -1,7 +1,9 @@
 """Whether an earlier choice is still needed, once more has been added."""
 
+import importlib
 from types import SimpleNamespace
 
+from built_fits import built_fit, dataset_stub
 from machines import one_axis
 
 from identify.dataset.dataset import datasets
@@ -42,3 +44,37 @@ def test_a_second_of_several_takes_the_place_of_a_first_that_is_not_needed():
         assert axis["cogging"].values == pole.values
     assert {c.effect for c in found.scaling.where} == {"", *plain.names, "cogging"}
     assert _in_its_place(only, CATALOGUE["wear"]) == (only, "wear")
+
+
+def test_the_next_of_several_move_up_once_all_needless_ones_are_gone(monkeypatch):
+    """Else a second under the first's name would not be asked about."""
+    plain = STAGE.axes["x"]
+    effects = [CATALOGUE["cogging"].numbered(n) for n in (1, 2, 3)]
+    axis = plain
+    for n, effect in enumerate(effects):
+        axis = axis.with_effect(Fitted.at_start(effect, {"p": 0.01 + 0.01 * n}))
+    module = importlib.import_module("identify.selection.forward_selection")
+    needless: set[str] = set()
+
+    def score(without, fit, dataset, effect):
+        return SimpleNamespace(supported=effect.name not in needless)
+
+    def less(effect, fit, base, dataset):
+        return built_fit(1.0, axis=fit.axis.without(effect.name))
+
+    monkeypatch.setattr(module, "score", score)
+    monkeypatch.setattr(module, "less", less)
+    monkeypatch.setattr(module, "fit_thoroughly", lambda axis, dataset: built_fit(1.0, axis=axis))
+    full, earlier = built_fit(1.0, axis=axis), [SimpleNamespace(effect=e) for e in effects]
+    for gone, left, dropped in (
+        (("cogging",), (0.02, 0.03), ("cogging_3",)),
+        (("cogging", "cogging_2"), (0.03,), ("cogging_3", "cogging_2")),
+        (("cogging_2",), (0.01, 0.03), ("cogging_3",)),
+    ):
+        needless.clear()
+        needless.update(gone)
+        fit, names = _eliminated_backwards(full, full, dataset_stub(), earlier)
+        kept = [f for f in fit.axis.effects if f.effect.name.startswith("cogging")]
+        assert [f.values["p"] for f in kept] == list(left)
+        assert [f.effect.name for f in kept] == [e.name for e in effects[: len(left)]]
+        assert {*names} == {*dropped}

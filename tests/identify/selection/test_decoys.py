@@ -141,7 +141,26 @@ def test_one_part_of_a_log_that_nothing_explains_does_not_decide_alone() -> None
         whole, typical = trial.proofs(columns, sticking=False)
         assert not whole.holds
         assert typical.holds
-        assert trial.proof(columns, sticking=False) == typical
+        assert decoys.clearer((whole, typical)) is typical
+        assert (whole.typical, typical.typical) == (False, True)
+
+
+def test_a_block_that_holds_next_to_nothing_proves_nothing(monkeypatch):
+    """Any column moved into it makes there what was not; the noise floor is what counts."""
+    kept = np.ones(240, dtype=bool)
+    monkeypatch.setattr(decoys, "moving", lambda logs, sticking: kept)
+
+    def is_proved(seed: int, quiet: float) -> bool:
+        """Of six random walks for another one, all small in the first sixth of both logs."""
+        walks = np.cumsum(np.random.default_rng(seed).standard_normal((2, 240, 7)), axis=1)
+        walks[:, :40] *= 0.01
+        force = walks[..., 0] / np.sqrt(np.mean(walks[..., 0] ** 2, axis=1))[:, None]
+        parts = [_Part((k,), force[k], np.zeros((240, 0)), kept) for k in (0, 1)]
+        found = Trial(*parts, quiet).proofs(lambda logs: [walks[logs[0], :, 1:]], sticking=False)
+        return decoys.clearer(found).holds
+
+    without, with_floor = (sum(is_proved(k, quiet) for k in range(40)) for quiet in (0.0, 0.04))
+    assert with_floor < 0.5 * without
 
 
 def test_a_strength_that_the_fit_logs_do_not_excite_stays_whatever_it_does_in_others() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from built_fits import built_dataset, built_fit, dataset_stub, step
@@ -39,5 +40,8 @@ def test_what_was_added_in_a_step_of_its_own_is_no_alternative_to_another():
     )
     fit = built_fit(1.0)
     told = AxisDiagnosis(dataset_stub(), fit, (), steps, fit, Verdict.MISSING_EFFECTS, None)
+    assert told.answers == (("cogging", "end_stop", "wear"),)
+    curve = SimpleNamespace(shape=SimpleNamespace(effect="cable_slab"))
+    told = replace(told, curves=(curve,))
     assert told.answers == (("cogging", "wear"),)
     assert told.ambiguous_with == ("wear",)

@@ -58,19 +58,20 @@ def test_within_no_evidence_of_the_best_the_catalogue_decides(behind, level):
 
 
 @pytest.mark.parametrize(
-    ("ratio", "left", "first"),
+    ("ratio", "left", "floor", "first"),
     [
-        (0.93, 1.36, True),  # as large as the error, which a static friction lowers by the way
-        (0.84, 1.36, False),
-        (1.16, 1.36, False),
-        (0.93, 1.29, False),  # an effect that leaves noise
+        (0.93, 0.84, 0.5, True),  # an effect that lowers what the model makes of the noise
+        (0.84, 0.84, 0.5, False),
+        (1.16, 0.84, 0.5, False),
+        (0.93, 0.86, 0.5, False),  # one behind the noise, which it leaves
+        (0.93, 0.64, 0.5, False),  # one after which noise of its own is left
     ],
 )
-def test_a_noise_as_large_as_the_error_comes_first_where_no_effect_leaves_as_little(
-    ratio, left, first
+def test_a_noise_as_large_as_the_error_comes_first_where_effects_only_lower_it(
+    ratio, left, floor, first
 ):
     noise = built(NOISE, bic=900.0, fit=built_fit(ratio))
-    lowers = built("wear", bic=3000.0, fit=built_fit(left))
+    lowers = built("wear", bic=3000.0, fit=built_fit(left, floor))
     found = names(_ranked([lowers, noise]))
     assert found == ([NOISE.name, "wear"] if first else ["wear", NOISE.name])
 

@@ -52,15 +52,21 @@ def test_beside_a_curve_those_effects_are_tried_first_that_take_most(monkeypatch
 
 
 @pytest.mark.parametrize(
-    ("lessened", "supported", "goes_on"),
-    [(0.96, False, True), (0.94, False, False), (0.41, True, True), (0.39, True, False)],
+    ("lessened", "supported", "law", "goes_on"),
+    [
+        (0.96, False, "cable_slab", True),
+        (0.94, False, "cable_slab", False),
+        (0.41, True, "cable_slab", True),
+        (0.39, True, "cable_slab", False),
+        (0.96, True, "cogging", False),  # the law of the effect itself, which the model has not
+    ],
 )
 def test_effect_and_curve_take_nearly_all_or_a_good_part_with_every_support(
-    monkeypatch, lessened, supported, goes_on
+    monkeypatch, lessened, supported, law, goes_on
 ):
     """Where bumps have another form too, an effect and the cable's curve leave their share."""
     effect = built("cogging", bic=40.0, t=9.0, before=8.0, after=3.0, fit=built_fit(3.0))
-    found = module.Reshaped(object.__new__(WrongShape), effect.fit, CURVED)
+    found = module.Reshaped(SimpleNamespace(effect=law), effect.fit, CURVED)
     without = built_fit(4.0)
 
     def score(smaller, fit, dataset, what):
@@ -80,7 +86,7 @@ def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypat
     # Of the best effect's squared error, 0.8 is what a curve may leave; a refit may leave 0.3 of
     # what a linear step does.
     asked = []
-    shape = WrongShape(object.__new__(Shape), Proof(gain, 0.0))
+    shape = WrongShape(object.__new__(Shape), Proof(gain, 0.0), gain)
     object.__setattr__(shape.shape, "curve", type("Plain", (), {"rubs": False}))
 
     def in_place(fit, dataset, shape):
@@ -121,6 +127,7 @@ def against(monkeypatch, proof, *, left, before=8.0):
         (2.04, 0.01, ["missing", "wrong_shape"]),  # 0.81 of what the effect takes
         (2.05, 0.01, ["missing"]),
         (2.04, 0.16, ["missing"]),  # no more than a decoy
+        (1.0, 0.01, ["missing", "wrong_shape"]),  # clearly less, but it replaces no proved finding
     ],
 )
 def test_a_curve_that_is_not_proved_must_take_as_much_as_the_effect(

@@ -50,5 +50,5 @@ def test_the_smallest_goes_first_and_the_last_stays(monkeypatch):
     """Two that explain the same each bring back nothing alone: one of them must stay."""
     shares = {"cogging": 0.004, "wear": 0.002, "end_stop": 0.003}
     assert selected(monkeypatch, shares) == (["cogging"], ("cogging",))
-    alone = (step("wear", dropped=("cogging",)), step("cogging"))
-    assert selected(monkeypatch, shares, *alone)[0] == ["wear", "cogging"]
+    alone = (step("cogging"), step("wear", dropped=("cogging",)))
+    assert selected(monkeypatch, shares, *alone)[0] == ["cogging", "wear"]

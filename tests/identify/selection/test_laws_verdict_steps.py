@@ -41,6 +41,16 @@ def diagnosis(verdict: Verdict, *steps, ranking=()) -> AxisDiagnosis:
     return AxisDiagnosis(DATASET, HIGH, tuple(ranking), steps, LOW, verdict, None)
 
 
+def test_a_name_that_comes_again_after_it_was_dropped_is_an_answer():
+    """A second cogging took the place of the first, and another second one was added then."""
+    steps = (
+        step("cogging"),
+        step("wear", dropped=("wear",)),
+        step("wear"),
+    )
+    assert kept(steps) == [steps[0], steps[2]]
+
+
 def test_what_a_later_step_made_needless_is_not_an_answer():
     steps = (
         step("cogging", ("wear",)),
