@@ -71,10 +71,11 @@ class Start:
 def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     """The effect at its best shapes beside the base, best first; at least one.
 
-    All shapes are tried on the logs' heads with the screened strengths, the best of them with every
-    strength, and the best of those on all of the logs; the others only if the first gains more
-    there than chance. So are the shapes that make no force on the heads, such as a stop that only a
-    later move reaches. A friction's shapes are told apart by the heads.
+    All shapes, or of many those that ``_scanned`` picks, are tried on the logs' heads with the
+    screened strengths, the best of them with every strength, and the best of those on all of the
+    logs; the others only if the first gains more there than chance. So are the shapes that make no
+    force on the heads, such as a stop that only a later move reaches. A friction's shapes are told
+    apart by the heads.
     """
     excitation = with_what_repeats(base, dataset)
     nothing, absent = np.zeros(0), Fitted.at_start(effect)

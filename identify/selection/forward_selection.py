@@ -70,7 +70,7 @@ def diagnose_axis(
         )
         steps += [*more[:-1], replace(more[-1], dropped=dropped)]
         states.append(SelectionState(tuple(steps), final))
-        if final.at_floor and is_all_noise(final):
+        if is_all_noise(final):
             break
         if shifts and (moved := moved_by(final, dataset)):
             again = fit_axis(base.axis, moved.fit)

@@ -89,8 +89,8 @@ def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) 
         if lessened < RULE.least_part:
             continue
         without = less(candidate.effect, found.fit, fit, dataset)
-        needed = score(without, found.fit, dataset, candidate.effect).supported
-        if needed or lessened > RULE.nearly_all:
+        all_of_it = lessened > RULE.nearly_all
+        if all_of_it or score(without, found.fit, dataset, candidate.effect).supported:
             return Reshaped(found.shape, candidate.fit, without)
     return None
 

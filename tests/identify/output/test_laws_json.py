@@ -11,7 +11,6 @@ import pytest
 from built_fits import CATALOGUE, NOISE
 from strict_json import expected_refit, strict
 
-from identify.output import remarks
 from identify.output.as_json import (
     add_json,
     compare_json,
@@ -24,11 +23,7 @@ from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.validation import loop_in_words, region_in_words
 from twin.log.check import CheckReport, Fault, Finding, Severity
 
-
-@pytest.fixture(autouse=True)
-def nothing_moved(monkeypatch):
-    """Parameters that moved are another test's."""
-    monkeypatch.setattr(remarks, "moved_parameters", lambda before, after: ())
+pytestmark = pytest.mark.usefixtures("nothing_moved")
 
 
 def test_what_is_not_finite_is_null_at_any_depth():

@@ -18,11 +18,7 @@ from identify.output.diagnosis_json import diagnose_json
 from identify.output.words.selection import SEVERAL, advice
 from identify.selection.diagnosis import Verdict
 
-
-@pytest.fixture(autouse=True)
-def nothing_moved(monkeypatch):
-    """Parameters that moved are another test's."""
-    monkeypatch.setattr(remarks, "moved_parameters", lambda before, after: ())
+pytestmark = pytest.mark.usefixtures("nothing_moved")
 
 
 def expected_candidate(c):

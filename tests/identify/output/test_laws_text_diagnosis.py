@@ -32,10 +32,7 @@ from identify.output.words.validation import region_in_words
 from identify.selection.confounded import Change, Refit
 from identify.selection.diagnosis import Step, Verdict
 
-
-@pytest.fixture(autouse=True)
-def nothing_moved(monkeypatch):
-    monkeypatch.setattr(remarks_module, "moved_parameters", lambda before, after: ())
+pytestmark = pytest.mark.usefixtures("nothing_moved")
 
 
 def test_a_diagnosis():
