@@ -11,7 +11,8 @@ from effect_runs import CATALOGUE
 
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.drive import is_noise, parts_of, reading_error
-from identify.estimation.fit import Fit, fit_axis, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import Estimate, estimates
 from identify.experiment_design.planting import added_force, draw_effect

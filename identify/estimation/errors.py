@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.given_logs import Role
-from identify.estimation.fit import Fit, error_on, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Fit, error_on
 
 
 @dataclass(frozen=True)

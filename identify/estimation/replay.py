@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.fit import rms
+from identify.estimation.evidence import rms
 from identify.estimation.open_loop import START_FIT, as_logged, open_loop, states_along
 from twin.core.native import Table
 from twin.effect import Kind

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.evidence import effective_samples
-from identify.estimation.fit import Outcome, rms
+from identify.estimation.evidence import effective_samples, rms
+from identify.estimation.fit import Outcome
 from identify.estimation.levenberg_marquardt import Solution, minimise
 from identify.estimation.replay import (
     LEAST_READING,

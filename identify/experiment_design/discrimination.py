@@ -23,8 +23,8 @@ from identify.dataset.motion import SHORTEST_LOG, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.test_function import LEAST_BLOCKS
 from identify.dataset.time_scale import choose_test_function
-from identify.estimation.evidence import effective_samples, evidence
-from identify.estimation.fit import fit_axis, rms
+from identify.estimation.evidence import effective_samples, evidence, rms
+from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.subspace import orthonormal, unabsorbed
 from identify.experiment_design.candidate_experiments import NotRun

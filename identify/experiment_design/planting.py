@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise, reading_error
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.fit import Fit, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
 from identify.estimation.subspace import unabsorbed
 from twin.effect import Effect, Excitation, Parameter

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.decision import RULE
-from identify.estimation.fit import Fit, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Fit
 from identify.estimation.force_balance import changes, jacobian, residual
 from identify.estimation.intervals import half_widths
 from identify.estimation.subspace import orthonormal, unabsorbed

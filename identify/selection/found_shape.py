@@ -9,8 +9,8 @@ import numpy as np
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import moving
-from identify.estimation.evidence import effective_samples
-from identify.estimation.fit import Fit, rms
+from identify.estimation.evidence import effective_samples, rms
+from identify.estimation.fit import Fit
 from identify.estimation.force_balance import averaged_force
 from identify.selection.smoothed import Linearised, solve
 from identify.selection.wrong_shape import Shape, sticking

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
-from identify.estimation.fit import Fit, error_on, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Fit, error_on
 from identify.selection.ranking import less, part_explained
 from identify.selection.scoring import Candidate, score
 

@@ -21,8 +21,9 @@ from identify.estimation.evidence import (
     held_out_gain,
     left_out,
     noise_gain,
+    rms,
 )
-from identify.estimation.fit import Fit, error_on, rms
+from identify.estimation.fit import Fit, error_on
 from identify.estimation.force_balance import residual
 from identify.estimation.time_origin import phases_found
 from identify.selection.decoys import proof

@@ -9,7 +9,8 @@ import numpy as np
 
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.fit import Fit, error_on, fit_axis, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.subspace import unabsorbed
 from identify.experiment_design.planting import (

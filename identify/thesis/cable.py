@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import datasets
 from identify.estimation.cable_force import CableForce, cable_force
-from identify.estimation.fit import rms
+from identify.estimation.evidence import rms
 from identify.measure import cable_force as of_passes
 from identify.thesis.chapter import Chapter, Progress, Recovered
 from identify.thesis.printed import ROLLER_PITCH

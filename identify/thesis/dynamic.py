@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import datasets
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.fit import rms
+from identify.estimation.evidence import rms
 from identify.estimation.presliding import Presliding
 from identify.estimation.replay import Beginning, Replay, measured_beginning
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.motion import motion_of
-from identify.estimation.evidence import evidence
-from identify.estimation.fit import Fit, error_on, fit_axis, rms
+from identify.estimation.evidence import evidence, rms
+from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.velocity_map import velocity_map
 from identify.selection.nonparametric import fit_nonparametric
 from identify.thesis.aging import Aging, aging

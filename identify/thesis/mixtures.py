@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.fit import Fit, error_on, fit_axis, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.intervals import half_widths
 from identify.selection.candidates import try_effect
 from identify.thesis.mixed_friction import EFFECT, PARTS, WEIGHT, mixed

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.noise_floor import floor_of
-from identify.estimation.fit import Fit, error_on, fit_axis, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.thesis.behaviours import LEG, LOOP, RATE, behaviours, turning
 from identify.thesis.chapter import Chapter, Progress
 from identify.thesis.prescribed import force_along

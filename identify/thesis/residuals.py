@@ -15,7 +15,8 @@ import numpy as np
 from identify.dataset.dataset import datasets
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.channel_delay import fit_aligned, realigned
-from identify.estimation.fit import Fit, error_on, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Fit, error_on
 from identify.selection.diagnosis import Verdict
 from identify.selection.forward_selection import diagnose_axis
 from identify.thesis.chapter import Chapter, Progress, Recovered

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.fit import rms
+from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
 from identify.estimation.presliding import Presliding
 from identify.estimation.stribeck_curve import StribeckCurve, fit_stribeck

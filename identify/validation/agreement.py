@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import datasets
-from identify.estimation.fit import Fit, Outcome, finished, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import BLOCKS, LARGEST_RATIO, QUANTILE
 from identify.estimation.subspace import orthonormal, unabsorbed

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import PreparedLog, at_rest, moving, sticks
-from identify.estimation.evidence import effective_samples
-from identify.estimation.fit import Fit, rms
+from identify.estimation.evidence import effective_samples, rms
+from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
 from identify.selection.residual_dependence import UNITS, gathered, unit_of
 from identify.validation.error_spectrum import bands

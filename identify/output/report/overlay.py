@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from identify.estimation.fit import rms
+from identify.estimation.evidence import rms
 from identify.output.report.blocks import Block, Heading, Picture, Section
 from identify.output.report.drawing import (
     BLUE,

@@ -14,7 +14,7 @@ from machines import one_axis
 from identify.dataset.dataset import by_log, datasets
 from identify.dataset.noise_floor import floor_of
 from identify.estimation.channel_delay import aligned
-from identify.estimation.fit import rms
+from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
 from identify.output.as_json import fit_json
 from identify.output.text import fit_text

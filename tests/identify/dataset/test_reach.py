@@ -10,7 +10,8 @@ from constructed import log_of, waves
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.prepared_log import moving
 from identify.estimation.channel_delay import realigned
-from identify.estimation.fit import error_on, fit_axis, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import error_on, fit_axis
 from identify.output.words.estimation import prepared_in_words
 from twin.model.machine import MachineModel
 

@@ -20,7 +20,7 @@ from constructed import (
 from identify.dataset.drive import reading_error
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.fit import rms
+from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
 from identify.estimation.open_loop import START_FIT, as_logged, states_along
 from identify.experiment_design.planting import (

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, fitted
 
-from identify.estimation.fit import rms
+from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
 from identify.output.report import overlay, residuals, shape, whiteness
 from identify.output.report.drawing import (

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identify.estimation.fit import rms
+from identify.estimation.evidence import rms
 from identify.estimation.subspace import orthonormal, unabsorbed
 from identify.workflow import diagnose, fit
 from twin.effects import Catalogue, load_catalogue

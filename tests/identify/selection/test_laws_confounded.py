@@ -11,7 +11,8 @@ import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, built_fit, fitted
 
 from identify import demo
-from identify.estimation.fit import Outcome, finished, rms
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.experiment_design import rival_hypotheses as explanations
 from identify.experiment_design.discrimination import Explanation

@@ -8,8 +8,7 @@ from constructed import SHORT, dataset_of, effect, moved, windowed
 
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import moving, sticks
-from identify.estimation.evidence import effective_samples
-from identify.estimation.fit import rms
+from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.force_balance import residual
 from identify.output.words.validation import region_in_words
 from identify.selection.residual_dependence import (
