@@ -4,7 +4,9 @@ The residual before averaging, with a from second differences, is pure noise at 
 white noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 cos(w dt))/dt^2)^2.
 A and B are fitted to its spectrum above the band of the effects; the test functions pass a part of
 both. Where the encoder's noise hides that of the force in the whole band, the noise of the force is
-taken from the command: the part that the controller did not compute from its readings.
+taken from the command: the part that the controller did not compute from its readings. The force of
+a machine is as noisy in each of its logs: what one has more of in the band is its motion's doing,
+such as of a load that strikes within its play.
 """
 
 from __future__ import annotations
@@ -65,16 +67,26 @@ def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
 def unrounded_floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     """The floor (N RMS) that these logs would have, had their readings not been rounded."""
     parts = []
-    for log in logs:
-        noise = noise_of(axis, log.motion)
+    motions = [log.motion for log in logs]
+    for noise, log in zip(_noises_of(axis, motions), logs, strict=True):
         own = max(noise.reading - _white_rounding(log.motion), 0.0)
         parts.append(_passed(replace(noise, reading=own), log.motion, log.test_function))
-    return _with_own(_together(parts, [log.motion for log in logs]), logs)
+    return _with_own(_together(parts, motions), logs)
 
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
     """RMS in N of what measurement noise alone leaves in the force residual of these logs."""
-    return _together([_variance(axis, *log) for log in logs], [motion for motion, _ in logs])
+    motions = [motion for motion, _ in logs]
+    noises = _noises_of(axis, motions)
+    each = [_variance(axis, n, *log) for n, log in zip(noises, logs, strict=True)]
+    return _together(each, motions)
+
+
+def _noises_of(axis: AxisModel, motions: Sequence[Motion]) -> list[Noise]:
+    """The noise of each log, with the force of all as noisy as that of the quietest."""
+    noises = [noise_of(axis, motion) for motion in motions]
+    quietest = min((n.force for n in noises), default=0.0)
+    return [replace(n, force=quietest) for n in noises]
 
 
 def _with_own(sensors: float, logs: Sequence[PreparedLog]) -> float:
@@ -86,8 +98,7 @@ def _together(variances: Sequence[float], motions: Sequence[Motion]) -> float:
     return float(np.sqrt(np.average(variances, weights=[m.signals.shape[1] for m in motions])))
 
 
-def _variance(axis: AxisModel, motion: Motion, test_function: TestFunction) -> float:
-    noise = noise_of(axis, motion)
+def _variance(axis: AxisModel, noise: Noise, motion: Motion, test_function: TestFunction) -> float:
     if not any(is_noise(f.effect) for f in axis.effects):
         return _passed(noise, motion, test_function)
     return _passed(noise, motion, test_function, _slow_rounding(motion, noise.segment))

@@ -67,14 +67,29 @@ def test_the_floor_is_in_proportion_to_the_noise_and_falls_with_the_window():
 
 
 def test_the_square_of_a_floor_of_logs_is_the_mean_of_theirs_weighed_by_their_lengths():
+    """Of readings with unlike noise; the force of a machine is as noisy in each log."""
     axis = AxisModel(MASS)
-    logs = [noisy(4, 0.02, duration=3.0), noisy(5, 0.06, duration=7.0)]
-    own = [floor_of(axis, [log]) ** 2 for log in logs]
+    logs = [noisy(4, 0.02, 3e-7, duration=3.0), noisy(5, 0.02, 6e-7, duration=7.0)]
+    own = [noise_of(axis, log.motion) for log in logs]
+    force = min(noise.force for noise in own)
     parts = [len(log.motion.time) for log in logs]
-    wanted = (own[0] * parts[0] + own[1] * parts[1]) / sum(parts)
-    assert floor_of(axis, logs) ** 2 == pytest.approx(wanted, rel=1e-9)
+    sizes = [
+        passed(log.fine, *np.sqrt(np.array([force, noise.reading]) * RATE / 2.0))
+        for log, noise in zip(logs, own, strict=True)
+    ]
+    wanted = np.average(np.square(sizes), weights=parts)
+    assert floor_of(axis, logs) ** 2 == pytest.approx(wanted, rel=0.05)
     pairs = [(log.motion, log.test_function) for log in logs]
     assert noise_floor(axis, pairs[::-1]) == pytest.approx(floor_of(axis, logs))
+
+
+def test_what_one_log_has_more_of_in_the_band_is_no_noise():
+    """Such as a load that strikes within its play, over which the quiet log knows better."""
+    axis = AxisModel(MASS)
+    quiet, struck = noisy(4, 0.02), noisy(5, 0.06)
+    alone, both = (floor_of(axis, logs) for logs in ([quiet], [struck, quiet]))
+    assert both == pytest.approx(alone, rel=0.02)
+    assert floor_of(axis, [struck]) > 2.5 * alone
 
 
 def test_what_the_model_explains_is_no_noise():
