@@ -23,6 +23,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.estimation.decision import RULE
 from identify.estimation.evidence import left_out
 from identify.estimation.fit import Fit
 from identify.estimation.fit_problem import is_constant
@@ -42,9 +43,10 @@ GROUPS_QUANTILE = 1.8331129326562374  # of Student's t for GROUPS - 1
 TINY = 1e-12  # of the squared influence, which may lie in one group
 FAR = 4.0  # half widths to either side at which the error must have risen
 LEAST_RISE = 0.1  # of the rise that the linearised residual predicts
-# Of error to noise floor. Above it more than three quarters of the squared error are no noise; what
-# parameters took over of a missing effect, which no residual shows, exceeds their intervals.
-LARGEST_RATIO = 2.0
+# Of error to noise floor. Above it the error is more than noise, and what parameters took over of a
+# missing effect, which no residual shows, exceeds their intervals: of 32 that were given between it
+# and twice the floor beside a missing effect, half held the truth.
+LARGEST_RATIO = RULE.at_floor
 
 
 class Side(Enum):

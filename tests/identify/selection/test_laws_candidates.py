@@ -163,6 +163,7 @@ def test_held_out_windows_at_rest_are_left_out_where_either_friction_sticks(quie
     monkeypatch.setattr(scoring, "moving", moving)
     monkeypatch.setattr(scoring, "residual", lambda axis, logs: RNG.standard_normal(300))
     monkeypatch.setattr(scoring, "forces_lessened", lambda axis, motions: 1.0)
+    monkeypatch.setattr(scoring, "_beats_decoys", lambda *_: False)
     held = SimpleNamespace(motion=None)
     dataset, lugre = dataset_stub(holdout=(held,)), PLAIN.with_effect(fitted("lugre"))
     for one, two in ((PLAIN, lugre), (lugre, PLAIN), (lugre, lugre)):
