@@ -25,7 +25,7 @@ from identify.selection.repeating_force import Repeat, not_general
 from identify.selection.reshaping import Reshaped
 from identify.selection.residual_dependence import Dependence
 from identify.selection.scoring import Candidate
-from identify.selection.wrong_shape import likely_shape, wrong_shape
+from identify.selection.wrong_shape import likely_shape, on_fit_logs, wrong_shape
 from twin.effect import Kind
 
 
@@ -177,8 +177,9 @@ class AxisDiagnosis:
         """The findings after a free curve of a law that the model has competed with one of them.
 
         It is the answer in its place where it leaves clearly less error, and beside it where it
-        leaves about as little; one that is not proved by itself must take as much of the error.
-        Not of friction, whose curves hold its modifiers. without: the fit without what was found.
+        leaves about as little, on the fit logs too; one that is not proved by itself must take as
+        much of the error. Not of friction, whose curves hold its modifiers. without: the fit
+        without what was found.
         """
         shape = likely_shape(without, self.dataset)
         if shape is None or shape.shape.curve.rubs or shape.effect not in self.base.axis.names:
@@ -187,6 +188,9 @@ class AxisDiagnosis:
         if not (shape.proof.holds or _takes_as_much(wrong, finding)):
             return findings
         if RULE.near * squared_left(wrong) > squared_left(finding):
+            return findings
+        unfitted = (1.0 - on_fit_logs(shape, without, self.dataset).gain) * without.error**2
+        if RULE.near * unfitted > self.with_named.error**2:
             return findings
         others = tuple(f for f in findings if f is not finding)
         clearly = squared_left(wrong) < RULE.beside_decoys * squared_left(finding)

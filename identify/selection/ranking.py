@@ -114,12 +114,15 @@ def part_explained(base: Fit, final: Fit) -> float:
 
 def less(effect: Effect, fit: Fit, base: Fit, dataset: Dataset) -> Fit:
     """The fit without an effect, refitted; a friction is replaced by that of the base."""
-    if effect.kind is Kind.FRICTION:
-        own = next((f for f in base.axis.effects if f.effect.kind is Kind.FRICTION), None)
-        axis = fit.axis.with_effect(own) if own else fit.axis.without(effect.name)
-    else:
-        axis = fit.axis.without(effect.name)
-    return fit_axis(axis, dataset.fit)
+    return fit_axis(axis_less(effect, fit.axis, base.axis), dataset.fit)
+
+
+def axis_less(effect: Effect, axis: AxisModel, base: AxisModel) -> AxisModel:
+    """The axis without an effect; a friction is replaced by that of the base."""
+    own = next((f for f in base.effects if f.effect.kind is Kind.FRICTION), None)
+    if effect.kind is Kind.FRICTION and own:
+        return axis.with_effect(own)
+    return axis.without(effect.name)
 
 
 def _ranked(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:

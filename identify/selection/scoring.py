@@ -27,7 +27,7 @@ from identify.estimation.fit import Fit, error_on
 from identify.estimation.force_balance import residual
 from identify.estimation.time_origin import phases_found
 from identify.selection.decoys import proof
-from twin.effect import Effect
+from twin.effect import Effect, Kind
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,15 @@ def _beats_decoys(base: Fit, candidate: Candidate, dataset: Dataset) -> bool:
         return False
     name = candidate.effect.name
     beside = proof(base, candidate.fit.axis[name], dataset)
-    return beside is not None and beside.holds
+    if beside is None:
+        return _is_clear(candidate)
+    return beside.holds
+
+
+def _is_clear(candidate: Candidate) -> bool:
+    """Whether a friction, which has no decoys, leaves clearly less of the held-out square."""
+    gain, rubs = candidate.gain, candidate.effect.kind is Kind.FRICTION
+    return rubs and gain.t > RULE.tie and gain.after**2 < RULE.beside_decoys * gain.before**2
 
 
 def _is_plausible(fit: Fit, effect: Effect, dataset: Dataset) -> bool:

@@ -16,7 +16,7 @@ from identify.selection.decoys import proof
 from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, Verdict, kept
 from identify.selection.findings import share_explained
 from identify.selection.pair_search import held_at_floor
-from identify.selection.ranking import less, part_explained, tie
+from identify.selection.ranking import axis_less, less, part_explained, tie
 from identify.selection.residual_dependence import explains, find_dependence
 from identify.selection.scoring import Candidate, score
 from twin.effect import Effect
@@ -137,18 +137,18 @@ def _gone(base: Fit, final: Fit, steps: Sequence[Step], dataset: Dataset) -> boo
 
 
 def _compared_again(states: Sequence[SelectionState], dataset: Dataset) -> tuple[Step, ...]:
-    """The steps, with ties decided beside all effects that were added.
+    """The steps, with ties decided beside all effects and free curves that were added.
 
-    When an early effect was compared with its rivals, the later effects were still missing.
+    When an early effect was compared with its rivals, the later ones were still missing.
     """
     base, (steps, final) = states[0].fit, (states[-1].steps, states[-1].fit)
     still = kept(steps)
-    if len(still) < 2:
+    if len(still) < 2 and not any(f.effect.free_shape for f in final.axis.effects):
         return steps
     named = {s.candidate.effect.name for s in still}
 
     def level(own: Candidate, rival: Candidate) -> bool:
-        axis = final.axis.without(own.effect.name)
+        axis = axis_less(own.effect, final.axis, base.axis)
         fit = fit_axis(axis.with_effect(rival.fit.axis[rival.effect.name]), dataset.fit)
         return tie(dataset, own, score(base, fit, dataset, rival.effect))
 

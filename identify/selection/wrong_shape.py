@@ -83,9 +83,15 @@ class WrongShape:
 
 
 def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
-    """The law whose free curve takes most of a fit's squared test error, if it is proved."""
+    """The law whose free curve takes most of a fit's squared test error, if it is proved.
+
+    On the blocks of the fit logs, by which its smoothing was chosen, it must beat its decoys too.
+    """
     likely = likely_shape(fit, dataset)
-    return likely if likely and likely.proof.holds else None
+    if likely is None or not likely.proof.holds:
+        return None
+    own = on_fit_logs(likely, fit, dataset)
+    return likely if own.gain > own.best_decoy else None
 
 
 @lru_cache(maxsize=4)  # in the selection, and beside what it named
@@ -111,6 +117,12 @@ def best_shape(fit: Fit, dataset: Dataset, effect: str) -> WrongShape | None:
     shapes = [s for s in _shapes(fit, dataset) if s.effect == effect]
     tried = [_with_proof(trial, s, fit, dataset) for s in shapes]
     return max(tried, key=lambda w: w.proof.gain, default=None)
+
+
+def on_fit_logs(found: WrongShape, fit: Fit, dataset: Dataset) -> Proof:
+    """What a free curve takes of the fit logs themselves, each block by the step of the others."""
+    trial = replace(Trial.of(fit, dataset), held=None)
+    return _proofs(trial, found.shape, fit, dataset, decoys=DECOYS)[0]
 
 
 def gain_on_test_logs(found: WrongShape, fit: Fit, dataset: Dataset) -> float:

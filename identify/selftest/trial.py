@@ -156,7 +156,8 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
 
     Right is a wrong shape where the machine's law has another, and so over the coordinate of what
     is planted where that is a friction in place of the model's or the catalogue has no name for it;
-    and that a missing effect only resembles one of the catalogue where what is planted is none.
+    and that a missing effect only resembles one of the catalogue where what is planted is none, or
+    is that one with another value of what a model holds by design.
     """
     names = (finding.effect, *finding.tied)
     match finding.kind:
@@ -169,7 +170,14 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
             right |= not {*case.effects}.isdisjoint(finding.tied)
         case FindingKind.RESEMBLES:
             right = any(e in OUTSIDE for e in case.effects)
+            right |= any(f.effect.name in names and _is_another(f) for f in built.planted)
     return Answer(names, finding.kind, right, finding.left, finding.confidence)
+
+
+def _is_another(planted: Fitted) -> bool:
+    """Whether a planted law has another value than the catalogue of what a fit does not change."""
+    usual = Fitted.at_start(planted.effect)
+    return any(planted.values[name] != usual.values[name] for name in usual.fixed)
 
 
 def _is_shape_of(planted: Effect, finding: Finding, built: Machine, case: Case) -> bool:
