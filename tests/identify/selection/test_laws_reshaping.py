@@ -104,8 +104,12 @@ def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypat
 # --- a finding against the curve of a law that the model has ---------------------------------
 
 
-def against(monkeypatch, proof, *, left, before=8.0):
-    """What is found after a missing effect, which leaves 2 N, competed with the cable's curve."""
+def against(monkeypatch, proof, *, left, before=8.0, fitted_to=0.9):
+    """What is found after a missing effect, which leaves 2 N, competed with the cable's curve.
+
+    fitted_to: part that the curve takes of the squared error of 8 N on the fit logs, where the
+    effect leaves 2.5 N.
+    """
     diagnoses = importlib.import_module("identify.selection.diagnosis")
     missing = replace(made.FOUND[0], tied=())
     missing = replace(missing, chosen=replace(missing.chosen, before=before, after=2.0))
@@ -116,8 +120,11 @@ def against(monkeypatch, proof, *, left, before=8.0):
     )
     monkeypatch.setattr(diagnoses, "likely_shape", lambda fit, dataset: shape)
     monkeypatch.setattr(diagnoses, "found_wrong", lambda *_: wrong)
+    monkeypatch.setattr(diagnoses, "on_fit_logs", lambda *_: Proof(fitted_to, 0.0))
     base = built_fit(8.0, axis=axis_of(fitted("cable_slab")))
-    whole = AxisDiagnosis(DATASET, base, (), (), base, Verdict.MISSING_EFFECTS, None)
+    final = built_fit(2.5, axis=base.axis)
+    monkeypatch.setattr(AxisDiagnosis, "with_named", final)
+    whole = AxisDiagnosis(DATASET, base, (), (), final, Verdict.MISSING_EFFECTS, None)
     return whole._against_shapes(missing, base, (missing,))
 
 
@@ -152,3 +159,12 @@ def test_a_curve_that_leaves_as_little_is_an_ambiguity_on_both_sides(
     found = against(monkeypatch, Proof(0.5, 0.0), left=left)
     assert [f.kind.value for f in found] == kinds
     assert [f.tied for f in found] == ties
+
+
+@pytest.mark.parametrize(("part", "rivals"), [(0.877, False), (0.879, True)])
+def test_a_curve_takes_the_place_of_a_finding_only_where_it_does_as_well_on_the_fit_logs(
+    monkeypatch, part, rivals
+):
+    """8 N there without the effect and 2.5 N with it: the curve may leave 2.5^2 / 0.8."""
+    found = against(monkeypatch, Proof(0.9, 0.0), left=1.5, fitted_to=part)
+    assert [f.kind.value for f in found] == (["wrong_shape"] if rivals else ["missing"])

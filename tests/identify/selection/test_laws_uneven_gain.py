@@ -56,6 +56,23 @@ def test_an_effect_must_lower_the_held_out_error_and_hold(monkeypatch, part, pro
     assert _beats_decoys(base, made, "data") is beats
 
 
+@pytest.mark.parametrize(
+    ("effect", "t", "part", "clear"),
+    [
+        ("dahl", 2.1, 0.79, True),
+        ("dahl", 1.9, 0.79, False),
+        ("dahl", 2.1, 0.81, False),
+        ("thermal_drift", 2.1, 0.5, False),  # it has none as it depends on the time alone
+    ],
+)
+def test_a_friction_without_decoys_counts_where_it_leaves_clearly_less(
+    monkeypatch, effect, t, part, clear
+):
+    made = replace(built(effect), gain=Gain(2.0, 2.0 * np.sqrt(part), t))
+    monkeypatch.setattr(module, "proof", lambda *_: None)
+    assert bool(_beats_decoys(built_fit(5.0), made, "data")) is clear
+
+
 def test_a_linear_step_takes_none_of_the_noise():
     fit = built_fit(2.0, 0.5)
     data = built_dataset("one", held=())

@@ -15,7 +15,7 @@ from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, kept
 from identify.selection.forward_selection import _eliminated_backwards
 from identify.selection.residual_dependence import Dependence
-from identify.selection.verdict import _compared_again, _graded
+from identify.selection.verdict import _graded
 from identify.selection.verdict import decided as decide
 
 module = importlib.import_module("identify.selection.verdict")
@@ -117,49 +117,6 @@ def test_an_earlier_effect_goes_where_the_fit_without_it_is_as_good(monkeypatch,
     assert fit.error == pytest.approx(error)
     assert fit.axis.names[1:] == ("wear", "end_stop")
     assert scored[-1] == (("end_stop",), ("wear", "end_stop"), "wear")
-
-
-# --- ties told again beside all that was added ----------------------------------------------
-
-
-def test_ties_are_told_again_only_beside_several_effects(monkeypatch):
-    fits, ties = [], []
-    final = built_fit(1.0, axis=axis_of(fitted("cogging"), fitted("wear"), fitted("end_stop")))
-
-    def refitted(axis, logs):
-        fits.append(axis.names[1:])
-        return built_fit(1.0, axis=axis)
-
-    def score(base, fit, dataset, effect):
-        assert base is HIGH
-        return built(effect, fit=fit)
-
-    def tie(dataset, own, rival):
-        ties.append((own.effect.name, own.fit is final, rival.effect.name))
-        return rival.effect.name == "constant_force"
-
-    monkeypatch.setattr(module, "fit_axis", refitted)
-    monkeypatch.setattr(module, "score", score)
-    monkeypatch.setattr(module, "tie", tie)
-    rivals = (built("constant_force"), built("wear"), built("quadratic_drag"))
-    steps = (
-        step("cogging", ("quadratic_drag",), rivals=rivals),
-        step("wear", ("payload_mass",)),
-        step("end_stop", ("payload_mass",), beside="wear", rivals=(built("constant_force"),)),
-        step("lugre", ("dahl",)),
-        step("gms", (), dropped=("lugre",)),
-    )
-    again = _compared_again([stage(HIGH), stage(final, *steps)], DATASET)
-    assert [s.tied for s in again] == [
-        ("constant_force",), (), ("payload_mass", "constant_force"), ("dahl",), (),
-    ]  # fmt: skip
-    compared = [("cogging", "constant_force"), ("cogging", "quadratic_drag")]
-    compared.append(("end_stop", "constant_force"))
-    assert ties == [(own, True, rival) for own, rival in compared]
-    own = [("wear", "end_stop"), ("wear", "end_stop"), ("cogging", "wear")]
-    assert fits == [(*o, rival) for o, (_, rival) in zip(own, compared, strict=True)]
-    alone = (steps[0],)
-    assert _compared_again([stage(HIGH), stage(final, *alone)], DATASET) == alone
 
 
 # --- the verdict ----------------------------------------------------------------------------

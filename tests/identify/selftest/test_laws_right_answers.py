@@ -72,3 +72,14 @@ def test_of_another_friction_the_curve_over_speed_of_the_models_own_is_right(tol
 def test_another_shape_is_right_where_the_law_of_the_machine_has_one():
     assert is_right("cogging", Coordinate.POSITION, reshaped=("cable_slab",))
     assert not is_right("cogging", Coordinate.POSITION, reshaped=("roller_spikes",))
+
+
+@pytest.mark.parametrize(
+    ("told", "n", "right"),
+    [("dahl", 1.0, False), ("dahl", 0.7, True), ("lugre", 0.7, False)],
+)
+def test_what_resembles_is_right_where_the_machine_has_another_exponent(told, n, right):
+    built = SimpleNamespace(planted=(fitted("dahl", n=n),))
+    finding = Finding(told, (), 0.9, *errors(2.0, 1.0), "N", {}, None)
+    finding = replace(finding, kind=FindingKind.RESEMBLES)
+    assert _answer(finding, built, Case(("dahl",), 5.0, 1)).right is right
