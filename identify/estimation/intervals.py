@@ -44,8 +44,8 @@ TINY = 1e-12  # of the squared influence, which may lie in one group
 FAR = 4.0  # half widths to either side at which the error must have risen
 LEAST_RISE = 0.1  # of the rise that the linearised residual predicts
 # Of error to noise floor. Above it the error is more than noise, and what parameters took over of a
-# missing effect, which no residual shows, exceeds their intervals: of 32 that were given between it
-# and twice the floor beside a missing effect, half held the truth.
+# missing effect, which no residual shows, exceeds their intervals: of 73 given up to twice the
+# floor beside a missing effect of 2 floors, 54 held the truth (seeds 740161991 and 1528482097).
 LARGEST_RATIO = RULE.at_floor
 
 

@@ -16,6 +16,7 @@ from identify.selection.findings import (
     FindingKind,
     as_a_whole,
     found,
+    found_reshaped,
     found_wrong,
     squared_left,
     with_shape,
@@ -25,7 +26,7 @@ from identify.selection.repeating_force import Repeat, not_general
 from identify.selection.reshaping import Reshaped
 from identify.selection.residual_dependence import Dependence
 from identify.selection.scoring import Candidate
-from identify.selection.wrong_shape import likely_shape, on_fit_logs, wrong_shape
+from identify.selection.wrong_shape import gain_on_fit_logs, likely_shape, wrong_shape
 from twin.effect import Kind
 
 
@@ -134,7 +135,9 @@ class AxisDiagnosis:
         each = [self._found(step) for step in (self._proved if self.named else ())]
         findings = tuple(finding for finding, _ in each)
         for curve in self.curves:
-            wrong = found_wrong(curve.shape, self.base, curve.before, self.dataset)
+            wrong = found_reshaped(
+                curve.shape, self.base, curve.before, self.with_named, self.dataset
+            )
             findings = with_shape(findings, wrong)
         for finding, without in each:
             if finding in findings:  # not one that a missing effect resembles
@@ -189,7 +192,7 @@ class AxisDiagnosis:
             return findings
         if RULE.near * squared_left(wrong) > squared_left(finding):
             return findings
-        unfitted = (1.0 - on_fit_logs(shape, without, self.dataset).gain) * without.error**2
+        unfitted = (1.0 - gain_on_fit_logs(shape, without, self.dataset)) * without.error**2
         if RULE.near * unfitted > self.with_named.error**2:
             return findings
         others = tuple(f for f in findings if f is not finding)

@@ -9,7 +9,7 @@ from enum import Enum
 from identify.dataset.dataset import Dataset
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors, error_in
-from identify.estimation.fit import Fit
+from identify.estimation.fit import Fit, fit_axis
 from identify.selection.confidence import confidence
 from identify.selection.decoys import Proof, proof
 from identify.selection.found_shape import FoundShape, found_shape
@@ -35,11 +35,12 @@ class Finding:
 
     tied: effects that these data cannot separate from it. explains: part of the squared test error
     above the noise floor that comes back when it alone is taken out, at most 1. tested: test
-    errors in ``unit`` without it and with it; of a wrong shape with the law and with a free curve
-    beside it, as one linear step predicts. chosen: the same on the logs that chose; without test
-    logs the test errors are these. parameters: of its law. proof: beside decoys; None where a shift
-    in time makes none. shape: the curve that is assumed and the one found, where they differ. left:
-    over the noise floor, the error that all findings together leave on the logs that chose.
+    errors in ``unit`` without it and with it; of a wrong shape with the law and with a free curve,
+    as one linear step predicts where no refit was made. chosen: the same on the logs that chose;
+    without test logs the test errors are these. parameters: of its law. proof: beside decoys; None
+    where a shift in time makes none. shape: the curve that is assumed and the one found, where they
+    differ. left: over the noise floor, the error that all findings together leave on the logs that
+    chose.
     """
 
     effect: str
@@ -85,17 +86,44 @@ def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> F
     if dataset.test:
         gain = gain_on_test_logs(shape, final, dataset)
         tested = _linear_step(final, dataset, Role.TEST, gain)
+    return _of_shape(shape, base, final, dataset, (chosen, tested))
+
+
+def found_reshaped(
+    shape: WrongShape, base: Fit, before: Fit, final: Fit, dataset: Dataset
+) -> Finding:
+    """The finding of a law whose free curve a final fit has; before: the fit with the law alone.
+
+    As of a missing effect, the final fit less this curve tells what it explains.
+    """
+    curve = shape.shape.empty.effect.name
+    if curve not in final.axis.names:
+        return found_wrong(shape, base, before, dataset)
+    axis = final.axis.without(curve)
+    if shape.effect not in axis.names:
+        axis = axis.with_effect(before.axis[shape.effect])
+    without = fit_axis(axis, dataset.fit)
+    chosen = Errors.of(without, final, dataset, dataset.chosen_on)
+    tested = Errors.of(without, final, dataset, Role.TEST) if dataset.test else chosen
+    return _of_shape(shape, base, before, dataset, (chosen, tested))
+
+
+def _of_shape(
+    shape: WrongShape, base: Fit, fit: Fit, dataset: Dataset, errors: tuple[Errors, Errors]
+) -> Finding:
+    """The finding of a wrong shape of a law in a fit, with its chosen and tested errors."""
+    chosen, tested = errors
     return Finding(
         effect=shape.effect,
         tied=(),
         explains=share_explained(tested, base, dataset),
         tested=tested,
         chosen=chosen,
-        unit=final.axis.units.force,
-        parameters=dict(final.axis[shape.effect].values),
+        unit=fit.axis.units.force,
+        parameters=dict(fit.axis[shape.effect].values),
         proof=shape.proof,
         kind=FindingKind.WRONG_SHAPE,
-        shape=found_shape(shape.shape, final, dataset),
+        shape=found_shape(shape.shape, fit, dataset),
     )
 
 

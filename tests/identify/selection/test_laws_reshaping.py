@@ -120,7 +120,7 @@ def against(monkeypatch, proof, *, left, before=8.0, fitted_to=0.9):
     )
     monkeypatch.setattr(diagnoses, "likely_shape", lambda fit, dataset: shape)
     monkeypatch.setattr(diagnoses, "found_wrong", lambda *_: wrong)
-    monkeypatch.setattr(diagnoses, "on_fit_logs", lambda *_: Proof(fitted_to, 0.0))
+    monkeypatch.setattr(diagnoses, "gain_on_fit_logs", lambda *_: fitted_to)
     base = built_fit(8.0, axis=axis_of(fitted("cable_slab")))
     final = built_fit(2.5, axis=base.axis)
     monkeypatch.setattr(AxisDiagnosis, "with_named", final)
