@@ -9,12 +9,19 @@ import pytest
 from built_fits import PLAIN, axis_of, built, built_dataset, fitted
 
 from identify.dataset.given_logs import Role
-from identify.estimation.fit import Outcome, finished
+from identify.estimation.errors import error_in
+from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
 from identify.output.words.selection import advice, finding_in_words, shape_in_words
 from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Step, Verdict
-from identify.selection.findings import FindingKind, found_wrong, with_shape
+from identify.selection.findings import (
+    FindingKind,
+    found_reshaped,
+    found_wrong,
+    share_explained,
+    with_shape,
+)
 from identify.selection.found_shape import AHEAD, BEHIND, BOTH, found_shape
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.reshaping import curve_in_place
@@ -110,6 +117,24 @@ def test_the_law_whose_curve_differs_is_told_and_its_curve_found(
 def test_where_no_shape_is_wrong_none_is_told(dataset) -> None:
     there = machine(dataset, lambda x, _: 0.0 * x)
     assert wrong_shape(base_of(there), there) is None
+
+
+@pytest.mark.parametrize(("force", "effect"), [case[:2] for case in CASES[:2]])
+def test_what_a_shape_explains_is_told_by_the_fit_without_its_curve(dataset, force, effect) -> None:
+    there = machine(dataset, force)
+    base = base_of(there)
+    shape = wrong_shape(base, there)
+    assert shape is not None
+    final = fit_in_place(base, there, shape.shape).fit
+    assert (effect in final.axis.names) is shape.shape.beside  # else its law comes back
+    found = found_reshaped(shape, base, base, final, there)
+    assert found.chosen.after == error_in(there.chosen_on, final, there)
+    alone = fit_axis(base.axis, there.fit)
+    assert found.chosen.before == pytest.approx(error_in(there.chosen_on, alone, there), rel=1e-3)
+    assert found.explains == share_explained(found.tested, base, there)
+    assert found_reshaped(shape, base, base, base, there).chosen == (
+        found_wrong(shape, base, base, there).chosen
+    )
 
 
 def test_what_a_curve_takes_is_also_told_of_the_fit_logs(dataset) -> None:
