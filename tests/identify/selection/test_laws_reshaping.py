@@ -185,8 +185,8 @@ def test_a_curve_that_lowers_no_error_any_more_is_not_told(
     diagnoses = importlib.import_module("identify.selection.diagnosis")
     sizes = made.FOUND[0].chosen
     shapes = [
-        replace(made.FOUND[0], chosen=replace(sizes, before=2.0, after=1.9 if low else 2.1))
-        for low in lowers
+        replace(made.FOUND[i], chosen=replace(sizes, before=2.0, after=1.9 if low else 2.1))
+        for i, low in enumerate(lowers)
     ]
     waiting = iter(shapes)
     monkeypatch.setattr(diagnoses, "found_reshaped", lambda *_: next(waiting))
