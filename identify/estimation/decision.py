@@ -62,7 +62,7 @@ class DecisionRule:
     least_bic: float = 10.0
     no_evidence: float = 2.0
     least_t: float = 3.0
-    fewest_cycles: float = 1.9
+    fewest_cycles: float = 2.5
 
     beyond_doubt: float = 100.0
     partial_bic: float = 50.0

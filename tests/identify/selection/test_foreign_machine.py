@@ -25,7 +25,7 @@ RIVALS = Catalogue(
     )
 )  # fmt: skip
 FEW = Catalogue([CATALOGUE[n] for n in ("asymmetric_friction", "cogging", "quadratic_drag")])
-QUICK = (4.0, FEW)  # s of each log, and the effects tried
+QUICK = (6.0, FEW)  # s of each log, and the effects tried
 FULL = (10.0, CATALOGUE)
 
 
