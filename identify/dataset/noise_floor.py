@@ -5,8 +5,8 @@ white noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 co
 A and B are fitted to its spectrum above the band of the effects; the test functions pass a part of
 both. Where the encoder's noise hides that of the force in the whole band, the noise of the force is
 taken from the command: the part that the controller did not compute from its readings. The force of
-a machine is as noisy in each of its logs: what one has more of in the band is its motion's doing,
-such as of a load that strikes within its play.
+a machine is as noisy in each of its logs: one with far more power in the band has it from its
+motion, such as a load that strikes within its play.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
 MOST_SEGMENTS = 64  # whose median is sure enough: with as many frequencies, to 1 % of the power
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 BAND_OF_BOTH = 0.25  # its end beside a measured velocity, whose noise vanishes towards 0.5
+LOUDER = 2.0  # times the power of the quietest log, beyond which it is no noise: estimates scatter
 PLAIN = 3.0  # times the reading's noise where the band begins; above it the force's noise shows
 
 
@@ -41,13 +42,14 @@ PLAIN = 3.0  # times the reading's noise where the band begins; above it the for
 class Noise:
     """Measurement noise of one log, before it is averaged by test functions.
 
-    frequency (k,): Hz. force: N^2/Hz, one-sided and white. reading: m^2/Hz, one-sided and white.
-    bend (k,): power gain from a reading to the apparent force, N^2/m^2. segment: samples of the
-    transform.
+    frequency (k,): Hz. force: N^2/Hz, one-sided and white. most: the same, that the log leaves room
+    for where the reading's noise hides it. reading: m^2/Hz, one-sided and white. bend (k,): power
+    gain from a reading to the apparent force, N^2/m^2. segment: samples of the transform.
     """
 
     frequency: Array
     force: float
+    most: float
     reading: float
     bend: Array
     segment: int
@@ -68,7 +70,7 @@ def unrounded_floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     """The floor (N RMS) that these logs would have, had their readings not been rounded."""
     parts = []
     motions = [log.motion for log in logs]
-    for noise, log in zip(_noises_of(axis, motions), logs, strict=True):
+    for noise, log in zip(noises_of(axis, motions), logs, strict=True):
         own = max(noise.reading - _white_rounding(log.motion), 0.0)
         parts.append(_passed(replace(noise, reading=own), log.motion, log.test_function))
     return _with_own(_together(parts, motions), logs)
@@ -77,16 +79,23 @@ def unrounded_floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
     """RMS in N of what measurement noise alone leaves in the force residual of these logs."""
     motions = [motion for motion, _ in logs]
-    noises = _noises_of(axis, motions)
+    noises = noises_of(axis, motions)
     each = [_variance(axis, n, *log) for n, log in zip(noises, logs, strict=True)]
     return _together(each, motions)
 
 
-def _noises_of(axis: AxisModel, motions: Sequence[Motion]) -> list[Noise]:
-    """The noise of each log, with the force of all as noisy as that of the quietest."""
+def noises_of(axis: AxisModel, motions: Sequence[Motion]) -> list[Noise]:
+    """The noise of each log; of its force what the quietest of the same rate leaves room for."""
     noises = [noise_of(axis, motion) for motion in motions]
-    quietest = min((n.force for n in noises), default=0.0)
-    return [replace(n, force=quietest) for n in noises]
+    quietest: dict[float, float] = {}
+    for noise, motion in zip(noises, motions, strict=True):
+        dt = motion.sample_period
+        quietest[dt] = min(noise.most, quietest.get(dt, np.inf))
+    least = [quietest[motion.sample_period] for motion in motions]
+    return [
+        replace(noise, force=low) if noise.force > LOUDER * low else noise
+        for noise, low in zip(noises, least, strict=True)
+    ]
 
 
 def _with_own(sensors: float, logs: Sequence[PreparedLog]) -> float:
@@ -161,9 +170,10 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     bend = _bend(axis, motion, frequency)
     band = _band(motion, frequency)
     force, reading = map(float, fitted_levels(np.stack([half, bend], axis=1)[band], power[band]))
-    if force < PLAIN * reading * bend[band][0]:
+    most = max(force, PLAIN * reading * float(bend[band][0]))
+    if force < most:
         force = motion.command_noise
-    return Noise(frequency, force, reading, bend, segment)
+    return Noise(frequency, force, most, reading, bend, segment)
 
 
 def _between_samples(force: Array, motion: Motion) -> Array:

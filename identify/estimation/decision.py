@@ -14,10 +14,12 @@ class DecisionRule:
     """When an effect is supported, when it is named, and when a search ends.
 
     at_floor: error over noise floor below which a residual counts as noise; the floor is an
-    estimate, accurate to 10 % on most machines.
+    estimate, accurate to 10 % on most machines. Above it parameters have no intervals.
     least_bic: evidence that supports an effect, "very strong" in R. E. Kass, A. E. Raftery, Bayes
     Factors, JASA 90 (1995). no_evidence: "not worth more than a bare mention", same source.
-    least_t: gain on the held-out logs over its standard error across blocks.
+    least_t: gain on the held-out logs over its standard error across blocks. friction_t: the same
+    of a friction that leaves clearly less (beside_decoys); laws of another shape, which each
+    friction leaves as they are, make the blocks uneven.
 
     fewest_cycles: over the travel, of a force that is said to repeat along the track; fewer are any
     smooth force of position.
@@ -40,7 +42,8 @@ class DecisionRule:
     same_error: relative error that simpler values may have. pair_first: part of the squared error
     that the first of two effects must explain alone.
 
-    beside_decoys: part of what its best decoy leaves of the squared error that an effect may leave.
+    beside_decoys: part of what its best decoy leaves of the squared error that an effect may leave;
+    of what the fit without it leaves, where it has no decoys.
     least_finding: least part of the squared error that one of several effects must explain; the law
     of another, a tenth off, leaves as much.
 
@@ -62,6 +65,7 @@ class DecisionRule:
     least_bic: float = 10.0
     no_evidence: float = 2.0
     least_t: float = 3.0
+    friction_t: float = 2.0
     fewest_cycles: float = 2.5
 
     beyond_doubt: float = 100.0

@@ -63,7 +63,7 @@ class AlwaysAtRest:
 
 @dataclass(frozen=True)
 class ModelWrong:
-    """The force error (in ``unit``, RMS) is far above the noise floor."""
+    """The force error (in ``unit``, RMS) is above the noise floor by more than that is unsure."""
 
     error: float
     floor: float

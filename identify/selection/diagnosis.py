@@ -134,7 +134,10 @@ class AxisDiagnosis:
         """
         each = [self._found(step) for step in (self._proved if self.named else ())]
         findings = tuple(finding for finding, _ in each)
-        for wrong in self._reshaped(beside_others=bool(findings)):
+        for curve in self.curves:
+            wrong = found_reshaped(
+                curve.shape, self.base, curve.before, self.with_named, self.dataset
+            )
             findings = with_shape(findings, wrong)
         for finding, without in each:
             if finding in findings:  # not one that a missing effect resembles
@@ -147,15 +150,6 @@ class AxisDiagnosis:
         verdict = Verdict.WRONG_SHAPE if shapes else self.verdict
         findings = as_a_whole(findings, self.with_named, self.dataset)
         return replace(self, findings=findings, verdict=verdict)
-
-    def _reshaped(self, *, beside_others: bool) -> list[Finding]:
-        """What the curves explain; beside others not those that lower no error any more."""
-        final = self.with_named
-        shapes = [
-            found_reshaped(c.shape, self.base, c.before, final, self.dataset) for c in self.curves
-        ]
-        helping = [w for w in shapes if w.chosen.after < w.chosen.before]
-        return helping if helping or beside_others else shapes
 
     def beside(self, base: Fit, curves: tuple[Reshaped, ...]) -> AxisDiagnosis:
         """The same of a base before some of its laws were given free curves."""
@@ -186,9 +180,9 @@ class AxisDiagnosis:
         """The findings after a free curve of a law that the model has competed with one of them.
 
         It is the answer in its place where it leaves clearly less error, and beside it where it
-        leaves about as little, on the fit logs too; one that is not proved by itself must take as
-        much of the error. Not of friction, whose curves hold its modifiers. without: the fit
-        without what was found.
+        leaves about as little; in both cases it must leave about as little on the fit logs too. One
+        that is not proved by itself must take as much of the error. Not of friction, whose curves
+        hold its modifiers. without: the fit without what was found.
         """
         shape = likely_shape(without, self.dataset)
         if shape is None or shape.shape.curve.rubs or shape.effect not in self.base.axis.names:

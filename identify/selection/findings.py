@@ -116,7 +116,7 @@ def _of_shape(
     return Finding(
         effect=shape.effect,
         tied=(),
-        explains=share_explained(tested, base, dataset),
+        explains=max(share_explained(tested, base, dataset), 0.0),
         tested=tested,
         chosen=chosen,
         unit=fit.axis.units.force,

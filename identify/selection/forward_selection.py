@@ -128,7 +128,10 @@ def _next(
         best = ranking[0]
         near = tuple(c for c in _near(best, ranking) if c.supported)
         tied = tuple(c.effect.name for c in near if tie(dataset, best, c))
-        return [Step(best, tied or _friction_instead(base, best, ranking), rivals=near)]
+        instead = () if tied else _friction_instead(base, best, ranking)
+        tied = tied or tuple(c.effect.name for c in instead)
+        rivals = (*near, *(c for c in instead if c not in near))
+        return [Step(best, tied, rivals=rivals)]
     if base.at_floor or held_at_floor(base, dataset):
         return []
     if not any(map(_foretells, ranking)) and is_unpredictable(base, dataset):
@@ -155,7 +158,9 @@ def _is_added(best: Candidate, base: Fit) -> bool:
     return best.supported and (not base.at_floor or best.delta_bic > RULE.beyond_doubt)
 
 
-def _friction_instead(base: Fit, best: Candidate, ranking: Sequence[Candidate]) -> tuple[str, ...]:
+def _friction_instead(
+    base: Fit, best: Candidate, ranking: Sequence[Candidate]
+) -> tuple[Candidate, ...]:
     """A friction that also explains nearly all, if the best candidate removes the dry friction.
 
     A machine always has dry friction. If adding a hysteresis removes all of it, the hysteresis is
@@ -164,9 +169,7 @@ def _friction_instead(base: Fit, best: Candidate, ranking: Sequence[Candidate]) 
     if not took_friction(base.axis, best.fit.axis):
         return ()
     frictions = (c for c in ranking if c.effect.kind is Kind.FRICTION and c.supported)
-    return tuple(c.effect.name for c in frictions if part_explained(base, c.fit) > RULE.nearly_all)[
-        :1
-    ]
+    return tuple(c for c in frictions if part_explained(base, c.fit) > RULE.nearly_all)[:1]
 
 
 def _near(best: Candidate, ranking: Sequence[Candidate]) -> tuple[Candidate, ...]:

@@ -42,7 +42,8 @@ class Candidate:
     plausible: whether the axis travels far enough for what repeats along the track to be seen to,
     as one cycle over all of the travel is any smooth force of position; and no time, length or
     frequency of the law ended at its bound, beyond which it is another law. beats_decoys: whether
-    it was set against them, and held.
+    it was set against them, and held; of a friction, which has none, whether it leaves clearly
+    less.
     """
 
     effect: Effect
@@ -113,12 +114,12 @@ def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
 
 
 def _beats_decoys(base: Fit, candidate: Candidate, dataset: Dataset) -> bool:
-    """Whether a held-out gain that is large, but uneven over the blocks, is the effect's own.
+    """Whether a held-out gain that is uneven over the blocks is the effect's own.
 
     Where much else is left, blocks differ by that; a few may hold most of it, so that the whole
     error hardly falls although that of a typical block does.
     """
-    if not candidate.gain.after < candidate.gain.before:
+    if not (candidate.gain.t > 0.0 and candidate.gain.after < candidate.gain.before):
         return False
     name = candidate.effect.name
     beside = proof(base, candidate.fit.axis[name], dataset)
@@ -130,7 +131,7 @@ def _beats_decoys(base: Fit, candidate: Candidate, dataset: Dataset) -> bool:
 def _is_clear(candidate: Candidate) -> bool:
     """Whether a friction, which has no decoys, leaves clearly less of the held-out square."""
     gain, rubs = candidate.gain, candidate.effect.kind is Kind.FRICTION
-    return rubs and gain.t > RULE.tie and gain.after**2 < RULE.beside_decoys * gain.before**2
+    return rubs and gain.t > RULE.friction_t and gain.after**2 < RULE.beside_decoys * gain.before**2
 
 
 def _is_plausible(fit: Fit, effect: Effect, dataset: Dataset) -> bool:

@@ -157,7 +157,7 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
     Right is a wrong shape where the machine's law has another, and so over the coordinate of what
     is planted where that is a friction in place of the model's or the catalogue has no name for it;
     and that a missing effect only resembles one of the catalogue where what is planted is none, or
-    is that one with another value of what a model holds by design.
+    is that one with another value of what a fit holds, such as an exponent.
     """
     names = (finding.effect, *finding.tied)
     match finding.kind:
@@ -175,9 +175,9 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
 
 
 def _is_another(planted: Fitted) -> bool:
-    """Whether a planted law has another value than the catalogue of what a fit does not change."""
-    usual = Fitted.at_start(planted.effect)
-    return any(planted.values[name] != usual.values[name] for name in usual.fixed)
+    """Whether the planted law has another shape value than the catalogue's that a fit holds."""
+    held = [p for p in planted.effect.parameters if p.fixed and not p.strength]
+    return any(p.start_rule is None and planted.values[p.name] != p.start for p in held)
 
 
 def _is_shape_of(planted: Effect, finding: Finding, built: Machine, case: Case) -> bool:

@@ -101,7 +101,7 @@ class AxisAgreement:
 
     @property
     def of_wrong_models(self) -> bool:
-        """Whether a fit is far above its noise floor, so that its intervals are scatter alone."""
+        """Whether a fit's error is more than noise, so that its intervals are scatter alone."""
         return max(self.above_floor) > LARGEST_RATIO
 
 

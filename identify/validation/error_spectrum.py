@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.noise_floor import noise_of
+from identify.dataset.noise_floor import Noise, noises_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.spectrum import densities, pieces_of
 from identify.estimation.force_balance import residual
@@ -43,7 +43,8 @@ def bands(axis: AxisModel, logs: Sequence[PreparedLog]) -> Bands:
     response, up to the frequency at which they pass a fifth of the power. Where static friction is
     undetermined the error counts as zero.
     """
-    spectra = [_spectrum(axis, log) for log in logs]
+    noises = noises_of(axis, [log.motion for log in logs])
+    spectra = [_spectrum(axis, log, noise) for log, noise in zip(logs, noises, strict=True)]
     weights = [log.motion.time[-1] for log in logs]
     frequency = min((s[0] for s in spectra), key=lambda f: f[-1])
     powers = [
@@ -58,7 +59,7 @@ def bands(axis: AxisModel, logs: Sequence[PreparedLog]) -> Bands:
     return Bands(edges[:-1], edges[1:], *sums)
 
 
-def _spectrum(axis: AxisModel, log: PreparedLog) -> tuple[Array, Array, Array, Array]:
+def _spectrum(axis: AxisModel, log: PreparedLog, noise: Noise) -> tuple[Array, Array, Array, Array]:
     """Of one log: frequencies Hz, power N^2/Hz of error, noise and what is to be explained."""
     motion = log.motion
     short = PreparedLog.of(motion, SHORTEST * motion.period)
@@ -72,7 +73,6 @@ def _spectrum(axis: AxisModel, log: PreparedLog) -> tuple[Array, Array, Array, A
     ratio = round(period / motion.sample_period)
     passed = short.test_function.response(motion.sample_period, segment * ratio)[: len(frequency)]
     passed_band = (passed > LEAST_PASSED) & (frequency > 0.0)
-    noise = noise_of(axis, motion)
     frequency = frequency[passed_band]
     error, explain = power[:, passed_band] / passed[passed_band]
     return frequency, error, np.interp(frequency, noise.frequency, noise.power), explain

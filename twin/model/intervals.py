@@ -24,8 +24,9 @@ COMMENT = "90 % intervals of the fit that wrote this file; for `twin agree`"
 class AxisIntervals:
     """Low and high ends (90 %) by parameter label, in the parameters' units.
 
-    above_floor: force error of the fit over its noise floor. Where it is large the model is wrong,
-    and the ends tell how far the values scatter from one part of the logs to another, no more.
+    above_floor: force error of the fit over its noise floor. Where it is more than noise the model
+    is wrong, and the ends tell how far the values scatter from one part of the logs to another, no
+    more.
     """
 
     ends: Mapping[str, Interval]

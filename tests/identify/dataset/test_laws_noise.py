@@ -21,6 +21,7 @@ from identify.dataset.noise_floor import (
     floor_of,
     noise_floor,
     noise_of,
+    noises_of,
 )
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, on_blocks, total_force
 from identify.dataset.test_function import TestFunction
@@ -67,18 +68,13 @@ def test_the_floor_is_in_proportion_to_the_noise_and_falls_with_the_window():
 
 
 def test_the_square_of_a_floor_of_logs_is_the_mean_of_theirs_weighed_by_their_lengths():
-    """Of readings with unlike noise; the force of a machine is as noisy in each log."""
     axis = AxisModel(MASS)
-    logs = [noisy(4, 0.02, 3e-7, duration=3.0), noisy(5, 0.02, 6e-7, duration=7.0)]
-    own = [noise_of(axis, log.motion) for log in logs]
-    force = min(noise.force for noise in own)
+    logs = [noisy(4, 0.02, duration=3.0), noisy(5, 0.025, duration=9.0)]
+    own = [floor_of(axis, [log]) ** 2 for log in logs]
     parts = [len(log.motion.time) for log in logs]
-    sizes = [
-        passed(log.fine, *np.sqrt(np.array([force, noise.reading]) * RATE / 2.0))
-        for log, noise in zip(logs, own, strict=True)
-    ]
-    wanted = np.average(np.square(sizes), weights=parts)
-    assert floor_of(axis, logs) ** 2 == pytest.approx(wanted, rel=0.05)
+    assert parts[1] > 2.5 * parts[0]
+    wanted = (own[0] * parts[0] + own[1] * parts[1]) / sum(parts)
+    assert floor_of(axis, logs) ** 2 == pytest.approx(wanted, rel=1e-9)
     pairs = [(log.motion, log.test_function) for log in logs]
     assert noise_floor(axis, pairs[::-1]) == pytest.approx(floor_of(axis, logs))
 
@@ -90,6 +86,30 @@ def test_what_one_log_has_more_of_in_the_band_is_no_noise():
     alone, both = (floor_of(axis, logs) for logs in ([quiet], [struck, quiet]))
     assert both == pytest.approx(alone, rel=0.02)
     assert floor_of(axis, [struck]) > 2.5 * alone
+    near = noisy(5, 0.024)  # within what estimates scatter each log keeps its own
+    each = [floor_of(axis, [log]) ** 2 for log in (near, quiet)]
+    assert floor_of(axis, [near, quiet]) ** 2 == pytest.approx(np.mean(each), rel=1e-9)
+
+
+def test_a_log_whose_reading_hides_the_force_leaves_room_for_so_much_noise_of_it():
+    axis = AxisModel(MASS)
+    hidden, loud = noisy(6, 1e-5, 4e-7), noisy(7, 2.0)
+    own = noise_of(axis, hidden.motion)
+    assert own.force < 0.5 * own.most
+    _, found = noises_of(axis, [hidden.motion, loud.motion])
+    assert found.force == own.most
+
+
+def test_logs_of_unlike_rates_have_noise_of_their_own():
+    """As large a noise of each sample has more power below half the rate where that is lower."""
+    axis = AxisModel(MASS)
+    t = np.arange(2000) / (0.25 * RATE)
+    u = MASS * PUSH(t + 2.0 / RATE) + np.random.default_rng(8).normal(0.0, 0.02, len(t))
+    slow = windowed(motion_of(log_of(0.25 * RATE, PLACE(t), u), "x", "", ripples=()), 0.04)
+    fast = noisy(4, 0.02)
+    apart = [noise_of(axis, log.motion).force for log in (slow, fast)]
+    assert apart[0] > 3.0 * apart[1]
+    assert [n.force for n in noises_of(axis, [slow.motion, fast.motion])] == apart
 
 
 def test_what_the_model_explains_is_no_noise():

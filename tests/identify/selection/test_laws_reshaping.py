@@ -168,29 +168,3 @@ def test_a_curve_takes_the_place_of_a_finding_only_where_it_does_as_well_on_the_
     """8 N there without the effect and 2.5 N with it: the curve may leave 2.5^2 / 0.8."""
     found = against(monkeypatch, Proof(0.9, 0.0), left=1.5, fitted_to=part)
     assert [f.kind.value for f in found] == (["wrong_shape"] if rivals else ["missing"])
-
-
-@pytest.mark.parametrize(
-    ("lowers", "beside_others", "told"),
-    [
-        ((True, False), True, [0]),
-        ((False, False), True, []),
-        ((True, False), False, [0]),
-        ((False, False), False, [0, 1]),  # alone they are the answer
-    ],
-)
-def test_a_curve_that_lowers_no_error_any_more_is_not_told(
-    monkeypatch, lowers, beside_others, told
-):
-    diagnoses = importlib.import_module("identify.selection.diagnosis")
-    sizes = made.FOUND[0].chosen
-    shapes = [
-        replace(made.FOUND[i], chosen=replace(sizes, before=2.0, after=1.9 if low else 2.1))
-        for i, low in enumerate(lowers)
-    ]
-    waiting = iter(shapes)
-    monkeypatch.setattr(diagnoses, "found_reshaped", lambda *_: next(waiting))
-    curves = (SimpleNamespace(shape=None, before=BASE),) * 2
-    whole = AxisDiagnosis(DATASET, BASE, (), (), CURVED, Verdict.WRONG_SHAPE, None, curves=curves)
-    found = whole._reshaped(beside_others=beside_others)
-    assert [shapes.index(f) for f in found] == told

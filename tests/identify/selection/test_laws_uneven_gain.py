@@ -35,21 +35,23 @@ def test_beating_the_decoys_stands_for_an_even_gain_alone(t, beats, bic, after, 
 
 
 @pytest.mark.parametrize(
-    ("part", "proof", "beats"),
+    ("part", "t", "proof", "beats"),
     [
-        (0.99, Proof(0.9, 0.1), True),
-        (1.01, Proof(0.9, 0.1), False),  # not asked
-        (0.99, Proof(0.9, 0.88), False),
-        (0.99, None, False),  # a friction has no decoys
+        (0.99, 0.1, Proof(0.9, 0.1), True),
+        (1.01, 0.1, Proof(0.9, 0.1), False),  # not asked
+        (0.99, -0.1, Proof(0.9, 0.1), False),  # nor where a typical block loses
+        (0.99, 0.1, Proof(0.9, 0.88), False),
+        (0.99, 0.1, None, False),  # none are made of what depends on the time alone
     ],
 )
-def test_an_effect_must_lower_the_held_out_error_and_hold(monkeypatch, part, proof, beats):
+def test_an_effect_must_lower_the_held_out_error_and_hold(monkeypatch, part, t, proof, beats):
     base = built_fit(5.0)
-    made = replace(built("wear"), gain=Gain(2.0, 2.0 * np.sqrt(part), 1.0))
+    made = replace(built("wear"), gain=Gain(2.0, 2.0 * np.sqrt(part), t))
 
     def asked(without, fitted, dataset):
         assert (without, fitted, dataset) == (base, made.fit.axis["wear"], "data")
         assert part < 1.0
+        assert t > 0.0
         return proof
 
     monkeypatch.setattr(module, "proof", asked)

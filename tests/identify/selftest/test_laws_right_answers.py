@@ -12,7 +12,7 @@ from built_results import errors
 from identify.selection.findings import Finding, FindingKind
 from identify.selftest.case import Case
 from identify.selftest.laws import OUTSIDE
-from identify.selftest.trial import _answer
+from identify.selftest.trial import _answer, _is_another
 from twin.curve import Coordinate
 from twin.model.machine import Fitted
 
@@ -83,3 +83,11 @@ def test_what_resembles_is_right_where_the_machine_has_another_exponent(told, n,
     finding = Finding(told, (), 0.9, *errors(2.0, 1.0), "N", {}, None)
     finding = replace(finding, kind=FindingKind.RESEMBLES)
     assert _answer(finding, built, Case(("dahl",), 5.0, 1)).right is right
+
+
+@pytest.mark.parametrize("planted", ["position_dependent_friction", "coulomb_viscous"])
+def test_a_start_by_the_travel_or_a_held_strength_is_no_other_law(planted):
+    assert not _is_another(fitted(planted, **DRAWN[planted]))
+
+
+DRAWN = {"position_dependent_friction": {"start": -0.07}, "coulomb_viscous": {"Fs": 0.3}}

@@ -37,7 +37,7 @@ def test_the_error_by_frequency_is_the_residual_in_its_band():
 
 def test_the_power_of_logs_is_weighed_by_their_lengths():
     axis = AxisModel(MASS)
-    logs = [noisy(15, 0.02, duration=5.0), noisy(16, 0.2, duration=9.0)]
+    logs = [noisy(15, 0.02, duration=5.0), noisy(16, 0.025, duration=9.0)]
     one, two, both = (bands(axis, part) for part in (logs[:1], logs[1:], logs))
     ends = [log.motion.time[-1] for log in logs]
     wide = one.low > 10.0
