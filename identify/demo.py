@@ -25,7 +25,7 @@ from twin.model.file import save_model
 from twin.model.machine import Fitted, MachineModel
 from twin.simulator import ReducedSimulator
 
-DURATION = 15.0  # s of each log
+DURATION = 12.0  # s of each log
 TRAINING, SELECTION, TEST = ("tracking", "moves"), "tracking", "moves"  # run for each role
 FORCE = 0.05  # N RMS of the hidden effect, about 50 times the noise floor
 VISIBLE = 0.5  # least part of the hidden force that a fit without the effect cannot absorb
