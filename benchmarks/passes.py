@@ -2,8 +2,8 @@
 
 A pass is the CPU time of the baseline's laws (LuGre, cable, spikes), fused by hand in numba, over
 all samples of the logs, before and after each command: what no identification can go below, and a
-unit that holds for any machine. Costs are of whole processes, less that of `twin effects`, which
-starts as they do.
+unit that follows the speed of the machine, though not alike on each. Costs are of whole processes,
+less that of `twin effects`, which starts as they do.
 """
 
 from __future__ import annotations

@@ -65,8 +65,7 @@ def found(
     effect: Effect, tied: tuple[str, ...], base: Fit, final: Fit, without: Fit, dataset: Dataset
 ) -> Finding:
     """The finding of one effect of a final fit; without: the same fit less this effect alone."""
-    chosen = Errors.of(without, final, dataset, dataset.chosen_on)
-    tested = Errors.of(without, final, dataset, Role.TEST) if dataset.test else chosen
+    chosen, tested = _errors(without, final, dataset)
     fitted = final.axis[effect.name]
     return Finding(
         effect=effect.name,
@@ -103,9 +102,13 @@ def found_reshaped(
     if shape.effect not in axis.names:
         axis = axis.with_effect(before.axis[shape.effect])
     without = fit_axis(axis, dataset.fit)
+    return _of_shape(shape, base, before, dataset, _errors(without, final, dataset))
+
+
+def _errors(without: Fit, final: Fit, dataset: Dataset) -> tuple[Errors, Errors]:
+    """On the logs that chose, and on test logs; without these the first twice."""
     chosen = Errors.of(without, final, dataset, dataset.chosen_on)
-    tested = Errors.of(without, final, dataset, Role.TEST) if dataset.test else chosen
-    return _of_shape(shape, base, before, dataset, (chosen, tested))
+    return chosen, Errors.of(without, final, dataset, Role.TEST) if dataset.test else chosen
 
 
 def _of_shape(

@@ -131,7 +131,8 @@ def _beats_decoys(base: Fit, candidate: Candidate, dataset: Dataset) -> bool:
 def _is_clear(candidate: Candidate) -> bool:
     """Whether a friction, which has no decoys, leaves clearly less of the held-out square."""
     gain, rubs = candidate.gain, candidate.effect.kind is Kind.FRICTION
-    return rubs and gain.t > RULE.friction_t and gain.after**2 < RULE.beside_decoys * gain.before**2
+    clearly = gain.after**2 < RULE.beside_decoys * gain.before**2
+    return bool(rubs and gain.t > RULE.friction_t and clearly)
 
 
 def _is_plausible(fit: Fit, effect: Effect, dataset: Dataset) -> bool:

@@ -115,14 +115,16 @@ def best_shape(fit: Fit, dataset: Dataset, effect: str) -> WrongShape | None:
 
 def gain_on_test_logs(found: WrongShape, fit: Fit, dataset: Dataset) -> float:
     """Part of a fit's squared error that a free curve takes on the test logs in one linear step."""
-    trial = Trial.of(fit, replace(dataset, holdout=dataset.test))
-    return _proofs(trial, found.shape, fit, dataset)[0].gain
+    return _gain(found, fit, replace(dataset, holdout=dataset.test))
 
 
 def gain_on_fit_logs(found: WrongShape, fit: Fit, dataset: Dataset) -> float:
     """The same on the fit logs, each block by the step of the others."""
-    trial = replace(Trial.of(fit, dataset), held=None)
-    return _proofs(trial, found.shape, fit, dataset)[0].gain
+    return _gain(found, fit, replace(dataset, holdout=()))
+
+
+def _gain(found: WrongShape, fit: Fit, dataset: Dataset) -> float:
+    return _proofs(Trial.of(fit, dataset), found.shape, fit, dataset)[0].gain
 
 
 def having_shape(effect: Effect, model: MachineModel, axis: str | None) -> list[str]:

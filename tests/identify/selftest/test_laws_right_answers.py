@@ -85,9 +85,9 @@ def test_what_resembles_is_right_where_the_machine_has_another_exponent(told, n,
     assert _answer(finding, built, Case(("dahl",), 5.0, 1)).right is right
 
 
-@pytest.mark.parametrize("planted", ["position_dependent_friction", "coulomb_viscous"])
-def test_a_start_by_the_travel_or_a_held_strength_is_no_other_law(planted):
-    assert not _is_another(fitted(planted, **DRAWN[planted]))
-
-
-DRAWN = {"position_dependent_friction": {"start": -0.07}, "coulomb_viscous": {"Fs": 0.3}}
+@pytest.mark.parametrize(
+    ("planted", "values"),
+    [("position_dependent_friction", {"start": -0.07}), ("coulomb_viscous", {"Fs": 0.3})],
+)
+def test_a_start_by_the_travel_or_a_held_strength_is_no_other_law(planted, values):
+    assert not _is_another(fitted(planted, **values))
