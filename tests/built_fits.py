@@ -81,13 +81,18 @@ def built(
     fit: Fit | None = None,
     gain: float | None = None,
     axis: str = "x",
+    typical: float | None = None,
 ) -> Candidate:
-    """A candidate with this difference of BIC; gain: of the log squared error, alone."""
+    """A candidate with this difference of BIC; gain: of the log squared error, alone.
+
+    typical: part of the squared error of a typical block that is left; as of the whole where None.
+    """
     effect = CATALOGUE[effect] if isinstance(effect, str) else effect
     proof = Evidence(bic / 100.0 if gain is None else gain, 0, 100.0)
     if fit is None:
         fit = built_fit(after, axis=axis_of().with_effect(Fitted.at_start(effect)))
-    return Candidate(effect, axis, fit, proof, Gain(before, after, t))
+    held = Gain(before, after, t, (after / before) ** 2 if typical is None else typical)
+    return Candidate(effect, axis, fit, proof, held)
 
 
 def step(effect: str = "cogging", tied: tuple[str, ...] = (), **changes: object) -> Step:

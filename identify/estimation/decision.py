@@ -42,7 +42,7 @@ class DecisionRule:
     same_error: relative error that simpler values may have. pair_first: part of the squared error
     that the first of two effects must explain alone.
 
-    beside_decoys: part of what its best decoy leaves of the squared error that an effect may leave;
+    beside_decoys: part of what its decoys leave of the squared error that an effect may leave;
     of what the fit without it leaves, where it has no decoys.
     least_finding: least part of the squared error that one of several effects must explain; the law
     of another, a tenth off, leaves as much.

@@ -76,11 +76,15 @@ def evidence(before: Array, after: Array, parameters: int) -> Evidence:
 
 @dataclass(frozen=True)
 class Gain:
-    """Held-out errors (RMS N) before and after, and the gain's t value across blocks."""
+    """Held-out errors (RMS N) before and after, and the gain's t value across blocks.
+
+    typical: part of the squared error of a typical block that is left; see held_out_gain.
+    """
 
     before: float
     after: float
     t: float
+    typical: float = 1.0
 
     @property
     def falls(self) -> bool:
@@ -91,8 +95,8 @@ class Gain:
 def held_out_gain(before: Array, after: Array, floor: float) -> Gain:
     """Compare two models on the same held-out residual samples (n,) N, with noise floor (N).
 
-    t is that of the logarithm of squared error plus squared floor, block by block, so that a few
-    blocks with large errors do not decide alone.
+    t and the typical part are those of the logarithm of squared error plus squared floor, block by
+    block, so that a few blocks with large errors do not decide alone.
     """
     if not len(before):  # at rest within every test function
         return Gain(np.nan, np.nan, 0.0)
@@ -103,7 +107,8 @@ def held_out_gain(before: Array, after: Array, floor: float) -> Gain:
     gains = np.log(sums[0] / sums[1])
     spread = gains.std(ddof=1) / np.sqrt(blocks) if blocks > 1 else np.inf
     t = gains.mean() / spread if spread > 0 else 0.0
-    return Gain(float(np.sqrt(np.mean(before**2))), float(np.sqrt(np.mean(after**2))), float(t))
+    typical = float(np.exp(-gains.mean()))
+    return Gain(rms(before), rms(after), float(t), typical)
 
 
 def noise_gain(residual: Array, before: float, after: float) -> float:

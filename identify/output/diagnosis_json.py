@@ -85,7 +85,7 @@ def _finding(f: Finding) -> dict[str, Any]:
         "unit": f.unit,
         "parameters": f.parameters,
         "gain": f.proof and f.proof.gain,
-        "best_decoy": f.proof and f.proof.best_decoy,
+        "decoy": f.proof and f.proof.decoy,
         "of_typical_block": f.proof and f.proof.typical,
         "shape": f.shape and _shape(f.shape),
     }

@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 Columns = Callable[[Sequence[PreparedLog]], list[Array]]
 
 DECOYS = 40
+RARE = 0.05  # of the decoys take more than that which an effect is set against
 SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
 SEED = 0  # of the shifts, the same for each effect
 RIDGE = 1e-4  # of a column's length, which keeps what the motion does not excite finite
@@ -40,20 +41,21 @@ TINY = 1e-100  # of anything that is nothing, as a column where the motion excit
 
 @dataclass(frozen=True)
 class Proof:
-    """Part of the squared test error that an effect takes, and the most that a decoy takes, 0..1.
+    """Part of the squared test error that an effect takes, and that only RARE decoys exceed, 0..1.
 
-    Both may be below zero, where the test error rises. typical: whether of that of a typical block,
+    The most that one of them takes is chance: some shift nearly repeats a motion that repeats. Both
+    may be below zero, where the test error rises. typical: whether of that of a typical block,
     not of all of it.
     """
 
     gain: float
-    best_decoy: float
+    decoy: float
     typical: bool = False
 
     @property
     def holds(self) -> bool:
-        """Whether the effect leaves clearly less than its best decoy."""
-        return 1.0 - self.gain < RULE.beside_decoys * (1.0 - self.best_decoy)
+        """Whether the effect leaves clearly less than its decoys."""
+        return 1.0 - self.gain < RULE.beside_decoys * (1.0 - self.decoy)
 
 
 def proof(without: Fit, fitted: Fitted, dataset: Dataset) -> Proof | None:
@@ -83,7 +85,7 @@ def proof(without: Fit, fitted: Fitted, dataset: Dataset) -> Proof | None:
 
 def clearer(proofs: tuple[Proof, Proof]) -> Proof:
     """The one that parts an effect and its decoys more."""
-    return min(proofs, key=lambda p: (1.0 - p.gain) / (1.0 - p.best_decoy))
+    return min(proofs, key=lambda p: (1.0 - p.gain) / (1.0 - p.decoy))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,8 +129,10 @@ class Trial:
         before = left(None)
         gains = 1.0 - left(np.zeros(count)) / before
         shifts = np.random.default_rng(SEED).uniform(*SHIFTS, (decoys, count))
-        untrue = [np.full(2, -np.inf), *(1.0 - left(s) / before for s in shifts)]
-        whole, typical = np.stack([gains, np.max(untrue, axis=0)], axis=1)
+        untrue = [1.0 - left(s) / before for s in shifts] or [np.full(2, -np.inf)]
+        whole, typical = np.stack(
+            [gains, np.quantile(untrue, 1.0 - RARE, axis=0, method="inverted_cdf")], axis=1
+        )
         (gain, decoy), (usual, usual_decoy) = whole.tolist(), typical.tolist()
         return Proof(gain, decoy), Proof(usual, usual_decoy, typical=True)
 

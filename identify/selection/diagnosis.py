@@ -227,7 +227,7 @@ class AxisDiagnosis:
 def _takes_as_much(wrong: Finding, finding: Finding) -> bool:
     """Whether a curve beats its decoys, and takes about as much error on the logs that chose."""
     taken, needed = (f.chosen.before**2 - f.chosen.after**2 for f in (wrong, finding))
-    beats = wrong.proof is not None and wrong.proof.gain > wrong.proof.best_decoy
+    beats = wrong.proof is not None and wrong.proof.gain > wrong.proof.decoy
     return beats and taken > RULE.near * needed > 0.0
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -130,8 +130,8 @@ def _next(
         tied = tuple(c.effect.name for c in near if tie(dataset, best, c))
         instead = () if tied else _friction_instead(base, best, ranking)
         tied = tied or tuple(c.effect.name for c in instead)
-        rivals = (*near, *(c for c in instead if c not in near))
-        return [Step(best, tied, rivals=rivals)]
+        rivals = dict.fromkeys((*near, *instead, *_sisters(best, ranking)))
+        return [Step(best, tied, rivals=tuple(rivals))]
     if base.at_floor or held_at_floor(base, dataset):
         return []
     if not any(map(_foretells, ranking)) and is_unpredictable(base, dataset):
@@ -172,6 +172,14 @@ def _friction_instead(
     return tuple(c for c in frictions if part_explained(base, c.fit) > RULE.nearly_all)[:1]
 
 
+def _sisters(best: Candidate, ranking: Sequence[Candidate]) -> Iterable[Candidate]:
+    """The other supported frictions, of a friction: effects still absent may part them wrongly."""
+    if best.effect.kind is not Kind.FRICTION:
+        return ()
+    frictions = (c for c in ranking if c.effect.kind is Kind.FRICTION and c.supported)
+    return (c for c in frictions if c is not best)
+
+
 def _near(best: Candidate, ranking: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """The other candidates that explain about as much as the best; dead times are all alike."""
     least = RULE.near * best.evidence.log_gain
@@ -193,11 +201,11 @@ def _eliminated_backwards(
             dropped.append(candidate.effect.name)
             continue
         without = less(candidate.effect, fit, base, dataset)
-        needed = score(without, fit, dataset, candidate.effect).supported
+        needed = _is_added(score(without, fit, dataset, candidate.effect), without)
         if needed:
             # The shapes of later effects were found beside this one; they may differ without it.
             without = fit_thoroughly(without.axis, dataset)
-            needed = score(without, fit, dataset, candidate.effect).supported
+            needed = _is_added(score(without, fit, dataset, candidate.effect), without)
         if not needed:
             fit = without
             dropped.append(candidate.effect.name)

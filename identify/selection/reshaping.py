@@ -58,16 +58,24 @@ def curve_in_place(
 
 
 def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:
-    """The free curve that leaves clearly less than the best absent effect; None where none does."""
+    """The free curve that leaves clearly less than each absent effect; None where none does.
+
+    Less of the whole squared test error; or of that of a typical block, and no more on the fit
+    logs: a force at a few places of the test logs decides their whole error alone.
+    """
     shape = wrong_shape(fit, dataset)
     if shape is None or shape.shape.curve.rubs:
         return None
-    supported = [c.gain.after for c in ranking if c.supported]
-    most = RULE.beside_decoys * min(supported, default=np.inf) ** 2
-    if BY_REFIT * (1.0 - shape.proof.gain) * error_in(dataset.chosen_on, fit, dataset) ** 2 > most:
+    rivals = [c for c in ranking if c.supported]
+    whole = RULE.beside_decoys * min((c.gain.after**2 for c in rivals), default=np.inf)
+    typical = RULE.beside_decoys * min((c.gain.typical for c in rivals), default=np.inf)
+    least = BY_REFIT * (1.0 - max(shape.taken, shape.proof.gain))
+    if least * error_in(dataset.chosen_on, fit, dataset) ** 2 > whole and least > typical:
         return None
     curve = fit_in_place(fit, dataset, shape.shape)
-    return None if curve.gain.after**2 > most else Reshaped(shape, fit, curve.fit)
+    fitted = min((c.fit.error for c in rivals), default=np.inf)
+    usually = curve.gain.typical <= typical and curve.fit.error <= fitted
+    return Reshaped(shape, fit, curve.fit) if curve.gain.after**2 <= whole or usually else None
 
 
 def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:

@@ -93,7 +93,7 @@ def _foretells(trial: Trial, columns: Columns, least: float, sticking: bool) -> 
     if proof.gain < least:
         return False
     proof, _ = trial.proofs(columns, sticking=sticking, decoys=DECOYS)
-    return proof.gain > proof.best_decoy
+    return proof.gain > proof.decoy
 
 
 def _kept_small(columns: Columns, dataset: Dataset) -> Columns:

@@ -101,7 +101,7 @@ def _without_small(
 def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:
     """Whether an effect leaves clearly less of the held-out logs than the fit without it.
 
-    Less than its best decoy, where a shift in time makes one. Noise has no force; the readings
+    Less than its decoys, where a shift in time makes one. Noise has no force; the readings
     themselves show it.
     """
     if is_noise(effect):

@@ -20,7 +20,7 @@ from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian
-from identify.selection.decoys import Proof, Trial, clearer
+from identify.selection.decoys import DECOYS, Proof, Trial, clearer
 from identify.selection.smoothed import STIFFNESS, Linearised, choose_stiffness
 from twin.curve import Curve
 from twin.effect import Effect, Kind
@@ -30,7 +30,6 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import ParameterReference
 from twin.signals import Array
 
-DECOYS = 20
 COARSELY = STIFFNESS[::2]  # how smooth a curve may be, to tell whether it helps
 
 
@@ -96,7 +95,7 @@ def likely_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
     """
     trial = Trial.of(fit, dataset)
     shapes = [s for s in _shapes(fit, dataset) if _rubs(trial, s, fit, dataset)]
-    found = [(s, max(p.gain for p in _proofs(trial, s, fit, dataset))) for s in shapes]
+    found = [(s, max(p.gain for p in _proofs(trial, s, fit, dataset, decoys=0))) for s in shapes]
     if not found:
         return None
     least = min(1.0 - gain for _, gain in found)
@@ -124,7 +123,7 @@ def gain_on_fit_logs(found: WrongShape, fit: Fit, dataset: Dataset) -> float:
 
 
 def _gain(found: WrongShape, fit: Fit, dataset: Dataset) -> float:
-    return _proofs(Trial.of(fit, dataset), found.shape, fit, dataset)[0].gain
+    return _proofs(Trial.of(fit, dataset), found.shape, fit, dataset, decoys=0)[0].gain
 
 
 def having_shape(effect: Effect, model: MachineModel, axis: str | None) -> list[str]:
@@ -223,16 +222,16 @@ def _rubs(trial: Trial, shape: Shape, fit: Fit, dataset: Dataset) -> bool:
         return True
     turned = shape.empty.effect.parts[1].name
     alone = replace(shape, stiffness={turned: shape.stiffness[turned]})
-    return clearer(_proofs(trial, alone, fit, dataset, decoys=DECOYS)).holds
+    return clearer(_proofs(trial, alone, fit, dataset)).holds
 
 
 def _with_proof(trial: Trial, shape: Shape, fit: Fit, dataset: Dataset) -> WrongShape:
-    proofs = _proofs(trial, shape, fit, dataset, decoys=DECOYS)
+    proofs = _proofs(trial, shape, fit, dataset)
     return WrongShape(shape, clearer(proofs), taken=proofs[0].gain)
 
 
 def _proofs(
-    trial: Trial, shape: Shape, fit: Fit, dataset: Dataset, decoys: int = 0
+    trial: Trial, shape: Shape, fit: Fit, dataset: Dataset, decoys: int = DECOYS
 ) -> tuple[Proof, Proof]:
     """Of the whole error and of that of a typical block."""
     resting = sticking(fit, shape)

@@ -113,10 +113,11 @@ def run(case: Case) -> TrialResult:
     begun = process_time()
     try:
         built = _built(case, catalogue)
+        dataset = prepared(built, case.strength)
     except NotShown:
         return TrialResult(case, shown=False, seconds=process_time() - begun)
     known = [e for e in catalogue.values() if case.known or e.name not in case.effects]
-    dataset, base = fit_aligned(built.model.axes[AXIS], prepared(built))
+    dataset, base = fit_aligned(built.model.axes[AXIS], dataset)
     found = diagnose_axis(base, dataset, Catalogue(known), workers=1).with_findings()
     return TrialResult(
         case=case,
@@ -137,9 +138,10 @@ def fitted(case: Case) -> TrialResult:
     """Make the machine and fit its model, without a diagnosis: where the truth of it lies."""
     try:
         built = _built(case, load_catalogue())
+        dataset = prepared(built, case.strength)
     except NotShown:
         return TrialResult(case, shown=False)
-    _, base = fit_aligned(built.model.axes[AXIS], prepared(built))
+    _, base = fit_aligned(built.model.axes[AXIS], dataset)
     return TrialResult(case, ratio=base.ratio, held=_held(built, base))
 
 

@@ -71,9 +71,9 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     sure = f"confidence {100.0 * finding.confidence:.0f} %"
     if finding.proof is None:
         return f"{text}; {sure}"
-    gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.best_decoy))
+    gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.decoy))
     of_it = "that of a typical part" if finding.proof.typical else "it"
-    step = f"in one linear step it takes {gain:.0f} % of {of_it}, its best decoy {decoy:.0f} %"
+    step = f"in one linear step it takes {gain:.0f} % of {of_it}, one decoy in twenty {decoy:.0f} % or more"
     return f"{text}; {step}; {sure}"
 
 

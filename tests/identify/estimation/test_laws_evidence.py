@@ -73,6 +73,7 @@ def test_a_held_out_gain_is_a_t_test_over_blocks():
     assert found.t == pytest.approx(wanted)
     assert found.before == pytest.approx(np.sqrt(np.mean(before**2)))
     assert found.after == pytest.approx(np.sqrt(np.mean(after**2)))
+    assert found.typical == pytest.approx(np.exp(-np.mean(gains)))
     assert held_out_gain(after, before, floor).t == pytest.approx(-wanted)
     assert held_out_gain(before, before, floor).t == 0.0
     assert held_out_gain(before[:1], after[:1], floor).t == 0.0

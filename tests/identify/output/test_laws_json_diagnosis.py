@@ -91,14 +91,14 @@ FINDINGS = [
         "indistinguishable_from": ["quadratic_drag"], "test_error_before": 7.17,
         "test_error_after": 2.19, "test_error_on": "selection", "unit": "N",
         "parameters": {"p": 0.0261},
-        "gain": 0.813, "best_decoy": 0.137, "of_typical_block": False, "shape": None,
+        "gain": 0.813, "decoy": 0.137, "of_typical_block": False, "shape": None,
         "confidence": made.FOUND[0].confidence,
     },
     {
         "effect": "lugre", "kind": "missing", "explains": 0.119,
         "indistinguishable_from": [], "test_error_before": 3.23, "test_error_after": 2.19,
         "test_error_on": "selection", "unit": "N", "parameters": {"Fc": 0.31},
-        "gain": None, "best_decoy": None, "of_typical_block": None, "shape": None,
+        "gain": None, "decoy": None, "of_typical_block": None, "shape": None,
         "confidence": made.FOUND[1].confidence,
     },
 ]  # fmt: skip

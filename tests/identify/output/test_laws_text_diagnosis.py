@@ -57,7 +57,7 @@ def test_a_diagnosis():
     assert rest[:3] == [
         "cogging explains 87 % of the squared error above the noise floor: without it the error "
         "on the selection logs is 7.17 N, with it 2.19 N; in one linear step it takes 81 % of it, "
-        f"its best decoy 14 %; {sure[0]}",
+        f"one decoy in twenty 14 % or more; {sure[0]}",
         "lugre explains 12 % of the squared error above the noise floor: without it the error on "
         f"the selection logs is 3.23 N, with it 2.19 N; {sure[1]}",
         "what remains beside the named effects is 3.19 N, 1.6 times the noise floor",

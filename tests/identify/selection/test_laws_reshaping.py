@@ -101,6 +101,30 @@ def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypat
     assert bool(asked) is refitted
 
 
+@pytest.mark.parametrize(
+    ("after", "typical", "fitted_to", "found"),
+    [
+        (3.5, 0.9, 9.0, True),  # 0.77 of the whole squared error that the effect leaves
+        (3.7, 0.9, 2.0, False),  # 0.86 of it
+        (6.0, 0.19, 2.9, True),  # of a typical block, 0.76 of it
+        (6.0, 0.21, 2.9, False),
+        (6.0, 0.19, 3.1, False),  # but more than the effect on the fit logs
+    ],
+)
+def test_a_curve_competes_by_the_whole_error_or_by_that_of_a_typical_block(
+    monkeypatch, after, typical, fitted_to, found
+):
+    """A friction with load beside a cable of another form: one end of the test log decides."""
+    shape = WrongShape(object.__new__(Shape), Proof(0.9, 0.1), 0.9)
+    object.__setattr__(shape.shape, "curve", type("Plain", (), {"rubs": False}))
+    curve = built(before=8.0, after=after, typical=typical, fit=built_fit(fitted_to))
+    effect = built(t=9.0, before=8.0, after=4.0, typical=0.25, fit=built_fit(3.0))
+    monkeypatch.setattr(module, "wrong_shape", lambda fit, dataset: shape)
+    monkeypatch.setattr(module, "error_in", lambda role, fit, dataset: 8.0)
+    monkeypatch.setattr(module, "fit_in_place", lambda fit, dataset, shape: curve)
+    assert bool(module._reshaped(BASE, DATASET, [effect])) is found
+
+
 # --- a finding against the curve of a law that the model has ---------------------------------
 
 
@@ -129,7 +153,7 @@ def against(monkeypatch, proof, *, left, before=8.0, fitted_to=0.9):
 
 
 @pytest.mark.parametrize(
-    ("left", "best_decoy", "kinds"),
+    ("left", "decoy", "kinds"),
     [
         (2.04, 0.01, ["missing", "wrong_shape"]),  # 0.81 of what the effect takes
         (2.05, 0.01, ["missing"]),
@@ -138,10 +162,10 @@ def against(monkeypatch, proof, *, left, before=8.0, fitted_to=0.9):
     ],
 )
 def test_a_curve_that_is_not_proved_must_take_as_much_as_the_effect(
-    monkeypatch, left, best_decoy, kinds
+    monkeypatch, left, decoy, kinds
 ):
     """In coloured noise both take little of the error, and the curve's proof falls just short."""
-    found = against(monkeypatch, Proof(0.15, best_decoy), left=left, before=2.2)
+    found = against(monkeypatch, Proof(0.15, decoy), left=left, before=2.2)
     assert [f.kind.value for f in found] == kinds
 
 

@@ -164,6 +164,31 @@ def test_a_friction_is_scaled_until_the_model_falls_short_by_the_strength(
     assert level * planted.values["Fc"] / FLOOR == pytest.approx(5.0, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("effects", "own", "shown"),
+    [
+        (["cogging"], 0.1, True),
+        (["cogging"], 0.3, False),  # the machine's own laws leave as much without the effect
+        (["lugre", "encoder_quantization"], 0.3, True),  # found by other means, or no force
+    ],
+)
+def test_a_force_is_shown_where_its_own_law_can_follow_the_logs(monkeypatch, effects, own, shown):
+    """Without it its law leaves 0.4 N; at 5 times 0.1 N it must reach 0.35 N, at 0.3 N 1.05 N."""
+    planted = tuple(fitted(name) for name in effects)
+    true = STAGE.with_axis("x", replace(STAGE.axes["x"], effects=planted))
+    made_up = SimpleNamespace(fit="logs")
+    monkeypatch.setattr(cases, "datasets", lambda *_, **__: {"x": made_up})
+    monkeypatch.setattr(
+        cases, "own_error", lambda axis, logs: own if axis is true.axes["x"] else 0.4
+    )
+    built = cases.Machine(STAGE, true, planted, frozenset(), frozenset(), {}, {}, {})
+    if shown:
+        assert cases.prepared(built, 5.0) is made_up
+        return
+    with pytest.raises(NotShown, match=effects[0]):
+        cases.prepared(built, 5.0)
+
+
 # --- the demonstration ----------------------------------------------------------------------
 
 

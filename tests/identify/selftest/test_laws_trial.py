@@ -98,7 +98,7 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
         return SimpleNamespace(with_findings=lambda: replace(found, findings=findings))
 
     monkeypatch.setattr(trial, "machine", build)
-    monkeypatch.setattr(trial, "prepared", lambda built: "dataset")
+    monkeypatch.setattr(trial, "prepared", lambda built, strength: "dataset")
     monkeypatch.setattr(trial, "fit_aligned", lambda axis, given: (given, base))
     monkeypatch.setattr(trial, "diagnose_axis", diagnose)
     monkeypatch.setattr(trial, "_tested", lambda found, built: 1.2)
