@@ -73,8 +73,8 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
         return f"{text}; {sure}"
     gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.decoy))
     of_it = "that of a typical part" if finding.proof.typical else "it"
-    step = f"in one linear step it takes {gain:.0f} % of {of_it}, one decoy in twenty {decoy:.0f} % or more"
-    return f"{text}; {step}; {sure}"
+    rarely = f"one decoy in twenty {decoy:.0f} % or more"
+    return f"{text}; in one linear step it takes {gain:.0f} % of {of_it}, {rarely}; {sure}"
 
 
 def named_errors_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str:
