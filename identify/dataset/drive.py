@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.motion import SMOOTHED, Motion
-from twin.core.native import walk, walk_sensing
+from twin.core.walks import walk, walk_sensing
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, axis_table
 from twin.signals import between, local_parabola
