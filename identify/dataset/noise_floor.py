@@ -168,7 +168,9 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     command = actual_force(axis, motion)
     raw = 0.5 * (command[1:] + command[:-1]) - axis.mass * between(velocity, dt)
     # The forces that the model explains, such as a bump passed at speed, are not noise either.
-    raw += _between_samples(total_force(on_blocks(axis), motion), motion)
+    table = on_blocks(axis)
+    if table.labels:
+        raw += _between_samples(total_force(table, motion), motion)
     # The median over segments ignores those with spikes and reversals.
     segment = min(max(round(SEGMENT / dt), 256), len(raw))
     frequency, power = _median_spectrum(raw, segment, dt, _at_rest(axis, motion))
