@@ -170,7 +170,7 @@ def fit_axis(
     internal, converged = problem.start, True
     if len(internal):
         problem.set_priors(internal)
-        internal, _ = problem.solve(internal, ROUGHLY, ROUGHLY)
+        internal, _ = problem.solve(internal, ROUGHLY)
         samples = problem.set_priors(internal)
         internal, converged = problem.solve(internal, NEGLIGIBLE / samples)
     return _ended(problem, internal, converged)

@@ -131,13 +131,10 @@ class FitProblem:
     def slopes(self, internal: Array) -> Array:
         return np.vstack([self.columns(internal), np.diag(self.pull), self.smooth])
 
-    def solve(self, internal: Array, tolerance: float, roughly: float = 0.0) -> tuple[Array, bool]:
-        """Least squares from these values; the solution and whether it converged.
-
-        tolerance, roughly: relative falls at which it ends, as ``minimise`` takes them.
-        """
+    def solve(self, internal: Array, tolerance: float) -> tuple[Array, bool]:
+        """Least squares from these values; the solution and whether it converged."""
         solution = minimise(
             self.rows, self.slopes, internal, self.bounds,
-            tolerance=tolerance, most_evaluations=self.most_evaluations, roughly=roughly,
+            tolerance=tolerance, most_evaluations=self.most_evaluations,
         )  # fmt: skip
         return solution.x, solution.converged

@@ -9,7 +9,7 @@ costs two matrix products an iteration; the QR decomposition of a general solver
 A Jacobian costs a walk over the motion for every variable, a residual one. Between two Jacobians
 the columns therefore follow the residuals by secants (C. G. Broyden, "A class of methods for
 solving nonlinear simultaneous equations", Math. Comput. 19, 1965) while each step keeps most of
-what it promises; the search ends only on a true Jacobian, unless it is to be rough.
+what it promises; the search ends only on a true Jacobian.
 """
 
 from __future__ import annotations
@@ -47,13 +47,11 @@ def minimise(
     *,
     tolerance: float,
     most_evaluations: int,
-    roughly: float = 0.0,
 ) -> Solution:
     """Variables that minimise the sum of squares of the residual (n,) within bounds (k,), (k,).
 
-    tolerance: relative fall of the sum of squares below which the search ends; roughly: the same on
-    columns that follow by secants, where they keep what they promise. start: (k,). Where the
-    residual at the start is not finite, the start is returned as not converged.
+    tolerance: relative fall of the sum of squares below which the search ends. start: (k,). Where
+    the residual at the start is not finite, the start is returned as not converged.
     """
     low, high = bounds
     x = np.clip(start, low, high)
@@ -74,7 +72,7 @@ def minimise(
             least = max(ROUNDING * cost, np.finfo(float).tiny)
             kept = (cost - trial_cost) / max(cost - expected, least)
             good = kept > KEPT
-            if fall < (tolerance if exact else roughly * good):
+            if fall < tolerance and exact:
                 return Solution(moved, True)
             if good and fall >= tolerance:
                 columns, exact = _secant(columns, moved - x, trial - force), False
