@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from twin.core.control import Controller
 from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
-from twin.core.native import walk
+from twin.core.walks import walk
 from twin.effects import load_catalogue
 from twin.experiments.trajectory import Setpoint
 from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table

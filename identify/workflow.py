@@ -12,7 +12,7 @@ from identify.dataset.given_logs import Role
 from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.errors import error_if_any
 from identify.estimation.fit import Fit
-from identify.estimation.force_balance import require_residual
+from identify.estimation.force_balance import require_finite, require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.estimation.replay import simulated_error
 from identify.estimation.simulated_motion import fit_simulated_motion
@@ -71,7 +71,7 @@ def fit(
         require_residual(model.axes[axis], dataset)
         dataset, fitted = fit_aligned(model.axes[axis], dataset)
         found[axis], fits[axis] = with_own_noise(fitted, dataset)
-        require_residual(fits[axis].axis, found[axis])
+        require_finite(fits[axis].residual, found[axis])
         progress("fitting", i + 1, len(found))
     held, tested = (
         {a: error_if_any(role, f, found[a]) for a, f in fits.items()}

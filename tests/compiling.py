@@ -3,7 +3,7 @@
 import numpy as np
 
 from twin.core.calling import law_address
-from twin.core.native import walk, walk_sensing
+from twin.core.walks import walk, walk_sensing
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Hardware, MachineModel, axis_table

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from twin.core.control import Controller
 from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
-from twin.core.native import walk
+from twin.core.walks import walk
 from twin.experiments.trajectory import Setpoint
 from twin.laws.motion import Array
 from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table

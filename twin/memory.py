@@ -5,16 +5,22 @@ from __future__ import annotations
 import ctypes
 from contextlib import suppress
 
-M_ARENA_MAX = -8  # malloc.h of glibc
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # malloc.h of glibc
+SMALLEST_MAPPED = 1 << 23  # bytes; a signal of a log is smaller, an array of several is not
+MOST_KEPT = 1 << 25  # bytes at the end of that place
 
 
 def share() -> None:
     """Let the threads of a program take memory from one place, where the C library is glibc.
 
-    It would keep what each of them has freed for that thread alone.
+    It would keep what each of them has freed for that thread alone, and take the next signal from
+    the system again, which clears that memory first.
     """
     with suppress(OSError, AttributeError, TypeError):
-        ctypes.CDLL(None).mallopt(M_ARENA_MAX, 1)
+        libc = ctypes.CDLL(None)
+        libc.mallopt(M_ARENA_MAX, 1)
+        libc.mallopt(M_MMAP_THRESHOLD, SMALLEST_MAPPED)
+        libc.mallopt(M_TRIM_THRESHOLD, MOST_KEPT)
 
 
 def give_back() -> None:

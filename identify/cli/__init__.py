@@ -48,6 +48,7 @@ def main() -> None:
                 f"this is a fault of the program: {type(error).__name__}: {error}; please report "
                 "it with the command and what TWIN_TRACEBACK=1 adds"
             )
+    gc.freeze()  # all of it ends with the process: to seek cycles before takes as long as to load
     sys.exit(code if isinstance(code, int) else 0)
 
 

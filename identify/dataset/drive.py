@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.motion import SMOOTHED, Motion
-from twin.core.native import walk, walk_sensing
+from twin.core.walks import walk, walk_sensing
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, axis_table
 from twin.signals import between, local_parabola
@@ -76,7 +76,7 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
     """
     sensing = [f for f in axis.effects if f.effect.kind is Kind.SENSING and not is_noise(f.effect)]
     if not sensing:
-        return motion, np.zeros(motion.raw.shape[1])
+        return motion, np.broadcast_to(0.0, motion.raw.shape[1])
     error, rate = reading_error(replace(axis, effects=tuple(sensing)), motion)
     blocks = motion.signals.copy()
     for block, at_samples in zip(blocks, (error, rate), strict=False):

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,18 +85,23 @@ def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) ->
     return _together(each, motions)
 
 
-def noises_of(axis: AxisModel, motions: Sequence[Motion]) -> list[Noise]:
+def noises_of(axis: AxisModel, motions: Sequence[Motion]) -> tuple[Noise, ...]:
     """The noise of each log; of its force what the quietest of the same rate leaves room for."""
+    return _noises_of(axis, tuple(motions))
+
+
+@lru_cache(maxsize=2)  # a fit, its evidence and its comparison ask for the same
+def _noises_of(axis: AxisModel, motions: tuple[Motion, ...]) -> tuple[Noise, ...]:
     noises = [noise_of(axis, motion) for motion in motions]
     quietest: dict[float, float] = {}
     for noise, motion in zip(noises, motions, strict=True):
         dt = motion.sample_period
         quietest[dt] = min(noise.most, quietest.get(dt, np.inf))
     least = [quietest[motion.sample_period] for motion in motions]
-    return [
+    return tuple(
         replace(noise, force=low) if noise.force > LOUDER * low else noise
         for noise, low in zip(noises, least, strict=True)
-    ]
+    )
 
 
 def _with_own(sensors: float, logs: Sequence[PreparedLog]) -> float:
@@ -162,7 +168,9 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     command = actual_force(axis, motion)
     raw = 0.5 * (command[1:] + command[:-1]) - axis.mass * between(velocity, dt)
     # The forces that the model explains, such as a bump passed at speed, are not noise either.
-    raw += _between_samples(total_force(on_blocks(axis), motion), motion)
+    table = on_blocks(axis)
+    if table.labels:
+        raw += _between_samples(total_force(table, motion), motion)
     # The median over segments ignores those with spikes and reversals.
     segment = min(max(round(SEGMENT / dt), 256), len(raw))
     frequency, power = _median_spectrum(raw, segment, dt, _at_rest(axis, motion))

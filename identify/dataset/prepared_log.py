@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from identify.dataset.drive import parts_of
 from identify.dataset.motion import Motion
 from identify.dataset.test_function import TestFunction
-from twin.core.native import Table, walk_sets
+from twin.core.native import Table
+from twin.core.walks import walk_sets
 from twin.effect import Kind
 from twin.model.machine import AxisModel, axis_table
 

@@ -31,13 +31,21 @@ def _is_added(axis: AxisModel, c: ParameterReference) -> bool:
     return effect.kind is not Kind.FRICTION and not effect.is_nonparametric
 
 
+def is_linear(axis: AxisModel, c: ParameterReference) -> bool:
+    """Whether the residual is linear in it, the others held: the mass, a strength of a force."""
+    if not c.effect:
+        return True
+    effect = axis[c.effect].effect
+    return c.parameter.strength and (effect.is_nonparametric or effect.kind is Kind.FORCE)
+
+
 def is_constant(axis: AxisModel, c: ParameterReference) -> bool:
     """Whether it is a strength whose column no free parameter changes: of a force with no other."""
-    if not (c.effect and c.parameter.strength):
+    if not (c.effect and is_linear(axis, c)):
         return False
     own, sensed = axis[c.effect], any(f.effect.kind is Kind.SENSING for f in axis.effects)
     alone = all(p.strength or p.name in own.fixed for p in own.effect.parameters)
-    return own.effect.is_nonparametric or (own.effect.kind is Kind.FORCE and alone and not sensed)
+    return own.effect.is_nonparametric or (alone and not sensed)
 
 
 class FitProblem:

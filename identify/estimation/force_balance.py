@@ -72,21 +72,29 @@ def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
 def require_residual(axis: AxisModel, dataset: Dataset) -> None:
     """Raise InputError where no test function is usable, or the residual is not a number."""
     kept = moving(dataset.fit, sticks(axis))
-    names = ", ".join(log.motion.name for log in dataset.fit)
     if not kept.any():
         raise InputError(
             f"axis {dataset.axis} comes to rest within every test function of "
-            f"{dataset.test_function_length:g} s of {names}, and at rest its friction is unknown; "
-            "give a log in which it moves for longer at a time, or a shorter --test-function (s)"
+            f"{dataset.test_function_length:g} s of {_names(dataset)}, and at rest its friction is "
+            "unknown; give a log in which it moves for longer at a time, or a shorter "
+            "--test-function (s)"
         )
     with np.errstate(all="ignore"):
-        bad = np.count_nonzero(~np.isfinite(residual(axis, dataset.fit)[kept]))
-    if bad:
+        require_finite(residual(axis, dataset.fit)[kept], dataset)
+
+
+def require_finite(left: Array, dataset: Dataset) -> None:
+    """Raise InputError where a residual (n,) N of the test functions that count is not a number."""
+    if bad := np.count_nonzero(~np.isfinite(left)):
         raise InputError(
             f"axis {dataset.axis}: the force of the model is not a finite number in {bad} of "
-            f"{np.count_nonzero(kept)} test functions of {names}; check the values of its effects, "
+            f"{len(left)} test functions of {_names(dataset)}; check the values of its effects, "
             "or leave them out to begin with their start values"
         )
+
+
+def _names(dataset: Dataset) -> str:
+    return ", ".join(log.motion.name for log in dataset.fit)
 
 
 def group_of(axis: AxisModel, effect: str) -> AxisModel:

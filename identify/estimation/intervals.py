@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import left_out
 from identify.estimation.fit import Fit
-from identify.estimation.fit_problem import is_constant
+from identify.estimation.fit_problem import is_linear
 from identify.estimation.force_balance import changes
 from twin.model.intervals import AxisIntervals
 from twin.model.parameters import ParameterReference, read, write
@@ -170,7 +170,7 @@ def open_sides(fit: Fit, where: Sequence[ParameterReference], half: Array) -> di
     """
     tried: list[tuple[ParameterReference, Side, float]] = []
     for c, width, value in zip(where, half, read(fit.axis, where), strict=True):
-        if is_constant(fit.axis, c):  # the squared error is a parabola in it
+        if is_linear(fit.axis, c):  # the squared error is a parabola in it
             continue
         for side, far in ((Side.SMALLER, -FAR * width), (Side.LARGER, FAR * width)):
             to = np.clip(value + far, c.parameter.lower, c.parameter.upper)

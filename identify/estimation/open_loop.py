@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from identify.dataset.prepared_log import PreparedLog
 from twin.core.control import Controller, gain_table
 from twin.core.loop import N_SIGNALS, POSITION_COLUMN
-from twin.core.native import Table, walk
+from twin.core.native import Table
+from twin.core.walks import walk
 from twin.model.machine import MachineModel
 from twin.signals import Array, between, local_parabola
 from twin.simulator import Stepper

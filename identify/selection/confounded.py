@@ -16,6 +16,7 @@ from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit
+from identify.estimation.fit_problem import is_linear
 from identify.estimation.force_balance import changes, jacobian, residual
 from identify.estimation.intervals import half_widths
 from identify.estimation.subspace import orthonormal, unabsorbed
@@ -31,6 +32,7 @@ Array = NDArray[np.float64]
 LEAST_FORCE = 0.1  # of the error before the fit: least force of a change that is reported
 SAME_FORCE = 0.01  # largest part of that force outside the span of an effect with the same force
 MOST_CHANGES = 3  # that are reported
+HEAD = 4.0  # s of the first log, on which most effects show that they are none of the alike
 
 
 @dataclass(frozen=True)
@@ -68,9 +70,8 @@ def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
     where = fit.scaling.where
     before, after = read(given, where), read(fit.axis, where)
     moved = np.flatnonzero(np.abs(after - before) > half_widths(fit))
-    backs = changes(fit.axis, fit.logs, [where[j] for j in moved], (before - after)[moved])
     found: list[tuple[Change, Array]] = []
-    for j, back in zip(moved, backs[:, fit.kept], strict=True):
+    for j, back in zip(moved, _backs(fit, moved, before - after), strict=True):
         c = where[j]
         change = Change(
             c.label, float(before[j]), float(after[j]), units(c.parameter.unit), rms(back),
@@ -84,16 +85,31 @@ def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
     return Refit(error, fit.error, tuple(told), units.force)
 
 
+def _backs(fit: Fit, moved: NDArray[np.intp], steps: Array) -> Array:
+    """Change (m, n) N of the residual as each of m parameters by itself moves by its step.
+
+    moved (m,): which of all; steps: of all.
+    """
+    where = fit.scaling.where
+    out = fit.jacobian[:, moved].T * steps[moved, None]
+    bent = np.array([not is_linear(fit.axis, where[j]) for j in moved], dtype=bool)
+    own = moved[bent]
+    out[bent] = changes(fit.axis, fit.logs, [where[j] for j in own], steps[own])[:, fit.kept]
+    return out
+
+
 def _alike(fit: Fit, catalogue: Catalogue, forces: Sequence[Array]) -> list[tuple[str, ...]]:
     """For each force (n,) N the absent linear effects that can produce it.
 
-    What an effect leaves of a force on one log by itself is less than what it leaves there when it
-    is fitted on all, so that the first log rules out most.
+    What an effect leaves of a force on a part by itself is less than what it leaves there when it
+    is fitted on all, so that the head of the first log rules out most.
     """
     found: list[list[str]] = [[] for _ in forces]
-    first = fit.kept[: len(fit.logs[0])]
+    whole = fit.logs[0]
+    head = PreparedLog.of(whole.motion.head(HEAD), whole.test_function.length)
+    first = fit.kept[: len(head)]
     for effect in _linear_effects(fit, catalogue) if forces else ():
-        begun = orthonormal(_columns(fit, effect, fit.logs[:1])[first])
+        begun = orthonormal(_columns(fit, effect, [head])[first])
         possible = [f for f in forces if _size_left(f[: len(begun)], begun) < _same(f)]
         if not possible:
             continue

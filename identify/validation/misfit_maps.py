@@ -269,15 +269,17 @@ def worst_regions(maps: Sequence[MisfitMap], samples: float, count: int = 3) -> 
     samples: effective sample size of the residual. A region counts only where it exceeds the noise
     floor by more than the largest of as many regions of pure noise would.
     """
-    from scipy.special import chdtri  # no fit needs it
-
     tried = sum(int(np.count_nonzero(m.visited)) for m in maps)
     found = []
     for m in maps:
+        excess = np.where(m.rms > ABOVE_FLOOR * m.floor, m.share - m.visited, 0.0)
+        if excess.max() < LEAST_SHARE:
+            continue
+        from scipy.special import chdtri  # where no region stands out, as in a fit, nothing asks
+
         values = np.maximum(samples * m.visited, 1.0)
         chance = np.sqrt(chdtri(values, CHANCE / max(tried, 1)) / values)
-        high = m.rms > np.maximum(ABOVE_FLOOR, chance) * m.floor
-        excess = np.where(high, m.share - m.visited, 0.0)
+        excess[~(m.rms > chance * m.floor)] = 0.0
         i = int(np.argmax(excess))
         if excess[i] < LEAST_SHARE:
             continue

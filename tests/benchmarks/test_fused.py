@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks import fused
 from benchmarks.simulation import FusedSimulator
 from benchmarks.workload import Workload
-from twin.core.native import walk_sets
+from twin.core.walks import walk_sets
 from twin.effects import load_catalogue
 from twin.experiments.kinds import Tracking
 from twin.experiments.named import simulate

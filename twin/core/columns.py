@@ -33,17 +33,17 @@ def averaged_columns(
         (max((motion.shape[1] - len(weights)) // stride + 1, 0), len(effect.strengths))
     )
     states = np.zeros(len(effect.states) + 1)
+    io = np.zeros(IO_SIZE + 1 + 2 * len(effect.strengths))
     _walk(
         address_of(effect.columns), np.array([*values, 0.0]), states, motion, period, time_origin,
-        weights, stride, means,
+        weights, stride, means, io,
     )  # fmt: skip
     return means.T
 
 
 @compiled(nogil=True)
-def _walk(law, parameters, states, motion, dt, time_origin, weights, stride, means):
-    count, strengths = means.shape
-    io = np.zeros(IO_SIZE + 1 + 2 * strengths)
+def _walk(law, parameters, states, motion, dt, time_origin, weights, stride, means, io):
+    count = means.shape[0]
     p, s, w = parameters.ctypes.data, states.ctypes.data, io.ctypes.data
     length = weights.shape[0]
     io[DT] = dt

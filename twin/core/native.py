@@ -13,32 +13,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.core.attached_masses import along, answers, settle, stands
-from twin.core.calling import ADDRESS, KIND, P_AT, S_AT, borrow, call_law, doubles_at, law_address
+from twin.core.attached_masses import answers, settle
+from twin.core.calling import ADDRESS, KIND, P_AT, S_AT, call_law, doubles_at, law_address
 from twin.core.compiled import compiled
 from twin.effect import (
-    A_OTHER,
     DRY,
     DT,
     FRICTION,
     HOLD,
-    INDEX,
-    IO_SIZE,
     MASS,
     MOVED,
     OUT,
     READING,
     STATIC,
-    TIME,
-    V_OTHER,
     VISCOUS,
-    WHEN,
-    X_OTHER,
     Effect,
     Kind,
     U,
     V,
-    X,
 )
 
 # States every axis has before those of its effects.
@@ -112,117 +104,6 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
     return net, added
 
 
-@compiled(nogil=True)
-def walk(
-    entries,
-    first,
-    last,
-    parameters,
-    states,
-    at,
-    motion,
-    others,
-    dt,
-    begin,
-    rows,
-    mass=1.0,
-    time_origin=0.0,
-):
-    """Forces along a measured motion: the laws stepped over every sample from ``begin`` on.
-
-    motion (3, n): position m, velocity m/s, command N; others (3, n): position, velocity,
-    acceleration of the other axis; mass: moved mass, kg; time_origin: s, when sample 0 was.
-    The mass that friction acts on is infinite, so that friction slides wherever v != 0: the force
-    that holds a measured axis at rest is not determined.
-    rows (n_entries, n): N.
-    """
-    entries, parameters, states = borrow((entries, parameters, states))
-    io = np.zeros(IO_SIZE)
-    row = np.zeros((2, entries.shape[0]))
-    io[DT] = dt
-    io[WHEN] = 0.5
-    io[MASS] = 1e300
-    io[MOVED] = mass
-    others_end = last
-    while others_end > first and int(entries[others_end - 1, KIND]) == _STRUCTURE:
-        others_end -= 1
-    p, s = parameters.ctypes.data, states.ctypes.data
-    standing = others_end < last and stands(entries, others_end, last, p, s, borrow(io))
-    for k in range(motion.shape[1]):
-        io[INDEX] = begin + k
-        io[TIME] = time_origin + (begin + k) * dt
-        io[X] = motion[0, k]
-        io[V] = motion[1, k]
-        io[U] = motion[2, k]
-        io[X_OTHER] = others[0, k]
-        io[V_OTHER] = others[1, k]
-        io[A_OTHER] = others[2, k]
-        lent = borrow(row)
-        axis_force(entries, first, others_end, parameters, states, at, borrow(io), lent, 0)
-        if others_end < last:
-            along(entries, others_end, last, p, s, borrow(io), motion[1], k, standing, lent)
-        for i in range(first, last):
-            rows[i, k] = row[0, i]
-
-
-@compiled(nogil=True)
-def walk_sets(
-    entries, first, last, sets, states_needed, motion, others, dt, begin, totals, mass, time_origin
-):
-    """Force of all effects together along a measured motion, for several sets of parameters.
-
-    As ``walk``, from fresh states, less the force of each effect by itself, which costs a third of
-    a walk. sets (m, n_p); totals (m, n): N.
-    """
-    io = np.zeros(IO_SIZE)
-    w = io.ctypes.data
-    structure = last
-    while structure > first and int(entries[structure - 1, KIND]) == _STRUCTURE:
-        structure -= 1
-    laws = structure - first
-    addresses, kinds, p_at, s_at = entries[first:structure].astype(np.int64).T.copy()
-    row = np.zeros((2, entries.shape[0]))
-    io[DT] = dt
-    io[WHEN] = 0.5
-    io[MASS] = 1e300
-    io[MOVED] = mass
-    stiff = 1e300 / dt
-    for j in range(sets.shape[0]):
-        states = np.zeros(states_needed)
-        p, s = sets[j].ctypes.data, states.ctypes.data
-        own, friction = totals[j], 0.0
-        standing = structure < last and stands(entries, structure, last, p, s, borrow(io))
-        for k in range(motion.shape[1]):
-            io[INDEX] = begin + k
-            io[TIME] = time_origin + (begin + k) * dt
-            io[X] = motion[0, k]
-            io[V] = motion[1, k]
-            io[U] = motion[2, k]
-            io[X_OTHER] = others[0, k]
-            io[V_OTHER] = others[1, k]
-            io[A_OTHER] = others[2, k]
-            io[DRY] = 1.0
-            io[STATIC] = 1.0
-            io[VISCOUS] = 1.0
-            io[FRICTION] = friction
-            stop = stiff * motion[1, k]
-            total = 0.0
-            for i in range(laws):
-                io[HOLD] = stop + io[U] + total
-                io[OUT] = 0.0
-                call_law(addresses[i], p + 8 * p_at[i], s + 8 * s_at[i], w)
-                if kinds[i] == _FORCE:
-                    total += io[OUT]
-                elif kinds[i] == _FRICTION:
-                    friction = io[OUT]
-            own[k] = total - friction + (io[U] - motion[2, k])
-            if structure < last:
-                lent = borrow(row)
-                along(entries, structure, last, p, s, borrow(io), motion[1], k, standing, lent)
-                for i in range(structure, last):
-                    own[k] += row[0, i]
-
-
 @compiled(inline=True)
 def sense(entries, first, last, parameters, states, io, position):
     """Encoder reading of a true position: the sensing effects in order."""
@@ -235,19 +116,6 @@ def sense(entries, first, last, parameters, states, io, position):
             io.ctypes.data,
         )
     return io[READING]
-
-
-@compiled(nogil=True)
-def walk_sensing(entries, first, last, parameters, states, motion, dt, readings):
-    """Encoder readings (n,) m along a motion (2 or more, n): position m, velocity m/s."""
-    io = np.zeros(IO_SIZE)
-    io[DT] = dt
-    for k in range(motion.shape[1]):
-        io[INDEX] = k
-        io[TIME] = k * dt
-        io[X] = motion[0, k]
-        io[V] = motion[1, k]
-        readings[k] = sense(entries, first, last, parameters, states, io, motion[0, k])
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from twin.core.native import law_address, walk
+from twin.core.native import law_address
+from twin.core.walks import walk
 from twin.effect import (
     DRY,
     DT,

@@ -11,7 +11,6 @@ from twin.log.check.report import CheckReport
 from twin.log.decode import read_parts, samples_by_axis, verified_parts
 from twin.log.log import Log, joined
 from twin.log.thin import thinned
-from twin.memory import give_back
 
 # Samples, all axes together. A check takes 130 bytes a sample beside 0.1 GB for the program.
 LARGEST_PART = 2_500_000
@@ -68,7 +67,6 @@ def _checked(parts: Iterable[Log], reports: list[Part]) -> Iterator[Log]:
     for part in parts:
         stop = start + len(part) * part.period
         reports.append(Part(start, stop, check_log(part)))
-        give_back()
         yield part
         start = stop
 

@@ -49,7 +49,7 @@ class Fitted:
     """An effect with its parameter values (name -> SI value); ``fixed`` are held by a fit."""
 
     effect: Effect
-    values: Mapping[str, float]
+    values: Mapping[str, float] = field(hash=False)
     fixed: frozenset[str]
 
     @classmethod

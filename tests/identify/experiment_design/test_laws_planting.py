@@ -35,7 +35,7 @@ from identify.experiment_design.planting import (
     visible_force,
 )
 from identify.validation.free_run import HORIZON, FreeRun, free_run, rms_error
-from twin.core.native import walk
+from twin.core.walks import walk
 from twin.effect import Parameter
 from twin.model.machine import AxisModel, Hardware, MachineModel, axis_table
 from twin.model.parameters import free_parameters, read

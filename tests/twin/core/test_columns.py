@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from twin.core.columns import averaged_columns
-from twin.core.native import build_table, walk_sets
+from twin.core.native import build_table
+from twin.core.walks import walk_sets
 from twin.effect import Effect
 from twin.effects import load_catalogue
 

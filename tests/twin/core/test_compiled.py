@@ -18,7 +18,7 @@ from numba.extending import intrinsic
 
 from twin.core import compiled
 from twin.core.compiled import digest
-from twin.core.native import walk
+from twin.core.walks import walk
 from twin.effects import load_catalogue
 from twin.model.machine import AxisModel, Fitted, axis_table
 
@@ -30,7 +30,7 @@ import numpy as np
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel, axis_table
-from twin.core.native import walk
+from twin.core.walks import walk
 from twin.simulator import ReducedSimulator
 
 catalogue = load_catalogue()

@@ -11,7 +11,7 @@ from axis_runs import BOTH, RATE, Stepper, effect, pushed, shoves
 from effect_runs import CATALOGUE
 
 from twin.core.attached_masses import slope
-from twin.core.native import walk
+from twin.core.walks import walk
 from twin.laws.motion import Array
 from twin.model.machine import AxisModel, Fitted, axis_table
 from twin.simulator import MujocoSimulator, ReducedSimulator

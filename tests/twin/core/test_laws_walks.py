@@ -6,7 +6,7 @@ from effect_runs import CATALOGUE
 
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import total_force, total_forces
-from twin.core.native import walk
+from twin.core.walks import walk
 from twin.effect import Kind
 from twin.model.machine import AxisModel, Fitted, axis_table
 

@@ -1,0 +1,177 @@
+"""The laws along a measured motion: forces of a table's effects, and readings of an encoder.
+
+What compiled code needs for its work is made here and lent to it: machine code that makes an array
+takes as long to load as all of numba's compiler for arrays.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.core.attached_masses import along, stands
+from twin.core.calling import ADDRESS, KIND, P_AT, S_AT, borrow, call_law
+from twin.core.compiled import compiled
+from twin.core.native import axis_force, sense
+from twin.effect import (
+    A_OTHER,
+    DRY,
+    DT,
+    FRICTION,
+    HOLD,
+    INDEX,
+    IO_SIZE,
+    MASS,
+    MOVED,
+    OUT,
+    STATIC,
+    TIME,
+    V_OTHER,
+    VISCOUS,
+    WHEN,
+    X_OTHER,
+    Kind,
+    U,
+    V,
+    X,
+)
+
+Array = NDArray[np.float64]
+
+_FORCE = Kind.FORCE.value
+_FRICTION = Kind.FRICTION.value
+_STRUCTURE = Kind.STRUCTURE.value
+
+
+def walk(
+    entries: Array, first: int, last: int, parameters: Array, states: Array, at: int,
+    motion: Array, others: Array, dt: float, begin: int, rows: Array, mass: float = 1.0,
+    time_origin: float = 0.0,
+) -> None:  # fmt: skip
+    """Forces along a measured motion: the laws stepped over every sample from ``begin`` on.
+
+    motion (3, n): position m, velocity m/s, command N; others (3, n): position, velocity,
+    acceleration of the other axis; mass: moved mass, kg; time_origin: s, when sample 0 was.
+    The mass that friction acts on is infinite, so that friction slides wherever v != 0: the force
+    that holds a measured axis at rest is not determined.
+    rows (n_entries, n): N.
+    """
+    _walk(
+        entries, first, _structure(entries, first, last), last, parameters, states, at, motion,
+        others, dt, begin, rows, time_origin, _lent(dt, mass), np.zeros((2, len(entries))),
+    )  # fmt: skip
+
+
+def walk_sets(
+    entries: Array, first: int, last: int, sets: Array, states_needed: int, motion: Array,
+    others: Array, dt: float, begin: int, totals: Array, mass: float, time_origin: float,
+) -> None:  # fmt: skip
+    """Force of all effects together along a measured motion, for several sets of parameters.
+
+    As ``walk``, from fresh states, less the force of each effect by itself, which costs a third of
+    a walk. sets (m, n_p); totals (m, n): N.
+    """
+    structure = _structure(entries, first, last)
+    laws = entries[first:structure].T.astype(np.int64, order="C")
+    _walk_sets(
+        entries, laws, structure, last, sets, np.zeros((len(sets), states_needed)), motion, others,
+        dt, begin, totals, time_origin, _lent(dt, mass), np.zeros((2, len(entries))),
+    )  # fmt: skip
+
+
+def walk_sensing(
+    entries: Array, first: int, last: int, parameters: Array, states: Array, motion: Array,
+    dt: float, readings: Array,
+) -> None:  # fmt: skip
+    """Encoder readings (n,) m along a motion (2 or more, n): position m, velocity m/s."""
+    _walk_sensing(entries, first, last, parameters, states, motion, dt, readings, _lent(dt, 0.0))
+
+
+def _structure(entries: Array, first: int, last: int) -> int:
+    """The first entry of those of structure effects, which are the last."""
+    return int(last) - int(np.count_nonzero(entries[first:last, KIND] == _STRUCTURE))
+
+
+def _lent(dt: float, mass: float) -> Array:
+    """io (IO_SIZE,) with what no sample changes."""
+    io = np.zeros(IO_SIZE)
+    io[[DT, WHEN, MASS, MOVED]] = dt, 0.5, 1e300, mass
+    return io
+
+
+@compiled(nogil=True)
+def _walk(
+    entries, first, structure, last, parameters, states, at, motion, others, dt, begin, rows,
+    time_origin, io, row,
+):  # fmt: skip
+    entries, parameters, states = borrow((entries, parameters, states))
+    p, s = parameters.ctypes.data, states.ctypes.data
+    standing = structure < last and stands(entries, structure, last, p, s, borrow(io))
+    for k in range(motion.shape[1]):
+        io[INDEX] = begin + k
+        io[TIME] = time_origin + (begin + k) * dt
+        io[X] = motion[0, k]
+        io[V] = motion[1, k]
+        io[U] = motion[2, k]
+        io[X_OTHER] = others[0, k]
+        io[V_OTHER] = others[1, k]
+        io[A_OTHER] = others[2, k]
+        lent = borrow(row)
+        axis_force(entries, first, structure, parameters, states, at, borrow(io), lent, 0)
+        if structure < last:
+            along(entries, structure, last, p, s, borrow(io), motion[1], k, standing, lent)
+        for i in range(first, last):
+            rows[i, k] = row[0, i]
+
+
+@compiled(nogil=True)
+def _walk_sets(
+    entries, laws, structure, last, sets, states, motion, others, dt, begin, totals, time_origin,
+    io, row,
+):  # fmt: skip
+    addresses, kinds, p_at, s_at = laws[ADDRESS], laws[KIND], laws[P_AT], laws[S_AT]
+    w = io.ctypes.data
+    stiff = 1e300 / dt
+    for j in range(sets.shape[0]):
+        p, s = sets[j].ctypes.data, states[j].ctypes.data
+        own, friction = totals[j], 0.0
+        standing = structure < last and stands(entries, structure, last, p, s, borrow(io))
+        for k in range(motion.shape[1]):
+            io[INDEX] = begin + k
+            io[TIME] = time_origin + (begin + k) * dt
+            io[X] = motion[0, k]
+            io[V] = motion[1, k]
+            io[U] = motion[2, k]
+            io[X_OTHER] = others[0, k]
+            io[V_OTHER] = others[1, k]
+            io[A_OTHER] = others[2, k]
+            io[DRY] = 1.0
+            io[STATIC] = 1.0
+            io[VISCOUS] = 1.0
+            io[FRICTION] = friction
+            stop = stiff * motion[1, k]
+            total = 0.0
+            for i in range(laws.shape[1]):
+                io[HOLD] = stop + io[U] + total
+                io[OUT] = 0.0
+                call_law(addresses[i], p + 8 * p_at[i], s + 8 * s_at[i], w)
+                if kinds[i] == _FORCE:
+                    total += io[OUT]
+                elif kinds[i] == _FRICTION:
+                    friction = io[OUT]
+            own[k] = total - friction + (io[U] - motion[2, k])
+            if structure < last:
+                lent = borrow(row)
+                along(entries, structure, last, p, s, borrow(io), motion[1], k, standing, lent)
+                for i in range(structure, last):
+                    own[k] += row[0, i]
+
+
+@compiled(nogil=True)
+def _walk_sensing(entries, first, last, parameters, states, motion, dt, readings, io):
+    for k in range(motion.shape[1]):
+        io[INDEX] = k
+        io[TIME] = k * dt
+        io[X] = motion[0, k]
+        io[V] = motion[1, k]
+        readings[k] = sense(entries, first, last, parameters, states, io, motion[0, k])
