@@ -111,13 +111,13 @@ class Trial:
         return Trial(self.fit.of_power(), self.held and self.held.of_power())
 
     def proofs(
-        self, columns: Columns, *, sticking: bool, decoys: int = DECOYS
+        self, columns: Columns, *, sticking: bool, decoys: int = DECOYS, rare: float = RARE
     ) -> tuple[Proof, Proof]:
         """What columns take of the fit's squared test error in one linear step, and their decoys.
 
         Of all of it, and of that of a typical block. columns: logs -> forces (m, j) N of each log,
         for strengths with a unit penalty. sticking: whether test functions with standstill are left
-        out.
+        out. rare: part of the decoys that may take more than the one told.
         """
         fit = self.fit.with_columns(columns, sticking)
         held = self.held and self.held.with_columns(columns, sticking)
@@ -131,7 +131,7 @@ class Trial:
         shifts = np.random.default_rng(SEED).uniform(*SHIFTS, (decoys, count))
         untrue = [1.0 - left(s) / before for s in shifts] or [np.full(2, -np.inf)]
         whole, typical = np.stack(
-            [gains, np.quantile(untrue, 1.0 - RARE, axis=0, method="inverted_cdf")], axis=1
+            [gains, np.quantile(untrue, 1.0 - rare, axis=0, method="inverted_cdf")], axis=1
         )
         (gain, decoy), (usual, usual_decoy) = whole.tolist(), typical.tolist()
         return Proof(gain, decoy), Proof(usual, usual_decoy, typical=True)

@@ -88,11 +88,14 @@ def keeps_its_amplitude(force: Array) -> bool:
 
 
 def _foretells(trial: Trial, columns: Columns, least: float, sticking: bool) -> bool:
-    """Whether columns take at least a part of the squared test error, and more than decoys do."""
+    """Whether columns take at least a part of the squared test error, and more than any decoy.
+
+    Many are tried, so that one decoy in twenty would let noise be foretold by some of them.
+    """
     proof, _ = trial.proofs(columns, sticking=sticking, decoys=0)
     if proof.gain < least:
         return False
-    proof, _ = trial.proofs(columns, sticking=sticking, decoys=DECOYS)
+    proof, _ = trial.proofs(columns, sticking=sticking, decoys=DECOYS, rare=0.0)
     return proof.gain > proof.decoy
 
 

@@ -57,7 +57,7 @@ def test_the_next_of_several_move_up_once_all_needless_ones_are_gone(monkeypatch
     needless: set[str] = set()
 
     def score(without, fit, dataset, effect):
-        return SimpleNamespace(supported=effect.name not in needless)
+        return SimpleNamespace(supported=effect.name not in needless, delta_bic=1e3)
 
     def less(effect, fit, base, dataset):
         return built_fit(1.0, axis=fit.axis.without(effect.name))
