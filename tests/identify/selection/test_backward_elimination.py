@@ -3,6 +3,7 @@
 import importlib
 from types import SimpleNamespace
 
+import pytest
 from built_fits import built_fit, dataset_stub
 from machines import one_axis
 
@@ -78,3 +79,25 @@ def test_the_next_of_several_move_up_once_all_needless_ones_are_gone(monkeypatch
         assert [f.values["p"] for f in kept] == list(left)
         assert [f.effect.name for f in kept] == [e.name for e in effects[: len(left)]]
         assert {*names} == {*dropped}
+
+
+@pytest.mark.parametrize(
+    ("evidence", "error", "kept"),
+    [(48.0, 1.4, True), (48.0, 1.2, False), (120.0, 1.2, True)],
+)
+def test_where_the_fit_without_it_is_at_the_floor_an_effect_needs_far_more_evidence(
+    monkeypatch, evidence, error, kept
+):
+    """As when it is added: a dead time told before the encoder's rounding explains the rest."""
+    module = importlib.import_module("identify.selection.forward_selection")
+    effect = CATALOGUE["actuator_delay"]
+    with_it = built_fit(1.0, 1.0, axis=STAGE.axes["x"].with_effect(Fitted.at_start(effect)))
+    without = built_fit(error, 1.0, axis=STAGE.axes["x"])
+    needed = SimpleNamespace(supported=True, delta_bic=evidence)
+    monkeypatch.setattr(module, "score", lambda *_: needed)
+    monkeypatch.setattr(module, "less", lambda *_: without)
+    monkeypatch.setattr(module, "fit_thoroughly", lambda axis, dataset: without)
+    fit, dropped = _eliminated_backwards(
+        without, with_it, dataset_stub(), [SimpleNamespace(effect=effect)]
+    )
+    assert (fit is with_it, dropped) == (kept, () if kept else ("actuator_delay",))

@@ -43,6 +43,15 @@ def test_the_best_is_added_with_the_supported_rivals_that_tie(monkeypatch):
     assert [r.effect.name for r in found.rivals] == ["wear", "end_stop"]
 
 
+def test_the_other_frictions_are_rivals_of_a_friction_however_far_they_are():
+    """A hysteresis that comes later may be what parted them."""
+    far = [built("dahl", bic=40.0, gain=0.4), built("lugre", bic=3.0, t=0.0, gain=0.1)]
+    far.append(built("wear", bic=500.0, gain=0.5))
+    for best, names in (("gms", ["dahl"]), ("cogging", [])):
+        (found,) = _next(HIGH, DATASET, [built(best, gain=5.0), *far], None)
+        assert [r.effect.name for r in found.rivals] == names
+
+
 @pytest.mark.parametrize(("base", "held"), [(LOW, False), (HIGH, True)])
 def test_no_pair_is_sought_at_the_floor(monkeypatch, base, held):
     monkeypatch.setattr(module, "held_at_floor", lambda fit, dataset: held and dataset is DATASET)
