@@ -168,16 +168,20 @@ def _friction_instead(
     """
     if not took_friction(base.axis, best.fit.axis):
         return ()
-    frictions = (c for c in ranking if c.effect.kind is Kind.FRICTION and c.supported)
-    return tuple(c for c in frictions if part_explained(base, c.fit) > RULE.nearly_all)[:1]
+    enough = (c for c in _frictions(ranking) if part_explained(base, c.fit) > RULE.nearly_all)
+    return tuple(enough)[:1]
 
 
 def _sisters(best: Candidate, ranking: Sequence[Candidate]) -> Iterable[Candidate]:
     """The other supported frictions, of a friction: effects still absent may part them wrongly."""
     if best.effect.kind is not Kind.FRICTION:
         return ()
-    frictions = (c for c in ranking if c.effect.kind is Kind.FRICTION and c.supported)
-    return (c for c in frictions if c is not best)
+    return (c for c in _frictions(ranking) if c is not best)
+
+
+def _frictions(ranking: Sequence[Candidate]) -> Iterable[Candidate]:
+    """The frictions that are supported."""
+    return (c for c in ranking if c.effect.kind is Kind.FRICTION and c.supported)
 
 
 def _near(best: Candidate, ranking: Sequence[Candidate]) -> tuple[Candidate, ...]:
@@ -201,11 +205,11 @@ def _eliminated_backwards(
             dropped.append(candidate.effect.name)
             continue
         without = less(candidate.effect, fit, base, dataset)
-        needed = _is_added(score(without, fit, dataset, candidate.effect), without)
+        needed = _is_needed(candidate.effect, fit, without, dataset)
         if needed:
             # The shapes of later effects were found beside this one; they may differ without it.
             without = fit_thoroughly(without.axis, dataset)
-            needed = _is_added(score(without, fit, dataset, candidate.effect), without)
+            needed = _is_needed(candidate.effect, fit, without, dataset)
         if not needed:
             fit = without
             dropped.append(candidate.effect.name)
@@ -213,6 +217,11 @@ def _eliminated_backwards(
         fit, later = _in_its_place(fit, candidate.effect)
         dropped = [later if name == candidate.effect.name else name for name in dropped]
     return fit, tuple(dropped)
+
+
+def _is_needed(effect: Effect, fit: Fit, without: Fit, dataset: Dataset) -> bool:
+    """Whether an effect of a fit would be added to the fit without it."""
+    return _is_added(score(without, fit, dataset, effect), without)
 
 
 def _in_its_place(fit: Fit, effect: Effect) -> tuple[Fit, str]:

@@ -99,6 +99,19 @@ def _lent(dt: float, mass: float) -> Array:
     return io
 
 
+@compiled(inline=True)
+def _arrive(io, motion, others, k, begin, dt, time_origin):
+    """What sample k of a motion brings into io."""
+    io[INDEX] = begin + k
+    io[TIME] = time_origin + (begin + k) * dt
+    io[X] = motion[0, k]
+    io[V] = motion[1, k]
+    io[U] = motion[2, k]
+    io[X_OTHER] = others[0, k]
+    io[V_OTHER] = others[1, k]
+    io[A_OTHER] = others[2, k]
+
+
 @compiled(nogil=True)
 def _walk(
     entries, first, structure, last, parameters, states, at, motion, others, dt, begin, rows,
@@ -108,14 +121,7 @@ def _walk(
     p, s = parameters.ctypes.data, states.ctypes.data
     standing = structure < last and stands(entries, structure, last, p, s, borrow(io))
     for k in range(motion.shape[1]):
-        io[INDEX] = begin + k
-        io[TIME] = time_origin + (begin + k) * dt
-        io[X] = motion[0, k]
-        io[V] = motion[1, k]
-        io[U] = motion[2, k]
-        io[X_OTHER] = others[0, k]
-        io[V_OTHER] = others[1, k]
-        io[A_OTHER] = others[2, k]
+        _arrive(io, motion, others, k, begin, dt, time_origin)
         lent = borrow(row)
         axis_force(entries, first, structure, parameters, states, at, borrow(io), lent, 0)
         if structure < last:
@@ -137,14 +143,7 @@ def _walk_sets(
         own, friction = totals[j], 0.0
         standing = structure < last and stands(entries, structure, last, p, s, borrow(io))
         for k in range(motion.shape[1]):
-            io[INDEX] = begin + k
-            io[TIME] = time_origin + (begin + k) * dt
-            io[X] = motion[0, k]
-            io[V] = motion[1, k]
-            io[U] = motion[2, k]
-            io[X_OTHER] = others[0, k]
-            io[V_OTHER] = others[1, k]
-            io[A_OTHER] = others[2, k]
+            _arrive(io, motion, others, k, begin, dt, time_origin)
             io[DRY] = 1.0
             io[STATIC] = 1.0
             io[VISCOUS] = 1.0
