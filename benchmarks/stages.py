@@ -33,7 +33,7 @@ STAGES: tuple[tuple[str, ModuleType, str], ...] = (
     ("fit", workflow, "fit_aligned"),
     ("intervals", workflow, "estimates"),
     ("ranking", forward_selection, "rank"),
-    ("next experiment", workflow, "_next_experiments"),
+    ("next experiment", workflow, "next_experiments"),
     ("comparison and free run", workflow, "_compared"),
 )
 Spent = dict[str, list[float]]
