@@ -87,6 +87,11 @@ class Gain:
     typical: float = 1.0
 
     @property
+    def left(self) -> float:
+        """Part of the squared error that is left."""
+        return (self.after / self.before) ** 2 if self.before > 0.0 else 1.0
+
+    @property
     def falls(self) -> bool:
         """Whether the error falls."""
         return self.after < self.before

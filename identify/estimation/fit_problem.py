@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 PRIOR_FORCE = 0.1  # expected force of an effect beside the friction, over the force to explain
 PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
+PRIOR_EXCESS = 1.0  # expected static friction beyond the Coulomb friction, over this
 
 
 def _is_added(axis: AxisModel, c: ParameterReference) -> bool:
@@ -53,9 +54,11 @@ class FitProblem:
 
     The prior on an effect beside the friction is a force of a tenth of the force to be explained.
     It matters only for parameters that the data cannot separate, such as a constant force and a
-    Coulomb asymmetry: it keeps both small, where they could be large and opposite. Beside a
-    nonparametric effect the prior of the physical effects is centred where the fit starts, so that
-    a force that both could explain stays with the physics. The nonparametric effect is smoothed.
+    Coulomb asymmetry: it keeps both small, where they could be large and opposite. Static friction
+    is expected within twice the Coulomb friction, or a few test functions at creep would set it to
+    whatever else the model lacks there. Beside a nonparametric effect the prior of the physical
+    effects is centred where the fit starts, so that a force that both could explain stays with the
+    physics. The nonparametric effect is smoothed.
     """
 
     def __init__(self, axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int) -> None:
@@ -93,6 +96,9 @@ class FitProblem:
         expected = max(PRIOR_FORCE * explained, noise)
         self.pull = np.where(self.added, noise * size / expected, 0.0)
         self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD
+        least = self.scaling.least(axis)
+        beyond = least > 0.0
+        self.pull[beyond], self.centre[beyond] = noise / (PRIOR_EXCESS * least[beyond]), 0.0
         return samples
 
     def _where(self, mask: NDArray[np.bool_]) -> list[ParameterReference]:

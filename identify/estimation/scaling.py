@@ -42,6 +42,11 @@ class Scaling:
             floors.append((index, 0.0 if index is not None else axis[c.effect].values[other]))
         return floors
 
+    def least(self, axis: AxisModel) -> Array:
+        """Values (k,) of the parameters below which these may not fall; zero without one."""
+        pairs = ((c.effect, c.parameter.at_least) for c in self.where)
+        return np.array([axis[e].values[other] if other else 0.0 for e, other in pairs])
+
     def inside(self, axis: AxisModel) -> Array:
         """The internal variables for the values of this axis."""
         values = read(axis, self.where)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.decision import RULE
-from identify.estimation.evidence import blocks_of, by_blocks
+from identify.estimation.evidence import Gain, blocks_of, by_blocks
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.time_origin import depends_on_time_origin
@@ -58,11 +58,13 @@ class Proof:
         return 1.0 - self.gain < RULE.beside_decoys * (1.0 - self.decoy)
 
 
-def proof(without: Fit, fitted: Fitted, dataset: Dataset) -> Proof | None:
+def proof(without: Fit, fitted: Fitted, dataset: Dataset, fit: Gain | None = None) -> Proof | None:
     """How an effect, at the shape it was found with, does beside a fit without it, and its decoys.
 
-    None where a shift in time makes no decoy: a friction takes the place of another, and what
-    depends on the time alone is as true at any other.
+    fit: what the fit with it takes of the held-out logs. The effect gains that where it is more
+    than one linear step takes: a law that changes what others' shapes must be does more than its
+    columns tell. None where a shift in time makes no decoy: a friction takes the place of another,
+    and what depends on the time alone is as true at any other.
     """
     axis = without.axis.with_effect(fitted)
     where = [
@@ -80,7 +82,11 @@ def proof(without: Fit, fitted: Fitted, dataset: Dataset) -> Proof | None:
         ends = np.cumsum([len(log) for log in logs])[:-1]
         return np.split(jacobian(axis, logs, where) / size, ends)
 
-    return clearer(Trial.of(without, dataset).proofs(columns, sticking=sticks(axis)))
+    whole, typical = Trial.of(without, dataset).proofs(columns, sticking=sticks(axis))
+    if fit is not None:
+        whole = replace(whole, gain=max(whole.gain, 1.0 - fit.left))
+        typical = replace(typical, gain=max(typical.gain, 1.0 - fit.typical))
+    return clearer((whole, typical))
 
 
 def clearer(proofs: tuple[Proof, Proof]) -> Proof:

@@ -8,7 +8,7 @@ from enum import Enum
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.given_logs import Role
-from identify.estimation.errors import Errors, error_in
+from identify.estimation.errors import Errors, error_in, gain_held_out
 from identify.estimation.fit import Fit, fit_axis
 from identify.selection.confidence import confidence
 from identify.selection.decoys import Proof, proof
@@ -75,7 +75,7 @@ def found(
         chosen=chosen,
         unit=final.axis.units.force,
         parameters=dict(fitted.values),
-        proof=proof(without, fitted, dataset),
+        proof=proof(without, fitted, dataset, gain_held_out(without, final, dataset)),
     )
 
 

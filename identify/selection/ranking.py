@@ -140,9 +140,14 @@ def _ranked(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
 
 
 def _below(helping: Sequence[Candidate], noisy: Fit) -> bool:
-    """Whether the best of these effects leaves less than a noise floor, but not noise alone."""
+    """Whether the best of these effects leaves less than a noise floor, but not noise alone.
+
+    A friction without memory does not count beside one with it: it sees none of the noise that
+    rounded readings make of that one's memory.
+    """
     least = RULE.floor_sure[0] * noisy.floor
-    return all(c.fit.error < least and not c.fit.at_floor for c in helping[:1])
+    seeing = [c for c in helping if sticks(noisy.axis) or not sticks(c.fit.axis)]
+    return all(c.fit.error < least and not c.fit.at_floor for c in seeing[:1])
 
 
 def is_all_noise(fit: Fit) -> bool:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import forces_lessened, is_noise
+from identify.dataset.drive import is_noise
 from identify.dataset.noise_floor import floor_of, unrounded_floor_of
-from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.decision import RULE
+from identify.estimation.errors import gain_held_out
 from identify.estimation.evidence import (
     Evidence,
     Gain,
@@ -24,7 +24,6 @@ from identify.estimation.evidence import (
     rms,
 )
 from identify.estimation.fit import Fit, error_on
-from identify.estimation.force_balance import residual
 from identify.estimation.time_origin import phases_found
 from identify.selection.decoys import proof
 from twin.effect import Effect, Kind
@@ -91,18 +90,11 @@ def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
     added += phases_found(fit.axis, effect.name, dataset)
     found = evidence(before, after, added)
-    if dataset.holdout:
-        held = moving(dataset.holdout, sticks(base.axis) or sticks(fit.axis))
-        motions = [log.motion for log in dataset.holdout]  # it may differ from the fit logs
-        pair = [
-            residual(f.axis, dataset.holdout)[held] / forces_lessened(f.axis, motions)
-            for f in (base, fit)
-        ]
-    elif found.delta_bic > RULE.least_bic:
-        pair = both(lambda f: _cross_validated(f, shared[f.kept]))
-    else:  # not supported, whatever cross-validation would give
-        pair = [before, after]
-    gain = held_out_gain(pair[0], pair[1], base.floor)
+    gain = gain_held_out(base, fit, dataset)
+    if gain is None:  # without evidence it is not supported, whatever cross-validation would give
+        crossed = found.delta_bic > RULE.least_bic
+        pair = both(lambda f: _cross_validated(f, shared[f.kept])) if crossed else [before, after]
+        gain = held_out_gain(pair[0], pair[1], base.floor)
     candidate = Candidate(effect, dataset.axis, fit, found, gain)
     if found.delta_bic < RULE.least_bic:
         return candidate
@@ -121,8 +113,8 @@ def _beats_decoys(base: Fit, candidate: Candidate, dataset: Dataset) -> bool:
     """
     if not (candidate.gain.t > 0.0 and candidate.gain.after < candidate.gain.before):
         return False
-    name = candidate.effect.name
-    beside = proof(base, candidate.fit.axis[name], dataset)
+    fitted = candidate.fit.axis[candidate.effect.name]
+    beside = proof(base, fitted, dataset, candidate.gain if dataset.holdout else None)
     if beside is None:
         return _is_clear(candidate)
     return beside.holds

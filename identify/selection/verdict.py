@@ -10,7 +10,7 @@ import numpy as np
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.estimation.decision import RULE
-from identify.estimation.errors import Errors
+from identify.estimation.errors import Errors, gain_held_out
 from identify.estimation.fit import Fit, fit_axis
 from identify.selection.decoys import proof
 from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, Verdict, kept
@@ -107,7 +107,9 @@ def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:
     if is_noise(effect):
         return True
     without = less(effect, final, base, dataset)
-    beside = proof(without, final.axis[effect.name], dataset)
+    beside = proof(
+        without, final.axis[effect.name], dataset, gain_held_out(without, final, dataset)
+    )
     chosen = Errors.of(without, final, dataset, dataset.chosen_on)
     if beside is not None:
         return beside.holds and chosen.after < chosen.before
