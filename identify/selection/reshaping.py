@@ -58,24 +58,36 @@ def curve_in_place(
 
 
 def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:
-    """The free curve that leaves clearly less than each absent effect; None where none does.
-
-    Less of the whole squared test error; or of that of a typical block, and no more on the fit
-    logs: a force at a few places of the test logs decides their whole error alone.
-    """
+    """The free curve that does clearly better than each absent effect; None where none does."""
     shape = wrong_shape(fit, dataset)
     if shape is None or shape.shape.curve.rubs:
         return None
     rivals = [c for c in ranking if c.supported]
-    whole = RULE.beside_decoys * min((c.gain.after**2 for c in rivals), default=np.inf)
-    typical = RULE.beside_decoys * min((c.gain.typical for c in rivals), default=np.inf)
+    whole = min((c.gain.after**2 for c in rivals), default=np.inf)
+    typical = min((c.gain.typical for c in rivals), default=np.inf)
     least = BY_REFIT * (1.0 - max(shape.taken, shape.proof.gain))
     if least * error_in(dataset.chosen_on, fit, dataset) ** 2 > whole and least > typical:
         return None
     curve = fit_in_place(fit, dataset, shape.shape)
-    fitted = min((c.fit.error for c in rivals), default=np.inf)
-    usually = curve.gain.typical <= typical and curve.fit.error <= fitted
-    return Reshaped(shape, fit, curve.fit) if curve.gain.after**2 <= whole or usually else None
+    return Reshaped(shape, fit, curve.fit) if _is_better(curve, rivals) else None
+
+
+def _is_better(curve: Candidate, rivals: Sequence[Candidate]) -> bool:
+    """Whether a curve leaves clearly less than each rival.
+
+    Less of the whole squared test error; or of that of a typical block, and no more on the fit
+    logs: a force at a few places of the test logs decides their whole error alone. Or no more of
+    either, where the fit logs part them.
+    """
+    gain = curve.gain
+    whole = min((c.gain.after**2 for c in rivals), default=np.inf)
+    typical = min((c.gain.typical for c in rivals), default=np.inf)
+    if gain.after**2 <= RULE.beside_decoys * whole:
+        return True
+    if gain.typical <= RULE.beside_decoys * typical:
+        return all(curve.fit.error <= c.fit.error for c in rivals)
+    parted = all(curve.evidence.over(c.evidence) > RULE.least_separation for c in rivals)
+    return parted and gain.after**2 <= whole and gain.typical <= typical
 
 
 def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:

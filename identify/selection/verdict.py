@@ -107,9 +107,8 @@ def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:
     if is_noise(effect):
         return True
     without = less(effect, final, base, dataset)
-    beside = proof(
-        without, final.axis[effect.name], dataset, gain_held_out(without, final, dataset)
-    )
+    refit = gain_held_out(without, final, dataset)
+    beside = proof(without, final.axis[effect.name], dataset, refit)
     chosen = Errors.of(without, final, dataset, dataset.chosen_on)
     if beside is not None:
         return beside.holds and chosen.after < chosen.before
