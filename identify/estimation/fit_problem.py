@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 PRIOR_FORCE = 0.1  # expected force of an effect beside the friction, over the force to explain
 PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
-PRIOR_EXCESS = 1.0  # expected static friction beyond the Coulomb friction, over this
+PRIOR_EXCESS = 3.0  # the same of static friction beyond the Coulomb friction, over this
 
 
 def _is_added(axis: AxisModel, c: ParameterReference) -> bool:
@@ -55,10 +55,10 @@ class FitProblem:
     The prior on an effect beside the friction is a force of a tenth of the force to be explained.
     It matters only for parameters that the data cannot separate, such as a constant force and a
     Coulomb asymmetry: it keeps both small, where they could be large and opposite. Static friction
-    is expected within twice the Coulomb friction, or a few test functions at creep would set it to
-    whatever else the model lacks there. Beside a nonparametric effect the prior of the physical
-    effects is centred where the fit starts, so that a force that both could explain stays with the
-    physics. The nonparametric effect is smoothed.
+    is expected within a few times the Coulomb friction, or a few test functions at creep would set
+    it to whatever else the model lacks there. Beside a nonparametric effect the prior of the
+    physical effects is centred where the fit starts, so that a force that both could explain stays
+    with the physics. The nonparametric effect is smoothed.
     """
 
     def __init__(self, axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int) -> None:

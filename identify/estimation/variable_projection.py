@@ -148,7 +148,8 @@ def one_linear_step(base: Fit, start: Start) -> Fit:
     """
     left = start.left + base.residual - base.unabsorbed
     where = base.scaling.where
-    norms = np.maximum(np.linalg.norm(base.jacobian, axis=0), 1e-300)
+    norms = np.linalg.norm(base.jacobian, axis=0)
+    norms[norms == 0.0] = np.inf  # a knot of a curve that the motion does not reach stays
     columns = base.jacobian / norms
     followed = columns.T @ (left - start.force)
     step = np.linalg.lstsq(columns.T @ columns, followed, rcond=1e-12)[0] / norms

@@ -102,7 +102,7 @@ def _needed_beside(
 
 def _foretells(candidate: Candidate) -> bool:
     """Whether a candidate, though not supported, takes so much that what is left is no noise."""
-    taken = 1.0 - (candidate.gain.after / candidate.gain.before) ** 2
+    taken = 1.0 - candidate.gain.left
     return candidate.delta_bic > RULE.least_bic and taken > RULE.least_share
 
 

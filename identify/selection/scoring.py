@@ -123,7 +123,7 @@ def _beats_decoys(base: Fit, candidate: Candidate, dataset: Dataset) -> bool:
 def _is_clear(candidate: Candidate) -> bool:
     """Whether a friction, which has no decoys, leaves clearly less of the held-out square."""
     gain, rubs = candidate.gain, candidate.effect.kind is Kind.FRICTION
-    clearly = gain.after**2 < RULE.beside_decoys * gain.before**2
+    clearly = gain.left < RULE.beside_decoys
     return bool(rubs and gain.t > RULE.friction_t and clearly)
 
 

@@ -49,7 +49,8 @@ def test_priors_are_rows_beside_the_residual():
     others = ("cable_slab", "cogging")
     added = [c.effect in others and c.parameter.strength for c in problem.scaling.where]
     np.testing.assert_array_equal(problem.added, added)
-    wanted = problem.pull * np.where(added, z, z - problem.start)
+    static = [c.label == "lugre.Fs" for c in problem.scaling.where]
+    wanted = problem.pull * np.where(np.logical_or(added, static), z, z - problem.start)
     np.testing.assert_allclose(rows[n:], wanted)
     slopes = problem.slopes(z)
     assert slopes.shape == (len(rows), k)
@@ -76,7 +77,9 @@ def test_priors_weigh_by_the_noise_and_the_force_to_be_explained(quiet):
     columns = np.sqrt(np.mean(problem.columns(problem.start) ** 2, axis=0))
     wanted = (size * columns / max(expected, size))[problem.added]
     np.testing.assert_allclose(problem.pull[problem.added], wanted)
-    others = ~is_log & ~problem.added
+    static = np.array([c.label == "lugre.Fs" for c in problem.scaling.where])
+    np.testing.assert_allclose(problem.pull[static], size / (3.0 * 0.31))
+    others = ~is_log & ~problem.added & ~static
     assert others.any()
     assert not problem.pull[others].any()
 

@@ -192,6 +192,22 @@ def test_the_base_moves_along_by_one_linear_step_within_its_bounds(dataset, base
             assert p.lower <= f.values[p.name] <= p.upper
 
 
+def test_what_the_motion_does_not_reach_stays_in_a_linear_step(dataset, base):
+    """As the outer knots of a curve: their columns are nothing, and so is their step."""
+    effect = CATALOGUE["cable_slab"]
+    start = _try(
+        _Ground.of(base, dataset, effect, SEEN, on_heads=False), {}, effect.strengths
+    )  # fmt: skip
+    unseen = next(i for i, c in enumerate(base.scaling.where) if c.effect == "constant_force")
+    partly = replace(base, residual=base.residual)
+    columns = base.jacobian.copy()
+    columns[:, unseen] = 0.0
+    partly.__dict__["jacobian"] = columns
+    found = one_linear_step(partly, start).axis
+    assert found["constant_force"].values == base.axis["constant_force"].values
+    assert found.mass != base.axis.mass
+
+
 # --- which shapes ---------------------------------------------------------------------------
 
 

@@ -76,4 +76,4 @@ def test_what_is_said_to_be_the_same_force_is() -> None:
     model = nominal().with_axis("x", held)
     effect = CATALOGUE[found.changes[0].alike[0]]
     added = workflow.add(effect, model, {"fit": logged("mass", 15.6)}, axis="x")
-    assert added.step.fit_error_after == pytest.approx(found.refitted, rel=0.01)
+    assert added.step.fit_error_after < 1.01 * found.refitted

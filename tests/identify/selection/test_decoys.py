@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, fitted
 
+from identify.estimation.evidence import Gain
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import averaged_force
 from identify.selection import decoys
@@ -73,6 +74,22 @@ def test_an_effect_is_set_against_what_one_decoy_in_twenty_exceeds(monkeypatch) 
     whole, typical = Trial(part, None).proofs(lambda logs: [], sticking=False)
     assert (whole.gain, whole.decoy) == pytest.approx((0.7, 0.37))
     assert (typical.gain, typical.decoy) == pytest.approx((0.8, 0.185))
+
+
+def test_a_refit_counts_where_it_takes_more_than_a_linear_step(monkeypatch, dataset) -> None:
+    """A friction that grows at rest changes what the friction beside it must be."""
+    proofs = Proof(0.3, 0.1), Proof(0.2, 0.15, typical=True)
+    monkeypatch.setattr(Trial, "proofs", lambda *_, **__: proofs)
+
+    def found(after: float, typical: float) -> Proof:
+        base = base_of(dataset)
+        told = proof(base, COGGING, dataset, Gain(2.0, after, 4.0, typical))
+        assert told is not None
+        return told
+
+    assert found(2.5, 1.2) == proof(base_of(dataset), COGGING, dataset) == proofs[0]
+    assert found(1.0, 1.2) == Proof(0.75, 0.1)
+    assert found(2.5, 0.4) == Proof(0.6, 0.15, typical=True)
 
 
 @pytest.mark.parametrize(

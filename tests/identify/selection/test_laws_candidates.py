@@ -20,6 +20,7 @@ from built_fits import (
     fitted,
 )
 
+from identify.estimation import errors
 from identify.estimation.evidence import Evidence, Gain, effective_samples, evidence
 from identify.selection import scoring
 from identify.selection.candidates import absent_effects
@@ -143,9 +144,9 @@ def test_the_held_out_logs_judge_before_and_after_in_that_order(quiet):
     richer = axis_of(fitted("constant_force", F0=2.0))
     fit = built_fit(0.1, 0.02, richer)
     found = score(base, fit, dataset, CATALOGUE["constant_force"])
-    kept = scoring.moving(dataset.holdout, True)
+    kept = errors.moving(dataset.holdout, True)
     before, after = (
-        np.sqrt(np.mean(scoring.residual(a, dataset.holdout)[kept] ** 2)) for a in (PLAIN, richer)
+        np.sqrt(np.mean(errors.residual(a, dataset.holdout)[kept] ** 2)) for a in (PLAIN, richer)
     )
     assert found.gain.before == pytest.approx(before)
     assert found.gain.after == pytest.approx(after)
@@ -160,9 +161,9 @@ def test_held_out_windows_at_rest_are_left_out_where_either_friction_sticks(quie
         asked.append(either)
         return slice(None)
 
-    monkeypatch.setattr(scoring, "moving", moving)
-    monkeypatch.setattr(scoring, "residual", lambda axis, logs: RNG.standard_normal(300))
-    monkeypatch.setattr(scoring, "forces_lessened", lambda axis, motions: 1.0)
+    monkeypatch.setattr(errors, "moving", moving)
+    monkeypatch.setattr(errors, "residual", lambda axis, logs: RNG.standard_normal(300))
+    monkeypatch.setattr(errors, "forces_lessened", lambda axis, motions: 1.0)
     monkeypatch.setattr(scoring, "_beats_decoys", lambda *_: False)
     held = SimpleNamespace(motion=None)
     dataset, lugre = dataset_stub(holdout=(held,)), PLAIN.with_effect(fitted("lugre"))

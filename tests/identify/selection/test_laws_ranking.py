@@ -76,6 +76,23 @@ def test_a_noise_as_large_as_the_error_comes_first_where_effects_only_lower_it(
     assert found == ([NOISE.name, "wear"] if first else ["wear", NOISE.name])
 
 
+@pytest.mark.parametrize(
+    ("present", "other", "first"),
+    [
+        ("lugre", "stribeck", NOISE.name),  # which sees nothing of what the other makes at creep
+        ("lugre", "dahl", "dahl"),
+        ("coulomb_viscous", "stribeck", "stribeck"),
+    ],
+)
+def test_a_friction_without_memory_does_not_come_before_the_noise_in_ones_with_it(
+    present, other, first
+):
+    rubs = replace(axis_of(), effects=(fitted(present),))
+    noise = built(NOISE, bic=900.0, fit=built_fit(0.93, axis=rubs))
+    left = built_fit(0.5, 0.49, axis=replace(rubs, effects=(fitted(other),)))
+    assert names(_ranked([built(other, bic=3000.0, fit=left), noise]))[0] == first
+
+
 def test_a_noise_comes_after_what_lowers_the_error_if_both_are_supported():
     noise, weak = built(NOISE, bic=900.0), built("wear", bic=20.0)
     assert names(_ranked([noise, weak])) == ["wear", NOISE.name]

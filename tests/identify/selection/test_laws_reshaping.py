@@ -83,8 +83,7 @@ def test_effect_and_curve_take_nearly_all_or_a_good_part_with_every_support(
 
 @pytest.mark.parametrize(("gain", "refitted"), [(0.58, False), (0.6, True)])
 def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypatch, gain, refitted):
-    # Of the best effect's squared error, 0.8 is what a curve may leave; a refit may leave 0.3 of
-    # what a linear step does.
+    # A curve may leave as much as the best effect, a refit 0.3 of what a linear step leaves.
     asked = []
     shape = WrongShape(object.__new__(Shape), Proof(gain, 0.0), gain)
     object.__setattr__(shape.shape, "curve", type("Plain", (), {"rubs": False}))
@@ -96,7 +95,7 @@ def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypat
     monkeypatch.setattr(module, "wrong_shape", lambda fit, dataset: shape)
     monkeypatch.setattr(module, "error_in", lambda role, fit, dataset: 8.0)
     monkeypatch.setattr(module, "fit_in_place", in_place)
-    best = 8.0 * np.sqrt(0.3 * 0.41 / 0.8)
+    best = 8.0 * np.sqrt(0.3 * 0.41)
     assert module._reshaped(BASE, DATASET, [built(t=9.0, before=8.0, after=best)]) is None
     assert bool(asked) is refitted
 
@@ -123,6 +122,24 @@ def test_a_curve_competes_by_the_whole_error_or_by_that_of_a_typical_block(
     monkeypatch.setattr(module, "error_in", lambda role, fit, dataset: 8.0)
     monkeypatch.setattr(module, "fit_in_place", lambda fit, dataset, shape: curve)
     assert bool(module._reshaped(BASE, DATASET, [effect])) is found
+
+
+@pytest.mark.parametrize(
+    ("evidence", "after", "typical", "better"),
+    [
+        (511.0, 3.9, 0.24, True),
+        (509.0, 3.9, 0.24, False),  # the fit logs hardly part them
+        (511.0, 4.1, 0.24, False),  # of either it may leave no more
+        (511.0, 3.9, 0.26, False),
+    ],
+)
+def test_a_curve_that_leaves_no_more_is_better_where_the_fit_logs_part_them(
+    evidence, after, typical, better
+):
+    """A cable that folds, beside a dead time: a soft stop leaves as much of one test log."""
+    curve = built(bic=evidence, before=8.0, after=after, typical=typical)
+    effect = built(bic=500.0, t=9.0, before=8.0, after=4.0, typical=0.25)
+    assert module._is_better(curve, [effect]) is better
 
 
 # --- a finding against the curve of a law that the model has ---------------------------------

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import built, built_dataset, built_fit
+from built_fits import built, built_dataset, built_fit, dataset_stub
 
 from identify.dataset.given_logs import Role
 from identify.estimation.evidence import Gain
@@ -44,18 +44,20 @@ def test_beating_the_decoys_stands_for_an_even_gain_alone(t, beats, bic, after, 
         (0.99, 0.1, None, False),  # none are made of what depends on the time alone
     ],
 )
-def test_an_effect_must_lower_the_held_out_error_and_hold(monkeypatch, part, t, proof, beats):
-    base = built_fit(5.0)
+@pytest.mark.parametrize("held", [(), ("log",)])
+def test_an_effect_must_lower_the_held_out_error_and_hold(monkeypatch, part, t, proof, beats, held):
+    base, data = built_fit(5.0), dataset_stub(holdout=held)
     made = replace(built("wear"), gain=Gain(2.0, 2.0 * np.sqrt(part), t))
 
-    def asked(without, fitted, dataset):
-        assert (without, fitted, dataset) == (base, made.fit.axis["wear"], "data")
+    def asked(without, fitted, dataset, gain):
+        assert (without, fitted, dataset) == (base, made.fit.axis["wear"], data)
+        assert gain is (made.gain if held else None)  # what the fit logs give is no refit's gain
         assert part < 1.0
         assert t > 0.0
         return proof
 
     monkeypatch.setattr(module, "proof", asked)
-    assert _beats_decoys(base, made, "data") is beats
+    assert _beats_decoys(base, made, data) is beats
 
 
 @pytest.mark.parametrize(
@@ -72,7 +74,7 @@ def test_a_friction_without_decoys_counts_where_it_leaves_clearly_less(
 ):
     made = replace(built(effect), gain=Gain(2.0, 2.0 * np.sqrt(part), t))
     monkeypatch.setattr(module, "proof", lambda *_: None)
-    assert _beats_decoys(built_fit(5.0), made, "data") is clear
+    assert _beats_decoys(built_fit(5.0), made, dataset_stub()) is clear
 
 
 def test_a_linear_step_takes_none_of_the_noise():

@@ -202,7 +202,8 @@ def test_a_step_is_named_that_is_sure_or_beats_its_decoys(monkeypatch, holds, su
     states = [stage(HIGH), stage(built_fit(5.0), FIRST), stage(final, FIRST, SECOND)]
     asked = []
 
-    def proof(without, fitted, dataset):
+    def proof(without, fitted, dataset, gain):
+        assert gain is None  # no held-out logs
         asked.append((without.axis.names, fitted.effect.name))
         holding = fitted.effect.name in holds
         return Proof(0.5, 0.1 if holding else 0.45)
@@ -240,7 +241,7 @@ def test_without_decoys_an_effect_is_proved_by_a_fifth_less_of_the_squared_error
 
     errors = Errors(4.0, after, Role.SELECTION)
     monkeypatch.setattr(module, "less", less)
-    monkeypatch.setattr(module, "proof", lambda without, fitted, dataset: None)
+    monkeypatch.setattr(module, "proof", lambda without, fitted, dataset, gain: None)
     monkeypatch.setattr(module.Errors, "of", lambda *_: errors)
     found = _graded(states, (), dataset_stub())
     assert (found is not None) is named
