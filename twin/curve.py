@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
@@ -25,13 +25,15 @@ class Curve:
     over: its coordinate. period: name of the parameter that is the length after which it repeats;
     None where it does not. by_direction: whether each direction of motion has a curve of its own.
     rubs: whether it is a level of friction, so that only a curve that turns with the direction is
-    another shape of it.
+    another shape of it. bent_by: name of a parameter, held by design, that bends the law's own
+    curve; None where the law has none.
     """
 
     over: Coordinate
     period: str | None = None
     by_direction: bool = False
     rubs: bool = False
+    bent_by: str | None = None
 
 
 # What a friction law assumes: its level over speed, and one level all along the track.
@@ -39,6 +41,8 @@ FRICTION_CURVES = (
     Curve(Coordinate.SPEED, by_direction=True, rubs=True),
     Curve(Coordinate.POSITION, by_direction=True, rubs=True),
 )
+# The same with a Stribeck exponent, between what bearings and greases show (0.5 to 4).
+STRIBECK_CURVES = (replace(FRICTION_CURVES[0], bent_by="n"), FRICTION_CURVES[1])
 
 
 @dataclass(frozen=True)

@@ -224,6 +224,12 @@ class Effect:
                 )
             if p.at_least is not None and p.at_least not in names:
                 raise ValueError(f"effect {self.name}: {p.name} refers to unknown {p.at_least}")
+        held = {p.name for p in self.parameters if p.fixed}
+        for bend in (c.bent_by for c in self.curves if c.bent_by):
+            if bend not in held:
+                raise ValueError(
+                    f"effect {self.name}: its curve is bent by {bend}, which is no fixed parameter"
+                )
 
     @cached_property
     def name(self) -> str:

@@ -30,6 +30,19 @@ class FindingKind(Enum):
 
 
 @dataclass(frozen=True)
+class Bend:
+    """A parameter of a law, held by design, with which its curve comes nearest to the one found.
+
+    held, found: in ``unit``.
+    """
+
+    parameter: str
+    held: float
+    found: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Finding:
     """A missing effect, or one whose law has the wrong shape, that the data prove.
 
@@ -39,7 +52,8 @@ class Finding:
     as one linear step predicts where no refit was made. chosen: the same on the logs that chose;
     without test logs the test errors are these. parameters: of its law. proof: beside decoys; None
     where a shift in time makes none. shape: the curve that is assumed and the one found, where they
-    differ. left: over the noise floor, the error that all findings together leave on the logs that
+    differ. bend: what would give the law that curve, where it has such a parameter. left: over the
+    noise floor, the error that all findings together leave on the logs that
     chose.
     """
 
@@ -53,6 +67,7 @@ class Finding:
     proof: Proof | None
     kind: FindingKind = FindingKind.MISSING
     shape: FoundShape | None = None
+    bend: Bend | None = None
     left: float = 1.0
 
     @property
@@ -95,6 +110,8 @@ def found_reshaped(
 
     As of a missing effect, the final fit less this curve tells what it explains.
     """
+    if shape.shape.curve.rubs:
+        return _found_bent(shape, base, before, final, dataset)
     curve = shape.shape.empty.effect.name
     if curve not in final.axis.names:
         return found_wrong(shape, base, before, dataset)
@@ -103,6 +120,19 @@ def found_reshaped(
         axis = axis.with_effect(before.axis[shape.effect])
     without = fit_axis(axis, dataset.fit)
     return _of_shape(shape, base, before, dataset, _errors(without, final, dataset))
+
+
+def _found_bent(shape: WrongShape, base: Fit, before: Fit, final: Fit, dataset: Dataset) -> Finding:
+    """The same of a friction whose own curve is bent in a final fit, if that has it still."""
+    bend = shape.shape.curve.bent_by
+    if bend is None or shape.effect not in final.axis.names:
+        return found_wrong(shape, base, before, dataset)
+    held, law = before.axis[shape.effect], final.axis[shape.effect]
+    straight = replace(law, values={**law.values, bend: held.values[bend]}, fixed=held.fixed)
+    without = fit_axis(final.axis.with_effect(straight), dataset.fit)
+    found = _of_shape(shape, base, before, dataset, _errors(without, final, dataset))
+    bent = Bend(bend, held.values[bend], law.values[bend], held.effect.parameter(bend).unit)
+    return replace(found, parameters=dict(law.values), bend=bent)
 
 
 def _errors(without: Fit, final: Fit, dataset: Dataset) -> tuple[Errors, Errors]:

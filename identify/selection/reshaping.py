@@ -9,14 +9,14 @@ contain what modifies friction.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
 from identify.estimation.errors import Errors, error_in
-from identify.estimation.fit import Fit
+from identify.estimation.fit import Fit, fit_axis
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.ranking import less
 from identify.selection.scoring import Candidate, score
@@ -60,9 +60,11 @@ def curve_in_place(
 def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:
     """The free curve that does clearly better than each absent effect; None where none does."""
     shape = wrong_shape(fit, dataset)
-    if shape is None or shape.shape.curve.rubs:
+    if shape is None:
         return None
     rivals = [c for c in ranking if c.supported]
+    if shape.shape.curve.rubs:
+        return _bent(shape, fit, dataset, rivals)
     whole = min((c.gain.after**2 for c in rivals), default=np.inf)
     typical = min((c.gain.typical for c in rivals), default=np.inf)
     least = BY_REFIT * (1.0 - max(shape.taken, shape.proof.gain))
@@ -70,6 +72,20 @@ def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Resha
         return None
     curve = fit_in_place(fit, dataset, shape.shape)
     return Reshaped(shape, fit, curve.fit) if _is_better(curve, rivals) else None
+
+
+def _bent(
+    shape: WrongShape, fit: Fit, dataset: Dataset, rivals: Sequence[Candidate]
+) -> Reshaped | None:
+    """The friction with what bends its own curve free, where that does clearly better."""
+    law, bend = fit.axis[shape.effect], shape.shape.curve.bent_by
+    if bend is None or bend not in law.fixed:
+        return None
+    bent = fit.axis.with_effect(replace(law, fixed=law.fixed - {bend}))
+    curve = score(fit, fit_axis(bent, dataset.fit), dataset, law.effect)
+    return (
+        Reshaped(shape, fit, curve.fit) if curve.supported and _is_better(curve, rivals) else None
+    )
 
 
 def _is_better(curve: Candidate, rivals: Sequence[Candidate]) -> bool:

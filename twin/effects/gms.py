@@ -21,7 +21,7 @@ integrated exactly over the sample for constant v, so any stiffness and C are st
 from functools import cache
 from math import copysign, exp, expm1, log
 
-from twin.curve import FRICTION_CURVES
+from twin.curve import STRIBECK_CURVES
 from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 SHARES = 9  # where the elements' own parameters begin
@@ -92,7 +92,7 @@ def of_size(elements: int) -> Effect:
         ),
         states=(*(f"F_{i}" for i in numbers), *(f"slip_{i}" for i in numbers)),
         law=law,
-        curves=FRICTION_CURVES,
+        curves=STRIBECK_CURVES,
         fingerprint="residual after a reversal that depends on where the axis turned before",
         excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
         of_size=of_size,

@@ -24,7 +24,7 @@ at the mean of the rates at both ends of the step: any stiffness is stable.
 
 from math import copysign, exp, expm1, log1p
 
-from twin.curve import FRICTION_CURVES
+from twin.curve import STRIBECK_CURVES
 from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 TURNS = 16  # reversals remembered
@@ -143,7 +143,7 @@ EFFECT = Effect(
     ),
     states=("F_h", "direction", "depth", *(f"turn_{i + 1}" for i in range(TURNS))),
     law=law,
-    curves=FRICTION_CURVES,
+    curves=STRIBECK_CURVES,
     fingerprint="residual after a reversal that depends on where the axis turned before",
     excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
 )  # fmt: skip

@@ -9,7 +9,7 @@ v, so any stiffness is stable.
 
 from math import copysign, exp, expm1
 
-from twin.curve import FRICTION_CURVES
+from twin.curve import STRIBECK_CURVES
 from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 GONE = 40.0  # exp(-40) is below the rounding of what it is added to
@@ -72,7 +72,7 @@ EFFECT = Effect(
     ),
     states=("z",),
     law=law,
-    curves=FRICTION_CURVES,
+    curves=STRIBECK_CURVES,
     fingerprint="residual after every reversal over a few bristle deflections of travel",
     excited_by="slow reversals of a few micrometres to millimetres, and a velocity staircase",
 )  # fmt: skip

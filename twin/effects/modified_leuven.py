@@ -21,7 +21,7 @@ rates at both ends of the step, so it never changes sign and any stiffness is st
 from functools import cache
 from math import copysign, exp, expm1, log, log1p
 
-from twin.curve import FRICTION_CURVES
+from twin.curve import STRIBECK_CURVES
 from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 SHARES = 11  # where the elements' own parameters begin
@@ -136,7 +136,7 @@ def of_size(elements: int) -> Effect:
         ),
         states=tuple(f"F_{i}" for i in numbers),
         law=law,
-        curves=FRICTION_CURVES,
+        curves=STRIBECK_CURVES,
         fingerprint="residual after a reversal that depends on where the axis turned before",
         excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
         of_size=of_size,

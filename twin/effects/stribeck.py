@@ -11,7 +11,7 @@ allows it, exactly that force acts, so the axis is at rest to rounding and never
 
 from math import copysign, exp
 
-from twin.curve import FRICTION_CURVES
+from twin.curve import STRIBECK_CURVES
 from twin.effect import DRY, HOLD, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
 
 
@@ -55,7 +55,7 @@ EFFECT = Effect(
     states=("at_rest",),
     sticks=True,
     law=law,
-    curves=FRICTION_CURVES,
+    curves=STRIBECK_CURVES,
     fingerprint="residual rises below the Stribeck velocity, with the sign of the direction",
     excited_by="constant-speed passes in both directions, most of them slow",
 )  # fmt: skip

@@ -64,6 +64,10 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     if finding.kind is FindingKind.WRONG_SHAPE:
         what = f"{finding.effect} has another shape: a free curve beside its law explains"
         without, with_it = "with the law", "with the curve"
+    if bend := finding.bend:
+        with_it = f"with {bend.parameter} {numbers.amount(bend.found, bend.unit)}"
+        without = f"with {numbers.amount(bend.held, bend.unit)}"
+        what = f"{finding.effect} has another shape, which its law {with_it} has: that explains"
     text = (
         f"{what} {100.0 * finding.explains:.0f} % of the squared error above the noise floor: "
         f"{without} the {error} is {before}, {with_it} {after}"
@@ -72,9 +76,9 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     if finding.proof is None:
         return f"{text}; {sure}"
     gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.decoy))
-    of_it = "that of a typical part" if finding.proof.typical else "it"
+    of_it = "that of a typical part" if finding.proof.typical else "it all"
     rarely = f"one decoy in twenty {decoy:.0f} % or more"
-    return f"{text}; in one linear step it takes {gain:.0f} % of {of_it}, {rarely}; {sure}"
+    return f"{text}; of {of_it} it takes {gain:.0f} %, {rarely}; {sure}"
 
 
 def named_errors_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str:

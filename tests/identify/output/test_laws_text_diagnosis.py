@@ -56,7 +56,7 @@ def test_a_diagnosis():
     sure = [f"confidence {100.0 * f.confidence:.0f} %" for f in made.FOUND]
     assert rest[:3] == [
         "cogging explains 87 % of the squared error above the noise floor: without it the error "
-        "on the selection logs is 7.17 N, with it 2.19 N; in one linear step it takes 81 % of it, "
+        "on the selection logs is 7.17 N, with it 2.19 N; of it all it takes 81 %, "
         f"one decoy in twenty 14 % or more; {sure[0]}",
         "lugre explains 12 % of the squared error above the noise floor: without it the error on "
         f"the selection logs is 3.23 N, with it 2.19 N; {sure[1]}",

@@ -142,6 +142,43 @@ def test_a_curve_that_leaves_no_more_is_better_where_the_fit_logs_part_them(
     assert module._is_better(curve, [effect]) is better
 
 
+@pytest.mark.parametrize(
+    ("bend", "held", "t", "after", "bent"),
+    [
+        ("n", True, 9.0, 3.0, True),
+        (None, True, 9.0, 3.0, False),  # a law without what bends its curve
+        ("n", False, 9.0, 3.0, False),  # that is free already
+        ("n", True, 1.0, 3.0, False),  # no evidence on the held-out logs
+        ("n", True, 9.0, 3.7, False),  # an effect leaves about as little
+    ],
+)
+def test_a_friction_is_bent_where_that_does_clearly_better(monkeypatch, bend, held, t, after, bent):
+    """A Stribeck curve of another exponent, which a breakaway force that ages imitates."""
+    law = fitted("stribeck")
+    law = law if held else replace(law, fixed=law.fixed - {"n"})
+    base = built_fit(8.0, axis=replace(axis_of(), effects=(law,)))
+    shape = WrongShape(object.__new__(Shape), Proof(0.6, 0.2), 0.6)
+    object.__setattr__(shape.shape, "curve", SimpleNamespace(rubs=True, bent_by=bend))
+    object.__setattr__(shape.shape, "effect", "stribeck")
+    asked = []
+
+    def fit_axis(axis, logs):
+        asked.append(axis["stribeck"].fixed)
+        return built_fit(after)
+
+    def score(fit, again, dataset, effect):
+        assert (fit, effect) == (base, law.effect)
+        return built("stribeck", t=t, before=8.0, after=again.error, fit=again)
+
+    monkeypatch.setattr(module, "wrong_shape", lambda fit, dataset: shape)
+    monkeypatch.setattr(module, "fit_axis", fit_axis)
+    monkeypatch.setattr(module, "score", score)
+    rival = built("wear", t=9.0, before=8.0, after=4.0)
+    found = module._reshaped(base, DATASET, [rival])
+    assert bool(found) is bent
+    assert asked == ([law.fixed - {"n"}] if bend and held else [])
+
+
 # --- a finding against the curve of a law that the model has ---------------------------------
 
 

@@ -214,6 +214,33 @@ def test_a_curve_takes_part_in_the_selection_where_no_effect_leaves_as_little(da
     assert curve_in_place(base_of(nothing), nothing, (), OWN) is None
 
 
+def test_a_stribeck_curve_of_another_exponent_is_told_by_its_exponent(dataset) -> None:
+    """And not as the free curve of a speed, beside which the exponent could not be told."""
+    values = {"Fc": 0.3, "Fs": 1.2, "v0": 0.03, "sigma2": 0.5}
+    held = replace(axis_of(CABLE), effects=(fitted("stribeck", **values), CABLE))
+    true = held.with_effect(fitted("stribeck", **values, n=0.7))
+    there = machine(dataset, lambda x, _: 0.0 * x, true)
+    base = fit_axis(held, there.fit)
+    found = curve_in_place(base, there, (), held.names)
+    assert found is not None
+    assert found.shape.effect == "stribeck"
+    assert found.fit.axis["stribeck"].values["n"] == pytest.approx(0.7, abs=0.05)
+    assert found.fit.ratio < 0.2 * base.ratio
+    finding = found_reshaped(found.shape, base, base, found.fit, there)
+    assert finding.bend is not None
+    assert (finding.bend.parameter, finding.bend.held, finding.bend.unit) == ("n", 2.0, "1")
+    assert finding.chosen.after < 0.2 * finding.chosen.before
+    assert finding.parameters == dict(found.fit.axis["stribeck"].values)
+    words = finding_in_words(finding)
+    assert "stribeck has another shape, which its law with n 0." in words
+    assert "with 2 the error" in words
+    assert curve_in_place(found.fit, there, (), held.names) is None
+    # A friction that another one replaced since has no exponent to tell.
+    gone = found.fit.axis.with_effect(fitted("coulomb_viscous"))
+    replaced = finished(gone, gone, there.fit, Outcome.CONVERGED)
+    assert found_reshaped(found.shape, base, base, replaced, there).bend is None
+
+
 def test_each_law_of_a_wrong_shape_gets_a_curve_of_its_own(dataset) -> None:
     there = machine(dataset, lambda x, d: step(x, d) + 9.0 * bump(x, d))
     first = curve_in_place(base_of(there), there, (), OWN)

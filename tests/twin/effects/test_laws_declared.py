@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from effect_runs import CATALOGUE, FRICTIONS
 
-from twin.curve import Part
+from twin.curve import Coordinate, Curve, Part
 from twin.effect import Effect, Excitation, Kind, Parameter, V
 
 LOG = Excitation(
@@ -162,6 +162,15 @@ BAD = {
 def test_a_declaration_that_makes_no_sense_is_refused(fault: str) -> None:
     with pytest.raises(ValueError, match="effect test_laws_declared"):
         declared(*BAD[fault])
+
+
+def test_a_curve_is_bent_by_what_the_effect_holds() -> None:
+    bent = Curve(Coordinate.SPEED, rubs=True, bent_by="n")
+    held = declared(number("n", 2.0, 0.5, 4.0, fixed=True))
+    assert replace(held, curves=(bent,)).curves == (bent,)
+    for other in (number("n", 2.0, 0.5, 4.0), number("k", 2.0, 0.5, 4.0, fixed=True)):
+        with pytest.raises(ValueError, match="bent by n"):
+            replace(declared(other), curves=(bent,))
 
 
 def test_starts_from_a_log_stay_within_bounds() -> None:
