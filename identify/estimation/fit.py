@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 
 MOST_EVALUATIONS = 40
 ROUGHLY = 1e-3  # relative fall of the squared error, at which the priors are weighed again
+MOST_WEIGHINGS = 4
+WEIGHED = 0.9  # of the error by which the priors were weighed; above it they are not weighed again
 NEGLIGIBLE = 1e-3  # twice a gain in log likelihood, below which a fit has converged
 PUSHED = 3.0  # standard errors by which the gradient must point beyond a bound
 RESIDUAL_LINES = 6  # spectral lines of the residual that are told
@@ -171,9 +173,22 @@ def fit_axis(
     if len(internal):
         problem.set_priors(internal)
         internal, _ = problem.solve(internal, ROUGHLY)
-        samples = problem.set_priors(internal)
-        internal, converged = problem.solve(internal, NEGLIGIBLE / samples)
+        internal, converged = _weighed_again(problem, internal)
     return _ended(problem, internal, converged)
+
+
+def _weighed_again(problem: FitProblem, internal: Array) -> tuple[Array, bool]:
+    """The fit with priors weighed by the error that it leaves, and whether it converged.
+
+    Weighed by a much larger one they hold the fit back, and so what is left; hence once more.
+    """
+    converged = True
+    for _ in range(MOST_WEIGHINGS):
+        before, samples = rms(problem.force(internal)), problem.set_priors(internal)
+        internal, converged = problem.solve(internal, NEGLIGIBLE / samples)
+        if rms(problem.force(internal)) > WEIGHED * before:
+            break
+    return internal, converged
 
 
 def fit_roughly(axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int) -> Fit:

@@ -20,6 +20,7 @@ from twin.model.parameters import ParameterReference, free_parameters
 Array = NDArray[np.float64]
 
 PRIOR_FORCE = 0.1  # expected force of an effect beside the friction, over the force to explain
+UNSEEN = 1e-3  # of the force of another strength of the effect, below which one is not excited
 PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20
 PRIOR_EXCESS = 3.0  # the same of static friction beyond the Coulomb friction, over this
 
@@ -54,11 +55,12 @@ class FitProblem:
 
     The prior on an effect beside the friction is a force of a tenth of the force to be explained.
     It matters only for parameters that the data cannot separate, such as a constant force and a
-    Coulomb asymmetry: it keeps both small, where they could be large and opposite. Static friction
-    is expected within a few times the Coulomb friction, or a few test functions at creep would set
-    it to whatever else the model lacks there. Beside a nonparametric effect the prior of the
-    physical effects is centred where the fit starts, so that a force that both could explain stays
-    with the physics. The nonparametric effect is smoothed.
+    Coulomb asymmetry: it keeps both small, where they could be large and opposite. A strength that
+    the motion hardly reaches, as of bumps passed one way alone, stays where the fit starts. Static
+    friction is expected within a few times the Coulomb friction, or a few test functions at creep
+    would set it to whatever else the model lacks there. Beside a nonparametric effect the prior of
+    the physical effects is centred where the fit starts, so that a force that both could explain
+    stays with the physics. The nonparametric effect is smoothed.
     """
 
     def __init__(self, axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int) -> None:
@@ -94,12 +96,20 @@ class FitProblem:
         columns = self.columns(internal)
         size = np.linalg.norm(columns, axis=0) / np.sqrt(max(len(left), 1))
         expected = max(PRIOR_FORCE * explained, noise)
-        self.pull = np.where(self.added, noise * size / expected, 0.0)
+        alike = self._of_alike(size)
+        unseen = self.added & (size < UNSEEN * alike)
+        self.pull = np.where(self.added, noise * np.where(unseen, alike, size) / expected, 0.0)
+        self.centre[unseen] = self.start[unseen]
         self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD
         least = self.scaling.least(axis)
         beyond = least > 0.0
         self.pull[beyond], self.centre[beyond] = noise / (PRIOR_EXCESS * least[beyond]), 0.0
         return samples
+
+    def _of_alike(self, size: Array) -> Array:
+        """For each parameter the largest size (k,) among those of its effect in the same unit."""
+        kinds = [(c.effect, c.parameter.unit) for c in self.scaling.where]
+        return np.array([max(size[[k == own for k in kinds]]) for own in kinds])
 
     def _where(self, mask: NDArray[np.bool_]) -> list[ParameterReference]:
         return [c for c, wanted in zip(self.scaling.where, mask, strict=True) if wanted]

@@ -65,8 +65,10 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
         what = f"{finding.effect} has another shape: a free curve beside its law explains"
         without, with_it = "with the law", "with the curve"
     if bend := finding.bend:
-        with_it = f"with {bend.parameter} {numbers.amount(bend.found, bend.unit)}"
-        without = f"with {numbers.amount(bend.held, bend.unit)}"
+        with_it, without = (
+            f"with {bend.parameter} = {value:.3g}{'' if bend.unit == '1' else f' {bend.unit}'}"
+            for value in (bend.found, bend.held)
+        )
         what = f"{finding.effect} has another shape, which its law {with_it} has: that explains"
     text = (
         f"{what} {100.0 * finding.explains:.0f} % of the squared error above the noise floor: "

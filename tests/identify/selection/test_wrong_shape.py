@@ -232,8 +232,8 @@ def test_a_stribeck_curve_of_another_exponent_is_told_by_its_exponent(dataset) -
     assert finding.chosen.after < 0.2 * finding.chosen.before
     assert finding.parameters == dict(found.fit.axis["stribeck"].values)
     words = finding_in_words(finding)
-    assert "stribeck has another shape, which its law with n 0." in words
-    assert "with 2 the error" in words
+    assert "stribeck has another shape, which its law with n = 0.7 has" in words
+    assert "with n = 2 the error" in words
     assert curve_in_place(found.fit, there, (), held.names) is None
     # A friction that another one replaced since has no exponent to tell.
     gone = found.fit.axis.with_effect(fitted("coulomb_viscous"))
