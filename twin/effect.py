@@ -166,8 +166,8 @@ class Effect:
     simplest: the same force with simpler values, such as a shorter pitch where only harmonics were
     used. parts: the curves of a nonparametric effect, whose force is linear in its strengths; such
     an effect is never the answer of a diagnosis. columns: for one of many strengths, of which few
-    act at a time, a function as the law is that writes these to ``io`` from COLUMNS on, so that
-    all columns take one walk; the law is their sum. free_shape: of one that stands in the place of
+    act at a time or which share what is dear, a function as the law is that writes those which act
+    to ``io`` from COLUMNS on, so that all columns take one walk; the law is their sum. free_shape: of one that stands in the place of
     a law, and stays where other nonparametric effects are set aside. curves: those which the law
     assumes, where a diagnosis may ask whether a free curve does better. several: whether an axis
     may have the effect more than once, as cogging of poles and of slots; number: which of these it

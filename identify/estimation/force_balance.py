@@ -143,30 +143,25 @@ def changes(
     for j, c in enumerate(where):
         by_effect.setdefault(c.effect, []).append(j)
     for effect, index in by_effect.items():
-        own = [where[j] for j in index]
         if not effect:
             out[index] = steps[index, None] * _by_mass(axis, logs)
-        elif _has_columns(axis, own):
-            for span, part in zip(spans, _columns(axis, own, logs), strict=True):
-                out[index, span] = part
-            out[index] *= steps[index, None]
-        else:
-            group = group_of(axis, effect)
-            values = read(group, own)
+            continue
+        at_once = axis[effect].effect.columns is not None
+        linear = [j for j in index if at_once and where[j].parameter.strength]
+        if linear:
+            parts = _columns(axis, [where[j] for j in linear], logs)
+            for span, part in zip(spans, parts, strict=True):
+                out[linear, span] = part * steps[linear, None]
+        bent = [j for j in index if j not in linear]
+        if bent:
+            group, own = group_of(axis, effect), [where[j] for j in bent]
             moved = [
                 write(group, [c], [v + step])
-                for c, v, step in zip(own, values, steps[index], strict=True)
+                for c, v, step in zip(own, read(group, own), steps[bent], strict=True)
             ]
             for span, part in zip(spans, _differences(group, moved, effect, logs), strict=True):
-                out[index, span] = part
+                out[bent, span] = part
     return out
-
-
-def _has_columns(axis: AxisModel, where: Sequence[ParameterReference]) -> bool:
-    """Whether these parameters of one effect are strengths whose columns it gives in one walk."""
-    return axis[where[0].effect].effect.columns is not None and all(
-        c.parameter.strength for c in where
-    )
 
 
 def _columns(
