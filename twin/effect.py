@@ -159,21 +159,22 @@ class Effect:
     fingerprint: the trace in the residual when the effect is missing. excited_by: the motion that
     excites it. of_size: for a law of any number of elements, the effect with that many; its
     parameter ``elements``, whose bounds are both that number, tells the law. attach: of a structure
-    effect, builds its bodies in MuJoCo, given a twin.mujoco.bodies.Mount and the values by
-    name; its first two states are then the position (m) and speed (m/s) of the joint built.
-    added_mass: values by name -> what the effect adds to the moved mass, as a part of it.
-    sticks: whether it is a friction that holds the axis at rest with any force up to a level.
-    simplest: the same force with simpler values, such as a shorter pitch where only harmonics were
-    used. parts: the curves of a nonparametric effect, whose force is linear in its strengths; such
-    an effect is never the answer of a diagnosis. columns: for one of many strengths, of which few
-    act at a time, a function as the law is that writes these to ``io`` from COLUMNS on, so that
-    all columns take one walk; the law is their sum. free_shape: of one that stands in the place of
-    a law, and stays where other nonparametric effects are set aside. curves: those which the law
-    assumes, where a diagnosis may ask whether a free curve does better. several: whether an axis
-    may have the effect more than once, as cogging of poles and of slots; number: which of these it
-    is. is_itself: (values by name, the motion covered) -> whether the law with these values is the
-    effect, and not some other force that it imitates. dead_time: whether it does nothing but delay
-    the force against the reading; which of the two is late, no log of both can tell.
+    effect, builds its bodies in MuJoCo, given a twin.mujoco.bodies.Mount and the values by name;
+    its first two states are then the position (m) and speed (m/s) of the joint built. added_mass:
+    values by name -> what the effect adds to the moved mass, as a part of it. sticks: whether it is
+    a friction that holds the axis at rest with any force up to a level. simplest: the same force
+    with simpler values, such as a shorter pitch where only harmonics were used. parts: the curves
+    of a nonparametric effect, whose force is linear in its strengths; such an effect is never the
+    answer of a diagnosis. columns: for one of many strengths, of which few act at a time or which
+    share what is dear, a function as the law is that writes those which act to ``io`` from COLUMNS
+    on, so that all columns take one walk; the law is their sum (of a force, or what a sensing
+    effect adds to the reading). free_shape: of one that stands in the place of a law, and stays
+    where other nonparametric effects are set aside. curves: those which the law assumes, where a
+    diagnosis may ask whether a free curve does better. several: whether an axis may have the effect
+    more than once, as cogging of poles and of slots; number: which of these it is. is_itself:
+    (values by name, the motion covered) -> whether the law with these values is the effect, and not
+    some other force that it imitates. dead_time: whether it does nothing but delay the force
+    against the reading; which of the two is late, no log of both can tell.
     """
 
     kind: Kind

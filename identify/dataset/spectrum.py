@@ -86,11 +86,11 @@ class Grid:
 
     def powers(self, records: Sequence[Record]) -> Array:
         """Power of each record at the frequencies, (records, m)."""
-        spread = [
-            _spread(place, r.values * taper, self.cells)
-            for r, place, taper in zip(records, self.places, self.tapers, strict=True)
-        ]
-        return np.abs(np.fft.rfft(spread)[:, WIDTH:]) ** 2
+        tapered = [r.values * taper for r, taper in zip(records, self.tapers, strict=True)]
+        if not self.even:  # else each sample has a cell of its own
+            pairs = zip(self.places, tapered, strict=True)
+            tapered = [_spread(place, values, self.cells) for place, values in pairs]
+        return np.array([np.abs(np.fft.rfft(v, self.cells)[WIDTH:]) ** 2 for v in tapered])
 
 
 def pieces_of(signal: NDArray[Any], samples: int) -> NDArray[Any]:
@@ -172,13 +172,13 @@ def _spread(place: Array, values: Array, cells: int) -> Array:
     """
     first = np.floor(place).astype(int)
     t = place - first
-    weights = (
-        -t * (t - 1.0) * (t - 2.0) / 6.0,
-        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-        -(t + 1.0) * t * (t - 2.0) / 2.0,
-        (t + 1.0) * t * (t - 1.0) / 6.0,
+    weights = np.stack(
+        [
+            -t * (t - 1.0) * (t - 2.0) / 6.0,
+            (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+            -(t + 1.0) * t * (t - 2.0) / 2.0,
+            (t + 1.0) * t * (t - 1.0) / 6.0,
+        ]
     )
-    out = np.zeros(cells)
-    for k, weight in enumerate(weights):
-        out += np.bincount((first + k - 1) % cells, values * weight, cells)
-    return out
+    about = (first + np.arange(-1, 3)[:, None]) % cells
+    return np.asarray(np.bincount(about.ravel(), (weights * values).ravel(), cells))

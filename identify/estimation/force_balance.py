@@ -13,12 +13,13 @@ from identify.dataset.drive import actual_force, parts_of, reading_error, true_m
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, moving, sticks, total_force, total_forces
 from twin.core.calling import P_AT
-from twin.core.columns import averaged_columns
+from twin.core.columns import averaged_columns, reading_columns
 from twin.core.native import Table
 from twin.effect import Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
 from twin.model.parameters import ParameterReference, read, write
+from twin.signals import between
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ def averaged_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
     Log after log. A sensing effect adds an apparent force, mass x acceleration of the reading's
     error, and the other effects act along the true motion, under the actual force.
     """
-    table = _between(axis)
+    table = _table_between(axis)
     parts = []
     for log in logs:
         driven, added = _driven(axis, log)
@@ -44,7 +45,7 @@ def _is_stepped_finely(axis: AxisModel) -> bool:
     return any(f.effect.kind is Kind.ACTUATION and f.effect.states for f in axis.effects)
 
 
-def _between(axis: AxisModel) -> Table:
+def _table_between(axis: AxisModel) -> Table:
     """Table of the effects that act along the motion and force of ``_driven``."""
     apart = {Kind.SENSING, *((Kind.ACTUATION,) if _is_stepped_finely(axis) else ())}
     return axis_table({"": parts_of(axis, *(set(Kind) - apart))})
@@ -143,30 +144,26 @@ def changes(
     for j, c in enumerate(where):
         by_effect.setdefault(c.effect, []).append(j)
     for effect, index in by_effect.items():
-        own = [where[j] for j in index]
         if not effect:
             out[index] = steps[index, None] * _by_mass(axis, logs)
-        elif _has_columns(axis, own):
-            for span, part in zip(spans, _columns(axis, own, logs), strict=True):
-                out[index, span] = part
-            out[index] *= steps[index, None]
-        else:
-            group = group_of(axis, effect)
-            values = read(group, own)
+            continue
+        law = axis[effect].effect
+        at_once = law.columns is not None and law.kind is Kind.FORCE
+        linear = [j for j in index if at_once and where[j].parameter.strength]
+        if linear:
+            parts = _columns(axis, [where[j] for j in linear], logs)
+            for span, part in zip(spans, parts, strict=True):
+                out[linear, span] = part * steps[linear, None]
+        bent = [j for j in index if j not in linear]
+        if bent:
+            group, own = group_of(axis, effect), [where[j] for j in bent]
             moved = [
                 write(group, [c], [v + step])
-                for c, v, step in zip(own, values, steps[index], strict=True)
+                for c, v, step in zip(own, read(group, own), steps[bent], strict=True)
             ]
             for span, part in zip(spans, _differences(group, moved, effect, logs), strict=True):
-                out[index, span] = part
+                out[bent, span] = part
     return out
-
-
-def _has_columns(axis: AxisModel, where: Sequence[ParameterReference]) -> bool:
-    """Whether these parameters of one effect are strengths whose columns it gives in one walk."""
-    return axis[where[0].effect].effect.columns is not None and all(
-        c.parameter.strength for c in where
-    )
 
 
 def _columns(
@@ -193,7 +190,7 @@ def _differences(
     strengths = [group[effect].values[p.name] for p in group[effect].effect.strengths]
     absent = len(group.effects) == 1 and bool(strengths) and not any(strengths)
     if kind is Kind.SENSING and absent:
-        yield from (_apparent_forces(moved, log) for log in logs)
+        yield from (_apparent_forces(moved, effect, log) for log in logs)
         return
     if kind is Kind.SENSING or (kind is Kind.ACTUATION and _is_stepped_finely(group)):
         for log in logs:
@@ -201,7 +198,7 @@ def _differences(
             yield np.stack([averaged_force(axis, [log]) - base for axis in moved])
         return
     # The motion and the force behind it stay; all sets of values go along it in one walk.
-    table = _between(group)
+    table = _table_between(group)
     at = table.labels.index(("", effect))
     first = int(table.entries[at, P_AT])
     bases = 0 if absent else 1
@@ -218,12 +215,21 @@ def _differences(
         yield np.concatenate(means)
 
 
-def _apparent_forces(sensing: Sequence[AxisModel], log: PreparedLog) -> Array:
-    """Force (m, n) N that sensing effects alone seem to add, to first order in their error."""
-    path = log.motion.smoothed_position
-    rates = (reading_error(axis, log.motion, path, passes=1)[1] for axis in sensing)
-    forces = zip(sensing, rates, strict=True)
-    return np.stack([axis.mass * log.fine.acceleration(rate) for axis, rate in forces])
+def _apparent_forces(sensing: Sequence[AxisModel], effect: str, log: PreparedLog) -> Array:
+    """Force (m, n) N that one sensing effect alone seems to add, to first order in its error.
+
+    Linear in its strengths, where the effect gives their columns.
+    """
+    motion, mass, own = log.motion, sensing[0].mass, [axis[effect] for axis in sensing]
+    path, period = motion.smoothed_position, motion.sample_period
+    if own[0].effect.columns is None:
+        rates = (reading_error(axis, motion, path, passes=1)[1] for axis in sensing)
+        return np.stack([mass * log.fine.acceleration(rate) for rate in rates])
+    track = np.stack([path, motion.raw[0]])
+    errors = reading_columns(own[0].effect, own[0].vector(), track, period)
+    rates = (np.append(between(error, period), 0.0) for error in errors)
+    strengths = np.array([[f.values[p.name] for p in f.effect.strengths] for f in own])
+    return np.asarray(strengths @ [mass * log.fine.acceleration(rate) for rate in rates])
 
 
 def _by_mass(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:

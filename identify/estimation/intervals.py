@@ -255,20 +255,20 @@ def _by_influence(influence: Array, residual: Array) -> Array:
     an equal share of the squared influence, which is what the data tell of the estimate with the
     other parameters held. So all groups count alike, and the fit takes as much from each (CR2).
     """
-    order = np.argsort(np.abs(influence), axis=0)
-    told = np.take_along_axis(influence**2, order, axis=0)
-    middle = np.cumsum(told, axis=0) - 0.5 * told
-    whole = told.sum(axis=0)
+    size = np.abs(influence.T, order="C")
+    told = np.sort(size) ** 2
+    shares = np.cumsum(told, axis=1) - 0.5 * told
+    whole = told.sum(axis=1)
     whole[whole == 0.0] = 1.0  # of a sum of no parameters
-    group = np.minimum((middle / whole * GROUPS).astype(int), GROUPS - 1)
-    moved = np.take_along_axis(influence * residual[:, None], order, axis=0)
-
-    def by_group(values: Array) -> Array:
-        columns = zip(group.T, values.T, strict=True)
-        return np.stack([np.bincount(g, v, GROUPS) for g, v in columns], axis=1)
-
-    left = np.maximum(1.0 - by_group(told) / whole, TINY)
-    return GROUPS_QUANTILE * np.sqrt((by_group(moved) ** 2 / left).sum(axis=0))
+    out = np.empty(len(size))
+    for j, (share, own) in enumerate(zip(shares, size, strict=True)):
+        first = np.searchsorted(share, whole[j] * np.arange(1, GROUPS) / GROUPS)
+        edges = np.sqrt(told[j, np.minimum(first, len(own) - 1)])
+        group = np.count_nonzero(own >= edges[:, None], axis=0)
+        left = np.maximum(1.0 - np.bincount(group, own**2, GROUPS) / whole[j], TINY)
+        moved = np.bincount(group, influence[:, j] * residual, GROUPS)
+        out[j] = np.sqrt((moved**2 / left).sum())
+    return GROUPS_QUANTILE * out
 
 
 def _held(fit: Fit) -> list[Estimate]:

@@ -50,12 +50,12 @@ def _peaks(
 ) -> tuple[float, ...]:
     """Pitches (m) at which a sine gains more than at those beside, the largest gains first."""
     halves = np.arange(2 * FEWEST_CYCLES, 2 * MOST_CYCLES + 1)
-    turn = np.pi / span * np.outer(position, halves)
+    turn = np.exp(1j * np.pi / span * position)[:, None]
+    # Each wave is the one before turned on by half a cycle over the travel.
+    waves = np.cumprod(np.hstack([turn ** halves[0], turn.repeat(len(halves) - 1, axis=1)]), axis=1)
     basis = orthonormal(columns)
     left = unabsorbed(force, basis)
-    sine, cosine = (
-        unabsorbed(weight[:, None] * wave, basis) for wave in (np.sin(turn), np.cos(turn))
-    )
+    sine, cosine = (unabsorbed(weight[:, None] * wave, basis) for wave in (waves.imag, waves.real))
     a, b, c = (
         np.einsum("ij,ij->j", *pair) for pair in ((sine, sine), (cosine, cosine), (sine, cosine))
     )

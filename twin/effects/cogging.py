@@ -9,18 +9,28 @@ from collections.abc import Mapping
 from math import cos, hypot, pi, sin
 
 from twin.curve import Coordinate, Curve
-from twin.effect import OUT, Effect, Excitation, Kind, Parameter, X
+from twin.effect import COLUMNS, OUT, Effect, Excitation, Kind, Parameter, X
 
 
-def law(p, s, io):
+def waves(p, io):
+    """Sine and cosine of each harmonic, in the order of the strengths."""
     phase = 2.0 * pi * io[X] / p[0]
     sin1 = sin(phase)
     cos1 = cos(phase)
     sin2 = 2.0 * sin1 * cos1
     cos2 = cos1 * cos1 - sin1 * sin1
-    sin3 = sin2 * cos1 + cos2 * sin1
-    cos3 = cos2 * cos1 - sin2 * sin1
+    return sin1, cos1, sin2, cos2, sin2 * cos1 + cos2 * sin1, cos2 * cos1 - sin2 * sin1
+
+
+def law(p, s, io):
+    sin1, cos1, sin2, cos2, sin3, cos3 = waves(p, io)
     io[OUT] = p[1] * sin1 + p[2] * cos1 + p[3] * sin2 + p[4] * cos2 + p[5] * sin3 + p[6] * cos3
+
+
+def columns(p, s, io):
+    io[COLUMNS] = 6
+    for j, wave in enumerate(waves(p, io)):
+        io[COLUMNS + 1 + 2 * j], io[COLUMNS + 2 + 2 * j] = j, wave
 
 
 def pitches(e: Excitation) -> tuple[float, ...]:
@@ -62,6 +72,7 @@ EFFECT = Effect(
         ),
     ),
     law=law,
+    columns=columns,
     simplest=simplest,
     curves=(Curve(Coordinate.POSITION, period="p"),),
     several=True,

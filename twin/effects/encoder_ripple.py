@@ -9,18 +9,28 @@ of a phase error is left out, a shift of zero.
 
 from math import cos, pi, sin
 
-from twin.effect import READING, Effect, Excitation, Kind, Parameter
+from twin.effect import COLUMNS, READING, Effect, Excitation, Kind, Parameter
 
 SCALES = (2e-6, 4e-6, 8e-6, 1e-5, 1.6e-5, 2e-5, 4e-5, 1e-4)  # m; longer ones show as ripples
 
 
-def law(p, s, io):
+def waves(p, io):
+    """Sine and cosine of each harmonic, in the order of the strengths."""
     phase = 2.0 * pi * io[READING] / p[0]
     sine = sin(phase)
     cosine = cos(phase)
-    twice = 2.0 * sine * cosine
-    error = p[1] * sine + p[2] * cosine + p[3] * twice + p[4] * (cosine * cosine - sine * sine)
-    io[READING] += error
+    return sine, cosine, 2.0 * sine * cosine, cosine * cosine - sine * sine
+
+
+def law(p, s, io):
+    sine, cosine, sine2, cosine2 = waves(p, io)
+    io[READING] += p[1] * sine + p[2] * cosine + p[3] * sine2 + p[4] * cosine2
+
+
+def columns(p, s, io):
+    io[COLUMNS] = 4
+    for j, wave in enumerate(waves(p, io)):
+        io[COLUMNS + 1 + 2 * j], io[COLUMNS + 2 + 2 * j] = j, wave
 
 
 def periods(e: Excitation) -> tuple[float, ...]:
@@ -47,6 +57,7 @@ EFFECT = Effect(
         ),
     ),
     law=law,
+    columns=columns,
     fingerprint="command and speed ripple at a frequency of speed over the signal period",
     excited_by="slow constant speeds over many signal periods",
 )  # fmt: skip
