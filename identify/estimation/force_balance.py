@@ -242,5 +242,5 @@ def _by_mass(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
 def difference_step(c: ParameterReference, value: float) -> float:
     """A step within the bounds, small relative to the value or to the parameter's range."""
     p = c.parameter
-    size = 1e-5 * max(abs(value), abs(p.start), 1e-6 * min(p.upper - p.lower, 1e3))
+    size = 1e-5 * max(abs(value), abs(p.start), 1e-3 * min(p.upper - p.lower, 1.0))
     return size if value + size <= p.upper else -size
