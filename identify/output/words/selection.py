@@ -201,6 +201,11 @@ def nonparametric_in_words(fitted: Fitted) -> str:
 def advice(findings: Sequence[Finding] = ()) -> str:
     """What lowers the error where no physical effect explains it, or a law has the wrong shape."""
     for f in findings:
+        if f.bend is not None:
+            return (
+                f"fixed = [] for {f.effect} in the model file lets `twin fit` find its "
+                f"{f.bend.parameter}, which gives the model the shape that the logs show"
+            )
         if f.shape is not None:
             first = f"twin add {f.effect}, then " if f.kind is FindingKind.RESEMBLES else ""
             shaped = f"{first}twin add --shape {f.effect}"

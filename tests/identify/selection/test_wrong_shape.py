@@ -234,6 +234,7 @@ def test_a_stribeck_curve_of_another_exponent_is_told_by_its_exponent(dataset) -
     words = finding_in_words(finding)
     assert "stribeck has another shape, which its law with n = 0.7 has" in words
     assert "with n = 2 the error" in words
+    assert advice((finding,)).startswith("fixed = [] for stribeck in the model file")
     assert curve_in_place(found.fit, there, (), held.names) is None
     # A friction that another one replaced since has no exponent to tell.
     gone = found.fit.axis.with_effect(fitted("coulomb_viscous"))
