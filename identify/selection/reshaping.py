@@ -21,7 +21,7 @@ from identify.selection.nonparametric import fit_in_place
 from identify.selection.ranking import less
 from identify.selection.scoring import Candidate, score
 from identify.selection.unpredictable import is_unpredictable
-from identify.selection.wrong_shape import WrongShape, wrong_shape
+from identify.selection.wrong_shape import WrongShape, wrong_shapes
 
 MOST_TRIED = 3  # effects beside which a curve is sought
 MOST_CURVES = 3  # on one axis
@@ -58,13 +58,23 @@ def curve_in_place(
 
 
 def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:
-    """The free curve that does clearly better than each absent effect; None where none does."""
-    shape = wrong_shape(fit, dataset)
-    if shape is None:
-        return None
+    """The free curve that does clearly better than each absent effect; None where none does.
+
+    That which takes most; the next where that is of a friction whose own curve cannot be bent so.
+    """
     rivals = [c for c in ranking if c.supported]
-    if shape.shape.curve.rubs:
-        return _bent(shape, fit, dataset, rivals)
+    for shape in wrong_shapes(fit, dataset):
+        if not shape.shape.curve.rubs:
+            return _in_place(shape, fit, dataset, rivals)
+        if bent := _bent(shape, fit, dataset, rivals):
+            return bent
+    return None
+
+
+def _in_place(
+    shape: WrongShape, fit: Fit, dataset: Dataset, rivals: Sequence[Candidate]
+) -> Reshaped | None:
+    """A law with its free curve, where that does clearly better."""
     whole = min((c.gain.after**2 for c in rivals), default=np.inf)
     typical = min((c.gain.typical for c in rivals), default=np.inf)
     least = BY_REFIT * (1.0 - max(shape.taken, shape.proof.gain))

@@ -9,7 +9,7 @@ friction, test functions with standstill are left out: there it may be anything.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -89,19 +89,30 @@ def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
 
 @lru_cache(maxsize=4)  # in the selection, and beside what it named
 def likely_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
-    """The same, proved or not; None where no curve takes anything.
+    """The same, proved or not; None where no curve takes anything."""
+    shapes = _by_gain(fit, dataset)
+    return _with_proof(Trial.of(fit, dataset), shapes[0], fit, dataset) if shapes else None
 
-    Of those that leave about as little, the one with fewer parts.
-    """
+
+def wrong_shapes(fit: Fit, dataset: Dataset) -> Iterator[WrongShape]:
+    """Each law of a fit that is proved to have another shape; those that take most come first."""
+    trial = Trial.of(fit, dataset)
+    proved = (_with_proof(trial, s, fit, dataset) for s in _by_gain(fit, dataset))
+    return (w for w in proved if w.proof.holds)
+
+
+@lru_cache(maxsize=4)
+def _by_gain(fit: Fit, dataset: Dataset) -> tuple[Shape, ...]:
+    """The curves that the data ask for by falling gain; of about as little left, fewer parts."""
     trial = Trial.of(fit, dataset)
     shapes = [s for s in _shapes(fit, dataset) if _rubs(trial, s, fit, dataset)]
-    found = [(s, max(p.gain for p in _proofs(trial, s, fit, dataset, decoys=0))) for s in shapes]
-    if not found:
-        return None
-    least = min(1.0 - gain for _, gain in found)
-    near = [s for s, gain in found if RULE.near * (1.0 - gain) <= least]
-    best = min(near, key=lambda s: len(s.stiffness))
-    return _with_proof(trial, best, fit, dataset)
+    left = {s: 1.0 - max(p.gain for p in _proofs(trial, s, fit, dataset, decoys=0)) for s in shapes}
+    order: list[Shape] = []
+    while left:
+        near = [s for s in left if RULE.near * left[s] <= min(left.values())]
+        order.append(min(near, key=lambda s: len(s.stiffness)))
+        del left[order[-1]]
+    return tuple(order)
 
 
 def best_shape(fit: Fit, dataset: Dataset, effect: str) -> WrongShape | None:

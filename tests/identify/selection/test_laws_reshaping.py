@@ -92,7 +92,7 @@ def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypat
         asked.append(shape)
         return built(before=8.0, after=9.0)
 
-    monkeypatch.setattr(module, "wrong_shape", lambda fit, dataset: shape)
+    monkeypatch.setattr(module, "wrong_shapes", lambda fit, dataset: iter([shape]))
     monkeypatch.setattr(module, "error_in", lambda role, fit, dataset: 8.0)
     monkeypatch.setattr(module, "fit_in_place", in_place)
     best = 8.0 * np.sqrt(0.3 * 0.41)
@@ -118,7 +118,7 @@ def test_a_curve_competes_by_the_whole_error_or_by_that_of_a_typical_block(
     object.__setattr__(shape.shape, "curve", type("Plain", (), {"rubs": False}))
     curve = built(before=8.0, after=after, typical=typical, fit=built_fit(fitted_to))
     effect = built(t=9.0, before=8.0, after=4.0, typical=0.25, fit=built_fit(3.0))
-    monkeypatch.setattr(module, "wrong_shape", lambda fit, dataset: shape)
+    monkeypatch.setattr(module, "wrong_shapes", lambda fit, dataset: iter([shape]))
     monkeypatch.setattr(module, "error_in", lambda role, fit, dataset: 8.0)
     monkeypatch.setattr(module, "fit_in_place", lambda fit, dataset, shape: curve)
     assert bool(module._reshaped(BASE, DATASET, [effect])) is found
@@ -170,13 +170,49 @@ def test_a_friction_is_bent_where_that_does_clearly_better(monkeypatch, bend, he
         assert (fit, effect) == (base, law.effect)
         return built("stribeck", t=t, before=8.0, after=again.error, fit=again)
 
-    monkeypatch.setattr(module, "wrong_shape", lambda fit, dataset: shape)
+    monkeypatch.setattr(module, "wrong_shapes", lambda fit, dataset: iter([shape]))
     monkeypatch.setattr(module, "fit_axis", fit_axis)
     monkeypatch.setattr(module, "score", score)
     rival = built("wear", t=9.0, before=8.0, after=4.0)
     found = module._reshaped(base, DATASET, [rival])
     assert bool(found) is bent
     assert asked == ([law.fixed - {"n"}] if bend and held else [])
+
+
+@pytest.mark.parametrize(
+    ("laws", "bends", "tried", "found"),
+    [
+        (("lugre", "cable_slab"), False, ["lugre", "cable_slab"], "cable_slab"),
+        (("lugre", "cable_slab"), True, ["lugre"], "lugre"),
+        (("cable_slab", "cogging"), True, ["cable_slab"], "cable_slab"),
+        (("lugre",), False, ["lugre"], None),
+    ],
+)
+def test_a_friction_that_cannot_be_bent_leaves_the_place_to_the_next(
+    monkeypatch, laws, bends, tried, found
+):
+    """A cable that folds, beside hysteresis: what the friction's curve takes is no exponent's."""
+    asked = []
+
+    def shape_of(name):
+        shape = WrongShape(object.__new__(Shape), Proof(0.6, 0.1), 0.6)
+        object.__setattr__(shape.shape, "curve", SimpleNamespace(rubs=name == "lugre"))
+        object.__setattr__(shape.shape, "effect", name)
+        return shape
+
+    def attempt(succeeds):
+        def try_it(shape, fit, dataset, rivals):
+            asked.append(shape.effect)
+            return shape if succeeds else None
+
+        return try_it
+
+    monkeypatch.setattr(module, "wrong_shapes", lambda fit, dataset: map(shape_of, laws))
+    monkeypatch.setattr(module, "_bent", attempt(bends))
+    monkeypatch.setattr(module, "_in_place", attempt(True))
+    answer = module._reshaped(BASE, DATASET, [])
+    assert asked == tried
+    assert (answer and answer.effect) == found
 
 
 # --- a finding against the curve of a law that the model has ---------------------------------

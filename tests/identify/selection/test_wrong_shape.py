@@ -26,7 +26,7 @@ from identify.selection.found_shape import AHEAD, BEHIND, BOTH, found_shape
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.reshaping import curve_in_place
 from identify.selection.residual_dependence import Dependence
-from identify.selection.wrong_shape import best_shape, gain_on_fit_logs, wrong_shape
+from identify.selection.wrong_shape import best_shape, gain_on_fit_logs, wrong_shape, wrong_shapes
 from identify.workflow import add_shape
 from twin.effects import load_catalogue
 from twin.errors import InputError
@@ -112,6 +112,18 @@ def test_the_law_whose_curve_differs_is_told_and_its_curve_found(
     words = shape_in_words(effect, drawn)
     assert f"The law of {effect} is off most at position" in words
     assert " m" in words
+
+
+def test_each_law_that_is_proved_wrong_is_told_most_first(dataset) -> None:
+    there = machine(dataset, lambda x, d: step(x, d) + 3.0 * bump(x, d))
+    found = list(wrong_shapes(base_of(there), there))
+    assert {w.effect for w in found} >= {"cable_slab", "cogging"}
+    assert all(w.proof.holds for w in found)
+    first = wrong_shape(base_of(there), there)
+    assert first is not None
+    assert found[0].effect == first.effect
+    taken = [max(w.taken, w.proof.gain) for w in found[:2]]
+    assert taken[0] > 0.9 * taken[1]
 
 
 def test_where_no_shape_is_wrong_none_is_told(dataset) -> None:
