@@ -72,7 +72,9 @@ class FitProblem:
         self.bounds = self.scaling.bounds()
         self.start = np.clip(self.scaling.inside(axis), *self.bounds)
         self.added = np.array([_is_added(axis, c) for c in self.scaling.where], dtype=bool)
-        self.centre = np.where(self.added & (not has_nonparametric(axis)), 0.0, self.start)
+        self.excess = np.array([bool(c.parameter.at_least) for c in self.scaling.where], dtype=bool)
+        near_none = (self.excess | self.added) & (not has_nonparametric(axis))
+        self.expected = self.centre = np.where(near_none, 0.0, self.start)
         self.pull = np.zeros(len(self.start))
         self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
         # A force is linear in its strengths, so their columns are computed once.
@@ -98,12 +100,12 @@ class FitProblem:
         expected = max(PRIOR_FORCE * explained, noise)
         alike = self._of_alike(size)
         unseen = self.added & (size < UNSEEN * alike)
+        self.centre = np.where(unseen, self.start, self.expected)
         self.pull = np.where(self.added, noise * np.where(unseen, alike, size) / expected, 0.0)
-        self.centre[unseen] = self.start[unseen]
         self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD
         least = self.scaling.least(axis)
-        beyond = least > 0.0
-        self.pull[beyond], self.centre[beyond] = noise / (PRIOR_EXCESS * least[beyond]), 0.0
+        beyond = self.excess & (least > 0.0)
+        self.pull[beyond] = noise / (PRIOR_EXCESS * least[beyond])
         return samples
 
     def _of_alike(self, size: Array) -> Array:

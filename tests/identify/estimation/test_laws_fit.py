@@ -11,6 +11,7 @@ from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import (
     Outcome,
+    _weighed_again,
     error_on,
     finished,
     fit_axis,
@@ -82,6 +83,46 @@ def test_priors_weigh_by_the_noise_and_the_force_to_be_explained(quiet):
     others = ~is_log & ~problem.added & ~static
     assert others.any()
     assert not problem.pull[others].any()
+
+
+def test_a_strength_that_the_motion_hardly_reaches_stays_where_it_starts():
+    """Bumps of a roller that is passed one way alone: those of the other way tell nothing."""
+    bumps = effect("roller_spikes", {"ahead": 0.05, "behind": 0.04, "width": 3e-3})
+    one_way = moved(np.random.default_rng(5), 1.5, 1000.0)
+    signals = one_way.signals.copy()
+    signals[0] = 0.1 * np.arange(signals.shape[1]) * one_way.period
+    signals[1] = 0.1
+    logs = [windowed(replace(one_way, signals=signals, raw=signals[1:]))]
+    axis = AxisModel(1.7, effects=(*ODD.effects[:1], bumps))
+    problem = FitProblem(axis, logs, 10)
+    problem.set_priors(problem.start)
+    labels = [c.label for c in problem.scaling.where]
+    ahead, behind = (labels.index(f"roller_spikes.{name}") for name in ("ahead", "behind"))
+    assert problem.pull[behind] == pytest.approx(problem.pull[ahead])
+    assert (problem.centre[ahead], problem.centre[behind]) == (0.0, 0.04)
+    assert fit_axis(axis, logs).axis["roller_spikes"].values["behind"] == pytest.approx(0.04)
+
+
+def test_priors_are_weighed_again_while_the_error_falls_far(monkeypatch):
+    """Weighed by the error of a fit that they hold back, they would hold back the next as well."""
+    errors, weighed = iter([1.0, 0.5, 0.5, 0.4, 0.4, 0.39]), []
+
+    class Problem:
+        def force(self, _):
+            return np.full(3, next(errors))
+
+        def set_priors(self, internal):
+            weighed.append(internal)
+            return 100.0
+
+        def solve(self, internal, tolerance):
+            assert tolerance == pytest.approx(1e-5)
+            return internal + 1, True
+
+    assert _weighed_again(Problem(), 0) == (3, True)
+    assert weighed == [0, 1, 2]
+    errors = iter(0.5**k for k in range(20))
+    assert _weighed_again(Problem(), 0)[0] == 4
 
 
 MAPPED = AxisModel(1.7, effects=(*ODD.effects[:2], effect("empirical_map")))
