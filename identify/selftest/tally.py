@@ -68,7 +68,7 @@ def rates(results: Sequence[TrialResult]) -> list[Rate]:
         out.append(_rate(f"wrong names, {text}", trials, _wrong_name))
         out.append(_rate(f"confident wrong names, {text}", trials, _confident, asked))
     out.append(
-        _rate("outside the catalogue: no name, and the right coordinate",
+        _rate("outside the catalogue: no wrong name, and the right coordinate",
               outside, _honest, COORDINATE)
     )  # fmt: skip
     # No target: some laws contain that of another, and some motions of the stage part no two.
@@ -203,4 +203,4 @@ def _confident(o: TrialResult) -> bool:
 
 
 def _honest(o: TrialResult) -> bool:
-    return not o.wrong and o.depends_on in o.coordinates
+    return not o.wrong and not o.told.isdisjoint(o.coordinates)

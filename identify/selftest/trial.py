@@ -32,6 +32,7 @@ from twin.model.machine import Fitted
 from twin.model.parameters import read
 
 STAGE = "proton_xy"
+OVER = {Coordinate.POSITION: "position", Coordinate.SPEED: "velocity"}  # what a curve tells
 NEARLY = 0.8  # part of the strongest dependence from which a coordinate counts as right
 
 
@@ -40,7 +41,8 @@ class Answer:
     """A finding of the diagnosis, and whether it is right.
 
     names: the effect, and those declared as ambiguous with it. left: error over the noise floor,
-    which its confidence is read from. confidence: stated, 0..1.
+    which its confidence is read from. confidence: stated, 0..1. coordinate: that of the curve which
+    it shows, where a law has another shape.
     """
 
     names: tuple[str, ...]
@@ -48,6 +50,7 @@ class Answer:
     right: bool
     left: float = np.nan
     confidence: float = np.nan
+    coordinate: str | None = None
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,11 @@ class TrialResult:
             all(name in answer for name, answer in zip(self.case.effects, order, strict=True))
             for order in permutations(missing, len(self.case.effects))
         )
+
+    @property
+    def told(self) -> frozenset[str | None]:
+        """The coordinates that are told, of an unexplained residual and of the curves shown."""
+        return frozenset((self.depends_on, *(a.coordinate for a in self.answers)))
 
     @property
     def wrong(self) -> tuple[Answer, ...]:
@@ -173,7 +181,8 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
         case FindingKind.RESEMBLES:
             right = any(e in OUTSIDE for e in case.effects)
             right |= any(f.effect.name in names and _is_another(f) for f in built.planted)
-    return Answer(names, finding.kind, right, finding.left, finding.confidence)
+    over = OVER[finding.shape.over] if finding.shape else None
+    return Answer(names, finding.kind, right, finding.left, finding.confidence, over)
 
 
 def _is_another(planted: Fitted) -> bool:

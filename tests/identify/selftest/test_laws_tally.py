@@ -92,7 +92,9 @@ def test_every_outcome_is_counted_once_in_its_own_row():
         "confident wrong names, planted inside the catalogue": (4, inside, "at most 1 %"),
         "wrong names, planted outside the catalogue": (9, 32, ""),
         "confident wrong names, planted outside the catalogue": (9, 32, "at most 3 %"),
-        "outside the catalogue: no name, and the right coordinate": (13, 32, "at least 80 %"),
+        "outside the catalogue: no wrong name, and the right coordinate": (
+            13, 32, "at least 80 %",
+        ),
         "another name for an effect taken out of the catalogue": (8, 8, ""),
         "test error within 1.3 of what noise leaves, where the answer is right": (23, 29, ""),
         "90 % intervals that hold the truth, nothing missing": (
@@ -102,6 +104,18 @@ def test_every_outcome_is_counted_once_in_its_own_row():
             11, 33, "at least 85 %",
         ),
     }  # fmt: skip
+
+
+def test_a_curve_tells_a_coordinate_as_a_remainder_does():
+    """A bump at one place: what is told is the cable's curve over position, and nothing is left."""
+
+    def counted(*answers):
+        found = rates([replace(LOST, answers=answers)])
+        return next(r.count for r in found if r.what.startswith("outside"))
+
+    assert [counted(replace(SHAPE, coordinate=c)) for c in ("x", "y", None)] == [1, 0, 0]
+    assert counted(replace(SHAPE, coordinate="y"), replace(SHAPE, coordinate="x")) == 1
+    assert counted(replace(SHAPE, coordinate="x"), B) == 0
 
 
 def test_a_name_counts_as_confident_from_where_one_acts_on_it():

@@ -16,10 +16,12 @@ from identify.estimation.intervals import half_widths
 from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
+from identify.selection.found_shape import FoundShape
 from identify.selftest import cases, trial
 from identify.selftest.case import Case
 from identify.selftest.laws import OUTSIDE
 from identify.selftest.trial import Held, _held, _right_coordinates
+from twin.curve import Coordinate
 
 OUTSIDE_ONE = next(iter(OUTSIDE))
 HELD = Held("mass", 0.9, True)
@@ -68,6 +70,10 @@ def test_the_truth_lies_so_many_half_widths_from_a_value(dataset):
     assert [h.label for h in _held(machine, fit)] == list(half)
 
 
+def over(coordinate: Coordinate) -> FoundShape:
+    return FoundShape(coordinate, np.zeros(1), "m", None, False, "N", {})
+
+
 @pytest.mark.parametrize("known", [True, False])
 def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
     base, final = built_fit(4.0, 0.5), built_fit(1.1, 1.0)
@@ -78,8 +84,13 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
     finding = Finding("wear", ("cogging",), 0.9, *errors(2.0, 1.0), "N", {}, Proof(0.9, 0.1))
     findings = (
         finding, replace(finding, effect="gms"), replace(finding, effect="wear", tied=()),
-        replace(finding, effect="lugre", kind=FindingKind.WRONG_SHAPE),
-        replace(finding, effect="cable", kind=FindingKind.WRONG_SHAPE, tied=(), proof=None),
+        replace(
+            finding, effect="lugre", kind=FindingKind.WRONG_SHAPE, shape=over(Coordinate.SPEED)
+        ),
+        replace(
+            finding, effect="cable", kind=FindingKind.WRONG_SHAPE, tied=(), proof=None,
+            shape=over(Coordinate.POSITION),
+        ),
     )  # fmt: skip
     found = AxisDiagnosis(
         dataset, base, tuple(built(n, bic=b) for n, b in (("wear", 90.0), ("gms", 80.0))), (),
@@ -119,6 +130,8 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
     assert (out.answers[0].left, out.answers[0].confidence) == (
         finding.left, finding.confidence,
     )  # fmt: skip
+    assert [a.coordinate for a in out.answers] == [None, None, None, "velocity", "position"]
+    assert out.told == {"time", "velocity", "position", None}
     trial.run(Case(("cogging",), 3.0, 7, "bumps", known))
     assert asked["draw"] == first
     trial.run(Case((OUTSIDE_ONE,), 3.0, 8))
