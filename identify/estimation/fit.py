@@ -186,7 +186,7 @@ def _weighed_again(problem: FitProblem, internal: Array) -> tuple[Array, bool]:
     for _ in range(MOST_WEIGHINGS):
         before, samples = rms(problem.force(internal)), problem.set_priors(internal)
         internal, converged = problem.solve(internal, NEGLIGIBLE / samples)
-        if rms(problem.force(internal)) > WEIGHED * before:
+        if not converged or rms(problem.force(internal)) > WEIGHED * before:
             break
     return internal, converged
 
