@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 from identify.estimation.errors import Errors
@@ -88,6 +89,7 @@ def _finding(f: Finding) -> dict[str, Any]:
         "decoy": f.proof and f.proof.decoy,
         "of_typical_block": f.proof and f.proof.typical,
         "shape": f.shape and _shape(f.shape),
+        "bend": f.bend and asdict(f.bend),
     }
 
 

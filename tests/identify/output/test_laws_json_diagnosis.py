@@ -14,9 +14,10 @@ from identify.output import remarks
 from identify.output.as_json import (
     plan_json,
 )
-from identify.output.diagnosis_json import diagnose_json
+from identify.output.diagnosis_json import _finding, diagnose_json
 from identify.output.words.selection import SEVERAL, advice
 from identify.selection.diagnosis import Verdict
+from identify.selection.findings import Bend
 
 pytestmark = pytest.mark.usefixtures("nothing_moved")
 
@@ -91,17 +92,25 @@ FINDINGS = [
         "indistinguishable_from": ["quadratic_drag"], "test_error_before": 7.17,
         "test_error_after": 2.19, "test_error_on": "selection", "unit": "N",
         "parameters": {"p": 0.0261},
-        "gain": 0.813, "decoy": 0.137, "of_typical_block": False, "shape": None,
+        "gain": 0.813, "decoy": 0.137, "of_typical_block": False, "shape": None, "bend": None,
         "confidence": made.FOUND[0].confidence,
     },
     {
         "effect": "lugre", "kind": "missing", "explains": 0.119,
         "indistinguishable_from": [], "test_error_before": 3.23, "test_error_after": 2.19,
         "test_error_on": "selection", "unit": "N", "parameters": {"Fc": 0.31},
-        "gain": None, "decoy": None, "of_typical_block": None, "shape": None,
+        "gain": None, "decoy": None, "of_typical_block": None, "shape": None, "bend": None,
         "confidence": made.FOUND[1].confidence,
     },
 ]  # fmt: skip
+
+
+def test_what_bends_a_frictions_curve_is_told_with_its_unit():
+    bent = replace(made.FOUND[1], bend=Bend("n", 2.0, 0.66, "1"))
+    told = strict(_finding(bent))
+    assert told["bend"] == {"parameter": "n", "held": 2.0, "found": 0.66, "unit": "1"}
+
+
 REMAINDER = {
     "error": pytest.approx(3.19), "over_noise_floor": pytest.approx(3.19 / 2.03),
     "unit": "N", "depends_on": "other_axis_position", "share_of_error": 0.631,
