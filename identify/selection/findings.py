@@ -10,6 +10,7 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors, error_in, gain_held_out
 from identify.estimation.fit import Fit, fit_axis
+from identify.selection.bent_curve import bent_curve
 from identify.selection.confidence import confidence
 from identify.selection.decoys import Proof, proof
 from identify.selection.found_shape import FoundShape, found_shape
@@ -132,7 +133,8 @@ def _found_bent(shape: WrongShape, base: Fit, before: Fit, final: Fit, dataset: 
     without = fit_axis(final.axis.with_effect(straight), dataset.fit)
     found = _of_shape(shape, base, before, dataset, _errors(without, final, dataset))
     bent = Bend(bend, held.values[bend], law.values[bend], held.effect.parameter(bend).unit)
-    return replace(found, parameters=dict(law.values), bend=bent)
+    drawn = bent_curve(held, final, dataset)
+    return replace(found, parameters=dict(law.values), bend=bent, shape=drawn)
 
 
 def _errors(without: Fit, final: Fit, dataset: Dataset) -> tuple[Errors, Errors]:

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
+from identify.estimation.prescribed_motion import force_along
 from identify.estimation.presliding import Presliding
 from identify.estimation.replay import Beginning, Replay, measured_beginning
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
 from identify.thesis.cable import of_position
 from identify.thesis.chapter import Chapter, Progress, Recovered
 from identify.thesis.informed import Informed, informed
-from identify.thesis.prescribed import force_along
 from identify.thesis.track import APART, FIRST
 from twin.core.control import Controller
 from twin.effect import Kind

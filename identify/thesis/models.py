@@ -20,9 +20,9 @@ from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.noise_floor import floor_of
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis
+from identify.estimation.prescribed_motion import force_along
 from identify.thesis.behaviours import LEG, LOOP, RATE, behaviours, turning
 from identify.thesis.chapter import Chapter, Progress
-from identify.thesis.prescribed import force_along
 from identify.thesis.residuals import friction_of, frictions
 from identify.thesis.traits import Traits, traits
 from twin.effect import Effect, Excitation, Kind

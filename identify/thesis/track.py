@@ -22,11 +22,11 @@ from identify.dataset.motion import motion_of
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.intervals import half_widths, half_widths_of
 from identify.estimation.map_curve import NAMES, stribeck_through
+from identify.estimation.prescribed_motion import steady_friction
 from identify.estimation.stribeck_curve import fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
 from identify.thesis.chapter import Chapter, Progress
 from identify.thesis.maps_of_logs import track_of_logs
-from identify.thesis.prescribed import force_along
 from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.experiments.kinds import Staircase
@@ -43,7 +43,6 @@ FIRST, APART = -0.136, 34e-3  # m, of the thesis's places
 DIRECTIONS = (1.0, -1.0)
 BRISK = 0.004  # m/s, above which moves are so short that they are repeated
 FASTEST = 0.3  # of the velocity limit, which a move of 10 mm reaches and holds
-STEADY_TRAVEL, STEPS = 0.1, 2000  # m and steps over which a law settles at one place
 
 
 @dataclass(frozen=True)
@@ -211,17 +210,6 @@ def _curve(axis: AxisModel, place: float, velocity: Array) -> Array:
 
 
 PART = 0.1  # of a half width, the step of a difference
-
-
-def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
-    """Friction (N, positive where it opposes the motion) after a long way at one place.
-
-    place: m; velocity: m/s, not zero.
-    """
-    period = STEADY_TRAVEL / STEPS / abs(velocity)
-    places, velocities = np.repeat([[place], [velocity]], STEPS, axis=1)
-    force = force_along(axis, places, velocities, period, Kind.FRICTION, Kind.MODIFIER)
-    return float(-np.sign(velocity) * force[-1])
 
 
 CHAPTER = Chapter(("thesis_track",), FULL, SMALL, run, track_of_logs)

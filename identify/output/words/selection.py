@@ -102,11 +102,10 @@ def also_chose_in_words(on: Role) -> str | None:
 
 
 def shape_in_words(effect: str, shape: FoundShape, numbers: Numbers = PLAIN) -> str:
-    """Where a law differs most from the curve found, and what that does at standstill."""
-    direction, curve = max(
-        shape.curves.items(), key=lambda c: np.nanmax(np.abs(c[1].found - c[1].assumed))
-    )
-    at = int(np.nanargmax(np.abs(curve.found - curve.assumed)))
+    """Where a law surely differs most from the curve found, and what that does at standstill."""
+    sure = {name: np.abs(c.found - c.assumed) - c.band for name, c in shape.curves.items()}
+    direction = max(sure, key=lambda name: np.nanmax(sure[name]))
+    curve, at = shape.curves[direction], int(np.nanargmax(sure[direction]))
     assumed, found, band = (
         numbers.amount(float(values[at]), shape.force_unit)
         for values in (curve.assumed, curve.found, curve.band)

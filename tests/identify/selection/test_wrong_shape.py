@@ -22,12 +22,13 @@ from identify.selection.findings import (
     share_explained,
     with_shape,
 )
-from identify.selection.found_shape import AHEAD, BEHIND, BOTH, found_shape
+from identify.selection.found_shape import AHEAD, BEHIND, BOTH, Drawn, FoundShape, found_shape
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.reshaping import curve_in_place
 from identify.selection.residual_dependence import Dependence
 from identify.selection.wrong_shape import best_shape, gain_on_fit_logs, wrong_shape, wrong_shapes
 from identify.workflow import add_shape
+from twin.curve import Coordinate
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.model.machine import MachineModel
@@ -243,6 +244,17 @@ def test_a_stribeck_curve_of_another_exponent_is_told_by_its_exponent(dataset) -
     assert (finding.bend.parameter, finding.bend.held, finding.bend.unit) == ("n", 2.0, "1")
     assert finding.chosen.after < 0.2 * finding.chosen.before
     assert finding.parameters == dict(found.fit.axis["stribeck"].values)
+    drawn = finding.shape
+    assert drawn is not None
+    assert (drawn.over, drawn.unit, drawn.force_unit) == (Coordinate.SPEED, "m/s", "N")
+    own = 0.3 + 0.9 * np.exp(-((drawn.coordinate / 0.03) ** 0.7)) + 0.5 * drawn.coordinate
+    for name, way in ((AHEAD, 1.0), (BEHIND, -1.0)):
+        curve = drawn.curves[name]
+        np.testing.assert_allclose(-way * curve.found, own, rtol=0.01)
+        off = np.abs(curve.assumed - curve.found)
+        assert off.max() > 0.05
+        assert (off > 3.0 * curve.band).mean() > 0.5
+        assert (np.abs(-way * curve.found - own) < 2.0 * curve.band).mean() > 0.7
     words = finding_in_words(finding)
     assert "stribeck has another shape, which its law with n = 0.7 has" in words
     assert "with n = 2 the error" in words
@@ -318,3 +330,15 @@ def test_a_curve_is_drawn_where_the_logs_have_been(dataset) -> None:
     gone = "The force is gone at standstill."
     assert gone in shape_in_words("a", replace(drawn, lets_go=True))
     assert gone not in shape_in_words("a", replace(drawn, lets_go=False))
+
+
+def test_the_place_told_is_where_the_curves_surely_differ_most() -> None:
+    """Near standstill a curve is hardly known: what it shows there is no statement."""
+    speed, flat = np.array([1e-3, 0.02, 0.1]), np.full(3, -0.3)
+    curves = {
+        AHEAD: Drawn(flat, flat - [0.5, 0.02, 0.0], np.array([0.6, 1e-3, 1e-3])),
+        BEHIND: Drawn(-flat, -flat + [0.0, 0.01, 0.0], np.full(3, 1e-3)),
+    }
+    shape = FoundShape(Coordinate.SPEED, speed, "m/s", None, False, "N", curves)
+    told = shape_in_words("lugre", shape)
+    assert "speed 0.02 m/s, forwards: it assumes -0.3 N, the logs show -0.32 N" in told

@@ -10,9 +10,9 @@ import pytest
 from built_fits import CATALOGUE, HARDWARE, axis_of, fitted
 from constructed import log_of
 
+from identify.estimation.prescribed_motion import force_along
 from identify.thesis import behaviours, cable, dynamic, models, residuals, simulation, twin
 from identify.thesis.chapter import Recovered
-from identify.thesis.prescribed import force_along
 from twin.core.control import Controller
 from twin.effect import Kind
 from twin.log import AxisLog, Log

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identify.estimation.prescribed_motion import force_along
 from identify.thesis.behaviours import LOOP, RATE, turning
 from identify.thesis.future import FULL, _of_a_mixture
 from identify.thesis.mixed_friction import PARTS, mixed
-from identify.thesis.prescribed import force_along
 from twin.effect import Kind
 from twin.effects import load_catalogue
 from twin.model.file import load_model

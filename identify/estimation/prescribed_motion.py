@@ -13,6 +13,8 @@ from twin.model.machine import AxisModel, axis_table
 
 Array = NDArray[np.float64]
 
+STEADY_TRAVEL, STEPS = 0.1, 2000  # m and steps over which a law settles at one place
+
 
 def force_along(
     axis: AxisModel, position: Array, velocity: Array, period: float, *kinds: Kind
@@ -27,3 +29,14 @@ def force_along(
         sample_period=period, position_noise=0.0, raw=signals[1:],
     )  # fmt: skip
     return total_force(axis_table({"": parts_of(axis, *kinds)}), motion)
+
+
+def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
+    """Friction (N, positive where it opposes the motion) after a long way at one place.
+
+    place: m; velocity: m/s, not zero.
+    """
+    period = STEADY_TRAVEL / STEPS / abs(velocity)
+    places, velocities = np.repeat([[place], [velocity]], STEPS, axis=1)
+    force = force_along(axis, places, velocities, period, Kind.FRICTION, Kind.MODIFIER)
+    return float(-np.sign(velocity) * force[-1])
