@@ -101,12 +101,14 @@ def _without_small(
 def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:
     """Whether an effect leaves clearly less of the held-out logs than the fit without it.
 
-    Less than its decoys, where a shift in time makes one. Noise has no force; the readings
-    themselves show it.
+    Less than its decoys, where a shift in time makes one; and where that fit is at the floor, with
+    far more evidence. Noise has no force; the readings themselves show it.
     """
     if is_noise(effect):
         return True
     without = less(effect, final, base, dataset)
+    if without.at_floor and _is_doubtful(score(without, final, dataset, effect)):
+        return False
     refit = gain_held_out(without, final, dataset)
     beside = proof(without, final.axis[effect.name], dataset, refit)
     chosen = Errors.of(without, final, dataset, dataset.chosen_on)
@@ -118,15 +120,24 @@ def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:
 def _convincing(before: SelectionState, after: SelectionState, dataset: Dataset) -> bool:
     """Whether effects reach the noise floor, explain nearly all, or remove the foremost dependence.
 
-    A wrong effect that imitates the missing one does not remove the foremost dependence.
+    A wrong effect that imitates the missing one does not remove the foremost dependence. Where the
+    fit before is at the floor already, as the floor is known at the end, they need far more
+    evidence than they were added with: what is noise had seemed to be left for them.
     """
     added = after.steps[len(before.steps) :]
+    if before.fit.at_floor and all(_is_doubtful(s.candidate) for s in added):
+        return False
     return (
         after.fit.at_floor
         or held_at_floor(after.fit, dataset)
         or part_explained(before.fit, after.fit) > RULE.nearly_all
         or _gone(before.fit, after.fit, added, dataset)
     )
+
+
+def _is_doubtful(candidate: Candidate) -> bool:
+    """Whether an effect lacks the evidence that it needs where noise may be all that is left."""
+    return not candidate.is_noise and candidate.delta_bic < RULE.beyond_doubt
 
 
 def _gone(base: Fit, final: Fit, steps: Sequence[Step], dataset: Dataset) -> bool:

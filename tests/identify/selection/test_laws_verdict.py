@@ -135,6 +135,24 @@ def test_the_floor_or_nearly_all_or_the_foremost_convinces(
     assert _convincing(stage(base), stage(after, ONE), DATASET) is convinced
 
 
+@pytest.mark.parametrize(
+    ("effect", "evidence", "before", "convinced"),
+    [
+        ("cogging", 99.0, 1.29, False),
+        ("cogging", 101.0, 1.29, True),
+        ("cogging", 99.0, 1.31, True),
+        (NOISE.name, 11.0, 1.29, True),
+    ],
+)
+def test_where_noise_is_all_that_was_left_an_effect_needs_far_more_evidence(
+    monkeypatch, effect, evidence, before, convinced
+):
+    """It was added before what is left of all was told as noise of the drive."""
+    told(monkeypatch)
+    added = step(effect, bic=evidence)
+    assert _convincing(stage(built_fit(before)), stage(built_fit(1.0), added), DATASET) is convinced
+
+
 def test_only_the_first_effect_that_was_added_must_be_proven(monkeypatch):
     asked = told(monkeypatch, explains=True)
     after = fit_with_part(0.6)

@@ -226,6 +226,27 @@ def test_a_step_is_named_that_is_sure_or_beats_its_decoys(monkeypatch, holds, su
     assert ("wear" in fit.axis.names) is ("wear" in named)
 
 
+@pytest.mark.parametrize(
+    ("error", "evidence", "named"), [(1.29, 99.0, False), (1.29, 101.0, True), (1.31, 99.0, True)]
+)
+def test_beating_decoys_is_not_enough_where_noise_is_all_that_is_left(
+    monkeypatch, error, evidence, named
+):
+    final = built_fit(1.0, axis=axis_of(fitted("wear")))
+    without = built_fit(error)
+    monkeypatch.setattr(module, "less", lambda *_: without)
+    monkeypatch.setattr(module, "proof", lambda *_: Proof(0.5, 0.1))
+    monkeypatch.setattr(module.Errors, "of", lambda *_: Errors(4.0, 3.0, Role.SELECTION))
+
+    def score(fit, larger, dataset, effect):
+        assert (fit, larger, effect.name) == (without, final, "wear")
+        return built("wear", bic=evidence)
+
+    monkeypatch.setattr(module, "score", score)
+    states = [stage(HIGH), stage(final, step("wear"))]
+    assert (_graded(states, (), dataset_stub()) is not None) is named
+
+
 @pytest.mark.parametrize(("after", "named"), [(3.5, True), (3.6, False)])
 def test_without_decoys_an_effect_is_proved_by_a_fifth_less_of_the_squared_error(
     monkeypatch, after, named
