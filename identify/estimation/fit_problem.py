@@ -74,7 +74,9 @@ class FitProblem:
         self.added = np.array([_is_added(axis, c) for c in self.scaling.where], dtype=bool)
         self.excess = np.array([bool(c.parameter.at_least) for c in self.scaling.where], dtype=bool)
         near_none = (self.excess | self.added) & (not has_nonparametric(axis))
-        self.expected = self.centre = np.where(near_none, 0.0, self.start)
+        self.neutral = self.centre = np.where(near_none, 0.0, self.start)
+        kinds = [(c.effect, c.parameter.unit) for c in self.scaling.where]
+        self.alike = np.array([kinds.index(kind) for kind in kinds], dtype=int)
         self.pull = np.zeros(len(self.start))
         self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
         # A force is linear in its strengths, so their columns are computed once.
@@ -100,7 +102,7 @@ class FitProblem:
         expected = max(PRIOR_FORCE * explained, noise)
         alike = self._of_alike(size)
         unseen = self.added & (size < UNSEEN * alike)
-        self.centre = np.where(unseen, self.start, self.expected)
+        self.centre = np.where(unseen, self.start, self.neutral)
         self.pull = np.where(self.added, noise * np.where(unseen, alike, size) / expected, 0.0)
         self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD
         least = self.scaling.least(axis)
@@ -110,8 +112,9 @@ class FitProblem:
 
     def _of_alike(self, size: Array) -> Array:
         """For each parameter the largest size (k,) among those of its effect in the same unit."""
-        kinds = [(c.effect, c.parameter.unit) for c in self.scaling.where]
-        return np.array([max(size[[k == own for k in kinds]]) for own in kinds])
+        largest = np.zeros(len(size))
+        np.maximum.at(largest, self.alike, size)
+        return np.asarray(largest[self.alike])
 
     def _where(self, mask: NDArray[np.bool_]) -> list[ParameterReference]:
         return [c for c, wanted in zip(self.scaling.where, mask, strict=True) if wanted]

@@ -5,19 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from identify.dataset.dataset import Dataset
+from identify.estimation.curve_band import with_band
 from identify.estimation.fit import Fit
-from identify.estimation.intervals import half_widths, half_widths_of
 from identify.estimation.prescribed_motion import steady_friction
 from identify.selection.found_shape import AHEAD, BEHIND, UNITS, Drawn, FoundShape
 from twin.curve import Coordinate
 from twin.effect import Kind
 from twin.model.machine import AxisModel, Fitted
-from twin.model.parameters import read, write
 from twin.signals import Array
 
 SPEEDS = 24
 SLOWEST = 0.01  # of the highest speed, the least that is drawn
-PART = 0.1  # of a half width, the step of a difference
+RUBBING = (Kind.FRICTION, Kind.MODIFIER)
 
 
 def bent_curve(held: Fitted, final: Fit, dataset: Dataset) -> FoundShape:
@@ -40,17 +39,10 @@ def bent_curve(held: Fitted, final: Fit, dataset: Dataset) -> FoundShape:
 
 def _drawn(before: AxisModel, final: Fit, place: float, velocity: Array) -> Drawn:
     """Force (k,) N of two axes at velocities (k,) m/s, and half the band of the fitted one."""
-    found = _force(final.axis, place, velocity)
-    where, half = final.scaling.where, half_widths(final)
-    slopes = np.zeros((len(where), len(velocity)))
-    values = read(final.axis, where)
-    for i, c in enumerate(where):
-        rubs = c.effect and final.axis[c.effect].effect.kind in (Kind.FRICTION, Kind.MODIFIER)
-        if rubs and np.isfinite(half[i]):
-            step = PART * half[i]
-            moved = _force(write(final.axis, [c], [values[i] + step]), place, velocity)
-            slopes[i] = (moved - found) / step
-    return Drawn(_force(before, place, velocity), found, half_widths_of(final, slopes))
+    rubs = [f.effect.name for f in final.axis.effects if f.effect.kind in RUBBING]
+    among = [c for c in final.scaling.where if c.effect in rubs]
+    found, band = with_band(final, lambda axis: _force(axis, place, velocity), among)
+    return Drawn(_force(before, place, velocity), found, band)
 
 
 def _force(axis: AxisModel, place: float, velocity: Array) -> Array:

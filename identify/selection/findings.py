@@ -16,6 +16,7 @@ from identify.selection.decoys import Proof, proof
 from identify.selection.found_shape import FoundShape, found_shape
 from identify.selection.wrong_shape import WrongShape, gain_on_test_logs
 from twin.effect import Effect
+from twin.model.machine import AxisModel
 
 
 class FindingKind(Enum):
@@ -54,8 +55,7 @@ class Finding:
     without test logs the test errors are these. parameters: of its law. proof: beside decoys; None
     where a shift in time makes none. shape: the curve that is assumed and the one found, where they
     differ. bend: what would give the law that curve, where it has such a parameter. left: over the
-    noise floor, the error that all findings together leave on the logs that
-    chose.
+    noise floor, the error that all findings together leave on the logs that chose.
     """
 
     effect: str
@@ -101,7 +101,8 @@ def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> F
     if dataset.test:
         gain = gain_on_test_logs(shape, final, dataset)
         tested = _linear_step(final, dataset, Role.TEST, gain)
-    return _of_shape(shape, base, final, dataset, (chosen, tested))
+    drawn = found_shape(shape.shape, final, dataset)
+    return _of_shape(shape, drawn, base, final.axis, dataset, (chosen, tested))
 
 
 def found_reshaped(
@@ -120,7 +121,9 @@ def found_reshaped(
     if shape.effect not in axis.names:
         axis = axis.with_effect(before.axis[shape.effect])
     without = fit_axis(axis, dataset.fit)
-    return _of_shape(shape, base, before, dataset, _errors(without, final, dataset))
+    drawn = found_shape(shape.shape, before, dataset)
+    errors = _errors(without, final, dataset)
+    return _of_shape(shape, drawn, base, before.axis, dataset, errors)
 
 
 def _found_bent(shape: WrongShape, base: Fit, before: Fit, final: Fit, dataset: Dataset) -> Finding:
@@ -131,10 +134,10 @@ def _found_bent(shape: WrongShape, base: Fit, before: Fit, final: Fit, dataset: 
     held, law = before.axis[shape.effect], final.axis[shape.effect]
     straight = replace(law, values={**law.values, bend: held.values[bend]}, fixed=held.fixed)
     without = fit_axis(final.axis.with_effect(straight), dataset.fit)
-    found = _of_shape(shape, base, before, dataset, _errors(without, final, dataset))
-    bent = Bend(bend, held.values[bend], law.values[bend], held.effect.parameter(bend).unit)
-    drawn = bent_curve(held, final, dataset)
-    return replace(found, parameters=dict(law.values), bend=bent, shape=drawn)
+    drawn, errors = bent_curve(held, final, dataset), _errors(without, final, dataset)
+    found = _of_shape(shape, drawn, base, final.axis, dataset, errors)
+    unit = held.effect.parameter(bend).unit
+    return replace(found, bend=Bend(bend, held.values[bend], law.values[bend], unit))
 
 
 def _errors(without: Fit, final: Fit, dataset: Dataset) -> tuple[Errors, Errors]:
@@ -144,9 +147,14 @@ def _errors(without: Fit, final: Fit, dataset: Dataset) -> tuple[Errors, Errors]
 
 
 def _of_shape(
-    shape: WrongShape, base: Fit, fit: Fit, dataset: Dataset, errors: tuple[Errors, Errors]
+    shape: WrongShape,
+    drawn: FoundShape,
+    base: Fit,
+    axis: AxisModel,
+    dataset: Dataset,
+    errors: tuple[Errors, Errors],
 ) -> Finding:
-    """The finding of a wrong shape of a law in a fit, with its chosen and tested errors."""
+    """The finding of a wrong shape of a law of an axis, with its chosen and tested errors."""
     chosen, tested = errors
     return Finding(
         effect=shape.effect,
@@ -154,11 +162,11 @@ def _of_shape(
         explains=max(share_explained(tested, base, dataset), 0.0),
         tested=tested,
         chosen=chosen,
-        unit=fit.axis.units.force,
-        parameters=dict(fit.axis[shape.effect].values),
+        unit=axis.units.force,
+        parameters=dict(axis[shape.effect].values),
         proof=shape.proof,
         kind=FindingKind.WRONG_SHAPE,
-        shape=found_shape(shape.shape, fit, dataset),
+        shape=drawn,
     )
 
 

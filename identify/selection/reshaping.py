@@ -75,8 +75,7 @@ def _in_place(
     shape: WrongShape, fit: Fit, dataset: Dataset, rivals: Sequence[Candidate]
 ) -> Reshaped | None:
     """A law with its free curve, where that does clearly better."""
-    whole = min((c.gain.after**2 for c in rivals), default=np.inf)
-    typical = min((c.gain.typical for c in rivals), default=np.inf)
+    whole, typical = _least_left(rivals)
     least = BY_REFIT * (1.0 - max(shape.taken, shape.proof.gain))
     if least * error_in(dataset.chosen_on, fit, dataset) ** 2 > whole and least > typical:
         return None
@@ -105,15 +104,19 @@ def _is_better(curve: Candidate, rivals: Sequence[Candidate]) -> bool:
     logs: a force at a few places of the test logs decides their whole error alone. Or no more of
     either, where the fit logs part them.
     """
-    gain = curve.gain
-    whole = min((c.gain.after**2 for c in rivals), default=np.inf)
-    typical = min((c.gain.typical for c in rivals), default=np.inf)
+    gain, (whole, typical) = curve.gain, _least_left(rivals)
     if gain.after**2 <= RULE.beside_decoys * whole:
         return True
     if gain.typical <= RULE.beside_decoys * typical:
         return all(curve.fit.error <= c.fit.error for c in rivals)
     parted = all(curve.evidence.over(c.evidence) > RULE.least_separation for c in rivals)
     return parted and gain.after**2 <= whole and gain.typical <= typical
+
+
+def _least_left(rivals: Sequence[Candidate]) -> tuple[float, float]:
+    """What the best leaves of the squared test error, N^2, and of a typical block's, as a part."""
+    whole = min((c.gain.after**2 for c in rivals), default=np.inf)
+    return whole, min((c.gain.typical for c in rivals), default=np.inf)
 
 
 def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:

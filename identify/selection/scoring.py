@@ -71,6 +71,11 @@ class Candidate:
         )  # fmt: skip
 
     @property
+    def is_beyond_doubt(self) -> bool:
+        """Whether the evidence is enough where noise may be all that is left."""
+        return self.delta_bic > RULE.beyond_doubt
+
+    @property
     def is_noise(self) -> bool:
         """Whether the effect lowers no error but raises the noise floor."""
         return is_noise(self.effect)

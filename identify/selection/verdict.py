@@ -136,8 +136,8 @@ def _convincing(before: SelectionState, after: SelectionState, dataset: Dataset)
 
 
 def _is_doubtful(candidate: Candidate) -> bool:
-    """Whether an effect lacks the evidence that it needs where noise may be all that is left."""
-    return not candidate.is_noise and candidate.delta_bic < RULE.beyond_doubt
+    """Whether an effect may be noise that is left; noise itself has no force to doubt."""
+    return not (candidate.is_noise or candidate.is_beyond_doubt)
 
 
 def _gone(base: Fit, final: Fit, steps: Sequence[Step], dataset: Dataset) -> bool:

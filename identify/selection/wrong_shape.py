@@ -87,23 +87,25 @@ def wrong_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
     return likely if likely and likely.proof.holds else None
 
 
-@lru_cache(maxsize=4)  # in the selection, and beside what it named
 def likely_shape(fit: Fit, dataset: Dataset) -> WrongShape | None:
     """The same, proved or not; None where no curve takes anything."""
-    shapes = _by_gain(fit, dataset)
-    return _with_proof(Trial.of(fit, dataset), shapes[0], fit, dataset) if shapes else None
+    trial, shapes = _by_gain(fit, dataset)
+    return _with_proof(trial, shapes[0], fit, dataset) if shapes else None
 
 
 def wrong_shapes(fit: Fit, dataset: Dataset) -> Iterator[WrongShape]:
     """Each law of a fit that is proved to have another shape; those that take most come first."""
-    trial = Trial.of(fit, dataset)
-    proved = (_with_proof(trial, s, fit, dataset) for s in _by_gain(fit, dataset))
+    trial, shapes = _by_gain(fit, dataset)
+    proved = (_with_proof(trial, s, fit, dataset) for s in shapes)
     return (w for w in proved if w.proof.holds)
 
 
-@lru_cache(maxsize=4)
-def _by_gain(fit: Fit, dataset: Dataset) -> tuple[Shape, ...]:
-    """The curves that the data ask for by falling gain; of about as little left, fewer parts."""
+@lru_cache(maxsize=4)  # in the selection, and beside what it named
+def _by_gain(fit: Fit, dataset: Dataset) -> tuple[Trial, tuple[Shape, ...]]:
+    """The curves that the data ask for by falling gain; of about as little left, fewer parts.
+
+    And the trial of the fit, beside which each is proved.
+    """
     trial = Trial.of(fit, dataset)
     shapes = [s for s in _shapes(fit, dataset) if _rubs(trial, s, fit, dataset)]
     left = {s: 1.0 - max(p.gain for p in _proofs(trial, s, fit, dataset, decoys=0)) for s in shapes}
@@ -112,7 +114,7 @@ def _by_gain(fit: Fit, dataset: Dataset) -> tuple[Shape, ...]:
         near = [s for s in left if RULE.near * left[s] <= min(left.values())]
         order.append(min(near, key=lambda s: len(s.stiffness)))
         del left[order[-1]]
-    return tuple(order)
+    return trial, tuple(order)
 
 
 def best_shape(fit: Fit, dataset: Dataset, effect: str) -> WrongShape | None:
@@ -236,6 +238,7 @@ def _rubs(trial: Trial, shape: Shape, fit: Fit, dataset: Dataset) -> bool:
     return clearer(_proofs(trial, alone, fit, dataset)).holds
 
 
+@lru_cache(maxsize=4)
 def _with_proof(trial: Trial, shape: Shape, fit: Fit, dataset: Dataset) -> WrongShape:
     proofs = _proofs(trial, shape, fit, dataset)
     return WrongShape(shape, clearer(proofs), taken=proofs[0].gain)

@@ -203,4 +203,4 @@ def _confident(o: TrialResult) -> bool:
 
 
 def _honest(o: TrialResult) -> bool:
-    return not o.wrong and not o.told.isdisjoint(o.coordinates)
+    return not o.wrong and not o.named_coordinates.isdisjoint(o.coordinates)

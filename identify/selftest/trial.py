@@ -100,8 +100,8 @@ class TrialResult:
         )
 
     @property
-    def told(self) -> frozenset[str | None]:
-        """The coordinates that are told, of an unexplained residual and of the curves shown."""
+    def named_coordinates(self) -> frozenset[str | None]:
+        """Those of an unexplained residual and of the curves shown."""
         return frozenset((self.depends_on, *(a.coordinate for a in self.answers)))
 
     @property

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
+from identify.estimation.curve_band import with_band
 from identify.estimation.fit import Fit, fit_axis
-from identify.estimation.intervals import half_widths, half_widths_of
 from identify.estimation.map_curve import NAMES, stribeck_through
 from identify.estimation.prescribed_motion import steady_friction
 from identify.estimation.stribeck_curve import fit_stribeck
@@ -33,7 +33,6 @@ from twin.experiments.kinds import Staircase
 from twin.experiments.named import simulate
 from twin.log import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
-from twin.model.parameters import read, write
 from twin.simulator import FineSimulator
 
 Array = NDArray[np.float64]
@@ -193,23 +192,13 @@ def _local_fit(model: MachineModel, name: str, logs: Mapping[str, Log], found: V
 
 def _of_law(fit: Fit, place: float, velocity: Array) -> Found:
     """The curve of a fitted law in one direction, at these velocities (k,) m/s."""
-    where, half = fit.scaling.where, half_widths(fit)
-    centre, values = _curve(fit.axis, place, velocity), read(fit.axis, where)
-    slopes = np.zeros((len(where), len(NAMES)))
-    for i in np.flatnonzero(np.isfinite(half)):
-        step = PART * half[i]
-        moved = _curve(write(fit.axis, [where[i]], [values[i] + step]), place, velocity)
-        slopes[i] = (moved - centre) / step
-    return centre, half_widths_of(fit, slopes)
+    return with_band(fit, lambda axis: _curve(axis, place, velocity), fit.scaling.where)
 
 
 def _curve(axis: AxisModel, place: float, velocity: Array) -> Array:
     """Parameters (4,) of the curve through the friction that an axis reaches at one place."""
     friction = np.array([steady_friction(axis, place, float(v)) for v in velocity])
     return np.array(astuple(fit_stribeck(np.abs(velocity), friction))[: len(NAMES)])
-
-
-PART = 0.1  # of a half width, the step of a difference
 
 
 CHAPTER = Chapter(("thesis_track",), FULL, SMALL, run, track_of_logs)

@@ -4,7 +4,7 @@ import importlib
 from types import SimpleNamespace
 
 import pytest
-from built_fits import built_fit, dataset_stub
+from built_fits import built, built_fit, dataset_stub
 from machines import one_axis
 
 from identify.dataset.dataset import datasets
@@ -58,7 +58,7 @@ def test_the_next_of_several_move_up_once_all_needless_ones_are_gone(monkeypatch
     needless: set[str] = set()
 
     def score(without, fit, dataset, effect):
-        return SimpleNamespace(supported=effect.name not in needless, delta_bic=1e3)
+        return built(effect, bic=-1e3 if effect.name in needless else 1e3)
 
     def less(effect, fit, base, dataset):
         return built_fit(1.0, axis=fit.axis.without(effect.name))
@@ -93,7 +93,7 @@ def test_where_the_fit_without_it_is_at_the_floor_an_effect_needs_far_more_evide
     effect = CATALOGUE["actuator_delay"]
     with_it = built_fit(1.0, 1.0, axis=STAGE.axes["x"].with_effect(Fitted.at_start(effect)))
     without = built_fit(error, 1.0, axis=STAGE.axes["x"])
-    needed = SimpleNamespace(supported=True, delta_bic=evidence)
+    needed = built(effect, bic=evidence)
     monkeypatch.setattr(module, "score", lambda *_: needed)
     monkeypatch.setattr(module, "less", lambda *_: without)
     monkeypatch.setattr(module, "fit_thoroughly", lambda axis, dataset: without)

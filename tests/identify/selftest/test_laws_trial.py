@@ -131,7 +131,7 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
         finding.left, finding.confidence,
     )  # fmt: skip
     assert [a.coordinate for a in out.answers] == [None, None, None, "velocity", "position"]
-    assert out.told == {"time", "velocity", "position", None}
+    assert out.named_coordinates == {"time", "velocity", "position", None}
     trial.run(Case(("cogging",), 3.0, 7, "bumps", known))
     assert asked["draw"] == first
     trial.run(Case((OUTSIDE_ONE,), 3.0, 8))

@@ -11,6 +11,7 @@ from built_fits import CATALOGUE, axis_of, built_fit, fitted
 from constructed import COVERED, log_of
 from scipy.stats import t as student
 
+from identify.estimation import curve_band
 from identify.estimation.intervals import half_widths_of
 from identify.estimation.stribeck_curve import StribeckCurve
 from identify.estimation.velocity_map import VelocityMap
@@ -51,8 +52,8 @@ def test_the_band_of_a_curve_follows_from_what_each_parameter_does_to_it(monkeyp
     monkeypatch.setattr(
         track, "_curve", lambda axis, place, velocity: read(axis, fit.scaling.where) @ slopes
     )
-    monkeypatch.setattr(track, "half_widths", lambda _: np.linspace(0.01, 0.02, count))
-    monkeypatch.setattr(track, "half_widths_of", lambda _, found: found)
+    monkeypatch.setattr(curve_band, "half_widths", lambda _: np.linspace(0.01, 0.02, count))
+    monkeypatch.setattr(curve_band, "half_widths_of", lambda _, found: found)
     _, found = track._of_law(fit, 0.0, np.ones(3))
     np.testing.assert_allclose(found, slopes, rtol=1e-6)
 
