@@ -16,6 +16,7 @@ from twin.core.native import law_address
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.model.file import load_model
+from twin.parallel import parallel
 
 DURATION = 30.0  # s of each log
 EXPERIMENTS = ("tracking", "moves", "tracking", "moves")
@@ -42,9 +43,10 @@ def measure() -> list[Figure]:
     before = fits()
     fitted = workflow.fit(model, logs)
 
-    def ranked(workers: int) -> None:
-        for axis, base in fitted.fits.items():
-            rank(base, fitted.datasets[axis], catalogue, workers=workers)
+    def ranked(count: int) -> None:
+        with parallel(count):
+            for axis, base in fitted.fits.items():
+                rank(base, fitted.datasets[axis], catalogue)
 
     runs = interleaved([partial(ranked, 1), partial(ranked, 2)], 1)
     one, two = (float(t) for t in np.median(runs, axis=0))

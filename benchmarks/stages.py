@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from functools import wraps
 from pathlib import Path
@@ -26,6 +25,7 @@ from identify.selection.candidates import absent_effects, try_effect
 from twin.core.calling import law_address
 from twin.effects import load_catalogue
 from twin.log import Log, read_log
+from twin.parallel import parallel
 
 TITLE = "Stages of a diagnosis in passes, and the effects that it tries"
 STAGES: tuple[tuple[str, ModuleType, str], ...] = (
@@ -130,17 +130,12 @@ def _candidates(work: Workload) -> list[Figure]:
 def _threads(work: Workload) -> Figure:
     """Wall time of a whole diagnosis on one thread over that on two."""
     wall = {}
-    for workers in (1, 2):
-        pool = _pool_of(workers)
-        with patch("identify.selection.ranking.ThreadPoolExecutor", pool):
+    for count in (1, 2):
+        with parallel(count):
             begun = perf_counter()
             workflow.diagnose(work.model, work.hidden, catalogue=load_catalogue())
-            wall[workers] = perf_counter() - begun
+            wall[count] = perf_counter() - begun
     return Figure(
         "a whole diagnosis on two threads, times faster than on one", wall[1] / wall[2], "1",
         Target(low=1.9), f"{wall[1]:.1f} s and {wall[2]:.1f} s wall; of meaning on an idle machine",
     )  # fmt: skip
-
-
-def _pool_of(workers: int) -> Callable[..., ThreadPoolExecutor]:
-    return lambda *_: ThreadPoolExecutor(workers)

@@ -34,6 +34,7 @@ from twin.errors import InputError
 from twin.log import Log
 from twin.memory import give_back
 from twin.model.machine import MachineModel
+from twin.parallel import parallel
 
 if TYPE_CHECKING:
     from identify.thesis.chapters import Reproduction
@@ -46,6 +47,7 @@ def silent(what: str, done: int, total: int) -> None:
     """Progress that is not shown."""
 
 
+@parallel()
 def fit(
     model: MachineModel,
     logs: Logs,
@@ -86,6 +88,7 @@ def fit(
     return FitResult(model, found, fits, intervals, held, tested, given, known)
 
 
+@parallel()
 def fit_simulation(found: FitResult, *, progress: Progress = silent) -> SimulationFit:
     """Fit the motion that the model makes of the command alone, from a fit of the force residual.
 
@@ -103,6 +106,7 @@ def fit_simulation(found: FitResult, *, progress: Progress = silent) -> Simulati
     return SimulationFit(model, found, axes, held)
 
 
+@parallel()
 def compare(
     model: MachineModel, logs: Logs, *, test_function: float | None = None,
     progress: Progress = silent,
@@ -123,6 +127,7 @@ def _compared(model: MachineModel, found: Mapping[str, Dataset], progress: Progr
     return Comparison(model, axes)
 
 
+@parallel()
 def diagnose(
     model: MachineModel,
     logs: Logs,
@@ -163,6 +168,7 @@ def diagnose(
     )  # fmt: skip
 
 
+@parallel()
 def add(
     effect: Effect,
     model: MachineModel,
@@ -200,6 +206,7 @@ def add(
     return addition(best, before.fits[best.axis], before.datasets, before.model, given)
 
 
+@parallel()
 def add_shape(
     effect: Effect,
     model: MachineModel,
@@ -238,6 +245,7 @@ def add_named(found: Diagnosis) -> Addition | None:
     return addition(best, leading.base, prepared, found.model, found.model)
 
 
+@parallel()
 def agree(
     fit_a: FitResult | MachineModel,
     fit_b: FitResult | MachineModel,
@@ -254,6 +262,7 @@ def agree(
     return agreement(a, b, load_catalogue() if catalogue is None else catalogue)
 
 
+@parallel()
 def reproduce(
     chapters: Sequence[str] = (), *, small: bool = False, seed: int = 1, progress: Progress = silent
 ) -> Reproduction:

@@ -24,6 +24,7 @@ from twin.log import Log
 from twin.memory import give_back
 from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits
+from twin.parallel import spread
 
 Array = NDArray[np.float64]
 
@@ -188,7 +189,7 @@ def _of_axis(model: MachineModel, name: str, going: Given, test_function: float 
     )
     return Dataset(
         axis=name,
-        fit=tuple(PreparedLog.of(m, length) for m in fit),
+        fit=tuple(spread(partial(PreparedLog.of, length=length), fit)),
         holdout=_within_reach(held, length, fit),
         test=_within_reach(test, length, fit),
         covered=cache(partial(excitation, fit, axis.hardware.travel)),
@@ -218,7 +219,8 @@ def _within_reach(
     """
     low, high = min(m.position.min() for m in fit), max(m.position.max() for m in fit)
     margin = MARGIN * (high - low)
-    within = [PreparedLog.of(m, length, (low - margin, high + margin)) for m in motions]
+    reach = (low - margin, high + margin)
+    within = spread(lambda m: PreparedLog.of(m, length, reach), motions)
     if sum(np.count_nonzero(w.reached) for w in within) < LEAST_SHARED * sum(map(len, within)):
         return tuple(PreparedLog.of(m, length) for m in motions)
     return tuple(within)
@@ -255,7 +257,10 @@ def _motions(
     longest: float,
 ) -> tuple[list[Motion], ...]:
     """Motions of each part of the logs, in blocks of at most a length (s); ripples: m."""
-    return tuple(
-        [motion_of(log, axis, name, machine, longest, ripples) for name, log in some.items()]
-        for some in parts
-    )
+
+    def motion(given: tuple[str, Log]) -> Motion:
+        name, log = given
+        return motion_of(log, axis, name, machine, longest, ripples)
+
+    made = iter(spread(motion, [given for some in parts for given in some.items()]))
+    return tuple([*islice(made, len(some))] for some in parts)

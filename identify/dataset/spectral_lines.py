@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.spectrum import EMPTY, FINEST_CYCLES, WIDTH, Grid, Record, level
+from twin.parallel import spread
 
 Array = NDArray[np.float64]
 
@@ -174,7 +175,8 @@ def _refined(records: Sequence[Record], frequency: float, step: float) -> tuple[
 
 def _share(records: Sequence[Record], frequencies: Array) -> Array:
     """Share of the records' variance that a sine of each frequency (m,) takes, (m,) 0..1."""
-    return np.sum([_taken(r, frequencies) for r in records], axis=0) / _energy(records)
+    taken = spread(lambda record: _taken(record, frequencies), records)
+    return np.sum(taken, axis=0) / _energy(records)
 
 
 def _taken(record: Record, frequencies: Array) -> Array:
@@ -187,7 +189,8 @@ def _taken(record: Record, frequencies: Array) -> Array:
     sine -= sine.mean(axis=1, keepdims=True)
     cosine -= cosine.mean(axis=1, keepdims=True)
     values = record.values - record.values.mean()
-    ss, cc, cs = ((a * b).sum(axis=1) for a, b in ((sine, sine), (cosine, cosine), (sine, cosine)))
+    pairs = (sine, sine), (cosine, cosine), (sine, cosine)
+    ss, cc, cs = (np.einsum("ij,ij->i", a, b) for a, b in pairs)
     ys, yc, both = sine @ values, cosine @ values, ss * cc - cs**2
     gain = ys**2 * cc + yc**2 * ss - 2.0 * ys * yc * cs
     known = both > np.finfo(float).eps * ss * cc

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import product
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +22,12 @@ from twin.effect import Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
 from twin.model.parameters import ParameterReference, read, write
+from twin.parallel import spread
 from twin.signals import between
 
 Array = NDArray[np.float64]
+_Along: TypeAlias = Callable[[PreparedLog], Array]
+_Walk: TypeAlias = tuple[list[int], _Along]
 
 AT_ONCE = 500_000  # forces of several sets of parameters that are held until they are averaged
 
@@ -33,11 +39,12 @@ def averaged_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
     error, and the other effects act along the true motion, under the actual force.
     """
     table = _table_between(axis)
-    parts = []
-    for log in logs:
+
+    def averaged(log: PreparedLog) -> Array:
         driven, added = _driven(axis, log)
-        parts.append(log.test_function.mean(total_force(table, driven)) + added)
-    return np.concatenate(parts)
+        return np.asarray(log.test_function.mean(total_force(table, driven)) + added)
+
+    return np.concatenate(spread(averaged, logs))
 
 
 def _is_stepped_finely(axis: AxisModel) -> bool:
@@ -140,20 +147,29 @@ def changes(
     out = np.empty((len(where), sum(map(len, logs))))
     ends = np.cumsum([len(log) for log in logs])
     spans = [slice(end - len(log), end) for end, log in zip(ends, logs, strict=True)]
+
+    def walk(job: tuple[_Walk, tuple[PreparedLog, slice]]) -> None:
+        (rows, along), (log, span) = job
+        out[rows, span] = along(log)
+
+    spread(walk, product(_walks(axis, where, steps), zip(logs, spans, strict=True)))
+    return out
+
+
+def _walks(axis: AxisModel, where: Sequence[ParameterReference], steps: Array) -> Iterator[_Walk]:
+    """For each walk along a log the parameters that it is for, and the change that they make."""
     by_effect: dict[str, list[int]] = {}
     for j, c in enumerate(where):
         by_effect.setdefault(c.effect, []).append(j)
     for effect, index in by_effect.items():
         if not effect:
-            out[index] = steps[index, None] * _by_mass(axis, logs)
+            yield index, partial(_by_mass, axis, steps[index, None])
             continue
         law = axis[effect].effect
         at_once = law.columns is not None and law.kind is Kind.FORCE
         linear = [j for j in index if at_once and where[j].parameter.strength]
         if linear:
-            parts = _columns(axis, [where[j] for j in linear], logs)
-            for span, part in zip(spans, parts, strict=True):
-                out[linear, span] = part * steps[linear, None]
+            yield linear, partial(_by_strengths, axis, [where[j] for j in linear], steps[linear])
         bent = [j for j in index if j not in linear]
         if bent:
             group, own = group_of(axis, effect), [where[j] for j in bent]
@@ -161,58 +177,58 @@ def changes(
                 write(group, [c], [v + step])
                 for c, v, step in zip(own, read(group, own), steps[bent], strict=True)
             ]
-            for span, part in zip(spans, _differences(group, moved, effect, logs), strict=True):
-                out[bent, span] = part
-    return out
+            yield bent, _difference(group, moved, effect)
 
 
-def _columns(
-    axis: AxisModel, where: Sequence[ParameterReference], logs: Sequence[PreparedLog]
-) -> Iterator[Array]:
-    """Averaged force (m, n) per unit of strengths of one effect that has columns, by logs."""
+def _by_strengths(
+    axis: AxisModel, where: Sequence[ParameterReference], steps: Array, log: PreparedLog
+) -> Array:
+    """Change (m, n) N of the averaged force by strengths of one effect that has columns."""
     own = axis[where[0].effect]
     names = [p.name for p in own.effect.strengths]
     rows = [names.index(c.parameter.name) for c in where]
-    for log in logs:
-        motion, test = true_motion(axis, log.motion)[0], log.test_function
-        yield averaged_columns(
-            own.effect, own.vector(), motion.signals, motion.period, motion.time_origin,
-            test.weights, test.stride,
-        )[rows]  # fmt: skip
+    motion, test = true_motion(axis, log.motion)[0], log.test_function
+    columns = averaged_columns(
+        own.effect, own.vector(), motion.signals, motion.period, motion.time_origin,
+        test.weights, test.stride,
+    )  # fmt: skip
+    return np.asarray(columns[rows] * steps[:, None])
 
 
-def _differences(
-    group: AxisModel, moved: Sequence[AxisModel], effect: str, logs: Sequence[PreparedLog]
-) -> Iterator[Array]:
-    """Change (m, n) N of the averaged force when one effect's values move, log after log."""
+def _difference(group: AxisModel, moved: Sequence[AxisModel], effect: str) -> _Along:
+    """Change (m, n) N of the averaged force along a log when one effect's values move."""
     kind = group[effect].effect.kind
     # An effect alone of no strength gives no force, which need not be walked for.
     strengths = [group[effect].values[p.name] for p in group[effect].effect.strengths]
     absent = len(group.effects) == 1 and bool(strengths) and not any(strengths)
     if kind is Kind.SENSING and absent:
-        yield from (_apparent_forces(moved, effect, log) for log in logs)
-        return
+        return partial(_apparent_forces, moved, effect)
     if kind is Kind.SENSING or (kind is Kind.ACTUATION and _is_stepped_finely(group)):
-        for log in logs:
-            base = 0.0 if absent else averaged_force(group, [log])
-            yield np.stack([averaged_force(axis, [log]) - base for axis in moved])
-        return
+        return partial(_one_by_one, moved, None if absent else group)
     # The motion and the force behind it stay; all sets of values go along it in one walk.
     table = _table_between(group)
-    at = table.labels.index(("", effect))
-    first = int(table.entries[at, P_AT])
-    bases = 0 if absent else 1
-    sets = np.tile(table.parameters, (len(moved) + bases, 1))
-    for row, axis in zip(sets[bases:], moved, strict=True):
+    first = int(table.entries[table.labels.index(("", effect)), P_AT])
+    sets = np.tile(table.parameters, (len(moved), 1))
+    for row, axis in zip(sets, moved, strict=True):
         vector = axis[effect].vector()
         row[first : first + len(vector)] = vector
-    for log in logs:
-        motion = _driven(group, log)[0]
-        unmoved = 0.0 if absent else total_forces(table, sets[:1], motion)
-        at_once = max(AT_ONCE // motion.signals.shape[1], 1)
-        batches = [sets[i : i + at_once] for i in range(bases, len(sets), at_once)]
-        means = [log.test_function.mean(total_forces(table, b, motion) - unmoved) for b in batches]
-        yield np.concatenate(means)
+    return partial(_together, group, table, sets, absent)
+
+
+def _one_by_one(moved: Sequence[AxisModel], unmoved: AxisModel | None, log: PreparedLog) -> Array:
+    """The change by walks of their own, from an axis or from no force."""
+    base = 0.0 if unmoved is None else averaged_force(unmoved, [log])
+    return np.stack([averaged_force(axis, [log]) - base for axis in moved])
+
+
+def _together(group: AxisModel, table: Table, sets: Array, absent: bool, log: PreparedLog) -> Array:
+    """The change by sets (m, p) of the table's parameters in one walk; absent: from no force."""
+    motion = _driven(group, log)[0]
+    unmoved = 0.0 if absent else total_forces(table, table.parameters[None], motion)
+    at_once = max(AT_ONCE // motion.signals.shape[1], 1)
+    batches = (sets[i : i + at_once] for i in range(0, len(sets), at_once))
+    means = [log.test_function.mean(total_forces(table, b, motion) - unmoved) for b in batches]
+    return np.concatenate(means)
 
 
 def _apparent_forces(sensing: Sequence[AxisModel], effect: str, log: PreparedLog) -> Array:
@@ -232,11 +248,10 @@ def _apparent_forces(sensing: Sequence[AxisModel], effect: str, log: PreparedLog
     return np.asarray(strengths @ [mass * log.fine.acceleration(rate) for rate in rates])
 
 
-def _by_mass(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
-    """Derivative by the moved mass; attached masses and sensing errors are in proportion to it."""
+def _by_mass(axis: AxisModel, steps: Array, log: PreparedLog) -> Array:
+    """Change (m, n) N by the moved mass, to which attached masses and sensing errors scale."""
     attached = parts_of(axis, Kind.STRUCTURE, Kind.SENSING)
-    inertia = np.concatenate([log.acceleration for log in logs])
-    return np.asarray(averaged_force(attached, logs) / axis.mass - inertia)
+    return np.asarray(steps * (averaged_force(attached, [log]) / axis.mass - log.acceleration))
 
 
 def difference_step(c: ParameterReference, value: float) -> float:

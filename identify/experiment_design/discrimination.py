@@ -9,9 +9,7 @@ W. G. Hunter, A. M. Reiner, "Designs for discriminating between two rival models
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import permutations
 
@@ -37,6 +35,7 @@ from twin.log.check import moves
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters, read
 from twin.model.units import AxisUnits
+from twin.parallel import spread
 from twin.simulator import ReducedSimulator
 
 Array = NDArray[np.float64]
@@ -164,20 +163,16 @@ def contest(
 ) -> tuple[list[SimulatedExperiment], tuple[NotRun, ...]]:
     """Every experiment simulated and judged, best first; and those that the machine cannot run."""
     judge = _discriminating if len(arena.explanations) > 1 else _informative
-    jobs, not_run = [], []
-    # The laws run outside Python's lock; the simulation sets a callback of the whole process.
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for i, experiment in enumerate(experiments):
-            try:
-                new = arena.record(arena.explanations[0], experiment)
-            except CannotRun as why:
-                units = arena.machine.axes[arena.name].units
-                not_run.append(NotRun(experiment, str(why), units))
-            else:
-                jobs.append(pool.submit(judge, arena, experiment, new))
-            if progress:
-                progress("trying experiments", i + 1, len(experiments))
-    return sorted((t.result() for t in jobs), key=lambda t: -t.gain), tuple(not_run)
+    motions, not_run = [], []
+    for i, experiment in enumerate(experiments):
+        try:
+            motions.append((experiment, arena.record(arena.explanations[0], experiment)))
+        except CannotRun as why:
+            not_run.append(NotRun(experiment, str(why), arena.machine.axes[arena.name].units))
+        if progress:
+            progress("trying experiments", i + 1, len(experiments))
+    judged = spread(lambda pair: judge(arena, *pair), motions)
+    return sorted(judged, key=lambda t: -t.gain), tuple(not_run)
 
 
 def _discriminating(arena: Arena, experiment: Experiment, motion: Motion) -> SimulatedExperiment:

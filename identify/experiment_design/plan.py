@@ -35,6 +35,7 @@ from twin.errors import CannotRun, InputError
 from twin.experiments.file import in_short
 from twin.log import Log
 from twin.model.machine import MachineModel
+from twin.parallel import parallel
 
 Logs = Mapping[str, Log]
 Progress = Callable[[str, int, int], None]
@@ -78,6 +79,7 @@ class Plan:
         return self.chosen.gain > RULE.least_separation or len(self.between) == 1
 
 
+@parallel()
 def plan(
     model: MachineModel,
     logs: Logs | None = None,

@@ -26,6 +26,7 @@ from identify.estimation.time_origin import depends_on_time_origin
 from twin.effect import Kind
 from twin.model.machine import Fitted
 from twin.model.parameters import ParameterReference
+from twin.parallel import spread
 
 Array = NDArray[np.float64]
 Columns = Callable[[Sequence[PreparedLog]], list[Array]]
@@ -132,10 +133,10 @@ class Trial:
         def left(shifts: Array | None) -> Array:
             return _left(fit, held, shifts, self.quiet)
 
-        before = left(None)
-        gains = 1.0 - left(np.zeros(count)) / before
         shifts = np.random.default_rng(SEED).uniform(*SHIFTS, (decoys, count))
-        untrue = [1.0 - left(s) / before for s in shifts] or [np.full(2, -np.inf)]
+        before, after, *others = spread(left, [None, np.zeros(count), *shifts])
+        gains = 1.0 - after / before
+        untrue = [1.0 - other / before for other in others] or [np.full(2, -np.inf)]
         whole, typical = np.stack(
             [gains, np.quantile(untrue, 1.0 - rare, axis=0, method="inverted_cdf")], axis=1
         )

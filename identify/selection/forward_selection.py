@@ -39,18 +39,17 @@ def diagnose_axis(
     dataset: Dataset,
     catalogue: Catalogue,
     progress: Progress | None = None,
-    workers: int | None = None,
     shifts: int = RULE.most_shifts,
 ) -> AxisDiagnosis:
     """Add effects to one fitted axis while evidence supports them, and decide on the verdict.
 
-    workers: threads; one a core where None. shifts: how often the diagnosis may still start again
-    because an added effect changes the channel delay.
+    shifts: how often the diagnosis may still start again because an added effect changes the
+    channel delay.
     """
     if any(log.force_noise for log in dataset.fit):  # an effect may explain it yet
         dataset = dataset.with_force_noise(0.0)
         base = finished(base.axis, base.begun, dataset.fit, base.outcome)
-    ranked = partial(rank, catalogue=catalogue, progress=progress, workers=workers)
+    ranked = partial(rank, catalogue=catalogue, progress=progress)
     base, ranking = ranked(base, dataset)
     steps: list[Step] = []
     states = [SelectionState((), base)]
@@ -74,7 +73,7 @@ def diagnose_axis(
             break
         if shifts and (moved := moved_by(final, dataset)):
             again = fit_axis(base.axis, moved.fit)
-            return diagnose_axis(again, moved, catalogue, progress, workers, shifts - 1)
+            return diagnose_axis(again, moved, catalogue, progress, shifts - 1)
         dataset, final = synchronised(final, dataset)
         final, found = ranked(final, dataset)
         states[-1] = replace(states[-1], fit=final)

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +19,7 @@ from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.memory import give_back
 from twin.model.machine import AxisModel
+from twin.parallel import spread
 
 Array = NDArray[np.float64]
 LEADERS = 2  # that are refitted first, and tell what others must promise
@@ -33,14 +31,13 @@ def rank(
     dataset: Dataset,
     catalogue: Catalogue,
     progress: Progress | None = None,
-    workers: int | None = None,
 ) -> tuple[Fit, tuple[Candidate, ...]]:
     """The base, and every absent effect tried beside it, by falling merit.
 
     If the values of the best candidate without its effect are a better start for the base, the base
     is refitted from there: a base short of its optimum would give evidence to every candidate.
     """
-    candidates = _tried(base, dataset, absent_effects(base.axis, catalogue), progress, workers)
+    candidates = _tried(base, dataset, absent_effects(base.axis, catalogue), progress)
     give_back()
     supported = [c for c in candidates if c.supported]
     if supported:
@@ -58,7 +55,6 @@ def _tried(
     dataset: Dataset,
     effects: Sequence[Effect],
     progress: Progress | None,
-    workers: int | None,
 ) -> list[Candidate]:
     """A candidate for each effect, in their order.
 
@@ -67,27 +63,30 @@ def _tried(
     """
     done: dict[str, Candidate] = {}
 
-    def keep(candidate: Candidate | None) -> None:
-        if candidate is not None:
-            done[candidate.effect.name] = candidate
-            if progress:
-                progress(len(done), len(effects))
+    def keep(candidate: Candidate) -> None:
+        done[candidate.effect.name] = candidate
+        if progress:
+            progress(len(done), len(effects))
 
-    # The laws release Python's lock, so candidates run in parallel.
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
-        looks = []
-        for look in pool.map(partial(look_at, base, dataset), effects):
-            looks.append(look)
-            keep(look.candidate)
-        waiting = sorted((k for k in looks if k.candidate is None), key=_promise, reverse=True)
-        least = RULE.contender * _promise(waiting[0]) if waiting else 0.0
-        leaders = [k for k in waiting[:LEADERS] if _promise(k) >= least]
-        for candidate in pool.map(partial(refitted, base, dataset), leaders):
-            keep(candidate)
-        most = max((_explained(base, done[k.effect.name]) for k in leaders), default=0.0)
-        others = [k for k in waiting if k not in leaders and _promise(k) >= RULE.contender * most]
-        for candidate in pool.map(partial(refitted, base, dataset), others):
-            keep(candidate)
+    def looked(effect: Effect) -> Look:
+        found = look_at(base, dataset, effect)
+        if found.candidate is not None:
+            keep(found.candidate)
+        return found
+
+    def refit(look: Look) -> None:
+        keep(refitted(base, dataset, look))
+
+    looks = spread(looked, effects)
+    waiting = sorted((k for k in looks if k.candidate is None), key=_promise, reverse=True)
+    least = RULE.contender * _promise(waiting[0]) if waiting else 0.0
+    leaders = [k for k in waiting[:LEADERS] if _promise(k) >= least]
+    spread(refit, leaders)
+    most = max((_explained(base, done[k.effect.name]) for k in leaders), default=0.0)
+    spread(
+        refit,
+        [k for k in waiting if k not in leaders and _promise(k) >= RULE.contender * most],
+    )
     for look in looks:
         if look.effect.name not in done:
             keep(as_looked(base, dataset, look))

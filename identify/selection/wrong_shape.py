@@ -28,6 +28,7 @@ from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import ParameterReference
+from twin.parallel import spread
 from twin.signals import Array
 
 COARSELY = STIFFNESS[::2]  # how smooth a curve may be, to tell whether it helps
@@ -163,7 +164,7 @@ def sticking(fit: Fit, shape: Shape) -> bool:
 
 def _shapes(fit: Fit, dataset: Dataset) -> list[Shape]:
     """A free curve for each curve that a law of the fit assumes, where the data ask for one."""
-    made = (_chosen(fit, dataset, *laws) for laws in _assumed(fit.axis))
+    made = spread(lambda laws: _chosen(fit, dataset, *laws), _assumed(fit.axis))
     return [s for s in made if s is not None and not _has(fit.axis, s)]
 
 

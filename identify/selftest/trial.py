@@ -126,7 +126,7 @@ def run(case: Case) -> TrialResult:
         return TrialResult(case, shown=False, seconds=process_time() - begun)
     known = [e for e in catalogue.values() if case.known or e.name not in case.effects]
     dataset, base = fit_aligned(built.model.axes[AXIS], dataset)
-    found = diagnose_axis(base, dataset, Catalogue(known), workers=1).with_findings()
+    found = diagnose_axis(base, dataset, Catalogue(known)).with_findings()
     return TrialResult(
         case=case,
         verdict=found.verdict.name,

@@ -16,10 +16,11 @@ from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
 from identify.selection.residual_dependence import UNITS, gathered, unit_of
 from identify.validation.error_spectrum import bands
-from identify.validation.free_run import drift_of_noise, free_run, rms_error
+from identify.validation.free_run import FreeRun, drift_of_noise, free_run, rms_error
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import LINEAR, AxisUnits
+from twin.parallel import spread
 
 Array = NDArray[np.float64]
 
@@ -181,16 +182,19 @@ def position_errors(
 
     There is none where the motion is imposed.
     """
+    logs = {} if model.is_imposed else by_log(found)
+    begun = iter(range(len(logs)))
+
+    def run(parts: Mapping[str, PreparedLog]) -> tuple[FreeRun, FreeRun]:
+        progress(next(begun), len(logs))
+        own = free_run(model, parts)
+        return own, drift_of_noise(model, parts, own)
+
     errors: dict[str, dict[str, float]] = {a: {} for a in found}
     floors: dict[str, dict[str, float]] = {a: {} for a in found}
-    logs = {} if model.is_imposed else by_log(found)
-    for i, (name, parts) in enumerate(logs.items()):
-        progress(i, len(logs))
-        run = free_run(model, parts)
-        drift = drift_of_noise(model, parts, run)
-        for axis in parts:
-            errors[axis][name] = rms_error(run, axis)
-            floors[axis][name] = rms_error(drift, axis)
+    for name, both in zip(logs, spread(run, logs.values()), strict=True):
+        for axis in logs[name]:
+            errors[axis][name], floors[axis][name] = (rms_error(one, axis) for one in both)
     return errors, floors
 
 

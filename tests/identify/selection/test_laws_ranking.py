@@ -128,7 +128,7 @@ def ranked(monkeypatch, ratio, t=9.0, left=3.0):
 
     monkeypatch.setattr(ranking, "score", score)
     catalogue = Catalogue([CATALOGUE[n] for n in bics])
-    found = rank(base, DATASET, catalogue, lambda *done: bars.append(done), workers=1)
+    found = rank(base, DATASET, catalogue, lambda *done: bars.append(done))
     assert bars == [(1, 2), (2, 2)]
     return found, base, again, asked
 
@@ -162,7 +162,7 @@ def refits(monkeypatch, shares, explained, t=9.0):
     catalogue = Catalogue([CATALOGUE[n] for n in shares])
     shares = {e.name: shares[e.name] for e in catalogue.values()}
     order = iter(shares.items())
-    _, found = rank(base, DATASET, catalogue, workers=1)
+    _, found = rank(base, DATASET, catalogue)
     assert sorted(names(found)) == sorted(shares)
     return fitted_again, looked
 

@@ -104,8 +104,8 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
         )  # fmt: skip
         return machine
 
-    def diagnose(given, where, catalogue, workers):
-        asked.update(catalogue=set(catalogue), workers=workers)
+    def diagnose(given, where, catalogue):
+        asked.update(catalogue=set(catalogue))
         return SimpleNamespace(with_findings=lambda: replace(found, findings=findings))
 
     monkeypatch.setattr(trial, "machine", build)
@@ -116,7 +116,7 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
     monkeypatch.setattr(trial, "_held", lambda built, base: (HELD,))
     out = trial.run(Case(("cogging",), 3.0, 7, "bumps", known))
     first = asked["draw"]
-    assert (asked["effects"], asked["strength"], asked["workers"]) == (["cogging"], 3.0, 1)
+    assert (asked["effects"], asked["strength"]) == (["cogging"], 3.0)
     assert asked["varied"] == "bumps"
     assert ("cogging" in asked["catalogue"]) is known
     assert len(asked["catalogue"]) == len(CATALOGUE) - (not known)

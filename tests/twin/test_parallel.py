@@ -1,0 +1,91 @@
+"""Jobs that threads share."""
+
+import os
+import threading
+import time
+import warnings
+
+import numpy as np
+import pytest
+
+from twin.parallel import cores, parallel, spread
+
+
+def test_results_come_in_the_order_of_the_items_whichever_ends_first():
+    def job(k):
+        time.sleep(0.02 * (3 - k))
+        return k * k
+
+    with parallel(4):
+        assert spread(job, range(4)) == [0, 1, 4, 9]
+    assert spread(job, iter(range(4))) == [0, 1, 4, 9]
+    assert spread(job, ()) == []
+
+
+def test_jobs_go_side_by_side_within_parallel_and_one_after_another_outside():
+    meeting = threading.Barrier(2)
+
+    def meet(_):
+        meeting.wait(timeout=10.0)
+
+    with parallel(2):
+        spread(meet, range(2))  # each waits for the other
+    here = threading.get_ident()
+    assert spread(lambda _: threading.get_ident(), range(3)) == [here] * 3
+
+
+def test_what_a_job_spreads_stays_in_its_own_thread():
+    def job(_):
+        time.sleep(0.01)
+        return threading.get_ident(), spread(lambda _: threading.get_ident(), range(3))
+
+    with parallel(2):
+        found = spread(job, range(4))
+    assert len({own for own, _ in found}) == 2
+    assert all(set(parts) == {own} for own, parts in found)
+
+
+def test_the_outermost_decides_how_many_threads_there_are():
+    def running(_):
+        time.sleep(0.01)
+        return threading.get_ident()
+
+    with parallel(1), parallel(3):
+        assert len({*spread(running, range(6))}) == 1
+
+
+def test_a_job_that_fails_is_told_and_no_other_is_begun():
+    begun = []
+
+    def job(k):
+        begun.append(k)
+        time.sleep(0.01)
+        if k == 1:
+            raise KeyError("the second")
+        return k
+
+    with parallel(2), pytest.raises(KeyError, match="the second"):
+        spread(job, range(50))
+    assert len(begun) < 10
+    with parallel(2):  # and a later one is not held up
+        assert spread(abs, [-1, 2]) == [1, 2]
+
+
+def test_which_warnings_are_given_goes_with_the_job():
+    def job(_):
+        return np.array([1.0]) / 0.0
+
+    with warnings.catch_warnings(), parallel(2), np.errstate(all="ignore"):
+        warnings.simplefilter("error")
+        assert np.isinf(spread(job, range(4))).all()
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no affinity on this system")
+def test_as_many_cores_as_the_process_may_use():
+    allowed = os.sched_getaffinity(0)
+    try:
+        os.sched_setaffinity(0, {min(allowed)})
+        assert cores() == 1
+    finally:
+        os.sched_setaffinity(0, allowed)
+    assert cores() == len(allowed)

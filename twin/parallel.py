@@ -1,0 +1,49 @@
+"""Work spread over threads: the compiled laws, FFTs and linear algebra release Python's lock."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar, copy_context
+from typing import TypeVar
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+_POOL: ContextVar[ThreadPoolExecutor | None] = ContextVar("pool", default=None)
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    known = hasattr(os, "sched_getaffinity")
+    return len(os.sched_getaffinity(0)) if known else os.cpu_count() or 1
+
+
+@contextmanager
+def parallel(count: int | None = None) -> Iterator[None]:
+    """Let ``spread`` use that many threads, one a core where None; the outermost decides."""
+    if _POOL.get() is not None:
+        yield
+        return
+    with ThreadPoolExecutor(cores() if count is None else count) as pool:
+        token = _POOL.set(pool)
+        try:
+            yield
+        finally:
+            _POOL.reset(token)
+
+
+def spread(job: Callable[[T], R], items: Iterable[T]) -> list[R]:
+    """The results of a job for each item, in their order.
+
+    Outside ``parallel`` it is a loop, and so is what a job spreads in its turn: the parts of parts
+    are too short to share. Raises what the first job that fails raises; no other is begun then.
+    """
+    pool = _POOL.get()
+    if pool is None:
+        return [job(item) for item in items]
+    inside = copy_context()  # NumPy keeps there which warnings to give
+    inside.run(_POOL.set, None)
+    return list(pool.map(lambda item: inside.copy().run(job, item), items))
