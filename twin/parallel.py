@@ -41,9 +41,9 @@ def spread(job: Callable[[T], R], items: Iterable[T]) -> list[R]:
     Outside ``parallel`` it is a loop, and so is what a job spreads in its turn: the parts of parts
     are too short to share. Raises what the first job that fails raises; no other is begun then.
     """
-    pool = _POOL.get()
-    if pool is None:
-        return [job(item) for item in items]
+    given, pool = list(items), _POOL.get()
+    if pool is None or len(given) < 2:  # a single job may spread its own parts
+        return [job(item) for item in given]
     inside = copy_context()  # NumPy keeps there which warnings to give
     inside.run(_POOL.set, None)
-    return list(pool.map(lambda item: inside.copy().run(job, item), items))
+    return list(pool.map(lambda item: inside.copy().run(job, item), given))
