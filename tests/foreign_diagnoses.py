@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 import zlib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -37,10 +38,12 @@ STAGE = one_axis(load_model("proton_xy", CATALOGUE))
 NOTHING = {"nothing": Planted(lambda m, size, rng: m, fixed=True)}
 EFFECTS = INSIDE | OUTSIDE | NOTHING
 DURATION = 10.0  # s of each log
+NEAR = 0.8  # of the floors wanted, from which an effect has its size
 VARIANTS = ("", "Gaussian bumps", "no bumps at rest", "decimated", "half early", "one early")
 EARLY = {"half early": 0.5, "one early": 1.0}  # samples
 FIELDS = (
-    "planted", "seed", "floors", "left", "size", "verdict", "findings", "mark", "top", "held", "s",
+    "planted", "seed", "floors", "added", "left", "size", "verdict", "findings", "mark", "top",
+    "held", "s",
 )  # fmt: skip
 FORMS = {"bumps": "roller_spikes", "cable": "cable_slab", "stribeck": "lugre"}  # what has another
 
@@ -79,20 +82,25 @@ def excess(machine: Machine, model, seed: int) -> float:
 
 
 def sized(planted: Planted, base: Machine, model, wanted: float, seed: int):
-    """The machine with the effect as large as adds that many floors of error to the model's."""
-    size, before = planted.start, excess(base, model, seed)
+    """The machine with the effect as large as adds that many floors of error to the model's.
+
+    With its size, and the floors that it adds: fewer where the model's own parameters take it up.
+    """
+    size, before = 1.0 if planted.fixed else planted.start, excess(base, model, seed)
 
     def make(size):
         return planted.make(base, size, np.random.default_rng(seed))
 
-    if planted.fixed:
-        return make(1.0), 1.0
-    for _ in range(5):
-        seen = np.sqrt(max(excess(make(size), model, seed) ** 2 - before**2, 1e-4))
-        if 0.8 < seen / wanted < 1.25 or (size == planted.largest and seen < wanted):
+    def added(size):
+        return np.sqrt(max(excess(make(size), model, seed) ** 2 - before**2, 1e-4))
+
+    seen = added(size)
+    for _ in range(0 if planted.fixed else 5):
+        if NEAR < seen / wanted < 1.0 / NEAR or (size == planted.largest and seen < wanted):
             break
         size = min(size * np.clip(wanted / seen, 0.1, 10.0), planted.largest)
-    return make(size), size
+        seen = added(size)
+    return make(size), size, seen
 
 
 def diagnosed(model, machine: Machine, seed: int, duration=DURATION, catalogue=CATALOGUE):
@@ -104,8 +112,9 @@ def diagnosed(model, machine: Machine, seed: int, duration=DURATION, catalogue=C
 def describe(d, planted: Planted, forms=()) -> dict:
     """The answer in a line."""
     d = d.with_findings()
-    missing = [(f.effect, *f.tied) for f in d.findings if f.kind is FindingKind.MISSING]
-    wrong = [f.effect for f in d.findings if f.kind is not FindingKind.MISSING]
+    curves = [f.kind is FindingKind.WRONG_SHAPE for f in d.findings]
+    missing = [(f.effect, *f.tied) for f, c in zip(d.findings, curves, strict=True) if not c]
+    wrong = [f.effect for f, c in zip(d.findings, curves, strict=True) if c]
     true = [{*planted.right, *planted.near} & {*names} for names in missing]
     shapes = {FORMS[f] for f in forms}
     marks = [
@@ -140,13 +149,15 @@ def dataset(name: str, wanted: float, seed: int, forms=()) -> dict:
     code = 1000 * seed + zlib.crc32(name.encode()) % 997
     rng = np.random.default_rng(code)
     base, model = reshaped(drawn(rng), forms, rng), model_for(planted)
-    machine, size = sized(planted, base, model, wanted, code)
+    machine, size, added = sized(planted, base, model, wanted, code)
     begun = time.perf_counter()
     found = diagnosed(model, machine, code)
     row = {
         "planted": " ".join((f"{name} @{wanted:g}", *forms)),
         "seed": seed,
         "size": f"{size:.3g}",
+        "added": f"{added:.2f}",
+        "wanted": wanted if planted.right else 0.0,
     }
     return row | describe(found, planted, forms) | {"s": f"{time.perf_counter() - begun:.0f}"}
 
@@ -175,12 +186,33 @@ def empty(seed: int) -> dict:
     row = {
         "planted": f"empty {variant} {rate / 1e3:g}/{log_rate / 1e3:g} kHz", "seed": seed,
         "size": f"{noise['encoder_noise']:.1e} m, {noise['current_noise']:.1e} A",
+        "added": "0", "wanted": 0.0,
     }  # fmt: skip
     return row | describe(found, Planted(None)) | {"s": f"{time.perf_counter() - begun:.0f}"}
 
 
 def line(row: dict) -> str:
     return "| " + " | ".join(str(row[f]) for f in FIELDS) + " |\n"
+
+
+def summary(rows: Sequence[dict], forms: Sequence[str]) -> str:
+    """How many effects are named and shapes told, and what is wrong.
+
+    Of effects that add most of the floors asked for: what the model's own parameters take up is not
+    in the logs.
+    """
+    shown = [r for r in rows if float(r["added"]) > NEAR * r["wanted"] > 0.0]
+    named = [r for r in shown if {"right", "near"} & {*r["mark"].split()}]
+    told = [r for r in rows if "shape" in r["mark"].split()]
+    wrong = [r for r in rows if "WRONG" in r["mark"]]
+    lines = [
+        f"named: {len(named)} of {len(shown)} that show, of {len(rows)} planted",
+        f"a wrong shape told: {len(told)} of {len(rows)}" if forms else "",
+        f"wrong beside: {len(wrong)} of {len(rows)}",
+        *(f"not named: {r['planted']}, {r['added']} floors" for r in shown if r not in named),
+        *(f"does not show: {r['planted']}, {r['added']} floors" for r in rows if r not in shown),
+    ]
+    return "\n".join(filter(None, lines))
 
 
 def main() -> None:
@@ -201,13 +233,16 @@ def main() -> None:
             jobs += [(dataset, (n, floors, seed, given.forms)) for floors in levels]
     if not given.out.exists():
         given.out.write_text(line({f: f for f in FIELDS}) + "|---" * len(FIELDS) + "|\n")
+    rows = []
     for job, args in jobs:
         try:
-            text = line(job(*args))
+            rows.append(job(*args))
+            text = line(rows[-1])
         except Exception as error:  # one that fails must not end the dataset
             text = f"| {args} FAILED | {type(error).__name__}: {error} |\n"
         with given.out.open("a") as out:
             out.write(text)
+    print(summary(rows, given.forms))
 
 
 if __name__ == "__main__":
