@@ -122,13 +122,12 @@ def sense(entries, first, last, parameters, states, io, position):
 class Table:
     """A model as plain arrays.
 
-    entries (n, 4): law address, kind, first parameter, first state, as doubles, which hold any
-    address below 2^53 exactly, so that a table can travel in an mjModel. parameters (n_p,).
+    entries (n, 4): law address, kind, first parameter, first state. parameters (n_p,).
     axes: for each axis (first entry, last entry, first state, first sensing entry, last sensing
     entry). labels: (axis name, effect name) of each entry. masses (n_axes,) kg.
     """
 
-    entries: NDArray[np.float64]
+    entries: NDArray[np.int64]
     parameters: NDArray[np.float64]
     axes: NDArray[np.int64]
     masses: NDArray[np.float64]
@@ -158,7 +157,7 @@ def build_table(
             sensing += effect.kind is Kind.SENSING
         spans.append((sensing, len(rows), state_at, begin, sensing))
     return Table(
-        entries=np.array(rows, dtype=float).reshape(-1, 4),
+        entries=np.array(rows, dtype=np.int64).reshape(-1, 4),
         parameters=np.array([*parameters, 0.0]),
         axes=np.array(spans, dtype=np.int64),
         masses=np.array(masses, dtype=float),

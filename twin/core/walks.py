@@ -37,6 +37,7 @@ from twin.effect import (
 )
 
 Array = NDArray[np.float64]
+Entries = NDArray[np.int64]
 
 _FORCE = Kind.FORCE.value
 _FRICTION = Kind.FRICTION.value
@@ -44,7 +45,7 @@ _STRUCTURE = Kind.STRUCTURE.value
 
 
 def walk(
-    entries: Array, first: int, last: int, parameters: Array, states: Array, at: int,
+    entries: Entries, first: int, last: int, parameters: Array, states: Array, at: int,
     motion: Array, others: Array, dt: float, begin: int, rows: Array, mass: float = 1.0,
     time_origin: float = 0.0,
 ) -> None:  # fmt: skip
@@ -63,7 +64,7 @@ def walk(
 
 
 def walk_sets(
-    entries: Array, first: int, last: int, sets: Array, states_needed: int, motion: Array,
+    entries: Entries, first: int, last: int, sets: Array, states_needed: int, motion: Array,
     others: Array, dt: float, begin: int, totals: Array, mass: float, time_origin: float,
 ) -> None:  # fmt: skip
     """Force of all effects together along a measured motion, for several sets of parameters.
@@ -72,7 +73,7 @@ def walk_sets(
     a walk. sets (m, n_p); totals (m, n): N.
     """
     structure = _structure(entries, first, last)
-    laws = entries[first:structure].T.astype(np.int64, order="C")
+    laws = np.ascontiguousarray(entries[first:structure].T)
     _walk_sets(
         entries, laws, structure, last, sets, np.zeros((len(sets), states_needed)), motion, others,
         dt, begin, totals, time_origin, _lent(dt, mass), np.zeros((2, len(entries))),
@@ -80,14 +81,14 @@ def walk_sets(
 
 
 def walk_sensing(
-    entries: Array, first: int, last: int, parameters: Array, states: Array, motion: Array,
+    entries: Entries, first: int, last: int, parameters: Array, states: Array, motion: Array,
     dt: float, readings: Array,
 ) -> None:  # fmt: skip
     """Encoder readings (n,) m along a motion (2 or more, n): position m, velocity m/s."""
     _walk_sensing(entries, first, last, parameters, states, motion, dt, readings, _lent(dt, 0.0))
 
 
-def _structure(entries: Array, first: int, last: int) -> int:
+def _structure(entries: Entries, first: int, last: int) -> int:
     """The first entry of those of structure effects, which are the last."""
     return int(last) - int(np.count_nonzero(entries[first:last, KIND] == _STRUCTURE))
 

@@ -268,6 +268,7 @@ def attach(spec: mujoco.MjSpec, table: Table, period: float, axes: tuple[str, ..
     for axis, (first, last, state, _, _), mass in zip(axes, table.axes, table.masses, strict=True):
         joint, motor = model.joint(axis), model.actuator(f"motor_{axis}")
         spans.append((first, last, state, mass, joint.qposadr[0], joint.dofadr[0], motor.id))
+    # Doubles hold any address below 2^53 exactly, so that a table can travel in an mjModel.
     numbers = [
         period, len(axes), table.n_states, len(table.entries), len(table.parameters), user_at,
         *np.ravel(spans), *table.entries.ravel(), *table.parameters,
