@@ -36,6 +36,9 @@ MOST_SEGMENTS = 64  # whose median is sure enough: with as many frequencies, to 
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 BAND_OF_BOTH = 0.25  # its end beside a measured velocity, whose noise vanishes towards 0.5
 LOUDER = 2.0  # times the power of the quietest log, beyond which it is no noise: estimates scatter
+PASSED = 0.25  # of the power at rest
+PIECE = 64  # test functions of a piece, whose spectrum tells what the residual leaves room for
+REFUTED = 0.7  # of the floor, below which an error refutes it: estimates scatter by a tenth
 PLAIN = 3.0  # times the reading's noise where the band begins; above it the force's noise shows
 
 
@@ -61,10 +64,58 @@ class Noise:
         return np.asarray(self.force + self.reading * self.bend)
 
 
-def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
-    """RMS noise floor in N of the force residual of these logs."""
-    sensors = noise_floor(axis, [(log.motion, log.test_function) for log in logs])
-    return _with_own(sensors, logs)
+def floor_of(
+    axis: AxisModel, logs: Sequence[PreparedLog], left: Sequence[Array] | None = None
+) -> float:
+    """RMS noise floor in N of the force residual of these logs.
+
+    left: of each log (n,) N, what the axis leaves, zero where it tells nothing. A noise of the
+    force that alone would leave clearly more is refuted: it was the controller's answer to readings
+    that the log does not hold, or a load that strikes within its play. Its level is then what the
+    residual leaves room for.
+    """
+    motions = [log.motion for log in logs]
+    noises = noises_of(axis, motions)
+
+    def floor(noises: Sequence[Noise]) -> float:
+        each = (
+            _variance(axis, noise, log.motion, log.test_function)
+            for noise, log in zip(noises, logs, strict=True)
+        )
+        return _with_own(_together([*each], motions), logs)
+
+    known = floor(noises)
+    if left is None or _rms_of(left) > REFUTED * known:
+        return known
+    room = [_room_in(r, n, log) for r, n, log in zip(left, noises, logs, strict=True)]
+    return min(floor([replace(n, force=a) for n, a in zip(noises, room, strict=True)]), known)
+
+
+def _rms_of(left: Sequence[Array]) -> float:
+    """RMS of what is left of all logs where it tells something."""
+    told = np.concatenate([r[r != 0.0] for r in left])
+    return float(np.sqrt(np.mean(told**2))) if len(told) else np.inf
+
+
+def _room_in(left: Array, noise: Noise, log: PreparedLog) -> float:
+    """White noise of the force, N^2/Hz, that what is left (n,) N of a log leaves room for.
+
+    In the octave below where test functions pass a quarter of the power: what a model lacks is
+    slower.
+    """
+    test = log.test_function
+    step = test.stride * test.period
+    told = np.count_nonzero(left) / max(len(left), 1)
+    if told * len(left) < PIECE:
+        return noise.force
+    frequency, power = _median_spectrum(left, PIECE, step, left == 0.0)
+    passed = np.interp(
+        frequency, noise.frequency, test.response(log.motion.sample_period, noise.segment)
+    )
+    own = np.interp(frequency, noise.frequency, noise.reading * noise.bend)
+    room = np.maximum(power / (told * passed) - own, 0.0)
+    top = float(frequency[np.flatnonzero(passed < PASSED * passed[0])[0]])
+    return float(room[(frequency > 0.5 * top) & (frequency <= top)].mean())
 
 
 def unrounded_floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
@@ -110,7 +161,8 @@ def _with_own(sensors: float, logs: Sequence[PreparedLog]) -> float:
 
 
 def _together(variances: Sequence[float], motions: Sequence[Motion]) -> float:
-    return float(np.sqrt(np.average(variances, weights=[m.signals.shape[1] for m in motions])))
+    seconds = [m.signals.shape[1] * m.period for m in motions]  # as many test functions has each
+    return float(np.sqrt(np.average(variances, weights=seconds)))
 
 
 def _variance(axis: AxisModel, noise: Noise, motion: Motion, test_function: TestFunction) -> float:

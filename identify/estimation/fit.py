@@ -72,9 +72,21 @@ class Fit:
         return rms(self.residual)
 
     @cached_property
-    def floor(self) -> float:
-        """RMS noise floor in N."""
+    def by_log(self) -> list[Array]:
+        """The residual (n,) N of each log, zero where a test function carries no information."""
+        every = np.zeros(len(self.kept))
+        every[self.kept] = self.residual
+        return np.split(every, np.cumsum([len(log) for log in self.logs])[:-1])
+
+    @cached_property
+    def told_floor(self) -> float:
+        """RMS noise floor in N, as the logs tell it before what is left is known."""
         return floor_of(self.axis, self.logs)
+
+    @cached_property
+    def floor(self) -> float:
+        """RMS noise floor in N; less than the one told first where what is left refutes that."""
+        return floor_of(self.axis, self.logs, self.by_log)
 
     @cached_property
     def samples(self) -> float:
@@ -107,11 +119,8 @@ class Fit:
     @cached_property
     def lines(self) -> tuple[float, ...]:
         """Frequencies (Hz) at which the residual repeats in time, the surest first."""
-        every = np.zeros(len(self.kept))
-        every[self.kept] = self.residual
-        ends = np.cumsum([len(log) for log in self.logs])[:-1]
         steps = [log.test_function.stride * log.test_function.period for log in self.logs]
-        return lines_in_time(list(zip(np.split(every, ends), steps, strict=True)), RESIDUAL_LINES)
+        return lines_in_time(list(zip(self.by_log, steps, strict=True)), RESIDUAL_LINES)
 
     @cached_property
     def pitches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -157,6 +166,14 @@ class Fit:
     def at_floor(self) -> bool:
         """Whether the error is at the noise floor."""
         return self.ratio < RULE.at_floor
+
+    @property
+    def may_be_noise(self) -> bool:
+        """Whether what is left may be noise: at its floor, or too small for the floor told first.
+
+        How noisy the force is, which the readings hide, is then no more than a guess.
+        """
+        return self.at_floor or self.floor < self.told_floor
 
     @property
     def ratio(self) -> float:

@@ -142,8 +142,9 @@ class AxisDiagnosis:
         for finding, without in each:
             if finding in findings:  # not one that a missing effect resembles
                 findings = self._against_shapes(finding, without, findings)
-        shape = None if self.unexplained is None else wrong_shape(self.with_named, self.dataset)
-        if shape is not None:
+        beside = self.with_named
+        told = self.unexplained is None or beside.may_be_noise
+        if not told and (shape := wrong_shape(beside, self.dataset)):
             wrong = found_wrong(shape, self.base, self.with_named, self.dataset)
             findings = with_shape(findings, wrong)
         shapes = bool(findings) and all(f.kind is FindingKind.WRONG_SHAPE for f in findings)

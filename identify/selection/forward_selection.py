@@ -154,7 +154,7 @@ def _is_added(best: Candidate, base: Fit) -> bool:
 
     The noise floor is an estimate, so an effect may be significant although the error is at it.
     """
-    return best.supported and (not base.at_floor or best.is_beyond_doubt)
+    return best.supported and (best.is_beyond_doubt or not base.may_be_noise)
 
 
 def _friction_instead(

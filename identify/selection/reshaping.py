@@ -15,7 +15,7 @@ import numpy as np
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
-from identify.estimation.errors import Errors, error_in
+from identify.estimation.errors import Errors, error_in, gain_held_out
 from identify.estimation.fit import Fit, fit_axis
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.ranking import less
@@ -42,12 +42,12 @@ def curve_in_place(
 ) -> Reshaped | None:
     """The free curve that the selection should go on beside; None where there is none.
 
-    Also where the fit is at the noise floor, or has as many as MOST_CURVES. given: names of the
-    effects that the model had before the selection. The law of one that it added is asked about
+    Also where what the fit leaves may be noise, or it has as many as MOST_CURVES. given: names of
+    the effects that the model had before the selection. The law of one that it added is asked about
     where no other is supported: a curve over one pitch can hold the force of many.
     """
     curves = [f for f in fit.axis.effects if f.effect.free_shape]
-    if fit.at_floor or len(curves) >= MOST_CURVES:
+    if fit.may_be_noise or len(curves) >= MOST_CURVES:
         return None
     alone = _reshaped(fit, dataset, ranking)
     if alone and alone.shape.effect not in given and any(c.supported for c in ranking):
@@ -124,12 +124,13 @@ def _beside_an_effect(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) 
 
     Each distorts what the other leaves, so that neither has evidence alone: what a shape of force
     leaves is smooth, and a smooth residual has few effective samples. An effect counts by what it
-    takes of the test error, then by its evidence. Both together must take nearly all; or a good
-    part, where the effect has every support beside the curve.
+    takes of the test error; that with most evidence is asked about, little as it may be. Both
+    together must take nearly all; or a good part, where the effect has every support beside the
+    curve.
     """
-    likely = [c for c in ranking if c.plausible and _may_help(c)]
-    by_gain = sorted(likely, key=lambda c: c.gain.after / c.gain.before)[:MOST_TRIED]
-    by_evidence = sorted(likely, key=lambda c: -c.delta_bic)[:1]
+    plausible = [c for c in ranking if c.plausible]
+    by_gain = sorted(filter(_may_help, plausible), key=lambda c: c.gain.left)[:MOST_TRIED]
+    by_evidence = sorted(plausible, key=lambda c: -c.delta_bic)[:1]
     for candidate in (*by_gain, *(c for c in by_evidence if c not in by_gain)):
         found = _reshaped(candidate.fit, dataset, ())
         if found is None or found.shape.effect == candidate.effect.name:
@@ -151,7 +152,13 @@ def _may_help(candidate: Candidate) -> bool:
 
 
 def _lessened(before: Fit, after: Fit, dataset: Dataset) -> float:
-    """Part of the squared test error above the noise floor that is gone, at most 1."""
+    """Part of the squared test error above the noise floor that is gone, at most 1.
+
+    Of the whole, or of a typical block's where that is more: a few places that the fit logs hardly
+    reach can hold nearly all of the whole.
+    """
     chosen = Errors.of(before, after, dataset, dataset.chosen_on)
     above = chosen.before**2 - before.floor**2
-    return 1.0 - (chosen.after**2 - after.floor**2) / above if above > 0.0 else 0.0
+    whole = 1.0 - (chosen.after**2 - after.floor**2) / above if above > 0.0 else 0.0
+    gain = gain_held_out(before, after, dataset)
+    return whole if gain is None else max(whole, 1.0 - gain.typical)

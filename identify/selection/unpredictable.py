@@ -32,6 +32,7 @@ LAGS = (1, 2, 4, 8, 16, 32, 64)  # test functions, by which what moved before ma
 MOVED = ("velocity", "acceleration", "direction")
 RIDGE = 0.03  # of a column's length, which keeps hats that are seldom visited small
 DECOYS = 20
+LEAST_LOGS = 2
 ALIKE = 1.5  # times the error of the fit logs that noise may have on the held-out ones
 
 Columns = Callable[[Sequence[PreparedLog]], list[Array]]
@@ -56,9 +57,10 @@ def is_unpredictable(fit: Fit, dataset: Dataset) -> bool:
     """Whether neither the motion nor its past foretells the residual, and it swings as noise does.
 
     Neither on the held-out logs nor on blocks left out of the fit logs; noise is as large on both.
-    No line stands out of its spectrum, and it has no amplitude that it keeps.
+    No line stands out of its spectrum, and it has no amplitude that it keeps. One log alone does
+    not tell: what depends on where the axis is cannot be foretold where it comes by once.
     """
-    if keeps_its_amplitude(fit.residual):
+    if len(dataset.fit) + len(dataset.holdout) < LEAST_LOGS or keeps_its_amplitude(fit.residual):
         return False
     held = holdout_error(fit, dataset)
     if held is not None and held > ALIKE * fit.error:

@@ -107,7 +107,7 @@ def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:
     if is_noise(effect):
         return True
     without = less(effect, final, base, dataset)
-    if without.at_floor and _is_doubtful(score(without, final, dataset, effect)):
+    if without.may_be_noise and _is_doubtful(score(without, final, dataset, effect)):
         return False
     refit = gain_held_out(without, final, dataset)
     beside = proof(without, final.axis[effect.name], dataset, refit)
@@ -125,7 +125,7 @@ def _convincing(before: SelectionState, after: SelectionState, dataset: Dataset)
     evidence than they were added with: what is noise had seemed to be left for them.
     """
     added = after.steps[len(before.steps) :]
-    if before.fit.at_floor and all(_is_doubtful(s.candidate) for s in added):
+    if before.fit.may_be_noise and all(_is_doubtful(s.candidate) for s in added):
         return False
     return (
         after.fit.at_floor

@@ -122,9 +122,10 @@ def compare_axis(
     axis = model.axes[dataset.axis]
     kept = moving(dataset.fit, sticks(axis))
     every = residual(axis, dataset.fit)
-    floor = floor_of(axis, dataset.fit)
-    where = {k: v[kept] for k, v in _coordinates(axis, dataset.fit).items()}
     force = every[kept]
+    ends = np.cumsum([len(log) for log in dataset.fit])[:-1]
+    floor = floor_of(axis, dataset.fit, np.split(np.where(kept, every, 0.0), ends))
+    where = {k: v[kept] for k, v in _coordinates(axis, dataset.fit).items()}
     maps = _maps(axis, dataset, floor, force, where)
     maps.append(misfit_by_frequency(axis, dataset.fit))
     return AxisComparison(
@@ -145,7 +146,7 @@ def compare_axis(
 def worst_region(fit: Fit, dataset: Dataset) -> Region | None:
     """Where the force error of a fit stands most above its noise floor; None where nowhere."""
     where = {k: v[fit.kept] for k, v in _coordinates(fit.axis, dataset.fit).items()}
-    maps = _maps(fit.axis, dataset, floor_of(fit.axis, dataset.fit), fit.residual, where)
+    maps = _maps(fit.axis, dataset, fit.floor, fit.residual, where)
     return next(iter(worst_regions(maps, fit.samples)), None)
 
 
