@@ -1,13 +1,12 @@
-"""One thread for matrices: those of a fit are too small to share out.
-
-BLAS threads that wait for work cost CPU time, and take it from the candidates that go side by side.
-"""
+"""What threads share because the whole process has only one of it."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import wraps
+from threading import Lock
 from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -16,8 +15,39 @@ R = TypeVar("R")
 VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
+def entered_once(
+    context: Callable[[], AbstractContextManager[object]],
+) -> Callable[[], AbstractContextManager[None]]:
+    """The context, entered by the first of all that are within at once, and left by the last.
+
+    Each restoring what it found would leave the process with what another had set meanwhile.
+    """
+    lock, entered, within = Lock(), ExitStack(), 0
+
+    @contextmanager
+    def counted() -> Iterator[None]:
+        nonlocal within
+        with lock:
+            if within == 0:
+                entered.enter_context(context())
+            within += 1
+        try:
+            yield
+        finally:
+            with lock:
+                within -= 1
+                if within == 0:
+                    entered.close()
+
+    return counted
+
+
 def one_for_matrices(job: Callable[P, R]) -> Callable[P, R]:
-    """The job with one BLAS thread while it runs, unless the environment says how many."""
+    """The job with one BLAS thread while it runs, unless the environment says how many.
+
+    The matrices of a fit are too small to share out, and BLAS threads that wait for work cost CPU
+    time, and take it from the candidates that go side by side.
+    """
 
     @wraps(job)
     def limited(*arguments: P.args, **options: P.kwargs) -> R:

@@ -39,6 +39,7 @@ from twin.effect import (
     V,
     X,
 )
+from twin.threads import entered_once
 
 if TYPE_CHECKING:
     import mujoco
@@ -279,9 +280,10 @@ def attach(spec: mujoco.MjSpec, table: Table, period: float, axes: tuple[str, ..
     return user_at
 
 
+@entered_once
 @contextmanager
 def passive_callback() -> Iterator[None]:
-    """Install the native callback, and restore what was there before on leaving.
+    """Install the native callback while any thread simulates, then restore what was there before.
 
     Meanwhile MuJoCo's own timers stand still (``mjData.timer``): it reads the clock some twenty
     times a step, for a quarter of the step's time.
