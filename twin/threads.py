@@ -7,7 +7,10 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import wraps
 from threading import Lock
-from typing import ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -53,9 +56,37 @@ def one_for_matrices(job: Callable[P, R]) -> Callable[P, R]:
     def limited(*arguments: P.args, **options: P.kwargs) -> R:
         if any(name in os.environ for name in VARIABLES):
             return job(*arguments, **options)
-        from threadpoolctl import threadpool_limits
-
-        with threadpool_limits(1, user_api="blas"):
+        with _one_blas_thread():
             return job(*arguments, **options)
 
     return limited
+
+
+@entered_once
+@contextmanager
+def _one_blas_thread() -> Iterator[None]:
+    from threadpoolctl import ThreadpoolController
+
+    blas = ThreadpoolController().select(user_api="blas")
+    limit = _from_any_thread(blas, lambda: blas.limit(limits=1))
+    try:
+        yield
+    finally:
+        _from_any_thread(blas, limit.restore_original_limits)
+
+
+def _from_any_thread(blas: ThreadpoolController, change: Callable[[], R]) -> R:
+    """Change a limit; threadpoolctl 3.8 ignores, without a word, all threads but one.
+
+    That is the first that set a limit, until it lets go. The last call may end in another.
+    """
+
+    def let_go() -> None:
+        for library in blas.lib_controllers:
+            if hasattr(library, "clear_controlling_thread"):
+                library.clear_controlling_thread(force=True)
+
+    let_go()
+    changed = change()
+    let_go()
+    return changed
