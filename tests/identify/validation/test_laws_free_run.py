@@ -26,6 +26,7 @@ from identify.validation.free_run import (
 from identify.validation.misfit_maps import position_errors
 from identify.validation.side_by_side import side_by_side
 from twin.model.machine import AxisModel, Hardware, MachineModel
+from twin.simulator import MujocoSimulator, ReducedSimulator
 
 RATE, MASS = 1000.0, 1.7
 N = 1730
@@ -63,6 +64,23 @@ def test_a_wrong_mass_is_off_by_what_the_force_does_since_the_restart(factor):
         exact = held(FORCE[span], factor * MASS, 1.0 / RATE, X[start], v[start])
         off = exact - X[span]
         np.testing.assert_allclose(error[span], off, atol=0.01 * np.abs(off).max())
+
+
+@pytest.mark.parametrize("origin", [0.0203, -0.0203])
+def test_mujoco_runs_as_the_reduced_model_whenever_the_log_began(origin):
+    """The buffer of a delay begins anew at sample 0, not where the time passes 0."""
+    log = prepared()
+    log = replace(log, motion=replace(log.motion, time_origin=origin))
+    delayed = (
+        effect("actuator_delay", {"tau": 1.25e-3}),
+        effect("periodic_disturbance", {"f": 7.0, "a": 1.0}),
+    )
+    model = MachineModel("late", {"x": AxisModel(MASS, effects=delayed)}, RATE)
+    reduced, mujoco = (
+        free_run(model, {"x": log}, simulator).error["x"]
+        for simulator in (ReducedSimulator, MujocoSimulator)
+    )
+    np.testing.assert_allclose(mujoco, reduced, rtol=0, atol=1e-12)
 
 
 def test_the_error_is_the_root_of_its_mean_square_where_it_ran():
