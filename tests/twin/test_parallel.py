@@ -117,6 +117,24 @@ def test_a_job_that_fails_is_told_and_no_other_is_begun():
         assert spread(abs, [-1, 2]) == [1, 2]
 
 
+def test_how_many_jobs_have_ended_is_told_one_at_a_time_and_counts_up():
+    within, told = [], []
+
+    def tell(*at):
+        within.append(at)
+        time.sleep(0.002)
+        told.append((at, len(within)))
+        within.pop()
+
+    expected = [((k + 1, 12), 1) for k in range(12)]
+    with parallel(4):
+        spread(lambda k: time.sleep(0.001 * (12 - k)), range(12), tell)
+    assert told == expected
+    told.clear()
+    spread(abs, range(12), tell)
+    assert told == expected
+
+
 def test_which_warnings_are_given_goes_with_the_job():
     def job(_):
         return np.array([1.0]) / 0.0

@@ -26,6 +26,7 @@ from identify.validation.free_run import (
 from identify.validation.misfit_maps import position_errors
 from identify.validation.side_by_side import side_by_side
 from twin.model.machine import AxisModel, Hardware, MachineModel
+from twin.parallel import parallel
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
 RATE, MASS = 1000.0, 1.7
@@ -135,14 +136,17 @@ def test_each_log_has_its_own_error_and_that_of_its_noise(monkeypatch):
     monkeypatch.setattr(misfit_maps, "free_run", lambda model, parts: name(parts))
     monkeypatch.setattr(misfit_maps, "drift_of_noise", lambda model, parts, run: 10 * size[run])
     monkeypatch.setattr(misfit_maps, "rms_error", lambda run, axis: size.get(run, run))
-    dataset = dataset_of(prepared(name="one"), holdout=(prepared(name="two"),))
+    dataset = dataset_of(
+        prepared(name="one"), prepared(name="two"), holdout=(prepared(name="three"),)
+    )
     told = []
     errors, floors = position_errors(stage(), {"x": dataset}, lambda *at: told.append(at))
-    assert errors["x"] == {k: size[k] for k in errors["x"]}
-    assert floors["x"] == {k: 10 * size[k] for k in floors["x"]}
-    assert "one" in errors["x"]
-    assert [done for done, _ in told] == list(range(len(errors["x"])))
-    assert {whole for _, whole in told} == {len(errors["x"])}
+    assert errors["x"] == size
+    assert floors["x"] == {k: 10 * size[k] for k in size}
+    assert told == [(1, 2), (2, 2)]
+    with parallel(2):
+        position_errors(stage(), {"x": dataset}, lambda *at: told.append(at))
+    assert told[2:] == told[:2]
 
 
 def test_measured_is_the_model_and_what_is_left_on_one_clock():
