@@ -222,6 +222,18 @@ def exits(code):
     os._exit(code)
 
 
+def leaves():
+    raise SystemExit(3)
+
+
+def fails():
+    raise KeyError("damaged\n  table")
+
+
+def not_sent():
+    return lambda: None
+
+
 def hungry(size):
     return len(bytearray(size))
 
@@ -238,6 +250,15 @@ def test_work_apart_gives_its_answer_its_refusal_or_none():
     assert apart(hungry, 10**6, seconds=20.0, memory=10**8) == 10**6
     with pytest.raises(InputError, match="takes more memory"):
         apart(hungry, 3 * 10**8, seconds=20.0, memory=10**8)
+
+
+def test_an_error_in_work_apart_is_told_and_an_exit_as_an_exit():
+    with pytest.raises(NoAnswer, match=r"^failed while it was loaded \(KeyError: .damaged.* table"):
+        apart(fails, seconds=20.0)
+    with pytest.raises(NoAnswer, match=r"failed while it was loaded .*pickle"):
+        apart(not_sent, seconds=20.0)
+    with pytest.raises(NoAnswer, match="ended the program while it was loaded; remove the exit"):
+        apart(leaves, seconds=20.0)
 
 
 def test_a_crash_has_the_name_of_its_signal():
