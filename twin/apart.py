@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 
 class NoAnswer(InputError):
-    """The work hung, crashed or ended its process."""
+    """The work hung, failed, crashed or ended its process."""
 
 
 def apart(work: Callable[..., T], *arguments: Any, seconds: float, memory: int | None = None) -> T:
@@ -29,7 +29,7 @@ def apart(work: Callable[..., T], *arguments: Any, seconds: float, memory: int |
 
     work: a function of a module, as the other process looks it up by name. memory: bytes that it
     may take beside what the program has, where the system can tell. Raises InputError where it
-    does, and NoAnswer where it does not come to an end, crashes, or ends the process.
+    does, and NoAnswer where it does not come to an end, fails, crashes, or ends the process.
     """
     # A fork starts at once, with all that is imported; elsewhere it is not safe.
     context: Any = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
@@ -44,7 +44,7 @@ def apart(work: Callable[..., T], *arguments: Any, seconds: float, memory: int |
             raise NoAnswer(
                 f"does not come to an end within {seconds:g} s; look for a loop without an end"
             )
-        refused, result = answers.recv()
+        error, result = answers.recv()
     except EOFError:  # it ended without a word
         process.join()
         raise NoAnswer(_ended(process.exitcode)) from None
@@ -52,8 +52,8 @@ def apart(work: Callable[..., T], *arguments: Any, seconds: float, memory: int |
         process.kill()
         process.join()
         answers.close()
-    if refused:
-        raise InputError(refused)
+    if error is not None:
+        raise error
     return result
 
 
@@ -69,12 +69,21 @@ def _attempt(
     if memory is not None:
         _limit(memory)
     try:
-        answer = ("", work(*arguments))
-    except InputError as error:
-        answer = (str(error), None)
-    except MemoryError:
-        answer = ("takes more memory than a file of its size may; export it again", None)
-    questions.send(answer)
+        questions.send((None, work(*arguments)))
+        return
+    except Exception as error:  # an exit is none
+        told = _told(error)
+    questions.send((told, None))
+
+
+def _told(error: Exception) -> InputError:
+    """What is raised in this process for an error in the other."""
+    if isinstance(error, InputError):
+        return InputError(str(error))
+    if isinstance(error, MemoryError):
+        return InputError("takes more memory than a file of its size may; export it again")
+    reason = " ".join(f"{type(error).__name__}: {error}".split())
+    return NoAnswer(f"failed while it was loaded ({reason}); if the file is sound, report this")
 
 
 def _limit(memory: int) -> None:

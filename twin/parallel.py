@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
-from typing import TypeVar
+from threading import Lock
+from typing import Literal, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
+Done = Callable[[int, int], None]
 
-_POOL: ContextVar[ThreadPoolExecutor | None] = ContextVar("pool", default=None)
+_POOL: ContextVar[ThreadPoolExecutor | Literal["in a job"] | None] = ContextVar(
+    "pool", default=None
+)
 
 
 def cores() -> int:
@@ -35,15 +40,45 @@ def parallel(count: int | None = None) -> Iterator[None]:
             _POOL.reset(token)
 
 
-def spread(job: Callable[[T], R], items: Iterable[T]) -> list[R]:
+def spread(job: Callable[[T], R], items: Iterable[T], done: Done | None = None) -> list[R]:
     """The results of a job for each item, in their order.
 
     Outside ``parallel`` it is a loop, and so is what a job spreads in its turn: the parts of parts
-    are too short to share. Raises what the first job that fails raises; no other is begun then.
+    are too short to share. Where jobs fail no other is begun, and the first of them in the order of
+    the items is raised. done: see ``counting``; called as each job ends.
     """
     given, pool = list(items), _POOL.get()
-    if pool is None or len(given) < 2:  # a single job may spread its own parts
-        return [job(item) for item in given]
+    one_more = counting(len(given), done)
+
+    def run(item: T) -> R:
+        result = job(item)
+        one_more()
+        return result
+
+    alone = len(given) < 2  # a single job may spread its own parts
+    if alone or not isinstance(pool, ThreadPoolExecutor):
+        return [run(item) for item in given]
     inside = copy_context()  # NumPy keeps there which warnings to give
-    inside.run(_POOL.set, None)
-    return list(pool.map(lambda item: inside.copy().run(job, item), given))
+    inside.run(_POOL.set, "in a job")
+    jobs = [pool.submit(inside.copy().run, run, item) for item in given]
+    try:
+        wait(jobs, return_when=FIRST_EXCEPTION)
+    finally:
+        for waiting in jobs:
+            waiting.cancel()
+    return [ended.result() for ended in jobs if not ended.cancelled()]
+
+
+def counting(total: int, done: Done | None) -> Callable[[], None]:
+    """A function that tells ``done`` of one more of so many, from any thread.
+
+    The calls come one at a time and count up: done(1, total), done(2, total) and so on.
+    """
+    lock, numbers = Lock(), itertools.count(1)
+
+    def one_more() -> None:
+        if done is not None:
+            with lock:
+                done(next(numbers), total)
+
+    return one_more

@@ -16,7 +16,7 @@ from twin.core.native import Table
 from twin.errors import CannotRun, InputError
 from twin.experiments.trajectory.setpoint import AnySetpoint, Setpoint
 from twin.model.machine import MachineModel
-from twin.mujoco.callback import attach, offsets, passive_callback, step_address
+from twin.mujoco.callback import USER_HEADER, attach, offsets, passive_callback, step_address
 
 CHUNK = 20_000  # samples that are run, reported and recorded at once
 WATCHED_STATES = 8  # an effect with more states than this is not logged state by state
@@ -49,7 +49,10 @@ class Stepper(Protocol):
     def place(
         self, position: Array, velocity: Array, states: Array, first: int, origin: float = 0.0
     ) -> None:
-        """Set the axes' motion (n_axes,) and the effects' states before sample ``first``."""
+        """Set the axes' motion (n_axes,) and the effects' states before sample ``first``.
+
+        origin: s, when sample 0 was.
+        """
 
     def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
         """Run setpoints.shape[0] samples and fill ``out``: signals, forces, states."""
@@ -104,16 +107,14 @@ class MujocoSimulator:
         self, position: Array, velocity: Array, states: Array, first: int, origin: float = 0.0
     ) -> None:
         """See Stepper."""
-        self.data.time = origin + first * self.model.opt.timestep
+        self.data.time = first * self.model.opt.timestep
         self.data.qpos[self._where[:, 0]] = position
         self.data.qvel[self._where[:, 1]] = velocity
         self.data.qpos[self._attached[:, 0]] = states[self._attached[:, 2]]
         self.data.qvel[self._attached[:, 1]] = states[self._attached[:, 2] + 1]
         user = self.data.userdata[self.user_at :]
-        n = len(states)
-        user[0] = self.data.time
-        user[1 : 1 + n] = states
-        user[1 + n : 1 + 2 * n] = states
+        user[:USER_HEADER] = self.data.time, origin
+        user[USER_HEADER : USER_HEADER + 2 * len(states)] = np.tile(states, 2)
 
     def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
         """See Stepper."""

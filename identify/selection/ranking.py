@@ -19,7 +19,7 @@ from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.memory import give_back
 from twin.model.machine import AxisModel
-from twin.parallel import spread
+from twin.parallel import counting, spread
 
 Array = NDArray[np.float64]
 LEADERS = 2  # that are refitted first, and tell what others must promise
@@ -62,11 +62,11 @@ def _tried(
     what these explain.
     """
     done: dict[str, Candidate] = {}
+    one_more = counting(len(effects), progress)
 
     def keep(candidate: Candidate) -> None:
         done[candidate.effect.name] = candidate
-        if progress:
-            progress(len(done), len(effects))
+        one_more()
 
     def looked(effect: Effect) -> Look:
         found = look_at(base, dataset, effect)

@@ -184,16 +184,14 @@ def position_errors(
     There is none where the motion is imposed.
     """
     logs = {} if model.is_imposed else by_log(found)
-    begun = iter(range(len(logs)))
 
     def run(parts: Mapping[str, PreparedLog]) -> tuple[FreeRun, FreeRun]:
-        progress(next(begun), len(logs))
         own = free_run(model, parts)
         return own, drift_of_noise(model, parts, own)
 
     errors: dict[str, dict[str, float]] = {a: {} for a in found}
     floors: dict[str, dict[str, float]] = {a: {} for a in found}
-    for name, both in zip(logs, spread(run, logs.values()), strict=True):
+    for name, both in zip(logs, spread(run, logs.values(), progress), strict=True):
         for axis in logs[name]:
             errors[axis][name], floors[axis][name] = (rms_error(one, axis) for one in both)
     return errors, floors

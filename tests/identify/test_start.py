@@ -6,7 +6,9 @@ import json
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -101,3 +103,29 @@ def test_a_call_from_python_has_one_thread_for_matrices_and_leaves_them(monkeypa
         assert blas_threads() == {2}
         monkeypatch.setenv(VARIABLES[0], "2")
         assert one_for_matrices(blas_threads)() == {2}
+
+
+def test_calls_that_overlap_have_one_thread_for_matrices_and_leave_them(monkeypatch) -> None:
+    for name in VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+    begun, joined, over = Event(), Event(), Event()
+
+    @one_for_matrices
+    def first() -> None:
+        begun.set()
+        assert joined.wait(timeout=10.0)
+
+    @one_for_matrices
+    def second() -> set[int]:
+        joined.set()
+        assert over.wait(timeout=10.0)
+        return blas_threads()
+
+    with threadpool_limits(2, user_api="blas"), ThreadPoolExecutor(2) as pool:
+        ending = pool.submit(first)
+        assert begun.wait(timeout=10.0)
+        going_on = pool.submit(second)
+        ending.result()
+        over.set()
+        assert going_on.result() == {1}
+        assert blas_threads() == {2}

@@ -13,10 +13,13 @@ from twin import apart as apart_module
 from twin import breakdown, entries, simulator
 from twin.apart import NoAnswer, apart
 from twin.breakdown import HUGE, require_sound
+from twin.core.control import Controller, gain_table
+from twin.core.loop import N_SIGNALS, READING_COLUMN
+from twin.effect import INDEX, OUT, READING, TIME, Effect, Kind
 from twin.entries import read_toml, shown, toml_document
 from twin.errors import CannotRun, InputError, at
 from twin.experiments.trajectory import Setpoint
-from twin.model.machine import AxisModel, Hardware, MachineModel
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.numbers import is_number
 from twin.simulator import MujocoSimulator, ReducedSimulator, run, run_parts
 
@@ -219,6 +222,18 @@ def exits(code):
     os._exit(code)
 
 
+def leaves():
+    raise SystemExit(3)
+
+
+def fails():
+    raise KeyError("damaged\n  table")
+
+
+def not_sent():
+    return lambda: None
+
+
 def hungry(size):
     return len(bytearray(size))
 
@@ -235,6 +250,15 @@ def test_work_apart_gives_its_answer_its_refusal_or_none():
     assert apart(hungry, 10**6, seconds=20.0, memory=10**8) == 10**6
     with pytest.raises(InputError, match="takes more memory"):
         apart(hungry, 3 * 10**8, seconds=20.0, memory=10**8)
+
+
+def test_an_error_in_work_apart_is_told_and_an_exit_as_an_exit():
+    with pytest.raises(NoAnswer, match=r"^failed while it was loaded \(KeyError: .damaged.* table"):
+        apart(fails, seconds=20.0)
+    with pytest.raises(NoAnswer, match=r"failed while it was loaded .*pickle"):
+        apart(not_sent, seconds=20.0)
+    with pytest.raises(NoAnswer, match="ended the program while it was loaded; remove the exit"):
+        apart(leaves, seconds=20.0)
 
 
 def test_a_crash_has_the_name_of_its_signal():
@@ -254,7 +278,7 @@ def test_a_placed_simulation_begins_there_with_its_states():
     stage = MujocoSimulator(model, table)
     states = np.arange(1.0, table.n_states + 1) / 100.0
     stage.place(np.array([0.04]), np.array([0.7]), states, 30, origin=2.0)
-    assert stage.data.time == pytest.approx(2.0 + 30 / RATE)
+    assert stage.data.time == pytest.approx(30 / RATE)  # the origin is not in it
     slides = dict(zip(
         [stage.model.joint(i).name for i in range(stage.model.njnt)],
         zip(stage.data.qpos, stage.data.qvel, strict=True), strict=True,
@@ -263,3 +287,41 @@ def test_a_placed_simulation_begins_there_with_its_states():
     first = int(table.entries[0][3])
     assert list(slides.values()) == [pytest.approx(tuple(states[first : first + 2]))]
     assert SimpleNamespace(n=stage.model.njnt).n == 2
+
+
+def _index_and_time(p, s, io):
+    io[OUT] = io[INDEX] + io[TIME]
+
+
+def _time(p, s, io):
+    io[READING] = io[TIME]
+
+
+def told_by(kind, law, number=1):
+    """An effect without parameters that tells what its law is given."""
+    told = Effect(kind, "tells", "", "this test", (), law, fingerprint="", excited_by="")
+    return Fitted(told.numbered(number), {}, frozenset())
+
+
+@pytest.mark.parametrize("origin", [0.0203, -0.0203, 1e6])
+@pytest.mark.parametrize("stage", [ReducedSimulator, MujocoSimulator])
+def test_the_origin_is_in_the_time_of_a_law_and_not_in_its_index(stage, origin):
+    """A force and a sensor in either simulation; no other place of the time of a sample is."""
+    effects = told_by(Kind.FORCE, _index_and_time), told_by(Kind.SENSING, _time, number=2)
+    model = MachineModel("clock", {"x": AxisModel(1.0, Hardware(), effects)}, RATE)
+    table, first, n = model.table(), 30, 40
+    simulation = stage(model, table)
+    simulation.place(np.zeros(1), np.zeros(1), np.zeros(table.n_states), first, origin)
+    shared = (
+        1.0 / RATE, (table.entries, table.axes, table.parameters), np.zeros(table.n_states),
+        gain_table({"x": Controller()}, model.axes, 1.0 / RATE), np.zeros((1, 3)),
+        np.zeros(0, dtype=np.int64),
+    )  # fmt: skip
+    signals, forces = np.empty((n, 1, N_SIGNALS)), np.zeros((n, 2))
+    out = signals, forces, np.empty((n, 0))
+    simulation.run(first, shared, np.zeros((n, 1, 4)), np.zeros((n, 1)), out)
+    index = np.arange(first, first + n)
+    time = origin + index / RATE
+    np.testing.assert_allclose(signals[:, 0, READING_COLUMN], time, rtol=0, atol=1e-9)
+    told = forces[:, table.labels.index(("x", effects[0].effect.name))]
+    np.testing.assert_allclose(told, index + time, rtol=0, atol=1e-9)

@@ -54,6 +54,52 @@ def test_the_outermost_decides_how_many_threads_there_are():
         assert len({*spread(running, range(6))}) == 1
 
 
+def test_what_a_job_makes_parallel_stays_in_its_own_thread_too():
+    def job(_):
+        with parallel(3):
+            return {threading.get_ident(), *spread(running, range(6))}
+
+    def running(_):
+        time.sleep(0.001)
+        return threading.get_ident()
+
+    with parallel(2):
+        assert [len(used) for used in spread(job, range(2))] == [1, 1]
+
+
+def test_no_job_is_begun_after_one_failed_while_an_earlier_goes_on():
+    begun, failed = [], threading.Event()
+
+    def job(k):
+        begun.append(k)
+        if k == 0:
+            assert failed.wait(timeout=10.0)
+            time.sleep(0.3)  # in which some hundred others would be begun
+        if k == 1:
+            failed.set()
+            raise KeyError("the second")
+        time.sleep(0.001)
+
+    with parallel(2), pytest.raises(KeyError, match="the second"):
+        spread(job, range(1000))
+    assert len(begun) < 40
+
+
+def test_of_jobs_that_fail_the_first_of_the_items_is_told():
+    failed = threading.Event()
+
+    def job(k):
+        if k == 0:
+            assert failed.wait(timeout=10.0)
+            time.sleep(0.02)
+            raise KeyError("the first")
+        failed.set()
+        raise KeyError("a later one")
+
+    with parallel(2), pytest.raises(KeyError, match="the first"):
+        spread(job, range(50))
+
+
 def test_a_job_that_fails_is_told_and_no_other_is_begun():
     begun = []
 
@@ -69,6 +115,24 @@ def test_a_job_that_fails_is_told_and_no_other_is_begun():
     assert len(begun) < 10
     with parallel(2):  # and a later one is not held up
         assert spread(abs, [-1, 2]) == [1, 2]
+
+
+def test_how_many_jobs_have_ended_is_told_one_at_a_time_and_counts_up():
+    within, told = [], []
+
+    def tell(*at):
+        within.append(at)
+        time.sleep(0.002)
+        told.append((at, len(within)))
+        within.pop()
+
+    expected = [((k + 1, 12), 1) for k in range(12)]
+    with parallel(4):
+        spread(lambda k: time.sleep(0.001 * (12 - k)), range(12), tell)
+    assert told == expected
+    told.clear()
+    spread(abs, range(12), tell)
+    assert told == expected
 
 
 def test_which_warnings_are_given_goes_with_the_job():

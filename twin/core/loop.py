@@ -29,7 +29,7 @@ from twin.effect import (
     V,
     X,
 )
-from twin.mujoco.callback import call_step, word_at
+from twin.mujoco.callback import USER_HEADER, call_step, word_at
 
 # Columns of the logged signals of one axis.
 READING_COLUMN, COMMAND_COLUMN, POSITION_COLUMN, VELOCITY_COLUMN = range(4)
@@ -82,11 +82,12 @@ def run_mujoco(
     qvel = doubles_at(word_at(data + qvel_at))
     ctrl = doubles_at(word_at(data + ctrl_at))
     user = doubles_at(word_at(data + userdata))
-    after = user_at + 1 + n_states
+    origin = user[user_at + 1]
+    after = user_at + USER_HEADER + n_states
     io[DT] = dt
     for k in range(n):
         io[INDEX] = first_sample + k
-        io[TIME] = (first_sample + k) * dt
+        io[TIME] = origin + (first_sample + k) * dt
         for a in range(n_axes):
             ctrl[where[a, 2]] = control_axis(
                 a, qpos[where[a, 0]], qvel[where[a, 1]], 0.5 * dt, table, sensing_states, gains,

@@ -4,7 +4,8 @@ The table of a machine is stored in the mjModel itself, as the last custom numer
 and worker threads need nothing else. Its last number is a magic value; the callback
 returns at once for any other model. The states live in userdata: those at the start of the
 sample and those after it. The callback commits the second to the first when time has moved on,
-so a sample counts once however often MuJoCo evaluates its forces.
+so a sample counts once however often MuJoCo evaluates its forces. MuJoCo's time counts from the
+first sample, as INDEX is computed from it; the time origin is beside the states in userdata.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ from twin.effect import (
     V,
     X,
 )
+from twin.threads import entered_once
 
 if TYPE_CHECKING:
     import mujoco
@@ -47,6 +49,7 @@ UNKNOWN_LAYOUT = "this MuJoCo lays out its structs in an unknown way; report its
 NUMERIC = "proton_twin_table"
 MAGIC = 0.3401950653e77  # no model holds this by chance
 HEADER = 6  # period, axes, states, entries, parameters, first userdata
+USER_HEADER = 2  # time of the last call, s; time origin, s; then the states
 AXIS_COLUMNS = 7  # first entry, last entry, first state, mass, qpos, dof, actuator
 
 
@@ -204,10 +207,11 @@ def passive_forces(block, data, off):
     entries = view(block + 8 * table, (n_entries, 4))
     parameters = view(block + 8 * (table + 4 * n_entries), int(header[4]))
     user = word_at(data + off[1]) + 8 * int(header[5])
-    start = view(user + 8, n_states)
-    after = view(user + 8 * (1 + n_states), n_states)
-    rows = view(user + 8 * (1 + 2 * n_states), (1, n_entries))
-    io = view(user + 8 * (1 + 2 * n_states + n_entries), IO_SIZE)
+    states = user + 8 * USER_HEADER
+    start = view(states, n_states)
+    after = view(states + 8 * n_states, n_states)
+    rows = view(states + 8 * 2 * n_states, (1, n_entries))
+    io = view(states + 8 * (2 * n_states + n_entries), IO_SIZE)
     qpos = doubles_at(word_at(data + off[2]))
     qvel = doubles_at(word_at(data + off[3]))
     ctrl = doubles_at(word_at(data + off[4]))
@@ -215,7 +219,7 @@ def passive_forces(block, data, off):
     time = doubles_at(data + off[0])[0]
     begin_sample(time, doubles_at(user), start, after)
     io[INDEX] = np.rint(time / dt)
-    io[TIME] = time
+    io[TIME] = doubles_at(user)[1] + time
     io[DT] = dt
     io[WHEN] = 1.0
     for a in range(n_axes):
@@ -275,13 +279,14 @@ def attach(spec: mujoco.MjSpec, table: Table, period: float, axes: tuple[str, ..
     ]  # fmt: skip
     numbers += [len(numbers) + 2, MAGIC]
     spec.add_numeric(name=NUMERIC, data=numbers, size=len(numbers))
-    spec.nuserdata = user_at + 1 + 2 * table.n_states + len(table.entries) + IO_SIZE
+    spec.nuserdata = user_at + USER_HEADER + 2 * table.n_states + len(table.entries) + IO_SIZE
     return user_at
 
 
+@entered_once
 @contextmanager
 def passive_callback() -> Iterator[None]:
-    """Install the native callback, and restore what was there before on leaving.
+    """Install the native callback while any thread simulates, then restore what was there before.
 
     Meanwhile MuJoCo's own timers stand still (``mjData.timer``): it reads the clock some twenty
     times a step, for a quarter of the step's time.

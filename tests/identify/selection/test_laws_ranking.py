@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
+from threading import Barrier
 
 import numpy as np
 import pytest
@@ -22,6 +24,7 @@ from identify.selection import ranking
 from identify.selection.candidates import Look
 from identify.selection.ranking import _ranked, less, rank, tie
 from twin.effects import Catalogue
+from twin.parallel import parallel
 
 # The rules as they were decided.
 AT_FLOOR, SETTLED, FIRSTS, LEAST_PART = 1.3, 0.999, 3, 0.1
@@ -131,6 +134,26 @@ def ranked(monkeypatch, ratio, t=9.0, left=3.0):
     found = rank(base, DATASET, catalogue, lambda *done: bars.append(done))
     assert bars == [(1, 2), (2, 2)]
     return found, base, again, asked
+
+
+def test_candidates_that_are_tried_side_by_side_are_told_one_at_a_time(monkeypatch):
+    both, within, told = Barrier(2), [], []
+
+    def look_at(base, dataset, effect):
+        both.wait(timeout=10.0)
+        return Look(effect, (), 0.0, built(effect, t=1.0))
+
+    def tell(*at):
+        within.append(at)
+        time.sleep(0.02)
+        told.append((at, len(within)))
+        within.pop()
+
+    monkeypatch.setattr(ranking, "look_at", look_at)
+    catalogue = Catalogue([CATALOGUE[n] for n in ("cogging", "wear")])
+    with parallel(2):
+        rank(built_fit(4.0), DATASET, catalogue, tell)
+    assert told == [((1, 2), 1), ((2, 2), 1)]
 
 
 def refits(monkeypatch, shares, explained, t=9.0):

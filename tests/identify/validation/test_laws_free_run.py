@@ -26,6 +26,8 @@ from identify.validation.free_run import (
 from identify.validation.misfit_maps import position_errors
 from identify.validation.side_by_side import side_by_side
 from twin.model.machine import AxisModel, Hardware, MachineModel
+from twin.parallel import parallel
+from twin.simulator import MujocoSimulator, ReducedSimulator
 
 RATE, MASS = 1000.0, 1.7
 N = 1730
@@ -63,6 +65,23 @@ def test_a_wrong_mass_is_off_by_what_the_force_does_since_the_restart(factor):
         exact = held(FORCE[span], factor * MASS, 1.0 / RATE, X[start], v[start])
         off = exact - X[span]
         np.testing.assert_allclose(error[span], off, atol=0.01 * np.abs(off).max())
+
+
+@pytest.mark.parametrize("origin", [0.0203, -0.0203])
+def test_mujoco_runs_as_the_reduced_model_whenever_the_log_began(origin):
+    """The buffer of a delay begins anew at sample 0, not where the time passes 0."""
+    log = prepared()
+    log = replace(log, motion=replace(log.motion, time_origin=origin))
+    delayed = (
+        effect("actuator_delay", {"tau": 1.25e-3}),
+        effect("periodic_disturbance", {"f": 7.0, "a": 1.0}),
+    )
+    model = MachineModel("late", {"x": AxisModel(MASS, effects=delayed)}, RATE)
+    reduced, mujoco = (
+        free_run(model, {"x": log}, simulator).error["x"]
+        for simulator in (ReducedSimulator, MujocoSimulator)
+    )
+    np.testing.assert_allclose(mujoco, reduced, rtol=0, atol=1e-12)
 
 
 def test_the_error_is_the_root_of_its_mean_square_where_it_ran():
@@ -117,14 +136,17 @@ def test_each_log_has_its_own_error_and_that_of_its_noise(monkeypatch):
     monkeypatch.setattr(misfit_maps, "free_run", lambda model, parts: name(parts))
     monkeypatch.setattr(misfit_maps, "drift_of_noise", lambda model, parts, run: 10 * size[run])
     monkeypatch.setattr(misfit_maps, "rms_error", lambda run, axis: size.get(run, run))
-    dataset = dataset_of(prepared(name="one"), holdout=(prepared(name="two"),))
+    dataset = dataset_of(
+        prepared(name="one"), prepared(name="two"), holdout=(prepared(name="three"),)
+    )
     told = []
     errors, floors = position_errors(stage(), {"x": dataset}, lambda *at: told.append(at))
-    assert errors["x"] == {k: size[k] for k in errors["x"]}
-    assert floors["x"] == {k: 10 * size[k] for k in floors["x"]}
-    assert "one" in errors["x"]
-    assert [done for done, _ in told] == list(range(len(errors["x"])))
-    assert {whole for _, whole in told} == {len(errors["x"])}
+    assert errors["x"] == size
+    assert floors["x"] == {k: 10 * size[k] for k in size}
+    assert told == [(1, 2), (2, 2)]
+    with parallel(2):
+        position_errors(stage(), {"x": dataset}, lambda *at: told.append(at))
+    assert told[2:] == told[:2]
 
 
 def test_measured_is_the_model_and_what_is_left_on_one_clock():

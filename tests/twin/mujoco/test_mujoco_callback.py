@@ -50,6 +50,18 @@ def test_the_callback_goes_with_its_context() -> None:
     assert not installed()
 
 
+def test_the_callback_stays_while_any_simulation_runs_whichever_ends_first() -> None:
+    """Two threads end in any order; contexts entered and left by hand show each."""
+    for first, last in ((0, 1), (1, 0)):
+        both = passive_callback(), passive_callback()
+        for one in both:
+            one.__enter__()
+        both[first].__exit__(None, None, None)
+        assert installed()
+        both[last].__exit__(None, None, None)
+        assert not installed()
+
+
 def test_the_callback_goes_when_something_fails() -> None:
     with pytest.raises(KeyError), passive_callback():
         raise KeyError

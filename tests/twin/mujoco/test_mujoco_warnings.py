@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from math import nan, sqrt
 from pathlib import Path
+from threading import Barrier
 from typing import Any
 
 import mujoco
@@ -92,3 +94,32 @@ def test_the_handler_of_warnings_is_given_back() -> None:
     with collected_warnings(data):
         assert mujoco.get_mju_user_warning() is not before
     assert mujoco.get_mju_user_warning() is before
+
+
+def test_each_thread_has_the_warnings_of_its_own_simulation() -> None:
+    before, together = mujoco.get_mju_user_warning(), Barrier(2)
+
+    def warned(text: str) -> list[str]:
+        with collected_warnings(mujoco.MjData(mujoco.MjSpec().compile())) as found:
+            together.wait(timeout=10.0)  # both are within
+            mujoco.get_mju_user_warning()(text)
+            together.wait(timeout=10.0)
+        return [w.text for w in found]
+
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(warned, ("one", "other"))) == [["one"], ["other"]]
+    assert mujoco.get_mju_user_warning() is before
+
+
+def test_a_warning_of_another_simulation_goes_to_the_handler_that_was_there() -> None:
+    told: list[str] = []
+    mujoco.set_mju_user_warning(told.append)
+    try:
+        with (
+            collected_warnings(mujoco.MjData(mujoco.MjSpec().compile())) as found,
+            ThreadPoolExecutor(1) as elsewhere,
+        ):
+            elsewhere.submit(lambda: mujoco.get_mju_user_warning()("foreign")).result()
+    finally:
+        mujoco.set_mju_user_warning(None)
+    assert (told, found) == (["foreign"], [])
