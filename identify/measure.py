@@ -8,6 +8,7 @@ import numpy as np
 
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.excitation import excitation
+from identify.dataset.given_logs import require_samples
 from identify.dataset.motion import Motion, motion_of
 from identify.dataset.reading_ripple import ripples_of_widest
 from identify.dataset.test_function import TestFunction
@@ -62,6 +63,7 @@ def first_model(logs: Mapping[str, Log], name: str, catalogue: Catalogue) -> Mac
     step and the noise of the encoder. Raises InputError where no axis moves, and where the logs
     differ in sample rate.
     """
+    require_samples(logs)
     rates = sorted({log.sample_rate for log in logs.values()})
     if len(rates) != 1:
         raise InputError(

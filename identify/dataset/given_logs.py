@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.motion import SHORTEST_LOG
 from twin.errors import InputError
 from twin.log import Log
 from twin.log.check import moves
@@ -51,6 +52,16 @@ def _same(one: Log, other: Log) -> bool:
         for a in shared
         if moves(one, a)
     )
+
+
+def require_samples(logs: Mapping[str, Log]) -> None:
+    """Raise InputError where a log holds none."""
+    for name, log in logs.items():
+        if not log.axes or not len(log):
+            raise InputError(
+                f"{name}: has no samples; identification needs {SHORTEST_LOG:g} s in which an axis "
+                "moves; give another log"
+            )
 
 
 def require_one_kind(logs: Mapping[str, Log], name: str, axis: AxisModel) -> None:

@@ -16,6 +16,7 @@ from identify.dataset.noise_floor import floor_of
 from identify.estimation.channel_delay import aligned
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
+from identify.measure import first_model
 from identify.output.as_json import fit_json
 from identify.output.text import fit_text
 from identify.validation.free_run import HORIZON, free_run, rms_error
@@ -221,6 +222,17 @@ def test_an_axis_that_rests_in_every_window_is_refused_in_one_line(tmp_path):
     refusal("fit", "model.toml", "log.mcap", "--test-function", "0.1", folder=tmp_path)
     short = fit(PLAIN, {"log": log}, test_function=0.02).fits["x"]
     assert np.isfinite(short.error)
+
+
+@pytest.mark.parametrize("role", ["logs", "holdout", "test"])
+def test_a_log_without_samples_is_refused_in_one_line_in_any_role(role):
+    run = logged(STAGE, seconds=2.0)
+    given = {"logs": {"run": run}, "holdout": {}, "test": {}}
+    given[role] = {**given[role], "none": run.part(0, 0)}
+    told = one_line(datasets, STAGE, **given)
+    assert told.startswith("none: has no samples; identification needs 1 s in which an axis moves")
+    told = one_line(first_model, {"none": run.part(0, 0)}, "new", CATALOGUE)
+    assert told.startswith("none: has no samples")
 
 
 def test_what_is_not_a_number_is_refused_in_one_line():
