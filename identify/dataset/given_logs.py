@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.motion import SHORTEST_LOG
+from identify.dataset.shared_samples import share_samples
 from twin.errors import InputError
 from twin.log import Log
 from twin.log.check import moves
@@ -37,21 +38,12 @@ def require_apart(given: Given) -> None:
     for busy, free in combinations(Role, 2):
         for held, other in given[free].items():
             for name, log in given[busy].items():
-                if _same(log, other):
+                if share_samples(log, other):
                     what = "held out" if free is Role.SELECTION else "a test log"
                     raise InputError(
-                        f"{held}: {what}, but has the same samples as {name}, which {BUSY[busy]}, "
+                        f"{held}: {what}, but has samples of {name}, which {BUSY[busy]}, "
                         "and so cannot test the fit; give a log of another experiment"
                     )
-
-
-def _same(one: Log, other: Log) -> bool:
-    shared = one.axes.keys() & other.axes.keys()
-    return len(one) == len(other) and any(
-        np.array_equal(one.axes[a].position, other.axes[a].position)
-        for a in shared
-        if moves(one, a)
-    )
 
 
 def require_samples(logs: Mapping[str, Log]) -> None:

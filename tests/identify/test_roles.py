@@ -98,8 +98,8 @@ def test_logs_are_prepared_alike_in_each_role():
 @pytest.mark.parametrize(
     ("logs", "held", "why"),
     [
-        ({"a": TEST["c"]}, HELD, "a test log, but has the same samples as a, which is fitted"),
-        (LOGS, {"b": TEST["c"]}, "a test log, but has the same samples as b, which chooses"),
+        ({"a": TEST["c"]}, HELD, "a test log, but has samples of a, which is fitted"),
+        (LOGS, {"b": TEST["c"]}, "a test log, but has samples of b, which chooses"),
     ],
 )
 def test_a_log_has_one_role(logs, held, why):

@@ -13,6 +13,7 @@ from machines import one_axis
 
 from identify.dataset.dataset import by_log, datasets
 from identify.dataset.noise_floor import floor_of
+from identify.dataset.shared_samples import share_samples
 from identify.estimation.channel_delay import aligned
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
@@ -33,6 +34,7 @@ from twin.model.machine import AxisModel, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
 RATE = 2000.0  # Hz
+T = np.arange(4000) / RATE
 TWO = replace(load_model("proton_xy", CATALOGUE), sample_rate=RATE)
 STAGE = one_axis(TWO)
 BOTH = [ReducedSimulator, MujocoSimulator]
@@ -90,9 +92,36 @@ def test_a_force_one_sample_early_is_the_same_to_fit_compare_and_diagnose():
 
 def test_a_log_fitted_cannot_judge_the_fit():
     log = logged(STAGE, seconds=2.0)
-    with pytest.raises(InputError, match=r"b: held out, but has the same samples as a") as told:
+    with pytest.raises(InputError, match=r"b: held out, but has samples of a, which") as told:
         fit(STAGE, {"a": log}, {"b": cut(log, 0)})
     assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("other", [(1, 8000), (0, 7999), (2000, 6000), (5000, 8000)])
+def test_nor_can_one_that_holds_a_stretch_of_it(other):
+    """Be it at another place: a log that was cut, or two that overlap."""
+    log = logged(STAGE)
+    with pytest.raises(InputError, match=r"b: held out, but has samples of a, which is fitted"):
+        datasets(STAGE, {"a": log.part(0, 7000)}, {"b": log.part(*other)})
+    datasets(STAGE, {"a": log.part(0, 4000)}, {"b": log.part(4000, 8000)})
+
+
+def coarse_run(seed: int, start: float = 0.0) -> Log:
+    """A program of moves with rests, read and commanded in coarse steps with little noise."""
+    rng, t = np.random.default_rng(seed), start + np.arange(16000) / RATE
+    x = 0.1 * np.clip(2.0 * np.sin(2.0 * t), -1.0, 1.0) + rng.normal(0.0, 2e-6, len(t))
+    force = 3.0 * np.cos(2.0 * t) + rng.normal(0.0, 0.02, len(t))
+    return log_of(RATE, 2e-5 * np.round(x / 2e-5), 0.5 * np.round(force / 0.5))
+
+
+def test_runs_of_one_program_are_distinct_where_only_rest_is_the_same():
+    assert share_samples(coarse_run(1), coarse_run(1).part(700, 9000))
+    assert not share_samples(coarse_run(1), coarse_run(2))
+    assert not share_samples(coarse_run(1), coarse_run(2, start=0.5))
+    still = log_of(RATE, 0.0 * T, 0.0 * T)
+    assert not share_samples(still, still)
+    exact = [log_of(RATE, np.maximum(0.0, T - 0.5) ** k, 0.0 * T) for k in (2, 3)]
+    assert not share_samples(*exact)  # without noise, both rest in one place at first
 
 
 # --- the free run ---------------------------------------------------------------------------------
