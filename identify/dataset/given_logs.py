@@ -34,8 +34,16 @@ BUSY = {Role.TRAINING: "is fitted", Role.SELECTION: "chooses effects"}
 
 
 def require_apart(given: Given) -> None:
-    """Raise InputError where a log that is to test a fit has samples that took part in it."""
+    """Raise InputError where a log that is to test a fit has samples that took part in it.
+
+    Also where two of different roles have one name, by which each is told from then on.
+    """
     for busy, free in combinations(Role, 2):
+        for name in given[busy].keys() & given[free].keys():
+            raise InputError(
+                f"{name}: the name of a {busy.value} log and of a {free.value} log; give each log "
+                "one role, and a name of its own"
+            )
         for held, other in given[free].items():
             for name, log in given[busy].items():
                 if share_samples(log, other):

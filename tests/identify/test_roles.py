@@ -106,3 +106,15 @@ def test_a_log_has_one_role(logs, held, why):
     with pytest.raises(InputError, match=f"c: {why}") as told:
         datasets(STAGE, logs, held, test=TEST)
     assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(("held", "test"), [({"a": HELD["b"]}, {}), ({}, {"a": TEST["c"]})])
+def test_a_name_has_one_role(held, test):
+    """Not even of another recording: what is told of a log, such as its beginning, is by name."""
+    role = "selection" if held else "test"
+    why = f"^a: the name of a training log and of a {role} log; give each log one role"
+    with pytest.raises(InputError, match=why) as told:
+        datasets(STAGE, LOGS, held, test=test)
+    assert "\n" not in str(told.value)
+    apart = datasets(STAGE, {"one/a.mcap": LOGS["a"]}, {"two/a.mcap": HELD["b"]})["x"]
+    assert [log.motion.name for log in apart.logs] == ["one/a.mcap", "two/a.mcap"]
