@@ -164,7 +164,7 @@ def _prepared(model: MachineModel, given: Given, test_function: float | None) ->
     for name, axis in model.axes.items():
         for logs in given.values():
             require_one_kind(logs, name, axis)
-        found = {role: moving_in(logs, name) for role, logs in given.items()}
+        found = {role: moving_in(logs, name, tuple(model.axes)) for role, logs in given.items()}
         going = {role: moving for role, (moving, _) in found.items()}
         if going[Role.TRAINING]:
             still = tuple(n for _, names in found.values() for n in names)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.motion import SHORTEST_LOG
+from identify.dataset.motion import SHORTEST_LOG, other_axes
 from identify.dataset.shared_samples import share_samples
 from twin.errors import InputError
 from twin.log import Log
@@ -30,6 +30,7 @@ class Role(Enum):
 Given = Mapping[Role, Mapping[str, Log]]  # logs by name
 
 
+READ_IF_LOGGED = ("velocity", "setpoint_position")
 BUSY = {Role.TRAINING: "is fitted", Role.SELECTION: "chooses effects"}
 
 
@@ -76,14 +77,23 @@ def require_one_kind(logs: Mapping[str, Log], name: str, axis: AxisModel) -> Non
             )
 
 
-def moving_in(logs: Mapping[str, Log], axis: str) -> tuple[dict[str, Log], list[str]]:
-    """The logs in which the axis moves, by name, and the names of those in which it does not."""
+def moving_in(
+    logs: Mapping[str, Log], axis: str, machine: Sequence[str] = ()
+) -> tuple[dict[str, Log], list[str]]:
+    """The logs in which the axis moves, by name, and the names of those in which it does not.
+
+    machine: the axes of the machine. Raises InputError where what is read is not a number.
+    """
     held = {name: log for name, log in logs.items() if axis in log.axes}
     for name, log in held.items():
         _require_numbers(name, log, axis, "position", log.axes[axis].position)
     going = {name: log for name, log in held.items() if moves(log, axis)}
     for name, log in going.items():
         _require_numbers(name, log, axis, "force", log.axes[axis].force)
+        for signal in filter(log.axes[axis].columns.__contains__, READ_IF_LOGGED):
+            _require_numbers(name, log, axis, signal, log.axes[axis].columns[signal])
+        for other in other_axes(log, axis, machine):
+            _require_numbers(name, log, other, "position", log.axes[other].position)
     return going, [name for name in held if name not in going]
 
 

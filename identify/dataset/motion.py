@@ -231,7 +231,7 @@ def motion_of(
     block = _block_samples(position, noise, log.period, longest_block)
     force = log.axes[axis].force
     signals = _blocks(*_midpoints(position, force, log.period), block)
-    found = {a: _other(log, a, block) for a in _other_axes(log, axis, machine)}
+    found = {a: _other(log, a, block) for a in other_axes(log, axis, machine)}
     several = len(found) > 1 or len(machine) > MOST_AXES_OF_A_PAIR
     other = None if several else next(iter(found.values()), None)
     return Motion(
@@ -266,7 +266,7 @@ def _follows(signals: AxisLog) -> bool | None:
     return bool(np.corrcoef(wanted, position)[0, 1] ** 2 > FOLLOWS)
 
 
-def _other_axes(log: Log, axis: str, machine: Sequence[str]) -> list[str]:
+def other_axes(log: Log, axis: str, machine: Sequence[str]) -> list[str]:
     """The other axes of the log, of the machine alone where that has two."""
     pair = len(machine) == MOST_AXES_OF_A_PAIR
     return [a for a in log.axes if a != axis and (a in machine or not pair)]

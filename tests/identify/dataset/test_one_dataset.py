@@ -27,7 +27,7 @@ from identify.workflow import compare, diagnose, fit
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
-from twin.log import Log, write_log
+from twin.log import AxisLog, Log, write_log
 from twin.log.check import Fault, check_log, moves
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, MachineModel
@@ -51,7 +51,7 @@ def logged(model: MachineModel, seed: int = 1, seconds: float = 4.0, run: str = 
 def changed(log: Log, **columns) -> Log:
     """The log with columns of x made by functions of those that it has."""
     x = log.axes["x"]
-    new = {name: make(x.columns[name]) for name, make in columns.items()}
+    new = {name: make(x.columns.get(name)) for name, make in columns.items()}
     return replace(log, axes={**log.axes, "x": replace(x, columns={**x.columns, **new})})
 
 
@@ -266,11 +266,17 @@ def test_a_log_without_samples_is_refused_in_one_line_in_any_role(role):
 
 def test_what_is_not_a_number_is_refused_in_one_line():
     run = logged(STAGE, seconds=2.0)
-    for signal in ("position", "force"):
+    run = changed(run, velocity=lambda _: np.gradient(run.axes["x"].position))
+    for signal in ("position", "force", "velocity", "setpoint_position"):
         holed = changed(run, **{signal: lambda v: np.where(np.arange(len(v)) == 700, np.nan, v)})
         told = one_line(fit, STAGE, {"log": holed})
         assert told.startswith(f"log: {signal} of axis x is not a finite number in 1 of 4000")
         assert "from 0.35 s; cut the log there" in told
+    beside = AxisLog({"position": np.append(T[1:], np.nan), "force": T})
+    both = replace(run, axes={**run.axes, "z": beside})
+    told = one_line(fit, STAGE, {"log": both})  # whose motion x may depend on
+    assert told.startswith("log: position of axis z is not a finite number in 1 of 4000")
+    assert datasets(TWO, {"log": both}, {})  # that has two axes, no z
     wild = with_effect(STAGE, "quadratic_drag", c=1e6)
     law = wild.axes["x"]["quadratic_drag"]
     endless = replace(law, values={"c": np.inf})
