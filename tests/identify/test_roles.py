@@ -92,7 +92,9 @@ def test_logs_are_prepared_alike_in_each_role():
     assert log.reach == same.reach
     moved = realigned(tested, 2e-4), realigned(chosen, 2e-4)
     np.testing.assert_array_equal(moved[0].test[0].command, moved[1].holdout[0].command)
-    assert tested.with_force_noise(0.3).test[0].force_noise == 0.3
+    noisy = tested.with_force_noise(0.3)
+    assert [log.force_noise for log in noisy.logs] == [0.3, 0.3]
+    assert realigned(noisy, 2e-4).force_noise == 0.3
 
 
 @pytest.mark.parametrize(
