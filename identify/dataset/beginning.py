@@ -16,7 +16,7 @@ from identify.dataset.motion import Motion
 from identify.dataset.time_scale import regressors
 from twin.signals import Array
 
-LOOK = 0.1  # s, of the test functions that tell it
+LOOK = 0.1  # s, of the test functions that tell it; longer where samples are slow
 LONGEST = 1.0  # s, that a beginning may last
 LONGEST_PART = 0.1  # of a log
 SHORTEST = 0.2  # s, below which it is no matter
@@ -38,7 +38,10 @@ def beginnings(motions: Sequence[Motion]) -> Mapping[str, float]:
     usual = float(np.sqrt(np.mean((forces[late] - columns[:, late].T @ gains) ** 2)))
     left = np.abs(forces - columns.T @ gains)
     left[left < HELD * np.abs(forces)] = 0.0
-    found = {m.name: _first_usual(left[logs == k], times[k], usual) for k, m in enumerate(motions)}
+    found = {
+        m.name: _first_usual(left[logs == k], times[k], usual, 2.0 * test_functions[k].length)
+        for k, m in enumerate(motions)
+    }
     return {
         m.name: found[m.name]
         for m, end in zip(motions, ends, strict=True)
@@ -46,13 +49,16 @@ def beginnings(motions: Sequence[Motion]) -> Mapping[str, float]:
     }
 
 
-def _first_usual(left: Array, time: Array, usual: float) -> float:
-    """Time s from which the force left (n,) N is usual; 0 where it is from the start."""
+def _first_usual(left: Array, time: Array, usual: float, about: float) -> float:
+    """Time s from which the force left (n,) N is usual; 0 where it is from the start.
+
+    about: s, within which no force may be foreign.
+    """
     step = float(time[1] - time[0]) if len(time) > 1 else 1.0
-    width = max(round(2.0 * LOOK / step), 1)
+    width = max(round(about / step), 1)
     padded = np.pad(left, (width // 2, (width - 1) // 2), mode="symmetric")
-    about = sliding_window_view(padded, width).max(axis=1)
-    ordinary = np.flatnonzero(about <= FOREIGN * usual)
+    largest = sliding_window_view(padded, width).max(axis=1)
+    ordinary = np.flatnonzero(largest <= FOREIGN * usual)
     if not len(ordinary):
         return 0.0
     return 0.0 if ordinary[0] == 0 else float(time[ordinary[0]])

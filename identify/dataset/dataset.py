@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from identify.dataset.beginning import beginnings
 from identify.dataset.excitation import excitation
-from identify.dataset.given_logs import Given, Role, moving_in, require_apart, require_one_kind
+from identify.dataset.given_logs import (
+    Given,
+    Role,
+    moving_in,
+    require_apart,
+    require_one_kind,
+    require_samples,
+)
 from identify.dataset.motion import LONGEST_BLOCK, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.dataset.reading_ripple import ripples_of_widest
@@ -139,8 +146,8 @@ def datasets(
 
     logs, holdout, test: by name, of the roles training, selection, test. test_function: length in
     s; where None, chosen from what the training and selection logs hold. Raises InputError where no
-    axis of the model moves in any training log, where a signal is not a number, and where a log has
-    two roles.
+    axis of the model moves in any training log, where a log has no samples, where a signal is not a
+    number, and where a log has two roles.
     """
     parts = zip(Role, (logs, holdout, test or {}), strict=True)
     given = {role: dict(part) for role, part in parts}  # each log is read once
@@ -150,12 +157,14 @@ def datasets(
 
 
 def _prepared(model: MachineModel, given: Given, test_function: float | None) -> dict[str, Dataset]:
+    for logs in given.values():
+        require_samples(logs)
     require_apart(given)
     out: dict[str, Dataset] = {}
     for name, axis in model.axes.items():
         for logs in given.values():
             require_one_kind(logs, name, axis)
-        found = {role: moving_in(logs, name) for role, logs in given.items()}
+        found = {role: moving_in(logs, name, tuple(model.axes)) for role, logs in given.items()}
         going = {role: moving for role, (moving, _) in found.items()}
         if going[Role.TRAINING]:
             still = tuple(n for _, names in found.values() for n in names)

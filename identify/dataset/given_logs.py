@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.motion import SHORTEST_LOG, other_axes
+from identify.dataset.shared_samples import share_samples
 from twin.errors import InputError
 from twin.log import Log
 from twin.log.check import moves
@@ -28,29 +30,39 @@ class Role(Enum):
 Given = Mapping[Role, Mapping[str, Log]]  # logs by name
 
 
+READ_IF_LOGGED = ("velocity", "setpoint_position")
 BUSY = {Role.TRAINING: "is fitted", Role.SELECTION: "chooses effects"}
 
 
 def require_apart(given: Given) -> None:
-    """Raise InputError where a log that is to test a fit has samples that took part in it."""
+    """Raise InputError where a log that is to test a fit has samples that took part in it.
+
+    Also where two of different roles have one name, by which each is told from then on.
+    """
     for busy, free in combinations(Role, 2):
+        for name in given[busy].keys() & given[free].keys():
+            raise InputError(
+                f"{name}: the name of a {busy.value} log and of a {free.value} log; give each log "
+                "one role, and a name of its own"
+            )
         for held, other in given[free].items():
             for name, log in given[busy].items():
-                if _same(log, other):
+                if share_samples(log, other):
                     what = "held out" if free is Role.SELECTION else "a test log"
                     raise InputError(
-                        f"{held}: {what}, but has the same samples as {name}, which {BUSY[busy]}, "
+                        f"{held}: {what}, but has samples of {name}, which {BUSY[busy]}, "
                         "and so cannot test the fit; give a log of another experiment"
                     )
 
 
-def _same(one: Log, other: Log) -> bool:
-    shared = one.axes.keys() & other.axes.keys()
-    return len(one) == len(other) and any(
-        np.array_equal(one.axes[a].position, other.axes[a].position)
-        for a in shared
-        if moves(one, a)
-    )
+def require_samples(logs: Mapping[str, Log]) -> None:
+    """Raise InputError where a log holds none."""
+    for name, log in logs.items():
+        if not log.axes or not len(log):
+            raise InputError(
+                f"{name}: has no samples; identification needs {SHORTEST_LOG:g} s in which an axis "
+                "moves; give another log"
+            )
 
 
 def require_one_kind(logs: Mapping[str, Log], name: str, axis: AxisModel) -> None:
@@ -65,14 +77,23 @@ def require_one_kind(logs: Mapping[str, Log], name: str, axis: AxisModel) -> Non
             )
 
 
-def moving_in(logs: Mapping[str, Log], axis: str) -> tuple[dict[str, Log], list[str]]:
-    """The logs in which the axis moves, by name, and the names of those in which it does not."""
+def moving_in(
+    logs: Mapping[str, Log], axis: str, machine: Sequence[str] = ()
+) -> tuple[dict[str, Log], list[str]]:
+    """The logs in which the axis moves, by name, and the names of those in which it does not.
+
+    machine: the axes of the machine. Raises InputError where what is read is not a number.
+    """
     held = {name: log for name, log in logs.items() if axis in log.axes}
     for name, log in held.items():
         _require_numbers(name, log, axis, "position", log.axes[axis].position)
     going = {name: log for name, log in held.items() if moves(log, axis)}
     for name, log in going.items():
         _require_numbers(name, log, axis, "force", log.axes[axis].force)
+        for signal in filter(log.axes[axis].columns.__contains__, READ_IF_LOGGED):
+            _require_numbers(name, log, axis, signal, log.axes[axis].columns[signal])
+        for other in other_axes(log, axis, machine):
+            _require_numbers(name, log, other, "position", log.axes[other].position)
     return going, [name for name in held if name not in going]
 
 

@@ -27,6 +27,7 @@ SHORTEST_BLOCK = 1e-3  # s
 LONGEST_BLOCK = 1e-2  # s
 SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
 SHORTEST_LOG = 1.0  # s
+FEWEST_SAMPLES = 64  # of a log; more than those of 1 s where they are slow
 EQUAL = 1e-9  # relative difference by which whole samples may miss a length
 READ_BACK = 32  # readings that a controller is supposed to use
 ENOUGH = 200_000  # samples that tell the noise of a command
@@ -210,14 +211,16 @@ def motion_of(
 
     machine: the axes of the machine; on one of two axes others that were logged do not matter.
     longest_block: s; a noisy position asks for long blocks. ripples: m, sought where None.
-    Raises InputError where the axis is not in the log, does not move or is shorter than 1 s.
+    Raises InputError where the axis is not in the log, does not move, or is too short.
     """
     if axis not in log.axes:
         raise InputError(f"{name}: has no axis '{axis}'; it has {', '.join(log.axes)}")
     readings = log.axes[axis].position
-    if len(log) * log.period < SHORTEST_LOG:
+    least = max(SHORTEST_LOG, FEWEST_SAMPLES * log.period)
+    if len(log) * log.period < least:
         raise InputError(
-            f"{name}: lasts {len(log) * log.period:.3g} s; identification needs {SHORTEST_LOG:g} s"
+            f"{name}: lasts {len(log) * log.period:.3g} s; identification needs {least:.3g} s at "
+            f"{log.sample_rate:g} Hz, so record longer"
         )
     if np.ptp(readings) == 0.0:
         raise InputError(f"{name}: axis {axis} stands still; give a log in which it moves")
@@ -228,7 +231,7 @@ def motion_of(
     block = _block_samples(position, noise, log.period, longest_block)
     force = log.axes[axis].force
     signals = _blocks(*_midpoints(position, force, log.period), block)
-    found = {a: _other(log, a, block) for a in _other_axes(log, axis, machine)}
+    found = {a: _other(log, a, block) for a in other_axes(log, axis, machine)}
     several = len(found) > 1 or len(machine) > MOST_AXES_OF_A_PAIR
     other = None if several else next(iter(found.values()), None)
     return Motion(
@@ -263,7 +266,7 @@ def _follows(signals: AxisLog) -> bool | None:
     return bool(np.corrcoef(wanted, position)[0, 1] ** 2 > FOLLOWS)
 
 
-def _other_axes(log: Log, axis: str, machine: Sequence[str]) -> list[str]:
+def other_axes(log: Log, axis: str, machine: Sequence[str]) -> list[str]:
     """The other axes of the log, of the machine alone where that has two."""
     pair = len(machine) == MOST_AXES_OF_A_PAIR
     return [a for a in log.axes if a != axis and (a in machine or not pair)]

@@ -96,7 +96,7 @@ def choose_test_function(motions: Motions, others: Motions = (), *, imposed: boo
         )
         if noise_floor(AxisModel(mass), pairs) < QUIET * np.sqrt(np.mean(rest**2)):
             return length
-    return TEST_FUNCTIONS[-1]
+    return max(TEST_FUNCTIONS[-1], LEAST_BLOCKS * longest_block)
 
 
 def inertia(motions: Motions, length: float = 0.1) -> float:
@@ -113,11 +113,11 @@ def _least_mass(motions: Motions) -> float:
 def regressors(motions: Motions, length: float) -> tuple[Array, Array, list[TestFunction]]:
     """Acceleration, direction, speed and 1 by test functions (4, n), the force (n,) N, and these.
 
-    length: s, of the test functions.
+    length: s, of the test functions; of slow samples they are as short as can be.
     """
     columns, forces, test_functions = [], [], []
     for m in motions:
-        w = TestFunction.of_length(length, m.period)
+        w = TestFunction.of_length(max(length, LEAST_BLOCKS * m.period), m.period)
         direction = w.mean(np.sign(m.velocity))
         columns.append(
             np.stack(

@@ -109,7 +109,10 @@ def realigned(dataset: Dataset, shift: float) -> Dataset:
     """The dataset with a channel delay of ``shift`` (s) removed, counted from the original logs."""
     more = shift - dataset.channel_delay
     moved = dataset.with_logs(
-        PreparedLog.of(w.motion.with_force_ahead(more), w.test_function.length, w.reach)
+        replace(
+            PreparedLog.of(w.motion.with_force_ahead(more), w.test_function.length, w.reach),
+            force_noise=w.force_noise,
+        )
         for w in dataset.logs
     )
     return replace(moved, channel_delay=shift)

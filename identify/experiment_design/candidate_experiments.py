@@ -21,11 +21,17 @@ from twin.experiments.kinds import (
     Tracking,
 )
 from twin.experiments.trajectory import Limits
-from twin.model.machine import MachineModel
+from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import LINEAR, AxisUnits
 
 USED = 0.9  # part of the travel that passes cover
-SLOWEST = 5e-4  # m/s
+SLOWEST = 5e-4  # m/s, of a velocity map,
+SLOW = 0.1  # but no more than this part of the fastest
+SHORT = ((2e-5, 5e-5), (2e-4, 1e-3), (2e-3, 4e-3), (0.02, 1.0))  # m and m/s, of short passes
+STILL = (0.01, 2e-3)  # m and m/s, of passes while the other axis moves
+RESTED = (2e-3, 4e-3)  # m and m/s, of moves after rests
+STAGE = 0.34  # m, travel of the linear stage for which these are; of angles see _scale
+SEEN = 50.0  # times the noise and the step of the encoder, that an angle must be
 LOWEST = 2.0  # Hz, where a sweep begins
 SWEPT = (60.0, 120.0)  # Hz, where it ends: the shortest test functions pass little above
 EFFORTS = (1.0, 0.3)  # parts of the acceleration limit that steps use in turn
@@ -60,12 +66,12 @@ def proposals(
     """
     model.axis(axis)
     limits = dict(zip(model.axes, machine_limits(model), strict=True))
-    effort = _affordable(model, axis)
+    effort, scale = _affordable(model, axis), _scale(model.axes[axis])
     limits[axis] = gentle(limits[axis], effort)
     drafts = (
         *_random(duration),
-        *_passes(limits, axis, duration),
-        *_reversing(limits, axis, duration),
+        *_passes(limits, axis, duration, scale),
+        *_reversing(limits, axis, duration, scale),
         *_accelerating(limits, axis, duration),
         *_swept(model, limits, axis, duration),
     )
@@ -122,6 +128,19 @@ def _other_span(limits: dict[str, Limits], axis: str) -> float:
     return spans[0] if len(spans) == 1 else 0.0
 
 
+def _scale(axis: AxisModel) -> float:
+    """Of the lengths and speeds of a stage, for an axis whose travel is known: rad a metre.
+
+    Angles are as large a part of the travel, or as the encoder asks for to see the shortest.
+    """
+    h = axis.hardware
+    if not axis.rotary or h.travel is None:
+        return 1.0
+    travel = h.travel[1] - h.travel[0]
+    seen = SEEN * max(h.encoder_noise, h.encoder_resolution)
+    return min(max(travel / STAGE, seen / SHORT[0][0]), USED * travel / SHORT[-1][0])
+
+
 def _pass(axis: str, limit: Limits, span: float, speed: float, seconds: float) -> Passes:
     """As many passes as fit in that time, at the speed or as fast as the span allows."""
     speed = neat(min(speed, limit.fastest_plateau(span)))
@@ -129,7 +148,9 @@ def _pass(axis: str, limit: Limits, span: float, speed: float, seconds: float) -
     return Passes(axis, span, speed, repeats=min(max(int(seconds / once / 2), 1), MOST_REPEATS))
 
 
-def _passes(limits: dict[str, Limits], axis: str, duration: float) -> Iterator[Experiment]:
+def _passes(
+    limits: dict[str, Limits], axis: str, duration: float, scale: float = 1.0
+) -> Iterator[Experiment]:
     """Passes over the whole travel, and a velocity map; the other axis at rest, then moving."""
     limit = limits[axis]
     span = neat(USED * (limit.travel[1] - limit.travel[0]))
@@ -142,21 +163,29 @@ def _passes(limits: dict[str, Limits], axis: str, duration: float) -> Iterator[E
         if other:
             yield Passes(axis, span, passes.speed, passes.repeats, other=other)
     map_span = neat(0.3 * span)
-    speeds = np.geomspace(SLOWEST, limit.fastest_plateau(map_span), 10)
+    fastest = limit.fastest_plateau(map_span)
+    speeds = np.geomspace(min(SLOWEST * scale, SLOW * fastest), fastest, 10)
     yield Staircase(axis, tuple(map(neat, speeds)), map_span, neat(duration / 40.0))
 
 
-def _reversing(limits: dict[str, Limits], axis: str, duration: float) -> Iterator[Experiment]:
+def _reversing(
+    limits: dict[str, Limits], axis: str, duration: float, scale: float = 1.0
+) -> Iterator[Experiment]:
     """Short passes, slow and fast, and starts after rests of several lengths."""
     limit = limits[axis]
-    other = _other_span(limits, axis)
-    for span, speed in ((2e-5, 5e-5), (2e-4, 1e-3), (2e-3, 4e-3), (0.02, 1.0)):
-        yield _pass(axis, limit, span, speed, duration)
-    if other:
-        still = _pass(axis, limit, 0.01, 2e-3, duration)
-        yield Passes(axis, still.span, still.speed, still.repeats, other=other)
+
+    def passes(span: float, speed: float) -> Passes:
+        return _pass(axis, limit, neat(scale * span), scale * speed, duration)
+
+    for short in SHORT:
+        yield passes(*short)
+    if other := _other_span(limits, axis):
+        yield replace(passes(*STILL), other=other)
     rests = np.geomspace(0.1, duration / 3.0, 5)
-    yield Rests(axis, 2e-3, 4e-3, tuple(map(neat, rests * 0.55 * duration / rests.sum())))
+    move = passes(*RESTED)
+    yield Rests(
+        axis, move.span, move.speed, tuple(map(neat, rests * 0.55 * duration / rests.sum()))
+    )
 
 
 def _accelerating(limits: dict[str, Limits], axis: str, duration: float) -> Iterator[Experiment]:

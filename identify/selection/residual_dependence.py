@@ -155,7 +155,7 @@ def _share(residual: Array, coordinate: Array, bins: int) -> float:
 
 def find_dependence(base: Fit, dataset: Dataset) -> Dependence:
     """The coordinate on which the residual of a fit depends most, and its period if it has one."""
-    shares, lines = _shares(base.residual, _where(base, dataset))
+    shares, lines = _shares(base.residual, *_where(base, dataset))
     name = _foremost(shares)
     unit = unit_of(name, dataset.fit[0].motion)
     return Dependence(shares[name], name, lines.get(name), unit, shares)
@@ -166,8 +166,8 @@ def explains(before: Fit, after: Fit, dataset: Dataset) -> bool:
 
     What is left must be smaller along that coordinate, and depend on another more.
     """
-    shares, _ = _shares(before.residual, _where(before, dataset))
-    left, _ = _shares(after.residual, _where(after, dataset))
+    shares, _ = _shares(before.residual, *_where(before, dataset))
+    left, _ = _shares(after.residual, *_where(after, dataset))
     name = _foremost(shares)
     was = before.error * np.sqrt(shares[name])
     smaller = after.error * np.sqrt(left[name]) < RULE.left_over * was
@@ -176,25 +176,32 @@ def explains(before: Fit, after: Fit, dataset: Dataset) -> bool:
 
 def dependences(force: Array, fit: Fit, dataset: Dataset) -> dict[str, float]:
     """Share of a force's square (n,) N, on the windows of a fit, by each coordinate: 0..1."""
-    return _shares(force, _where(fit, dataset))[0]
+    return _shares(force, *_where(fit, dataset))[0]
 
 
-def _where(fit: Fit, dataset: Dataset) -> dict[str, Array]:
-    return {k: v[fit.kept] for k, v in gathered(dataset.fit).items()}
+def _where(fit: Fit, dataset: Dataset) -> tuple[dict[str, Array], NDArray[np.int64]]:
+    """Coordinates of the windows of a fit, and where those of each log but the first begin."""
+    ends = np.cumsum([len(log) for log in dataset.fit])
+    kept = np.concatenate([[0], np.cumsum(fit.kept)])
+    begins = np.unique(kept[ends])  # a log at rest throughout has none
+    where = {k: v[fit.kept] for k, v in gathered(dataset.fit).items()}
+    return where, begins[(begins > 0) & (begins < kept[-1])]
 
 
 def _shares(
-    residual: Array, where: Mapping[str, Array]
+    residual: Array, where: Mapping[str, Array], logs: NDArray[np.int64]
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Share of each coordinate, and the periods of those in which the residual repeats."""
+    """Share of each coordinate, and the periods of those in which the residual repeats.
+
+    logs: where each but the first begins.
+    """
     shares = {name: share(residual, values) for name, values in where.items()}
     for name in where.keys() - {"direction", "velocity"}:
         # Friction has the other sign backwards.
         backwards = share(residual * where["direction"], where[name])
         shares[name] = max(shares[name], backwards)
     periods = {}
-    restarts = np.flatnonzero(np.diff(where["time"]) < 0.0) + 1
-    for name, runs in (("position", []), ("time", restarts)):
+    for name, runs in (("position", []), ("time", logs)):
         found = line(residual, where[name], runs)
         if found is not None:
             periods[name], strength = found

@@ -236,9 +236,14 @@ def _explained(
 
 
 def _causes(force: Array, bases: Mapping[str, Array]) -> tuple[Cause, ...]:
-    """Effects that make up a force (n,) N, one after another, by their bases (n, k)."""
+    """Effects that make up a force (n,) N, one after another, by their bases (n, k).
+
+    None of no force, which what differs may make where the simulated motion does not reach.
+    """
     causes: list[Cause] = []
     taken, left, whole = np.zeros((len(force), 0)), 1.0, rms(force)
+    if whole == 0.0:
+        return ()
     while len(causes) < len(bases):
         joined = {n: orthonormal(np.hstack([taken, basis])) for n, basis in bases.items()}
         shares = {n: left - (rms(unabsorbed(force, q)) / whole) ** 2 for n, q in joined.items()}

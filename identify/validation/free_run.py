@@ -56,15 +56,16 @@ def free_run(
     accelerated = any(f.effect.reads("A_OTHER") for a in model.axes.values() for f in a.effects)
     states = states_along(table, position, command, period, starts, origin, accelerated)
     around = position[np.arange(-side, side + 1)[:, None] + starts]
-    begun = zip(starts, states, *local_cubic(around, period), strict=True)
+    ends = [*starts[1:], n]  # the last runs on where there is no room for another start
+    begun = zip(starts, ends, states, *local_cubic(around, period), strict=True)
     out = np.full((n, len(model.axes)), np.nan)
     simulation: Stepper = simulator(model, table)
-    for start, state, x, v, a in begun:
+    for start, end, state, x, v, a in begun:
         state[table.axes[:, 2] + LAST_ACCELERATION] = a
         state[table.axes[:, 2] + LAST_VELOCITY] = v - period * a
         # The stepped position leads the true one by half a sample (see twin.core.loop).
         simulation.place(x + 0.5 * period * v, v, state, int(start), origin)
-        span = slice(start, min(start + count, n))
+        span = slice(start, end)
         simulated = open_loop(model, table, simulation, int(start), command[span])
         out[span] = simulated - position[span]
     return FreeRun({a: out[:, i] for i, a in enumerate(model.axes) if a in logs}, HORIZON)

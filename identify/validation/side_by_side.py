@@ -31,17 +31,17 @@ def side_by_side(model: MachineModel, parts: Mapping[str, PreparedLog]) -> SideB
     first = max(int(np.argmax(np.isfinite(error))) for error in run.error.values())
     topics: dict[str, dict[str, Array]] = {}
     for axis, log in parts.items():
-        motion = log.motion
-        position, velocity, command = motion.at_samples(0.0)
-        times = motion.sample_period * np.arange(len(position))
+        off = np.nan_to_num(run.error[axis])
+        # Blocks of another length may end at another sample; the run is as long as the shorter.
+        position, velocity, command = log.motion.at_samples(0.0)[:, : len(off)]
+        times = log.motion.sample_period * np.arange(len(off))
         left = np.interp(times, log.time - log.motion.time[0], residual(model.axes[axis], [log]))
         force = np.interp(times, log.time - log.motion.time[0], log.command)
-        off = np.nan_to_num(run.error[axis])
         columns = {
             "measured": {"position": position, "velocity": velocity, "force": command},
             "model": {"position": position + off, "force": force - left},
             "residual": {"position": -off, "force": left},
         }
         for kind, signals in columns.items():
-            topics[f"/{kind}/{axis}"] = {n: c[first : len(off)] for n, c in signals.items()}
+            topics[f"/{kind}/{axis}"] = {n: c[first:] for n, c in signals.items()}
     return SideBySide(1.0 / next(iter(parts.values())).motion.sample_period, topics)

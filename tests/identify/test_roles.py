@@ -92,17 +92,31 @@ def test_logs_are_prepared_alike_in_each_role():
     assert log.reach == same.reach
     moved = realigned(tested, 2e-4), realigned(chosen, 2e-4)
     np.testing.assert_array_equal(moved[0].test[0].command, moved[1].holdout[0].command)
-    assert tested.with_force_noise(0.3).test[0].force_noise == 0.3
+    noisy = tested.with_force_noise(0.3)
+    assert [log.force_noise for log in noisy.logs] == [0.3, 0.3]
+    assert realigned(noisy, 2e-4).force_noise == 0.3
 
 
 @pytest.mark.parametrize(
     ("logs", "held", "why"),
     [
-        ({"a": TEST["c"]}, HELD, "a test log, but has the same samples as a, which is fitted"),
-        (LOGS, {"b": TEST["c"]}, "a test log, but has the same samples as b, which chooses"),
+        ({"a": TEST["c"]}, HELD, "a test log, but has samples of a, which is fitted"),
+        (LOGS, {"b": TEST["c"]}, "a test log, but has samples of b, which chooses"),
     ],
 )
 def test_a_log_has_one_role(logs, held, why):
     with pytest.raises(InputError, match=f"c: {why}") as told:
         datasets(STAGE, logs, held, test=TEST)
     assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(("held", "test"), [({"a": HELD["b"]}, {}), ({}, {"a": TEST["c"]})])
+def test_a_name_has_one_role(held, test):
+    """Not even of another recording: what is told of a log, such as its beginning, is by name."""
+    role = "selection" if held else "test"
+    why = f"^a: the name of a training log and of a {role} log; give each log one role"
+    with pytest.raises(InputError, match=why) as told:
+        datasets(STAGE, LOGS, held, test=test)
+    assert "\n" not in str(told.value)
+    apart = datasets(STAGE, {"one/a.mcap": LOGS["a"]}, {"two/a.mcap": HELD["b"]})["x"]
+    assert [log.motion.name for log in apart.logs] == ["one/a.mcap", "two/a.mcap"]

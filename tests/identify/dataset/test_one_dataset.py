@@ -13,9 +13,11 @@ from machines import one_axis
 
 from identify.dataset.dataset import by_log, datasets
 from identify.dataset.noise_floor import floor_of
+from identify.dataset.shared_samples import share_samples
 from identify.estimation.channel_delay import aligned
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
+from identify.measure import first_model
 from identify.output.as_json import fit_json
 from identify.output.text import fit_text
 from identify.validation.free_run import HORIZON, free_run, rms_error
@@ -25,13 +27,14 @@ from identify.workflow import compare, diagnose, fit
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
-from twin.log import Log, write_log
+from twin.log import AxisLog, Log, write_log
 from twin.log.check import Fault, check_log, moves
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
 RATE = 2000.0  # Hz
+T = np.arange(4000) / RATE
 TWO = replace(load_model("proton_xy", CATALOGUE), sample_rate=RATE)
 STAGE = one_axis(TWO)
 BOTH = [ReducedSimulator, MujocoSimulator]
@@ -48,7 +51,7 @@ def logged(model: MachineModel, seed: int = 1, seconds: float = 4.0, run: str = 
 def changed(log: Log, **columns) -> Log:
     """The log with columns of x made by functions of those that it has."""
     x = log.axes["x"]
-    new = {name: make(x.columns[name]) for name, make in columns.items()}
+    new = {name: make(x.columns.get(name)) for name, make in columns.items()}
     return replace(log, axes={**log.axes, "x": replace(x, columns={**x.columns, **new})})
 
 
@@ -89,9 +92,36 @@ def test_a_force_one_sample_early_is_the_same_to_fit_compare_and_diagnose():
 
 def test_a_log_fitted_cannot_judge_the_fit():
     log = logged(STAGE, seconds=2.0)
-    with pytest.raises(InputError, match=r"b: held out, but has the same samples as a") as told:
+    with pytest.raises(InputError, match=r"b: held out, but has samples of a, which") as told:
         fit(STAGE, {"a": log}, {"b": cut(log, 0)})
     assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("other", [(1, 8000), (0, 7999), (2000, 6000), (5000, 8000)])
+def test_nor_can_one_that_holds_a_stretch_of_it(other):
+    """Be it at another place: a log that was cut, or two that overlap."""
+    log = logged(STAGE)
+    with pytest.raises(InputError, match=r"b: held out, but has samples of a, which is fitted"):
+        datasets(STAGE, {"a": log.part(0, 7000)}, {"b": log.part(*other)})
+    datasets(STAGE, {"a": log.part(0, 4000)}, {"b": log.part(4000, 8000)})
+
+
+def coarse_run(seed: int, start: float = 0.0) -> Log:
+    """A program of moves with rests, read and commanded in coarse steps with little noise."""
+    rng, t = np.random.default_rng(seed), start + np.arange(16000) / RATE
+    x = 0.1 * np.clip(2.0 * np.sin(2.0 * t), -1.0, 1.0) + rng.normal(0.0, 2e-6, len(t))
+    force = 3.0 * np.cos(2.0 * t) + rng.normal(0.0, 0.02, len(t))
+    return log_of(RATE, 2e-5 * np.round(x / 2e-5), 0.5 * np.round(force / 0.5))
+
+
+def test_runs_of_one_program_are_distinct_where_only_rest_is_the_same():
+    assert share_samples(coarse_run(1), coarse_run(1).part(700, 9000))
+    assert not share_samples(coarse_run(1), coarse_run(2))
+    assert not share_samples(coarse_run(1), coarse_run(2, start=0.5))
+    still = log_of(RATE, 0.0 * T, 0.0 * T)
+    assert not share_samples(still, still)
+    exact = [log_of(RATE, np.maximum(0.0, T - 0.5) ** k, 0.0 * T) for k in (2, 3)]
+    assert not share_samples(*exact)  # without noise, both rest in one place at first
 
 
 # --- the free run ---------------------------------------------------------------------------------
@@ -223,13 +253,30 @@ def test_an_axis_that_rests_in_every_window_is_refused_in_one_line(tmp_path):
     assert np.isfinite(short.error)
 
 
+@pytest.mark.parametrize("role", ["logs", "holdout", "test"])
+def test_a_log_without_samples_is_refused_in_one_line_in_any_role(role):
+    run = logged(STAGE, seconds=2.0)
+    given = {"logs": {"run": run}, "holdout": {}, "test": {}}
+    given[role] = {**given[role], "none": run.part(0, 0)}
+    told = one_line(datasets, STAGE, **given)
+    assert told.startswith("none: has no samples; identification needs 1 s in which an axis moves")
+    told = one_line(first_model, {"none": run.part(0, 0)}, "new", CATALOGUE)
+    assert told.startswith("none: has no samples")
+
+
 def test_what_is_not_a_number_is_refused_in_one_line():
     run = logged(STAGE, seconds=2.0)
-    for signal in ("position", "force"):
+    run = changed(run, velocity=lambda _: np.gradient(run.axes["x"].position))
+    for signal in ("position", "force", "velocity", "setpoint_position"):
         holed = changed(run, **{signal: lambda v: np.where(np.arange(len(v)) == 700, np.nan, v)})
         told = one_line(fit, STAGE, {"log": holed})
         assert told.startswith(f"log: {signal} of axis x is not a finite number in 1 of 4000")
         assert "from 0.35 s; cut the log there" in told
+    beside = AxisLog({"position": np.append(T[1:], np.nan), "force": T})
+    both = replace(run, axes={**run.axes, "z": beside})
+    told = one_line(fit, STAGE, {"log": both})  # whose motion x may depend on
+    assert told.startswith("log: position of axis z is not a finite number in 1 of 4000")
+    assert datasets(TWO, {"log": both}, {})  # that has two axes, no z
     wild = with_effect(STAGE, "quadratic_drag", c=1e6)
     law = wild.axes["x"]["quadratic_drag"]
     endless = replace(law, values={"c": np.inf})

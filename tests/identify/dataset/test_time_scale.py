@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from constructed import log_of
+from constructed import CATALOGUE, log_of
 
 from identify.dataset.beginning import FOREIGN, HELD, beginnings
 from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
+from identify.dataset.test_function import LEAST_BLOCKS
 from identify.dataset.time_scale import HIDES, QUIET, SHOWS, Scale
+from identify.measure import first_model
 from identify.output.words.estimation import prepared_in_words
+from identify.workflow import compare, fit
+from twin.errors import InputError
 from twin.model.machine import AxisModel, MachineModel
 
 RATE = 1000.0
@@ -84,3 +88,31 @@ def test_no_beginning_is_left_out_where_the_force_is_ordinary():
     assert not told(0.2)  # not foreign beside the cogging
     assert not told(9.0, hang=3.0)  # no beginning
     assert FOREIGN > 1.0 > HELD
+
+
+def slow(rate: float, seconds: float, hang: float = 0.0):
+    """A log of a few samples a second, whose force belongs to the middle of each."""
+    t = np.arange(round(seconds * rate)) / rate
+    middle = t + 0.5 / rate
+    x = 0.1 * np.sin(1.1 * t) + 0.02 * np.sin(3.7 * t)
+    force = -MASS * (0.121 * np.sin(1.1 * middle) + 0.2738 * np.sin(3.7 * middle))
+    force[t < hang] += 9.0
+    return log_of(rate, x + np.random.default_rng(1).normal(0.0, 1e-6, len(t)), force)
+
+
+@pytest.mark.parametrize("rate", [50.0, 20.0])
+def test_a_slow_log_is_fitted_with_test_functions_as_short_as_its_samples_allow(rate):
+    shortest = LEAST_BLOCKS / rate
+    result = fit(PLAIN, {"log": slow(rate, 20.0)})
+    assert result.model.axes["x"].mass == pytest.approx(MASS, rel=0.01)
+    assert result.datasets["x"].test_function_length == pytest.approx(max(0.2, shortest))
+    with pytest.raises(InputError, match=f"give at least {shortest:g} s"):
+        fit(PLAIN, {"log": slow(rate, 20.0)}, test_function=0.1)
+    fit(PLAIN, {"log": slow(rate, 20.0)}, test_function=shortest)
+    assert first_model({"log": slow(rate, 20.0)}, "new", CATALOGUE).axes["x"].mass > 0.0
+    begun = datasets(PLAIN, {"log": slow(rate, 60.0, hang=0.3)}, {})["x"].begun
+    assert 0.3 < begun["log"] < 0.3 + 2.0 * shortest
+    least = f"log: lasts 1.2 s; identification needs {64 / rate:.3g} s at {rate:g} Hz"
+    with pytest.raises(InputError, match=least):
+        fit(PLAIN, {"log": slow(rate, 1.2)})
+    compare(PLAIN, {"log": slow(rate, 64 / rate)})

@@ -187,7 +187,8 @@ def test_the_exact_model_reproduces_the_motion_and_a_wrong_force_drifts_as_its_p
     assert known[side:-side].all()
     n = side + 2 * 1000 + 7
     short = prepared(x[:n], PUSH[:n])
-    assert np.isnan(free_run(model, short).error["x"][-5:]).all()  # no room for another start
+    # No room for another start, so the last one runs to the end.
+    assert np.abs(free_run(model, short).error["x"][-5:]).max() < 1e-7
     pushed = MachineModel(
         "s", {"x": AxisModel(1.7, effects=(effect("constant_force", {"F0": 0.34}),))}
     )

@@ -30,8 +30,8 @@ from identify.experiment_design.discrimination import (
 )
 from twin.errors import CannotRun
 from twin.experiments.experiment import gentle, machine_limits
-from twin.experiments.kinds import Moves, Passes, Staircase, Steps, Sweep, Tracking
-from twin.model.machine import MachineModel
+from twin.experiments.kinds import Moves, Passes, Rests, Staircase, Steps, Sweep, Tracking
+from twin.model.machine import AxisModel, Hardware, MachineModel
 
 plans = importlib.import_module("identify.experiment_design.plan")
 STAGE = MachineModel("s", {"x": PLAIN, "y": replace(PLAIN, mass=3.1)}, 2000.0)
@@ -143,6 +143,25 @@ def test_short_passes_and_rests_fit_the_time():
     assert sum(rests.rests) == pytest.approx(0.55 * 20.0, rel=0.01)
     assert rests.rests[-1] / rests.rests[0] == pytest.approx(20.0 / 3.0 / 0.1, rel=0.02)
     assert (rests.span, rests.speed) == (2e-3, 4e-3)
+
+
+@pytest.mark.parametrize(("noise", "scale"), [(1e-6, 6.8 / 0.34), (1e-4, 50.0 * 1e-4 / 2e-5)])
+def test_angles_are_part_of_the_travel_and_seen_by_the_encoder(noise, scale):
+    """The lengths of a linear stage, taken for rad, were lost in the noise of a rotary axis."""
+    hardware = Hardware((-3.4, 3.4), velocity=90.0, acceleration=2e3, jerk=1e5, encoder_noise=noise)
+    turned = AxisModel(5e-6, hardware, rotary=True)
+    found, not_run = proposals(MachineModel("r", {"a": turned}, 2000.0), "a", 20.0)
+    assert not not_run
+    short = [e.span for e in found if isinstance(e, Passes)][-4:]
+    np.testing.assert_allclose(short, scale * np.array([2e-5, 2e-4, 2e-3, 0.02]), rtol=0.01)
+    assert min(short) > 49.0 * noise
+    (rests,) = (e for e in found if isinstance(e, Rests))
+    assert (rests.span, rests.speed) == pytest.approx((2e-3 * scale, 4e-3 * scale), rel=0.01)
+    (stairs,) = (e for e in found if isinstance(e, Staircase))
+    assert stairs.speeds[0] == pytest.approx(5e-4 * scale, rel=0.01)
+    slow = MachineModel("r", {"a": replace(turned, hardware=replace(hardware, velocity=1e-3))}, 2e3)
+    *_, stairs = _passes({"a": machine_limits(slow)[0]}, "a", 20.0, scale)
+    assert (stairs.speeds[0], stairs.speeds[-1]) == (1e-4, 1e-3)
 
 
 def test_steps_take_turns_in_effort_until_the_time_is_used():

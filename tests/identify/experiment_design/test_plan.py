@@ -177,7 +177,8 @@ def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     case = CASES["delay"]
     machine = case.machine("actuator_delay")
     logs = [
-        {"log": simulate(machine, case.poor, seed=s, simulator=ReducedSimulator)} for s in (1, 2)
+        {f"log {s}": simulate(machine, case.poor, seed=s, simulator=ReducedSimulator)}
+        for s in (1, 2)
     ]
     catalogue = Catalogue([CATALOGUE[e] for e in case.pair])
     found = diagnose(case.stage, *logs, catalogue=catalogue, test_function=WINDOW)

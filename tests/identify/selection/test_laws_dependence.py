@@ -133,9 +133,25 @@ def test_a_residual_that_repeats_has_a_period_in_position_or_time():
     found = find_dependence(fit_leaving(pump + noise), DATASET)
     assert (found.depends_on, found.unit) == ("time", "s")
     assert found.period == pytest.approx(0.113, rel=0.01)
-    shares, periods = _shares(pump + noise, WHERE)
+    shares, periods = _shares(pump + noise, WHERE, np.array([len(LONG[0])]))
     assert list(periods) == ["time"]
     assert shares["time"] > 0.9
+
+
+def test_logs_are_told_apart_even_where_one_begins_later_than_the_other_ends():
+    """The second is at rest until the first has ended, so that time does not fall between them."""
+    kept = np.concatenate([WHERE["time"][: len(LONG[0])] < 2.7, LONG[1].time > 3.0])
+    time = WHERE["time"][kept]
+    assert (np.diff(time) > 0.0).all()
+    second = np.arange(len(KEPT))[kept] >= len(LONG[0])
+    noise = np.random.default_rng(4).normal(0.0, 0.1, len(time))
+    pump = np.sin(2.0 * np.pi * time / 0.113 + 2.5 * second) + noise
+    fit = SimpleNamespace(residual=pump, kept=kept)
+    assert find_dependence(fit, DATASET).shares["time"] > 0.9
+    still = SimpleNamespace(
+        residual=pump[second], kept=kept & (np.arange(len(kept)) >= len(LONG[0]))
+    )
+    assert find_dependence(still, DATASET).shares["time"] > 0.9
 
 
 def test_an_explanation_takes_away_what_the_residual_depended_on_most():

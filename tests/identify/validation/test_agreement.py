@@ -69,6 +69,20 @@ def test_an_effect_that_one_fit_has_alone_is_one_of_no_strength_in_the_other() -
     assert [d.label for d in found.differing] == ["constant_force.F0"]
 
 
+def test_what_makes_no_force_where_the_axis_moves_has_no_cause() -> None:
+    """Two stiffnesses of an end stop beyond the travel."""
+
+    def stopped(stiffness: float) -> MachineModel:
+        ends = {"low": -0.5, "high": 0.5, "stiffness": stiffness}
+        axis = fitted().axes["x"].with_effect(Fitted.at_start(CATALOGUE["end_stop"], ends))
+        interval = {"end_stop.stiffness": (0.9 * stiffness, 1.1 * stiffness)}
+        return fitted().with_axis("x", axis).with_intervals("x", AxisIntervals(interval, 1.0))
+
+    found = agreement(stopped(1e3), stopped(5e3), FEW).axes["x"]
+    assert [d.label for d in found.differing] == ["end_stop.stiffness"]
+    assert (found.force, found.causes) == (0.0, ())
+
+
 def test_intervals_travel_with_the_file_and_leave_with_what_they_belong_to(tmp_path: Path) -> None:
     path = tmp_path / "fitted.toml"
     save_model(fitted(), path)

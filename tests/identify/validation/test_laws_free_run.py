@@ -169,6 +169,19 @@ def test_measured_is_the_model_and_what_is_left_on_one_clock():
     np.testing.assert_allclose(measured["force"], log.motion.at_samples(0.0)[2][SIDE:])
 
 
+def test_axes_in_blocks_of_another_length_are_told_as_long_as_the_shorter():
+    """A noisy encoder asks for longer blocks, of which fewer samples fill a whole number."""
+    noise = 1e-4 * np.random.default_rng(5).standard_normal(N)
+    log = log_of(RATE, X, FORCE, X + noise)
+    parts = {a: windowed(motion_of(log, a, "log", ripples=()), 0.1) for a in "xy"}
+    lengths = {a: part.motion.raw.shape[1] for a, part in parts.items()}
+    assert lengths["y"] < lengths["x"]
+    model = MachineModel("m", {a: AxisModel(MASS) for a in "xy"}, RATE)
+    topics = side_by_side(model, parts).topics
+    shapes = {c.shape for columns in topics.values() for c in columns.values()}
+    assert shapes == {(lengths["y"] - SIDE,)}
+
+
 def test_the_clock_of_a_log_is_that_of_any_of_its_axes():
     one, other = prepared(), prepared()
     later = replace(other, motion=replace(other.motion, time_origin=0.7))
