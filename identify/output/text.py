@@ -26,6 +26,7 @@ from identify.output.words.selection import (
     remainder_in_words,
     shape_in_words,
     step_in_words,
+    tested_on,
     verdict_in_words,
 )
 from identify.output.words.validation import (
@@ -142,13 +143,13 @@ def diagnose_text(result: Diagnosis) -> str:
             if axis in result.left_over:
                 lines.append(f"  it is largest at {words(region_in_words(result.left_over[axis]))}")
             lines.append(f"  {advice(d.findings)}")
-        lines += [_ranking_line(c) for c in d.ranking[:4]]
-        lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
+        lines += [_ranking_line(c, tested_on(d)) for c in d.ranking[:4]]
+        lines += [_step_line(i, s, tested_on(d)) for i, s in enumerate(d.steps, start=1)]
         lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]
     return "\n".join(lines)
 
 
-def _step_line(number: int, step: Step) -> str:
+def _step_line(number: int, step: Step, judged_on: str) -> str:
     gain = step.candidate.gain
     if step.candidate.is_noise:
         return (
@@ -157,16 +158,16 @@ def _step_line(number: int, step: Step) -> str:
     dropped = f"; no longer needed: {', '.join(step.dropped)}" if step.dropped else ""
     beside = f" beside {step.beside}" if step.beside else ""
     return (
-        f"  step {number}: with {step.candidate.effect.name}{beside} the held-out error falls from "
-        f"{gain.before:.4g} to {gain.after:.4g} "
+        f"  step {number}: with {step.candidate.effect.name}{beside} the {judged_on} error falls "
+        f"from {gain.before:.4g} to {gain.after:.4g} "
         f"{step.candidate.fit.axis.units.force}{dropped}"
     )
 
 
-def _ranking_line(c: Candidate) -> str:
+def _ranking_line(c: Candidate, judged_on: str) -> str:
     unit, tail = c.fit.axis.units.force, "" if c.supported else "   not supported"
     return (
-        f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   held-out error "
+        f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   {judged_on} error "
         f"{c.gain.before:.4g} -> {c.gain.after:.4g} {unit}{tail}"
     )
 
@@ -233,7 +234,7 @@ def add_text(result: Addition) -> str:
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
         lines.append(
-            "  the data do not support this effect: evidence and held-out error do not both favour "
-            "it"
+            f"  the data do not support this effect: the evidence and {result.judged_by} do not "
+            "both favour it"
         )
     return "\n".join(lines)

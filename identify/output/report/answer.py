@@ -18,6 +18,7 @@ from identify.output.words.selection import (
     finding_in_words,
     refit_in_words,
     remainder_in_words,
+    tested_on,
     verdict_in_words,
 )
 from identify.output.words.validation import region_in_words
@@ -133,11 +134,6 @@ def _change(unit: str, before: float, after: float) -> str:
     return f"{number(before / scale.size)} → {scale.text(after)}"
 
 
-def tested_on(found: AxisDiagnosis) -> str:
-    """On what data a candidate was judged."""
-    return "held-out" if found.dataset.holdout else "cross-validated"
-
-
 def _tiles(axis: AxisComparison, found: AxisDiagnosis) -> list[Tile]:
     base, best = found.base, found.best
     unit, words = axis.units.force, axis.units.words
@@ -237,10 +233,10 @@ def _added(addition: Addition) -> Answer:
         replayed = f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo"
         tiles.append(Tile(words("Position, free run"), moved, replayed))
     outcome = "given the shape found" if step.action == "shape" else "added"
-    sentence = "The evidence and the held-out logs support the effect."
+    sentence = f"The evidence and {addition.judged_by} support the effect."
     if not addition.kept:
         sentence = (
-            "The evidence and the held-out logs do not both support this effect; leave it out."
+            f"The evidence and {addition.judged_by} do not both support this effect; leave it out."
         )
     return Answer(
         headline=f"Axis {step.axis}: {spaced(step.effect)} {outcome}",

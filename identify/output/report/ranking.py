@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from identify.output.report.answer import tested_on
 from identify.output.report.blocks import Block, Column, Heading, Picture, Row, Section, Table, Tone
 from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, number, quantity, spaced, title_case
+from identify.output.words.selection import tested_on
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.scoring import Candidate
 

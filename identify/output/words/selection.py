@@ -22,9 +22,6 @@ from twin.model.machine import Fitted
 from twin.model.units import units_of
 
 VERDICTS = {
-    Verdict.MISSING_EFFECTS: (
-        "The model lacks an effect: the fit logs and the held-out logs prove it."
-    ),
     Verdict.NOTHING_MISSING: "Nothing is missing: the force error is at its noise floor.",
     Verdict.WRONG_SHAPE: (
         "The model has the effect, but its law has another shape than the force of the machine."
@@ -43,8 +40,21 @@ SEVERAL = "Several effects explain the error equally well; these data cannot sep
 
 def verdict_in_words(found: AxisDiagnosis) -> str:
     """The answer of a diagnosis."""
-    several = found.ambiguous_with or any(f.tied for f in found.findings)
-    return SEVERAL if several else VERDICTS[found.verdict]
+    if found.ambiguous_with or any(f.tied for f in found.findings):
+        return SEVERAL
+    if found.verdict is not Verdict.MISSING_EFFECTS:
+        return VERDICTS[found.verdict]
+    lacks, them = ("several effects", "them") if len(found.named) > 1 else ("an effect", "it")
+    if found.dataset.holdout:
+        return f"The model lacks {lacks}: the fit logs and the held-out logs prove {them}."
+    return (
+        f"The model lacks {lacks}: the fit logs prove {them}, block by block; no log was held out."
+    )
+
+
+def tested_on(found: AxisDiagnosis) -> str:
+    """On what data a candidate was judged."""
+    return "held-out" if found.dataset.holdout else "cross-validated"
 
 
 def effect_in_words(found: AxisDiagnosis, effect: str) -> str:

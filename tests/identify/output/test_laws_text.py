@@ -167,7 +167,8 @@ def test_an_addition(kept):
     tested = replace(made.addition(kept), step=made.STEPS[1])
     assert "force error on the test logs      5.03 -> 2.83 N" in add_text(tested)
     assert "took part in the choice" not in add_text(tested)
-    unheld = add_text(replace(made.addition(), step=made.STEPS[2]))
+    unheld = add_text(replace(made.addition(kept), step=made.STEPS[2]))
+    assert ("the cross-validation on blocks of the fit logs do not" in unheld) is not kept
     assert "held-out" not in unheld
     assert "added wear to axis y" in unheld
 

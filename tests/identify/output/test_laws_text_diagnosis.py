@@ -27,6 +27,7 @@ from identify.output.words.selection import (
     named_errors_in_words,
     refit_in_words,
     repeat_in_words,
+    verdict_in_words,
 )
 from identify.output.words.validation import region_in_words
 from identify.selection.confounded import Change, Refit
@@ -103,8 +104,21 @@ def test_what_decided_nothing_is_told_apart_from_what_also_chose():
     assert diagnose_json(made.diagnosed(tested))["axes"]["x"]["test_error_on"] == "test"
 
 
+def test_nothing_is_said_of_held_out_logs_where_there_are_none():
+    steps = (Step(made.BEST, ()),)
+    held = made.diagnosis_of(steps=steps)
+    alone = replace(held, dataset=replace(made.DATASET, holdout=()))
+    assert verdict_in_words(held).endswith("the fit logs and the held-out logs prove it.")
+    assert verdict_in_words(alone).endswith(
+        "the fit logs prove it, block by block; no log was held out."
+    )
+    text = diagnose_text(made.diagnosed(alone)).split("axis x: ", 1)[1]
+    assert "with cogging the cross-validated error falls from 7.13 to 2.17 N" in text
+    assert "held-out" not in text
+
+
 def test_a_step_that_makes_the_rest_noise_has_no_errors():
-    line = _step_line(3, Step(built(NOISE), ()))
+    line = _step_line(3, Step(built(NOISE), ()), "held-out")
     assert line.strip() == f"step 3: {NOISE.name} explains the remaining error as noise"
 
 
