@@ -18,15 +18,16 @@ from identify.output.words.experiment_design import gap_in_words, not_run_in_wor
 from identify.output.words.selection import (
     advice,
     dependence_in_words,
-    effect_in_words,
     finding_in_words,
     named_errors_in_words,
+    named_in_words,
     nonparametric_in_words,
     refit_in_words,
     remainder_in_words,
     shape_in_words,
     step_in_words,
     tested_on,
+    ties_in_words,
     verdict_in_words,
 )
 from identify.output.words.validation import (
@@ -122,15 +123,14 @@ def diagnose_text(result: Diagnosis) -> str:
     lines = []
     for axis, d in result.axes.items():
         unit, words = d.base.axis.units.force, d.base.axis.units.words
-        named = f" {effect_in_words(d, d.best.effect.name)}." if d.best else ""
+        named = f" {named_in_words(d)}." if d.named else ""
         lines.append(f"axis {axis}: {words(verdict_in_words(d))}{named}")
         lines.append(
             f"  {words('force error')} {d.base.error:.4g} {unit}, noise floor "
             f"{d.base.floor:.4g} {unit} (ratio {d.base.ratio:.2f})"
         )
         lines.append(f"  {named_errors_in_words(d)}")
-        if d.ambiguous_with:
-            lines.append(f"  these data cannot separate it from: {', '.join(d.ambiguous_with)}")
+        lines += [f"  {tie}" for tie in ties_in_words(d)]
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         lines += [f"  {words(finding_in_words(f))}" for f in d.findings]

@@ -14,8 +14,8 @@ from identify.output.words.numbers import capitalised
 from identify.output.words.selection import (
     advice,
     dependence_in_words,
-    effect_in_words,
     finding_in_words,
+    named_in_words,
     refit_in_words,
     remainder_in_words,
     tested_on,
@@ -79,11 +79,9 @@ def _diagnosed(
 
 
 def _headline(found: AxisDiagnosis) -> str:
-    first, *more = [spaced(effect_in_words(found, name)) for name in found.named] or [""]
-    either = " or ".join([first, *map(spaced, found.ambiguous_with)])
     match found.verdict:
         case Verdict.MISSING_EFFECTS:
-            return f"{' and '.join([either, *more])} {'are' if more else 'is'} missing"
+            return f"{spaced(named_in_words(found))} {'are' if found.named[1:] else 'is'} missing"
         case Verdict.WRONG_SHAPE:
             return f"{spaced(found.findings[0].effect)} has another shape"
         case Verdict.UNEXPLAINED:

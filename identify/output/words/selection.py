@@ -63,6 +63,22 @@ def effect_in_words(found: AxisDiagnosis, effect: str) -> str:
     return f"something like {effect}" if effect in alike else effect
 
 
+def named_in_words(found: AxisDiagnosis) -> str:
+    """Every effect that is named, e.g. "cogging or wear, and lugre"; empty where none is."""
+    each = [" or ".join((effect_in_words(found, name), *alike)) for name, *alike in found.answers]
+    return (", and " if any(alike for _, *alike in found.answers) else " and ").join(each)
+
+
+def ties_in_words(found: AxisDiagnosis) -> list[str]:
+    """What these data cannot separate, one sentence a named effect, each pair once."""
+    ties = {f.effect: f.tied for f in found.findings} or {a[0]: a[1:] for a in found.answers}
+    said: list[str] = []
+    for name, alike in ties.items():
+        if {*alike} - {other for other in said if name in ties[other]}:
+            said.append(name)
+    return [f"these data cannot separate {name} from: {', '.join(ties[name])}" for name in said]
+
+
 def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     """E.g. "cogging explains 93 % of the squared error above the noise floor: ..."."""
     unit = finding.unit

@@ -70,7 +70,7 @@ def cards(diagnosis=None, **changes):
 
 def test_the_answer_for_an_ambiguity():
     first, second = cards(made.diagnosed())
-    assert first.headline == "Axis x: cogging or quadratic drag and lugre are missing"
+    assert first.headline == "Axis x: cogging or quadratic drag, and lugre are missing"
     assert (first.sentence, first.tone) == (SEVERAL, Tone.STRONG)
     tiles = [(t.name, t.value, t.remark) for t in first.tiles]
     ratio = f"{number(8.37 / 2.11)} → {number(1.19 / 1.03)}"
@@ -119,7 +119,7 @@ def test_an_effect_that_a_missing_one_resembles():
     like = replace(made.FOUND[0], kind=FindingKind.RESEMBLES)
     card, _ = cards(made.diagnosed(made.diagnosis_of(findings=(like, made.FOUND[1]))))
     assert card.headline == (
-        "Axis x: something like cogging or quadratic drag and lugre are missing"
+        "Axis x: something like cogging or quadratic drag, and lugre are missing"
     )
     assert card.remarks[0].startswith("What is missing resembles cogging, in another shape; that ")
 

@@ -27,6 +27,7 @@ from identify.output.words.selection import (
     named_errors_in_words,
     refit_in_words,
     repeat_in_words,
+    ties_in_words,
     verdict_in_words,
 )
 from identify.output.words.validation import region_in_words
@@ -43,14 +44,14 @@ def test_a_diagnosis():
     text = diagnose_text(result)
     y, lines = text.split("axis x: ", 1)
     lines = lines.splitlines()
-    assert lines[0] == f"{SEVERAL} cogging."
+    assert lines[0] == f"{SEVERAL} cogging or quadratic_drag, and lugre."
     assert lines[1] == "  force error 8.37 N, noise floor 2.11 N (ratio 3.97)"
     tested = x.tested
     assert lines.pop(2) == (
         f"  force error on the selection logs {tested.before:.3g} N, with what is named "
         f"{tested.after:.3g} N"
     )
-    assert lines[2] == "  these data cannot separate it from: quadratic_drag"
+    assert lines[2] == "  these data cannot separate cogging from: quadratic_drag"
     planned = [f"  {line}" for line in plan_text(result.next_experiments["x"]).splitlines()]
     assert lines[3 : 3 + len(planned)] == planned
     rest = [" ".join(line.split()) for line in lines[3 + len(planned) :]]
@@ -115,6 +116,17 @@ def test_nothing_is_said_of_held_out_logs_where_there_are_none():
     text = diagnose_text(made.diagnosed(alone)).split("axis x: ", 1)[1]
     assert "with cogging the cross-validated error falls from 7.13 to 2.17 N" in text
     assert "held-out" not in text
+
+
+def test_every_named_effect_is_in_the_headline():
+    two = made.diagnosis_of(steps=(Step(made.BEST, ()), Step(made.LATER, ())))
+    line = diagnose_text(made.diagnosed(two)).split("axis x: ", 1)[1].splitlines()[0]
+    assert line == f"{verdict_in_words(two)} cogging and lugre."
+    assert "several effects" in line
+    both = (replace(made.FOUND[0], tied=("lugre",)), replace(made.FOUND[1], tied=("cogging",)))
+    assert ties_in_words(replace(two, findings=both)) == [
+        "these data cannot separate cogging from: lugre"
+    ]
 
 
 def test_a_step_that_makes_the_rest_noise_has_no_errors():
