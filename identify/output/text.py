@@ -30,12 +30,12 @@ from identify.output.words.selection import (
     ties_in_words,
     verdict_in_words,
 )
+from identify.output.words.steps import step_lines
 from identify.output.words.validation import (
     correlation_in_words,
     loop_in_words,
     region_in_words,
 )
-from identify.selection.diagnosis import Step
 from identify.selection.nonparametric import nonparametric_labels
 from identify.selection.scoring import Candidate
 from twin.experiments.file import in_short
@@ -144,24 +144,9 @@ def diagnose_text(result: Diagnosis) -> str:
                 lines.append(f"  it is largest at {words(region_in_words(result.left_over[axis]))}")
             lines.append(f"  {advice(d.findings)}")
         lines += [_ranking_line(c, tested_on(d)) for c in d.ranking[:4]]
-        lines += [_step_line(i, s, tested_on(d)) for i, s in enumerate(d.steps, start=1)]
+        lines += [f"  {line}" for line in step_lines(d)]
         lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]
     return "\n".join(lines)
-
-
-def _step_line(number: int, step: Step, judged_on: str) -> str:
-    gain = step.candidate.gain
-    if step.candidate.is_noise:
-        return (
-            f"  step {number}: {step.candidate.effect.name} explains the remaining error as noise"
-        )
-    dropped = f"; no longer needed: {', '.join(step.dropped)}" if step.dropped else ""
-    beside = f" beside {step.beside}" if step.beside else ""
-    return (
-        f"  step {number}: with {step.candidate.effect.name}{beside} the {judged_on} error falls "
-        f"from {gain.before:.4g} to {gain.after:.4g} "
-        f"{step.candidate.fit.axis.units.force}{dropped}"
-    )
 
 
 def _ranking_line(c: Candidate, judged_on: str) -> str:

@@ -75,7 +75,7 @@ def expected_answer(x):
         "steps": [
             {
                 **expected_candidate(s.candidate), "ambiguous_with": list(s.tied),
-                "dropped": list(s.dropped), "beside": s.beside,
+                "dropped": list(s.dropped), "beside": s.beside, "not_named": None,
             }
             for s in x.steps
         ],

@@ -14,7 +14,6 @@ from identify.output import remarks as remarks_module
 from identify.output.diagnosis_json import diagnose_json
 from identify.output.remarks import remarks
 from identify.output.text import (
-    _step_line,
     diagnose_text,
     plan_text,
 )
@@ -30,9 +29,11 @@ from identify.output.words.selection import (
     ties_in_words,
     verdict_in_words,
 )
+from identify.output.words.steps import not_named_in_words, step_lines
 from identify.output.words.validation import region_in_words
 from identify.selection.confounded import Change, Refit
 from identify.selection.diagnosis import Step, Verdict
+from identify.selection.findings import FindingKind
 
 pytestmark = pytest.mark.usefixtures("nothing_moved")
 
@@ -130,8 +131,33 @@ def test_every_named_effect_is_in_the_headline():
 
 
 def test_a_step_that_makes_the_rest_noise_has_no_errors():
-    line = _step_line(3, Step(built(NOISE), ()), "held-out")
-    assert line.strip() == f"step 3: {NOISE.name} explains the remaining error as noise"
+    (line,) = step_lines(made.diagnosis_of(steps=(Step(built(NOISE), ()),)))
+    assert line == f"step 1: {NOISE.name} explains the remaining error as noise"
+
+
+def test_a_step_whose_effect_is_not_named_says_why():
+    cogging, lugre = Step(made.BEST, ()), Step(made.LATER, ())
+    drag = replace(made.RIVAL, fit=made.LATER.fit)
+
+    def why(*steps, **changes):
+        return [not_named_in_words(made.diagnosis_of(steps=steps, **changes), i) for i in (0, 1)]
+
+    assert why(cogging, lugre) == [None, None]
+    unproved = "not proved beside the others, or less than 1 % of the squared error"
+    assert why(cogging, replace(lugre, proved=False)) == [None, unproved]
+    assert why(cogging, lugre, verdict=Verdict.UNEXPLAINED) == [unproved, unproved]
+    assert why(Step(drag, ()), replace(lugre, dropped=("quadratic_drag",))) == [
+        "no longer needed beside lugre", None,
+    ]  # fmt: skip
+    shape = replace(made.FOUND[1], kind=FindingKind.WRONG_SHAPE)
+    named = (made.FOUND[0], shape)
+    assert why(cogging, replace(lugre, proved=False), findings=named)[1].startswith("it is part")
+    assert why(cogging, Step(drag, ()), findings=named) == [
+        None, "a free curve of lugre takes its place",
+    ]  # fmt: skip
+    left = made.diagnosis_of(steps=(cogging, replace(lugre, proved=False)))
+    assert step_lines(left)[1].endswith(f" N; not named: {unproved}")
+    assert diagnose_json(made.diagnosed(left))["axes"]["x"]["steps"][1]["not_named"] == unproved
 
 
 def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
