@@ -11,7 +11,7 @@ from identify.output.as_json import plan_json, refit_json
 from identify.output.remarks import remarks_on
 from identify.output.results import Diagnosis
 from identify.output.words.selection import advice, verdict_in_words
-from identify.output.words.steps import not_named_in_words
+from identify.output.words.steps import not_named_in_words, together_in_words
 from identify.selection.diagnosis import AxisDiagnosis, Step
 from identify.selection.findings import Finding
 from identify.selection.found_shape import FoundShape
@@ -46,6 +46,7 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "steps": [
             {**_step(s), "not_named": not_named_in_words(d, i)} for i, s in enumerate(d.steps)
         ],
+        "needed_together": together_in_words(d),
         "unexplained": dependence
         and {
             "share_of_error": dependence.share_of_error,

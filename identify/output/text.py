@@ -30,7 +30,7 @@ from identify.output.words.selection import (
     ties_in_words,
     verdict_in_words,
 )
-from identify.output.words.steps import step_lines
+from identify.output.words.steps import step_lines, support_in_words, together_in_words
 from identify.output.words.validation import (
     correlation_in_words,
     loop_in_words,
@@ -44,6 +44,7 @@ from twin.experiments.kinds import kind_of
 if TYPE_CHECKING:  # results print themselves by these functions
     from identify.output.addition import Addition
     from identify.output.results import Comparison, Diagnosis, FitResult
+    from identify.selection.diagnosis import AxisDiagnosis
     from identify.validation.misfit_maps import AxisComparison
 
 
@@ -134,6 +135,7 @@ def diagnose_text(result: Diagnosis) -> str:
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         lines += [f"  {words(finding_in_words(f))}" for f in d.findings]
+        lines += [f"  {together}" for together in together_in_words(d)]
         shapes = [shape_in_words(f.effect, f.shape) for f in d.findings if f.shape]
         lines += [f"  {words(text)}" for text in shapes]
         if remains := remainder_in_words(d):
@@ -143,16 +145,17 @@ def diagnose_text(result: Diagnosis) -> str:
             if axis in result.left_over:
                 lines.append(f"  it is largest at {words(region_in_words(result.left_over[axis]))}")
             lines.append(f"  {advice(d.findings)}")
-        lines += [_ranking_line(c, tested_on(d)) for c in d.ranking[:4]]
+        lines += [_ranking_line(c, d) for c in d.ranking[:4]]
         lines += [f"  {line}" for line in step_lines(d)]
         lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]
     return "\n".join(lines)
 
 
-def _ranking_line(c: Candidate, judged_on: str) -> str:
-    unit, tail = c.fit.axis.units.force, "" if c.supported else "   not supported"
+def _ranking_line(c: Candidate, found: AxisDiagnosis) -> str:
+    unit = c.fit.axis.units.force
+    tail = "" if c.supported else f"   {support_in_words(found, c)}"
     return (
-        f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   {judged_on} error "
+        f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   {tested_on(found)} error "
         f"{c.gain.before:.4g} -> {c.gain.after:.4g} {unit}{tail}"
     )
 
@@ -220,6 +223,7 @@ def add_text(result: Addition) -> str:
     if not result.kept:
         lines.append(
             f"  the data do not support this effect: the evidence and {result.judged_by} do not "
-            "both favour it"
+            "both favour it alone; if a diagnosis says that it needs another beside it, add that "
+            "to the new model and judge then"
         )
     return "\n".join(lines)

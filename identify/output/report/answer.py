@@ -21,6 +21,7 @@ from identify.output.words.selection import (
     tested_on,
     verdict_in_words,
 )
+from identify.output.words.steps import support_in_words, together_in_words
 from identify.output.words.validation import region_in_words
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.scoring import Candidate
@@ -62,6 +63,7 @@ def _diagnosed(
     )
     if found.best is not None and not found.findings:
         remarks.append(_left_over(found.best))
+    remarks.extend(capitalised(text) for text in together_in_words(found))
     remarks.extend(_runner_up(found))
     if found.unexplained is not None:
         remarks.append(f"{advice(found.findings)}.")
@@ -108,7 +110,7 @@ def _runner_up(found: AxisDiagnosis) -> list[str]:
     second = others[0]
     change = _change(found.dataset.units.force, second.gain.before, second.gain.after)
     role = "Runner-up" if found.best else "Nearest candidate"
-    verdict = "supported" if second.supported else "not supported"
+    verdict = support_in_words(found, second)
     return [
         f"{role}: {spaced(second.effect.name)}, ΔBIC {number(second.delta_bic)}, "
         f"{tested_on(found)} error {change}, {verdict}."
@@ -234,7 +236,8 @@ def _added(addition: Addition) -> Answer:
     sentence = f"The evidence and {addition.judged_by} support the effect."
     if not addition.kept:
         sentence = (
-            f"The evidence and {addition.judged_by} do not both support this effect; leave it out."
+            f"The evidence and {addition.judged_by} do not both support this effect; leave it out, "
+            "unless a diagnosis says that it needs another beside it."
         )
     return Answer(
         headline=f"Axis {step.axis}: {spaced(step.effect)} {outcome}",

@@ -1,4 +1,4 @@
-"""Sentences about the way to an answer: what each step did, and why its effect is not named."""
+"""Sentences about the way to an answer: the steps, and which candidates are needed together."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from identify.estimation.decision import RULE
 from identify.output.words.selection import tested_on
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import FindingKind
+from identify.selection.scoring import Candidate
 
 
 def step_lines(found: AxisDiagnosis) -> list[str]:
@@ -45,3 +46,33 @@ def not_named_in_words(found: AxisDiagnosis, index: int) -> str | None:
         "not proved beside the others, or less than "
         f"{100.0 * RULE.least_finding:.0f} % of the squared error"
     )
+
+
+def partner(found: AxisDiagnosis, effect: str) -> str | None:
+    """The named effect without which this named one has no evidence."""
+    beside = {s.candidate.effect.name: s.beside for s in found.steps}
+    other = beside.get(effect)
+    return other if other in found.named and effect in found.named else None
+
+
+def support_in_words(found: AxisDiagnosis, candidate: Candidate) -> str:
+    """Whether the data support a candidate alone, or together with another only."""
+    if candidate.supported:
+        return "supported"
+    other = partner(found, candidate.effect.name)
+    return f"only together with {other}" if other else "not supported"
+
+
+def together_in_words(found: AxisDiagnosis) -> list[str]:
+    """Of named effects that need each other: that they do, and how both are added."""
+    said = []
+    for i, first in enumerate(found.named):
+        second = partner(found, first)
+        if second in found.named[i + 1 :]:
+            said.append(
+                f"{first} and {second} are needed together, so the data support neither alone: "
+                f"twin add {first} MODEL LOG... -o first.toml, then "
+                f"twin add {second} first.toml LOG... -o both.toml; judge after the second "
+                "(the first ends with exit code 1)"
+            )
+    return said

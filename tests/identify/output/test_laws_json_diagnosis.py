@@ -79,6 +79,7 @@ def expected_answer(x):
             }
             for s in x.steps
         ],
+        "needed_together": [],
         "unexplained": {
             "share_of_error": 0.631, "depends_on": "other_axis_position", "period": 0.0273,
             "unit": "m",

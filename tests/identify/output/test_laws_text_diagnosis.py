@@ -29,7 +29,12 @@ from identify.output.words.selection import (
     ties_in_words,
     verdict_in_words,
 )
-from identify.output.words.steps import not_named_in_words, step_lines
+from identify.output.words.steps import (
+    not_named_in_words,
+    step_lines,
+    support_in_words,
+    together_in_words,
+)
 from identify.output.words.validation import region_in_words
 from identify.selection.confounded import Change, Refit
 from identify.selection.diagnosis import Step, Verdict
@@ -133,6 +138,25 @@ def test_every_named_effect_is_in_the_headline():
 def test_a_step_that_makes_the_rest_noise_has_no_errors():
     (line,) = step_lines(made.diagnosis_of(steps=(Step(built(NOISE), ()),)))
     assert line == f"step 1: {NOISE.name} explains the remaining error as noise"
+
+
+def test_two_effects_that_need_each_other_are_told_as_such(monkeypatch):
+    """Neither is supported alone, so the answer says how both are added."""
+    drag = replace(made.RIVAL, evidence=replace(made.RIVAL.evidence, log_gain=0.0))
+    steps = (Step(made.BEST, (), beside="quadratic_drag"), Step(drag, (), beside="cogging"))
+    x = made.diagnosis_of(steps=steps, ranking=(made.BEST, drag, made.WEAK))
+    assert [support_in_words(x, c) for c in x.ranking] == [
+        "supported", "only together with cogging", "not supported",
+    ]  # fmt: skip
+    (said,) = together_in_words(x)
+    assert said.startswith("cogging and quadratic_drag are needed together")
+    assert "twin add quadratic_drag first.toml LOG... -o both.toml; judge after the second" in said
+    assert "neither alone" in said
+    text = diagnose_text(made.diagnosed(x)).split("axis x: ", 1)[1]
+    assert f"\n  {said}\n" in text
+    assert "N   only together with cogging\n" in text
+    assert diagnose_json(made.diagnosed(x))["axes"]["x"]["needed_together"] == [said]
+    assert together_in_words(made.diagnosis_of()) == []
 
 
 def test_a_step_whose_effect_is_not_named_says_why():
