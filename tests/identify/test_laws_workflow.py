@@ -80,7 +80,8 @@ def test_a_parameter_moved_where_it_leaves_both_intervals(monkeypatch, f0, told)
     if told:
         (only,) = found
         assert moved_in_words(only) == (
-            f"constant_force.F0 moved from 1 to {f0:.4g} N: more than its interval"
+            f"constant_force.F0 moved from 1 to {f0:.4g} N: more than it scatters between "
+            "blocks of the logs"
         )
 
 

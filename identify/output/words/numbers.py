@@ -32,6 +32,16 @@ def _ratio(value: float) -> str:
     return f"{value:.1f}"
 
 
+def told_apart(before: float, after: float) -> tuple[str, str]:
+    """Two numbers with four digits, or with as many more as it takes to see that they differ."""
+    pair = f"{before:.4g}", f"{after:.4g}"
+    digits = 4
+    while pair[0] == pair[1] and before != after and digits < 15:
+        digits += 1
+        pair = f"{before:#.{digits}g}", f"{after:#.{digits}g}"
+    return pair
+
+
 PLAIN = Numbers(_amount, _span, _ratio)  # SI units, for a terminal and for JSON
 
 

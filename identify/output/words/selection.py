@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.given_logs import Role
-from identify.output.words.numbers import PLAIN, Numbers
+from identify.output.words.numbers import PLAIN, Numbers, told_apart
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
@@ -162,7 +162,7 @@ def change_in_words(change: Change) -> str:
     if change.alike:
         verb = "give" if len(change.alike) > 1 else "gives"
         same = f" ({' and '.join(change.alike)} {verb} the same {force})"
-    values = f"{change.before:.4g} -> {change.after:.4g} {change.unit}"
+    values = f"{' -> '.join(told_apart(change.before, change.after))} {change.unit}"
     by = f"{change.force:.3g} {change.force_unit}"
     return f"{change.label} {values} changes the {force} by {by}{same}"
 
@@ -181,10 +181,10 @@ def refit_in_words(refit: Refit) -> str | None:
 
 def moved_in_words(moved: MovedParameter) -> str:
     """How a parameter of the base changed when an effect was added."""
-    values = f"from {moved.before:.4g} to {moved.after:.4g} {moved.unit}"
+    values = f"from {' to '.join(told_apart(moved.before, moved.after))} {moved.unit}"
     if moved.collapsed:
         return f"{moved.label} collapsed {values}: it had taken over the missing effect's force"
-    return f"{moved.label} moved {values}: more than its interval"
+    return f"{moved.label} moved {values}: more than it scatters between blocks of the logs"
 
 
 def repeat_in_words(repeat: Repeat) -> str:

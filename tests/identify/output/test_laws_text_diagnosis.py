@@ -215,6 +215,18 @@ def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
     assert remarks(quiet, Refit(1.0, 1.0, ())) == ()
 
 
+def test_numbers_that_differ_look_different():
+    """Where the error is above noise intervals are refused, so none is told of."""
+    moved = moved_in_words(replace(made.MOVED, before=15.2004, after=15.2021))
+    assert moved == (
+        "mass moved from 15.200 to 15.202 kg: more than it scatters between blocks of the logs"
+    )
+    assert "mass 15.200 -> 15.202 kg" in change_in_words(
+        Change("mass", 15.2004, 15.2021, "kg", 0.572)
+    )
+    assert "from 15.2 to 15.2 kg" in moved_in_words(replace(made.MOVED, before=15.2, after=15.2))
+
+
 def test_a_change_has_its_values_and_force_in_place():
     change = Change("mass", 15.1, 15.7, "kg", 0.572, ("payload_mass", "cogging"))
     assert change_in_words(change) == (
