@@ -140,26 +140,37 @@ def _tiles(axis: AxisComparison, found: AxisDiagnosis) -> list[Tile]:
     if best is None:
         errors = _error_tiles(base.error, base.floor, axis.units)
         return [*errors, *_test_tile(found), *_position_tile(axis, "")]
-    name, gain = spaced(best.effect.name), best.gain
+    final = found.with_named
+    named = spaced(best.effect.name) if len(found.named) == 1 else "all that is named"
     return [
         Tile(
             words("Force error on the fit logs"),
-            _change(unit, base.error, best.fit.error),
-            f"with {name}, RMS",
+            _change(unit, base.error, final.error),
+            f"with {named}, RMS",
         ),
-        Tile(
-            words(f"{tested_on(found).capitalize()} force error"),
-            _change(unit, gain.before, gain.after),
-            f"t = {number(gain.t)} over blocks",
-        ),
+        *_chosen_tile(found, named),
         *_test_tile(found),
         Tile(
             "Error over noise floor",
-            f"{number(base.ratio)} → {number(best.fit.ratio)}",
-            f"floor {quantity(base.floor, unit)} RMS",
+            f"{number(base.error / final.floor)} → {number(final.ratio)}",
+            f"fit logs; floor {quantity(final.floor, unit)} RMS",
         ),
-        *_position_tile(axis, f", without {name}"),
+        *_position_tile(axis, f", without {named}"),
     ]
+
+
+def _chosen_tile(found: AxisDiagnosis, named: str) -> list[Tile]:
+    """The error on held-out logs; without them one effect has the error of cross-validation."""
+    units = found.dataset.units
+    if found.dataset.holdout:
+        chosen = found.chosen
+        error = _change(units.force, chosen.before, chosen.after)
+        return [Tile(units.words("Held-out force error"), error, f"with {named}, RMS")]
+    if found.best is None or len(found.named) > 1:
+        return []
+    gain = found.best.gain
+    error, t = _change(units.force, gain.before, gain.after), f"t = {number(gain.t)} over blocks"
+    return [Tile(units.words("Cross-validated force error"), error, t)]
 
 
 def _test_tile(found: AxisDiagnosis) -> list[Tile]:

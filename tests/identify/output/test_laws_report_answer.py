@@ -73,12 +73,14 @@ def test_the_answer_for_an_ambiguity():
     assert first.headline == "Axis x: cogging or quadratic drag, and lugre are missing"
     assert (first.sentence, first.tone) == (SEVERAL, Tone.STRONG)
     tiles = [(t.name, t.value, t.remark) for t in first.tiles]
-    ratio = f"{number(8.37 / 2.11)} → {number(1.19 / 1.03)}"
+    ratio = f"{number(8.37 / 2.03)} → {number(3.19 / 2.03)}"
+    chosen = made.diagnosed().axes["x"].chosen
+    held = answer._change("N", chosen.before, chosen.after)
     assert tiles == [
-        ("Force error on the fit logs", "8.37 → 1.19 N", "with cogging, RMS"),
-        ("Held-out force error", "7.13 → 2.17 N", "t = 9.10 over blocks"),
-        ("Error over noise floor", ratio, "floor 2.11 N RMS"),
-        ("Position, free run", "4.29 µm", "RMS of the worst log, without cogging"),
+        ("Force error on the fit logs", "8.37 → 3.19 N", "with all that is named, RMS"),
+        ("Held-out force error", held, "with all that is named, RMS"),
+        ("Error over noise floor", ratio, "fit logs; floor 2.03 N RMS"),
+        ("Position, free run", "4.29 µm", "RMS of the worst log, without all that is named"),
     ]  # fmt: skip
     assert first.remarks == [
         "With cogging the force error is at its noise floor.",
