@@ -101,12 +101,19 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
         f"{without} the {error} is {before}, {with_it} {after}"
     )
     sure = f"confidence {100.0 * finding.confidence:.0f} %"
+    return "; ".join((text, *_beside_decoys(finding), sure))
+
+
+def _beside_decoys(finding: Finding) -> list[str]:
+    """What an effect takes beside what chance would; nothing where it has no decoys."""
     if finding.proof is None:
-        return f"{text}; {sure}"
+        return []
     gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.decoy))
-    of_it = "that of a typical part" if finding.proof.typical else "it all"
-    rarely = f"one decoy in twenty {decoy:.0f} % or more"
-    return f"{text}; of {of_it} it takes {gain:.0f} %, {rarely}; {sure}"
+    where = " in a typical stretch of the log" if finding.proof.typical else ""
+    return [
+        f"of the squared error left without it{where}, it takes {gain:.0f} %, where 1 in 20 decoys "
+        f"(its force shifted in time) takes {decoy:.0f} % or more"
+    ]
 
 
 def named_errors_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str:

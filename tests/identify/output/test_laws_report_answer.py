@@ -112,7 +112,7 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     where = region_in_words(made.LEFT_OVER, SCALED)
     assert card.sentence.endswith(f"It is largest at {where}.")
     assert [r.split(" explains ")[0] for r in card.remarks[:2]] == ["Cogging", "Lugre"]
-    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N; of it all"
+    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N; of the squared"
     assert told in card.remarks[0]
     assert not any("is at its noise floor" in r for r in card.remarks)
 

@@ -22,6 +22,7 @@ from identify.output.words.selection import (
     SEVERAL,
     advice,
     change_in_words,
+    finding_in_words,
     moved_in_words,
     named_errors_in_words,
     refit_in_words,
@@ -37,6 +38,7 @@ from identify.output.words.steps import (
 )
 from identify.output.words.validation import region_in_words
 from identify.selection.confounded import Change, Refit
+from identify.selection.decoys import Proof
 from identify.selection.diagnosis import Step, Verdict
 from identify.selection.findings import FindingKind
 
@@ -64,8 +66,9 @@ def test_a_diagnosis():
     sure = [f"confidence {100.0 * f.confidence:.0f} %" for f in made.FOUND]
     assert rest[:3] == [
         "cogging explains 87 % of the squared error above the noise floor: without it the error "
-        "on the selection logs is 7.17 N, with it 2.19 N; of it all it takes 81 %, "
-        f"one decoy in twenty 14 % or more; {sure[0]}",
+        "on the selection logs is 7.17 N, with it 2.19 N; of the squared error left without it, it "
+        "takes 81 %, where 1 in 20 decoys (its force shifted in time) takes 14 % or more; "
+        f"{sure[0]}",
         "lugre explains 12 % of the squared error above the noise floor: without it the error on "
         f"the selection logs is 3.23 N, with it 2.19 N; {sure[1]}",
         "what remains beside the named effects is 3.19 N, 1.6 times the noise floor",
@@ -122,6 +125,15 @@ def test_nothing_is_said_of_held_out_logs_where_there_are_none():
     text = diagnose_text(made.diagnosed(alone)).split("axis x: ", 1)[1]
     assert "with cogging the cross-validated error falls from 7.13 to 2.17 N" in text
     assert "held-out" not in text
+
+
+def test_a_decoy_is_explained_where_it_is_told():
+    short = replace(made.FOUND[0], proof=Proof(0.94, 0.05, typical=True))
+    assert (
+        "left without it in a typical stretch of the log, it takes 94 %, where 1 in 20 decoys (its "
+        "force shifted in time) takes 5 % or more"
+    ) in finding_in_words(short)
+    assert "decoy" not in finding_in_words(made.FOUND[1])
 
 
 def test_every_named_effect_is_in_the_headline():
