@@ -100,7 +100,10 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
         f"{what} {100.0 * finding.explains:.0f} % of the squared error above the noise floor: "
         f"{without} the {error} is {before}, {with_it} {after}"
     )
-    sure = f"confidence {100.0 * finding.confidence:.0f} %"
+    sure = (
+        f"confidence {100.0 * finding.confidence:.0f} %: {finding.left:.3g} times the "
+        f"noise floor is left on the {finding.chosen.on.value} logs"
+    )
     return "; ".join((text, *_beside_decoys(finding), sure))
 
 

@@ -63,7 +63,11 @@ def test_a_diagnosis():
     planned = [f"  {line}" for line in plan_text(result.next_experiments["x"]).splitlines()]
     assert lines[3 : 3 + len(planned)] == planned
     rest = [" ".join(line.split()) for line in lines[3 + len(planned) :]]
-    sure = [f"confidence {100.0 * f.confidence:.0f} %" for f in made.FOUND]
+    sure = [
+        f"confidence {100.0 * f.confidence:.0f} %: {f.left:.3g} times the noise floor is left on "
+        "the selection logs"
+        for f in made.FOUND
+    ]
     assert rest[:3] == [
         "cogging explains 87 % of the squared error above the noise floor: without it the error "
         "on the selection logs is 7.17 N, with it 2.19 N; of the squared error left without it, it "
@@ -134,6 +138,13 @@ def test_a_decoy_is_explained_where_it_is_told():
         "force shifted in time) takes 5 % or more"
     ) in finding_in_words(short)
     assert "decoy" not in finding_in_words(made.FOUND[1])
+
+
+@pytest.mark.parametrize(("left", "sure"), [(1.28, "98 %: 1.28"), (1.33, "89 %: 1.33")])
+def test_a_confidence_tells_what_it_is_read_from(left, sure):
+    """Not from the test error, which may be at its noise floor beside 89 %."""
+    told = finding_in_words(replace(made.FOUND[1], left=left))
+    assert told.endswith(f"confidence {sure} times the noise floor is left on the selection logs")
 
 
 def test_every_named_effect_is_in_the_headline():
