@@ -25,6 +25,7 @@ from identify.output.words.selection import (
     refit_in_words,
     remainder_in_words,
     shape_in_words,
+    shares_in_words,
     step_in_words,
     tested_on,
     ties_in_words,
@@ -135,6 +136,7 @@ def diagnose_text(result: Diagnosis) -> str:
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         lines += [f"  {words(finding_in_words(f))}" for f in d.findings]
+        lines += [f"  {shares}" for shares in shares_in_words(d)]
         lines += [f"  {together}" for together in together_in_words(d)]
         shapes = [shape_in_words(f.effect, f.shape) for f in d.findings if f.shape]
         lines += [f"  {words(text)}" for text in shapes]

@@ -18,6 +18,7 @@ from identify.output.words.selection import (
     named_in_words,
     refit_in_words,
     remainder_in_words,
+    shares_in_words,
     tested_on,
     verdict_in_words,
 )
@@ -61,6 +62,7 @@ def _diagnosed(
         axis.units.words(f"{capitalised(spaced(finding_in_words(f, SCALED)))}")
         for f in found.findings
     )
+    remarks.extend(capitalised(text) for text in shares_in_words(found))
     if found.best is not None and not found.findings:
         remarks.append(_left_over(found.best))
     remarks.extend(capitalised(text) for text in together_in_words(found))

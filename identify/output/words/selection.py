@@ -107,6 +107,16 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     return "; ".join((text, *_beside_decoys(finding), sure))
 
 
+def shares_in_words(found: AxisDiagnosis) -> list[str]:
+    """That the shares of several findings are no parts of one whole; nothing of a single one."""
+    if len(found.findings) < 2:
+        return []
+    return [
+        "each share is of that effect taken out alone, the others refitted, so the shares need not "
+        "sum to 100 %"
+    ]
+
+
 def _beside_decoys(finding: Finding) -> list[str]:
     """What an effect takes beside what chance would; nothing where it has no decoys."""
     if finding.proof is None:

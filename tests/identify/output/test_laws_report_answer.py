@@ -114,6 +114,7 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     assert [r.split(" explains ")[0] for r in card.remarks[:2]] == ["Cogging", "Lugre"]
     told = "without it the error on the selection logs is 7.17 N, with it 2.19 N; of the squared"
     assert told in card.remarks[0]
+    assert "need not sum to 100 %" in card.remarks[2]
     assert not any("is at its noise floor" in r for r in card.remarks)
 
 

@@ -27,6 +27,7 @@ from identify.output.words.selection import (
     named_errors_in_words,
     refit_in_words,
     repeat_in_words,
+    shares_in_words,
     ties_in_words,
     verdict_in_words,
 )
@@ -68,16 +69,17 @@ def test_a_diagnosis():
         "the selection logs"
         for f in made.FOUND
     ]
-    assert rest[:3] == [
+    assert rest[:4] == [
         "cogging explains 87 % of the squared error above the noise floor: without it the error "
         "on the selection logs is 7.17 N, with it 2.19 N; of the squared error left without it, it "
         "takes 81 %, where 1 in 20 decoys (its force shifted in time) takes 14 % or more; "
         f"{sure[0]}",
         "lugre explains 12 % of the squared error above the noise floor: without it the error on "
         f"the selection logs is 3.23 N, with it 2.19 N; {sure[1]}",
+        *shares_in_words(x),
         "what remains beside the named effects is 3.19 N, 1.6 times the noise floor",
     ]
-    rest = rest[3:]
+    rest = rest[4:]
     assert rest[:3] == [
         "The error depends most on other axis position, which accounts for 63 % of the squared "
         "error, with a period of 0.0273 m.",
@@ -145,6 +147,12 @@ def test_a_confidence_tells_what_it_is_read_from(left, sure):
     """Not from the test error, which may be at its noise floor beside 89 %."""
     told = finding_in_words(replace(made.FOUND[1], left=left))
     assert told.endswith(f"confidence {sure} times the noise floor is left on the selection logs")
+
+
+def test_shares_of_several_are_said_to_be_no_parts_of_a_whole():
+    (said,) = shares_in_words(made.diagnosis_of(findings=made.FOUND))
+    assert "the shares need not sum to 100 %" in said
+    assert shares_in_words(made.diagnosis_of(findings=made.FOUND[:1])) == []
 
 
 def test_every_named_effect_is_in_the_headline():
