@@ -5,16 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from identify.estimation.intervals import Estimate, NoInterval, refusal
-from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
-from identify.experiment_design.rival_hypotheses import STRENGTH
 from identify.output.remarks import remarks_on
 from identify.output.words.estimation import (
     no_interval_in_words,
     outcome_in_words,
     prepared_in_words,
 )
-from identify.output.words.experiment_design import gap_in_words, not_run_in_words
+from identify.output.words.experiment_design import (
+    experiment_in_words,
+    gap_in_words,
+    in_order,
+    not_run_in_words,
+    supposed_in_words,
+)
 from identify.output.words.selection import (
     advice,
     dependence_in_words,
@@ -40,7 +44,6 @@ from identify.output.words.validation import (
 from identify.selection.nonparametric import nonparametric_labels
 from identify.selection.scoring import Candidate
 from twin.experiments.file import in_short
-from twin.experiments.kinds import kind_of
 
 if TYPE_CHECKING:  # results print themselves by these functions
     from identify.output.addition import Addition
@@ -181,22 +184,10 @@ def plan_text(result: Plan) -> str:
     lines += [f"  {name} is excited by {motion}" for name, motion in result.excited_by.items()]
     if result.favoured:
         lines.append(f"  the existing logs already favour {result.favoured}")
-    if result.supposed and several:
-        lines.append(
-            f"  no logs given: each effect is assumed at {STRENGTH:g} times the noise floor"
-        )
-    lines += [_experiment_line(t, several) for t in result.ranking[:SHOWN]]
+    if supposed := supposed_in_words(result):
+        lines.append(f"  {supposed}")
+    lines += [f"  {experiment_in_words(t, result)}" for t in in_order(result)[:SHOWN]]
     return "\n".join([*lines, *(f"  not run: {not_run_in_words(n)}" for n in result.not_run)])
-
-
-def _experiment_line(t: SimulatedExperiment, several: bool) -> str:
-    tail = f"{t.gain:8.1f} nats on the parameters"
-    if several:
-        tail = (
-            f"{t.difference:.3g} {t.units.force} unexplained by the rival "
-            f"({t.difference / t.floor:.1f} x noise floor), evidence {t.gain:.1f}"
-        )
-    return f"  {kind_of(t.experiment):10s} {t.duration:5.1f} s   {tail}"
 
 
 def add_text(result: Addition) -> str:
