@@ -71,7 +71,11 @@ def _diagnosed(
         remarks.append(f"{advice(found.findings)}.")
     if following is not None:
         remarks.append(_next_step(following))
-    if found.verdict is Verdict.NOTHING_MISSING and refit and (changed := refit_in_words(refit)):
+    if (
+        found.verdict is Verdict.NOTHING_MISSING
+        and refit
+        and (changed := refit_in_words(refit, SCALED))
+    ):
         remarks.append(capitalised(changed))
     return Answer(
         headline=f"Axis {axis.axis}: {_headline(found)}",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.given_logs import Role
-from identify.output.words.numbers import PLAIN, Numbers, told_apart
+from identify.output.words.numbers import PLAIN, Numbers
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
@@ -175,33 +175,31 @@ def remainder_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str | 
     return f"what remains{beside} is {error}, {fit.ratio:.1f} times the noise floor"
 
 
-def change_in_words(change: Change) -> str:
+def change_in_words(change: Change, numbers: Numbers = PLAIN) -> str:
     """E.g. "mass 15 -> 15.6 kg changes the force by 0.57 N (payload_mass gives the same force)"."""
     force = units_of(change.force_unit).words("force")
     same = ""
     if change.alike:
         verb = "give" if len(change.alike) > 1 else "gives"
         same = f" ({' and '.join(change.alike)} {verb} the same {force})"
-    values = f"{' -> '.join(told_apart(change.before, change.after))} {change.unit}"
-    by = f"{change.force:.3g} {change.force_unit}"
+    values = " -> ".join(numbers.change(change.before, change.after, change.unit))
+    by = numbers.amount(change.force, change.force_unit)
     return f"{change.label} {values} changes the {force} by {by}{same}"
 
 
-def refit_in_words(refit: Refit) -> str | None:
+def refit_in_words(refit: Refit, numbers: Numbers = PLAIN) -> str | None:
     """What fitting changed of the given model, or None where its values were good."""
     if not refit.changes:
         return None
-    changes = ", ".join(change_in_words(c) for c in refit.changes)
+    changes = ", ".join(change_in_words(c, numbers) for c in refit.changes)
     error = units_of(refit.unit).words("force error")
-    return (
-        f"with the given values the {error} is {refit.given:.3g} {refit.unit}, after the fit "
-        f"{refit.refitted:.3g} {refit.unit}: {changes}"
-    )
+    given, refitted = (numbers.amount(e, refit.unit) for e in (refit.given, refit.refitted))
+    return f"with the given values the {error} is {given}, after the fit {refitted}: {changes}"
 
 
-def moved_in_words(moved: MovedParameter) -> str:
+def moved_in_words(moved: MovedParameter, numbers: Numbers = PLAIN) -> str:
     """How a parameter of the base changed when an effect was added."""
-    values = f"from {' to '.join(told_apart(moved.before, moved.after))} {moved.unit}"
+    values = f"from {' to '.join(numbers.change(moved.before, moved.after, moved.unit))}"
     if moved.collapsed:
         return f"{moved.label} collapsed {values}: it had taken over the missing effect's force"
     return f"{moved.label} moved {values}: more than it scatters between blocks of the logs"

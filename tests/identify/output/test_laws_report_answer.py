@@ -92,7 +92,7 @@ def test_the_answer_for_an_ambiguity():
     ]
     assert second.headline == "Axis y: nothing is missing"
     assert second.tone is Tone.PLAIN
-    words = refit_in_words(made.refit_of(0.01))
+    words = refit_in_words(made.refit_of(0.01), SCALED)
     assert second.remarks[-1] == f"{words[0].upper()}{words[1:]}."
     assert second.remarks[0].startswith("Nearest candidate: constant force, ΔBIC 66.0")
     assert second.remarks[0].endswith("not supported.")
@@ -234,7 +234,8 @@ def test_notes_are_said_once():
     (listing,) = notes.section(subject).blocks
     assert listing.items.count("Axis x, cogging added: mass moved.") == 1
     told = [i for i in listing.items if i.startswith("Axis x: ")]
-    expected = remarks_module.remarks(made.diagnosis_of(), made.refit_of(0.0))
+    expected = remarks_module.remarks(made.diagnosis_of(), made.refit_of(0.0), numbers=SCALED)
+    assert "after the fit 127 mN" in expected[0]
     assert told == [f"Axis x: {r.removesuffix('.')}." for r in expected]
     assert notes.section(subject_of(history=())) is None
     refused = replace(made.diagnosed(), next_experiments={}, not_planned={"x": "no travel"})
