@@ -124,8 +124,8 @@ def _beside_decoys(finding: Finding) -> list[str]:
     gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.decoy))
     where = " in a typical stretch of the log" if finding.proof.typical else ""
     return [
-        f"of the squared error left without it{where}, it takes {gain:.0f} %, where 1 in 20 decoys "
-        f"(its force shifted in time) takes {decoy:.0f} % or more"
+        f"tried beside decoys (its force shifted in time) it takes {gain:.0f} % of the squared "
+        f"error left without it{where}, 1 in 20 of them {decoy:.0f} % or more"
     ]
 
 
@@ -172,7 +172,8 @@ def remainder_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str | 
     fit = found.with_named
     error = numbers.amount(fit.error, fit.axis.units.force)
     beside = " beside the named effects" if found.named else ""
-    return f"what remains{beside} is {error}, {fit.ratio:.1f} times the noise floor"
+    ratio = f"{fit.ratio:.1f} times the noise floor"
+    return f"what remains{beside} is {error} on the fit logs, {ratio}"
 
 
 def change_in_words(change: Change, numbers: Numbers = PLAIN) -> str:

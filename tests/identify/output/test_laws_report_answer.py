@@ -106,13 +106,13 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     left = made.diagnosis_of(unexplained=made.STRUCTURE, findings=made.FOUND)
     card, _ = cards(made.diagnosed(left))
     assert card.sentence.startswith(
-        f"{SEVERAL} What remains beside the named effects is 3.19 N, "
+        f"{SEVERAL} What remains beside the named effects is 3.19 N on the fit logs, "
         "1.6 times the noise floor. The error depends most on other axis position"
     )
     where = region_in_words(made.LEFT_OVER, SCALED)
     assert card.sentence.endswith(f"It is largest at {where}.")
     assert [r.split(" explains ")[0] for r in card.remarks[:2]] == ["Cogging", "Lugre"]
-    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N; of the squared"
+    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N; tried beside"
     assert told in card.remarks[0]
     assert "need not sum to 100 %" in card.remarks[2]
     assert not any("is at its noise floor" in r for r in card.remarks)

@@ -71,13 +71,14 @@ def test_a_diagnosis():
     ]
     assert rest[:4] == [
         "cogging explains 87 % of the squared error above the noise floor: without it the error "
-        "on the selection logs is 7.17 N, with it 2.19 N; of the squared error left without it, it "
-        "takes 81 %, where 1 in 20 decoys (its force shifted in time) takes 14 % or more; "
-        f"{sure[0]}",
+        "on the selection logs is 7.17 N, with it 2.19 N; tried beside decoys (its force shifted "
+        "in time) it takes 81 % of the squared error left without it, 1 in 20 of them 14 % or "
+        f"more; {sure[0]}",
         "lugre explains 12 % of the squared error above the noise floor: without it the error on "
         f"the selection logs is 3.23 N, with it 2.19 N; {sure[1]}",
         *shares_in_words(x),
-        "what remains beside the named effects is 3.19 N, 1.6 times the noise floor",
+        "what remains beside the named effects is 3.19 N on the fit logs, 1.6 times the noise "
+        "floor",
     ]
     rest = rest[4:]
     assert rest[:3] == [
@@ -136,8 +137,8 @@ def test_nothing_is_said_of_held_out_logs_where_there_are_none():
 def test_a_decoy_is_explained_where_it_is_told():
     short = replace(made.FOUND[0], proof=Proof(0.94, 0.05, typical=True))
     assert (
-        "left without it in a typical stretch of the log, it takes 94 %, where 1 in 20 decoys (its "
-        "force shifted in time) takes 5 % or more"
+        "; tried beside decoys (its force shifted in time) it takes 94 % of the squared error left "
+        "without it in a typical stretch of the log, 1 in 20 of them 5 % or more; "
     ) in finding_in_words(short)
     assert "decoy" not in finding_in_words(made.FOUND[1])
 
