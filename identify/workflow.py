@@ -21,6 +21,7 @@ from identify.measure import cable_force, velocity_map
 from identify.output.addition import Addition, addition
 from identify.output.results import Comparison, Diagnosis, FitResult, SimulationFit
 from identify.selection.candidates import try_effect, usable
+from identify.selection.confounded import refit
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone, reshaped
 from identify.selection.scoring import score
@@ -161,9 +162,11 @@ def diagnose(
     regions = {
         axis: worst_region(d.with_named, d.dataset) for axis, d in axes.items() if d.unexplained
     }
+    # Of the fit that the answer starts from: a diagnosis may correct another channel delay.
+    refits = {axis: refit(result.given.axes[axis], d.base, known) for axis, d in axes.items()}
     return Diagnosis(
         result.model, axes, _compared(result.model, result.datasets, progress), plans,
-        result.refits, tuple(name for name in catalogue if name not in known), not_planned,
+        refits, tuple(name for name in catalogue if name not in known), not_planned,
         {axis: region for axis, region in regions.items() if region},
     )  # fmt: skip
 

@@ -56,6 +56,12 @@ class Addition:
         return also_chose_in_words(Role.SELECTION if held else Role.TRAINING)
 
     @property
+    def judged_by(self) -> str:
+        """What judged the effect beside the evidence of the fit logs."""
+        held = self.step.holdout_error_after is not None
+        return "the held-out logs" if held else "the cross-validation on blocks of the fit logs"
+
+    @property
     def units(self) -> AxisUnits:
         """Of the axis that the effect was added to."""
         return self.candidate.fit.axis.units

@@ -10,7 +10,7 @@ from identify.experiment_design.plan import Plan
 from identify.output.addition import Addition
 from identify.output.results import Comparison, FitResult
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
-from identify.output.words.experiment_design import gap_in_words, not_run_in_words
+from identify.output.words.experiment_design import gap_in_words, in_order, not_run_in_words
 from identify.output.words.validation import loop_in_words, region_in_words
 from identify.selection.confounded import Refit
 from identify.validation.misfit_maps import AxisComparison
@@ -149,7 +149,7 @@ def plan_json(result: Plan) -> dict[str, Any]:
         "missing_motion": gap_in_words(result.gap),
         "excited_by": dict(result.excited_by),
         **_simulated(result.chosen, several),
-        "ranking": [_simulated(t, several) for t in result.ranking],
+        "ranking": [_simulated(t, several) for t in in_order(result)],
         "not_run": [not_run_in_words(n) for n in result.not_run],
     }
 

@@ -11,6 +11,7 @@ from identify.output.as_json import plan_json, refit_json
 from identify.output.remarks import remarks_on
 from identify.output.results import Diagnosis
 from identify.output.words.selection import advice, verdict_in_words
+from identify.output.words.steps import not_named_in_words, together_in_words
 from identify.selection.diagnosis import AxisDiagnosis, Step
 from identify.selection.findings import Finding
 from identify.selection.found_shape import FoundShape
@@ -42,7 +43,10 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "ranking": [_candidate(c) for c in d.ranking],
         "ambiguous_with": list(d.ambiguous_with),
         "missing": list(d.named),
-        "steps": [_step(s) for s in d.steps],
+        "steps": [
+            {**_step(s), "not_named": not_named_in_words(d, i)} for i, s in enumerate(d.steps)
+        ],
+        "needed_together": together_in_words(d),
         "unexplained": dependence
         and {
             "share_of_error": dependence.share_of_error,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from identify.estimation.fit import Outcome
 from identify.output.words.estimation import outcome_in_words, prepared_in_words
+from identify.output.words.numbers import PLAIN, Numbers
 from identify.output.words.selection import (
     also_chose_in_words,
     moved_in_words,
@@ -20,10 +21,14 @@ if TYPE_CHECKING:  # results print themselves, with these sentences
     from identify.output.results import Diagnosis
 
 
-def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
+def remarks_on(result: Diagnosis, axis: str, numbers: Numbers = PLAIN) -> tuple[str, ...]:
     """What a reader should know beside the answer for one axis."""
     return remarks(
-        result.axes[axis], result.refits.get(axis), result.not_tried, result.not_planned.get(axis)
+        result.axes[axis],
+        result.refits.get(axis),
+        result.not_tried,
+        result.not_planned.get(axis),
+        numbers,
     )
 
 
@@ -32,6 +37,7 @@ def remarks(
     refit: Refit | None,
     not_tried: Sequence[str] = (),
     not_planned: str | None = None,
+    numbers: Numbers = PLAIN,
 ) -> tuple[str, ...]:
     """Channel delays, fits that did not converge, changed parameters, weak evidence.
 
@@ -40,7 +46,7 @@ def remarks(
     """
     words = found.base.axis.units.words
     out = []
-    if refit and (changed := refit_in_words(refit)):
+    if refit and (changed := refit_in_words(refit, numbers)):
         out.append(changed)
     out += prepared_in_words(found.dataset)
     if found.base.ended is not Outcome.CONVERGED:
@@ -50,7 +56,7 @@ def remarks(
         if found.best.fit.ended is not Outcome.CONVERGED:
             out.append(f"with {name}: {words(outcome_in_words(found.best.fit.ended))}")
         moved = moved_parameters(found.base, found.best.fit)
-        out += [f"with {name}, {words(moved_in_words(m))}" for m in moved]
+        out += [f"with {name}, {words(moved_in_words(m, numbers))}" for m in moved]
     if found.repeat is not None:
         out.append(repeat_in_words(found.repeat))
     if not found.dataset.holdout:

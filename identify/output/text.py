@@ -5,43 +5,50 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from identify.estimation.intervals import Estimate, NoInterval, refusal
-from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
-from identify.experiment_design.rival_hypotheses import STRENGTH
 from identify.output.remarks import remarks_on
 from identify.output.words.estimation import (
     no_interval_in_words,
     outcome_in_words,
     prepared_in_words,
 )
-from identify.output.words.experiment_design import gap_in_words, not_run_in_words
+from identify.output.words.experiment_design import (
+    experiment_in_words,
+    gap_in_words,
+    in_order,
+    not_run_in_words,
+    supposed_in_words,
+)
 from identify.output.words.selection import (
     advice,
     dependence_in_words,
-    effect_in_words,
     finding_in_words,
     named_errors_in_words,
+    named_in_words,
     nonparametric_in_words,
     refit_in_words,
     remainder_in_words,
     shape_in_words,
+    shares_in_words,
     step_in_words,
+    tested_on,
+    ties_in_words,
     verdict_in_words,
 )
+from identify.output.words.steps import step_lines, support_in_words, together_in_words
 from identify.output.words.validation import (
     correlation_in_words,
     loop_in_words,
     region_in_words,
 )
-from identify.selection.diagnosis import Step
 from identify.selection.nonparametric import nonparametric_labels
 from identify.selection.scoring import Candidate
 from twin.experiments.file import in_short
-from twin.experiments.kinds import kind_of
 
 if TYPE_CHECKING:  # results print themselves by these functions
     from identify.output.addition import Addition
     from identify.output.results import Comparison, Diagnosis, FitResult
+    from identify.selection.diagnosis import AxisDiagnosis
     from identify.validation.misfit_maps import AxisComparison
 
 
@@ -121,18 +128,19 @@ def diagnose_text(result: Diagnosis) -> str:
     lines = []
     for axis, d in result.axes.items():
         unit, words = d.base.axis.units.force, d.base.axis.units.words
-        named = f" {effect_in_words(d, d.best.effect.name)}." if d.best else ""
+        named = f" {named_in_words(d)}." if d.named else ""
         lines.append(f"axis {axis}: {words(verdict_in_words(d))}{named}")
         lines.append(
             f"  {words('force error')} {d.base.error:.4g} {unit}, noise floor "
             f"{d.base.floor:.4g} {unit} (ratio {d.base.ratio:.2f})"
         )
         lines.append(f"  {named_errors_in_words(d)}")
-        if d.ambiguous_with:
-            lines.append(f"  these data cannot separate it from: {', '.join(d.ambiguous_with)}")
+        lines += [f"  {tie}" for tie in ties_in_words(d)]
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         lines += [f"  {words(finding_in_words(f))}" for f in d.findings]
+        lines += [f"  {shares}" for shares in shares_in_words(d)]
+        lines += [f"  {together}" for together in together_in_words(d)]
         shapes = [shape_in_words(f.effect, f.shape) for f in d.findings if f.shape]
         lines += [f"  {words(text)}" for text in shapes]
         if remains := remainder_in_words(d):
@@ -142,31 +150,17 @@ def diagnose_text(result: Diagnosis) -> str:
             if axis in result.left_over:
                 lines.append(f"  it is largest at {words(region_in_words(result.left_over[axis]))}")
             lines.append(f"  {advice(d.findings)}")
-        lines += [_ranking_line(c) for c in d.ranking[:4]]
-        lines += [_step_line(i, s) for i, s in enumerate(d.steps, start=1)]
+        lines += [_ranking_line(c, d) for c in d.ranking[:4]]
+        lines += [f"  {line}" for line in step_lines(d)]
         lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]
     return "\n".join(lines)
 
 
-def _step_line(number: int, step: Step) -> str:
-    gain = step.candidate.gain
-    if step.candidate.is_noise:
-        return (
-            f"  step {number}: {step.candidate.effect.name} explains the remaining error as noise"
-        )
-    dropped = f"; no longer needed: {', '.join(step.dropped)}" if step.dropped else ""
-    beside = f" beside {step.beside}" if step.beside else ""
+def _ranking_line(c: Candidate, found: AxisDiagnosis) -> str:
+    unit = c.fit.axis.units.force
+    tail = "" if c.supported else f"   {support_in_words(found, c)}"
     return (
-        f"  step {number}: with {step.candidate.effect.name}{beside} the held-out error falls from "
-        f"{gain.before:.4g} to {gain.after:.4g} "
-        f"{step.candidate.fit.axis.units.force}{dropped}"
-    )
-
-
-def _ranking_line(c: Candidate) -> str:
-    unit, tail = c.fit.axis.units.force, "" if c.supported else "   not supported"
-    return (
-        f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   held-out error "
+        f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   {tested_on(found)} error "
         f"{c.gain.before:.4g} -> {c.gain.after:.4g} {unit}{tail}"
     )
 
@@ -190,22 +184,10 @@ def plan_text(result: Plan) -> str:
     lines += [f"  {name} is excited by {motion}" for name, motion in result.excited_by.items()]
     if result.favoured:
         lines.append(f"  the existing logs already favour {result.favoured}")
-    if result.supposed and several:
-        lines.append(
-            f"  no logs given: each effect is assumed at {STRENGTH:g} times the noise floor"
-        )
-    lines += [_experiment_line(t, several) for t in result.ranking[:SHOWN]]
+    if supposed := supposed_in_words(result):
+        lines.append(f"  {supposed}")
+    lines += [f"  {experiment_in_words(t, result)}" for t in in_order(result)[:SHOWN]]
     return "\n".join([*lines, *(f"  not run: {not_run_in_words(n)}" for n in result.not_run)])
-
-
-def _experiment_line(t: SimulatedExperiment, several: bool) -> str:
-    tail = f"{t.gain:8.1f} nats on the parameters"
-    if several:
-        tail = (
-            f"{t.difference:.3g} {t.units.force} unexplained by the rival "
-            f"({t.difference / t.floor:.1f} x noise floor), evidence {t.gain:.1f}"
-        )
-    return f"  {kind_of(t.experiment):10s} {t.duration:5.1f} s   {tail}"
 
 
 def add_text(result: Addition) -> str:
@@ -233,7 +215,8 @@ def add_text(result: Addition) -> str:
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
         lines.append(
-            "  the data do not support this effect: evidence and held-out error do not both favour "
-            "it"
+            f"  the data do not support this effect: the evidence and {result.judged_by} do not "
+            "both favour it alone; if a diagnosis says that it needs another beside it, add that "
+            "to the new model and judge then"
         )
     return "\n".join(lines)

@@ -152,7 +152,7 @@ def _same(force: Array) -> float:
 
 @dataclass(frozen=True)
 class MovedParameter:
-    """A parameter that an added effect changed by more than its interval.
+    """A parameter that an added effect changed by more than it scatters between blocks of the logs.
 
     before, after: in ``unit``. collapsed: whether hardly any of a linear parameter is left, so that
     it had taken over the force of the effect that was missing.

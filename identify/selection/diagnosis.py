@@ -116,6 +116,11 @@ class AxisDiagnosis:
         """Test errors without and with what is named; without test logs, of those that chose."""
         return Errors.of(self.base, self.with_named, self.dataset, self.dataset.tested_on)
 
+    @cached_property
+    def chosen(self) -> Errors:
+        """The same errors on the logs that chose."""
+        return Errors.of(self.base, self.with_named, self.dataset, self.dataset.chosen_on)
+
     @property
     def best(self) -> Candidate | None:
         """The candidate that is named first, where one is."""

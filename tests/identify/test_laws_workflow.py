@@ -80,7 +80,8 @@ def test_a_parameter_moved_where_it_leaves_both_intervals(monkeypatch, f0, told)
     if told:
         (only,) = found
         assert moved_in_words(only) == (
-            f"constant_force.F0 moved from 1 to {f0:.4g} N: more than its interval"
+            f"constant_force.F0 moved from 1 to {f0:.4g} N: more than it scatters between "
+            "blocks of the logs"
         )
 
 
@@ -183,7 +184,8 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
         progress(1, 2)
         told = SimpleNamespace(
             axis=dataset.axis, fit=fit, catalogue=catalogue, dataset=dataset,
-            with_named=f"fit of {dataset.axis}", unexplained=dataset.axis == "y",
+            base=f"base of {dataset.axis}", with_named=f"fit of {dataset.axis}",
+            unexplained=dataset.axis == "y",
         )  # fmt: skip
         return SimpleNamespace(with_findings=lambda: told)
 
@@ -194,6 +196,7 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
     monkeypatch.setattr(workflow, "next_experiments", lambda *given: (given, "not planned"))
     monkeypatch.setattr(workflow, "_compared", lambda *given: given)
     monkeypatch.setattr(workflow, "worst_region", lambda *given: given)
+    monkeypatch.setattr(workflow, "refit", lambda *given: given)
     progress = lambda *done: bars.append(done)  # noqa: E731
     found = workflow.diagnose(
         described,
@@ -213,7 +216,9 @@ def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
     assert found.next_experiments == (found.axes, result.model, 0.07)
     assert found.not_planned == "not planned"
     assert found.comparison == (result.model, result.datasets, progress)
-    assert found.refits is result.refits
+    assert found.refits == {a: (made.MODEL.axes[a], f"base of {a}", "known") for a in "xy"}, (
+        "of the fit that the answer starts from"
+    )
     assert found.left_over == {"y": ("fit of y", result.datasets["y"])}
 
 

@@ -14,12 +14,15 @@ from identify.output.words.numbers import capitalised
 from identify.output.words.selection import (
     advice,
     dependence_in_words,
-    effect_in_words,
     finding_in_words,
+    named_in_words,
     refit_in_words,
     remainder_in_words,
+    shares_in_words,
+    tested_on,
     verdict_in_words,
 )
+from identify.output.words.steps import support_in_words, together_in_words
 from identify.output.words.validation import region_in_words
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.scoring import Candidate
@@ -59,14 +62,20 @@ def _diagnosed(
         axis.units.words(f"{capitalised(spaced(finding_in_words(f, SCALED)))}")
         for f in found.findings
     )
+    remarks.extend(capitalised(text) for text in shares_in_words(found))
     if found.best is not None and not found.findings:
         remarks.append(_left_over(found.best))
+    remarks.extend(capitalised(text) for text in together_in_words(found))
     remarks.extend(_runner_up(found))
     if found.unexplained is not None:
         remarks.append(f"{advice(found.findings)}.")
     if following is not None:
         remarks.append(_next_step(following))
-    if found.verdict is Verdict.NOTHING_MISSING and refit and (changed := refit_in_words(refit)):
+    if (
+        found.verdict is Verdict.NOTHING_MISSING
+        and refit
+        and (changed := refit_in_words(refit, SCALED))
+    ):
         remarks.append(capitalised(changed))
     return Answer(
         headline=f"Axis {axis.axis}: {_headline(found)}",
@@ -78,11 +87,9 @@ def _diagnosed(
 
 
 def _headline(found: AxisDiagnosis) -> str:
-    first, *more = [spaced(effect_in_words(found, name)) for name in found.named] or [""]
-    either = " or ".join([first, *map(spaced, found.ambiguous_with)])
     match found.verdict:
         case Verdict.MISSING_EFFECTS:
-            return f"{' and '.join([either, *more])} {'are' if more else 'is'} missing"
+            return f"{spaced(named_in_words(found))} {'are' if found.named[1:] else 'is'} missing"
         case Verdict.WRONG_SHAPE:
             return f"{spaced(found.findings[0].effect)} has another shape"
         case Verdict.UNEXPLAINED:
@@ -109,7 +116,7 @@ def _runner_up(found: AxisDiagnosis) -> list[str]:
     second = others[0]
     change = _change(found.dataset.units.force, second.gain.before, second.gain.after)
     role = "Runner-up" if found.best else "Nearest candidate"
-    verdict = "supported" if second.supported else "not supported"
+    verdict = support_in_words(found, second)
     return [
         f"{role}: {spaced(second.effect.name)}, ΔBIC {number(second.delta_bic)}, "
         f"{tested_on(found)} error {change}, {verdict}."
@@ -133,37 +140,43 @@ def _change(unit: str, before: float, after: float) -> str:
     return f"{number(before / scale.size)} → {scale.text(after)}"
 
 
-def tested_on(found: AxisDiagnosis) -> str:
-    """On what data a candidate was judged."""
-    return "held-out" if found.dataset.holdout else "cross-validated"
-
-
 def _tiles(axis: AxisComparison, found: AxisDiagnosis) -> list[Tile]:
     base, best = found.base, found.best
     unit, words = axis.units.force, axis.units.words
     if best is None:
         errors = _error_tiles(base.error, base.floor, axis.units)
         return [*errors, *_test_tile(found), *_position_tile(axis, "")]
-    name, gain = spaced(best.effect.name), best.gain
+    final = found.with_named
+    named = spaced(best.effect.name) if len(found.named) == 1 else "all that is named"
     return [
         Tile(
             words("Force error on the fit logs"),
-            _change(unit, base.error, best.fit.error),
-            f"with {name}, RMS",
+            _change(unit, base.error, final.error),
+            f"with {named}, RMS",
         ),
-        Tile(
-            words(f"{tested_on(found).capitalize()} force error"),
-            _change(unit, gain.before, gain.after),
-            f"t = {number(gain.t)} over blocks",
-        ),
+        *_chosen_tile(found, named),
         *_test_tile(found),
         Tile(
             "Error over noise floor",
-            f"{number(base.ratio)} → {number(best.fit.ratio)}",
-            f"floor {quantity(base.floor, unit)} RMS",
+            f"{number(base.error / final.floor)} → {number(final.ratio)}",
+            f"fit logs; floor {quantity(final.floor, unit)} RMS",
         ),
-        *_position_tile(axis, f", without {name}"),
+        *_position_tile(axis, f", without {named}"),
     ]
+
+
+def _chosen_tile(found: AxisDiagnosis, named: str) -> list[Tile]:
+    """The error on held-out logs; without them one effect has the error of cross-validation."""
+    units = found.dataset.units
+    if found.dataset.holdout:
+        chosen = found.chosen
+        error = _change(units.force, chosen.before, chosen.after)
+        return [Tile(units.words("Held-out force error"), error, f"with {named}, RMS")]
+    if found.best is None or len(found.named) > 1:
+        return []
+    gain = found.best.gain
+    error, t = _change(units.force, gain.before, gain.after), f"t = {number(gain.t)} over blocks"
+    return [Tile(units.words("Cross-validated force error"), error, t)]
 
 
 def _test_tile(found: AxisDiagnosis) -> list[Tile]:
@@ -237,10 +250,11 @@ def _added(addition: Addition) -> Answer:
         replayed = f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo"
         tiles.append(Tile(words("Position, free run"), moved, replayed))
     outcome = "given the shape found" if step.action == "shape" else "added"
-    sentence = "The evidence and the held-out logs support the effect."
+    sentence = f"The evidence and {addition.judged_by} support the effect."
     if not addition.kept:
         sentence = (
-            "The evidence and the held-out logs do not both support this effect; leave it out."
+            f"The evidence and {addition.judged_by} do not both support this effect; leave it out, "
+            "unless a diagnosis says that it needs another beside it."
         )
     return Answer(
         headline=f"Axis {step.axis}: {spaced(step.effect)} {outcome}",

@@ -72,6 +72,8 @@ def _draw(axes: Axes, found: MisfitMap, scale: Scale, lowest: float, units: Axis
     axes.set_ylim(bottom=low)
     name = NAMES.get(found.coordinate, title_case(found.coordinate))
     axes.set_xlabel(along.label(units_of(found.unit).words(name)))
+    if found.coordinate == "standstill":
+        axes.set_xticks([0.0, 1.0], ["moving", "at rest"])
     if found.coordinate == "frequency":
         axes.set_xscale("log")
         _plain_decades(axes.xaxis)

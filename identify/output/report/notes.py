@@ -5,7 +5,7 @@ from __future__ import annotations
 from identify.output.remarks import remarks_on
 from identify.output.report.blocks import Listing, Section
 from identify.output.report.subject import Subject
-from identify.output.report.units import spaced
+from identify.output.report.units import SCALED, spaced
 
 
 def section(subject: Subject) -> Section | None:
@@ -15,7 +15,7 @@ def section(subject: Subject) -> Section | None:
         if subject.diagnosis is not None and subject.diagnosed(axis.axis) is not None:
             notes.extend(
                 f"Axis {axis.axis}: {_sentence(note)}"
-                for note in remarks_on(subject.diagnosis, axis.axis)
+                for note in remarks_on(subject.diagnosis, axis.axis, SCALED)
             )
     for step in (*subject.steps, *(a.step for a in subject.additions)):
         done = "given the shape found" if step.action == "shape" else "added"

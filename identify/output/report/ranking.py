@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from identify.output.report.answer import tested_on
 from identify.output.report.blocks import Block, Column, Heading, Picture, Row, Section, Table, Tone
 from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, number, quantity, spaced, title_case
+from identify.output.words.selection import tested_on
+from identify.output.words.steps import partner
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.scoring import Candidate
 
@@ -80,7 +81,7 @@ def _table(found: AxisDiagnosis) -> Table:
                 number(c.delta_bic),
                 scale.text(c.gain.before),
                 scale.text(c.gain.after),
-                "yes" if c.supported else "no",
+                "yes" if c.supported else _unsupported(found, c),
                 values_of(c) if rank < WITH_VALUES else "",
             ),
             _tone(found, c),
@@ -100,6 +101,12 @@ def _table(found: AxisDiagnosis) -> Table:
         "data left out of the fit both favour the effect."
     )
     return Table(columns, rows, found.dataset.units.words(caption))
+
+
+def _unsupported(found: AxisDiagnosis, candidate: Candidate) -> str:
+    """No, unless it is one of two that are needed together."""
+    other = partner(found, candidate.effect.name)
+    return f"only together with {spaced(other)}" if other else "no"
 
 
 def _tone(found: AxisDiagnosis, candidate: Candidate) -> Tone:

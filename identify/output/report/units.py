@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identify.output.words.numbers import RAISED, Numbers
+from identify.output.words.numbers import RAISED, Numbers, told_apart
 
 PREFIXED = frozenset({"m", "m/s", "m/s^2", "N", "N m", "s", "A", "rad", "rad/s", "rad/s^2"})
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -118,4 +118,11 @@ def spaced(name: str) -> str:
     return name.replace("_", " ")
 
 
-SCALED = Numbers(quantity, span, number)  # how the sentences of the report write numbers
+def change(before: float, after: float, unit: str) -> tuple[str, str]:
+    """Two SI values in the unit that suits them, with digits that tell them apart."""
+    scale = Scale.of(unit, [before, after])
+    first, second = map(with_minus, told_apart(before / scale.size, after / scale.size))
+    return first, f"{second} {scale.unit}".rstrip()
+
+
+SCALED = Numbers(quantity, span, number, change)  # how the sentences of the report write numbers

@@ -104,12 +104,18 @@ def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
             for log, end in dataset.begun.items()
         ),
         *(
-            f"{log}: held out, but {100 * part:.0f} % of it lies at positions of axis "
-            f"{dataset.axis} where no fit log has been; there it tests nothing and is left out"
+            f"{log}: a {_role_of(log, dataset)} log, but {100 * part:.0f} % of it lies at "
+            f"positions of axis {dataset.axis} where no fit log has been; there it tests nothing "
+            "and is left out"
             for log, part in dataset.beyond.items()
             if part > WORTH_SAYING
         ),
     )
+
+
+def _role_of(log: str, dataset: Dataset) -> str:
+    """What a log beside the fit logs is given for."""
+    return "test" if log in [own.motion.name for own in dataset.test] else "held-out"
 
 
 def channel_delay_in_words(dataset: Dataset) -> str | None:

@@ -13,11 +13,15 @@ _MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
 
 @dataclass(frozen=True)
 class Numbers:
-    """amount: value, unit -> text; span: low, high, unit -> "low and high unit"; ratio: value."""
+    """How to write value and unit; low, high and unit; a ratio; values before and after, and unit.
+
+    The last are two texts, of which the second has the unit.
+    """
 
     amount: Callable[[float, str], str]
     span: Callable[[float, float, str], str]
     ratio: Callable[[float], str]
+    change: Callable[[float, float, str], tuple[str, str]]
 
 
 def _amount(value: float, unit: str) -> str:
@@ -32,7 +36,22 @@ def _ratio(value: float) -> str:
     return f"{value:.1f}"
 
 
-PLAIN = Numbers(_amount, _span, _ratio)  # SI units, for a terminal and for JSON
+def told_apart(before: float, after: float) -> tuple[str, str]:
+    """Two numbers with four digits, or with as many more as it takes to see that they differ."""
+    pair = f"{before:.4g}", f"{after:.4g}"
+    digits = 4
+    while pair[0] == pair[1] and before != after and digits < 15:
+        digits += 1
+        pair = f"{before:#.{digits}g}", f"{after:#.{digits}g}"
+    return pair
+
+
+def _change(before: float, after: float, unit: str) -> tuple[str, str]:
+    first, second = told_apart(before, after)
+    return first, f"{second} {unit}"
+
+
+PLAIN = Numbers(_amount, _span, _ratio, _change)  # SI units, for a terminal and for JSON
 
 
 def typeset(sentence: str) -> str:

@@ -22,9 +22,6 @@ from twin.model.machine import Fitted
 from twin.model.units import units_of
 
 VERDICTS = {
-    Verdict.MISSING_EFFECTS: (
-        "The model lacks an effect: the fit logs and the held-out logs prove it."
-    ),
     Verdict.NOTHING_MISSING: "Nothing is missing: the force error is at its noise floor.",
     Verdict.WRONG_SHAPE: (
         "The model has the effect, but its law has another shape than the force of the machine."
@@ -43,14 +40,43 @@ SEVERAL = "Several effects explain the error equally well; these data cannot sep
 
 def verdict_in_words(found: AxisDiagnosis) -> str:
     """The answer of a diagnosis."""
-    several = found.ambiguous_with or any(f.tied for f in found.findings)
-    return SEVERAL if several else VERDICTS[found.verdict]
+    if found.ambiguous_with or any(f.tied for f in found.findings):
+        return SEVERAL
+    if found.verdict is not Verdict.MISSING_EFFECTS:
+        return VERDICTS[found.verdict]
+    lacks, them = ("several effects", "them") if len(found.named) > 1 else ("an effect", "it")
+    if found.dataset.holdout:
+        return f"The model lacks {lacks}: the fit logs and the held-out logs prove {them}."
+    return (
+        f"The model lacks {lacks}: the fit logs prove {them}, block by block; no log was held out."
+    )
+
+
+def tested_on(found: AxisDiagnosis) -> str:
+    """On what data a candidate was judged."""
+    return "held-out" if found.dataset.holdout else "cross-validated"
 
 
 def effect_in_words(found: AxisDiagnosis, effect: str) -> str:
     """A named effect: "cogging", or "something like cogging" where the missing one resembles it."""
     alike = {f.effect for f in found.findings if f.kind is FindingKind.RESEMBLES}
     return f"something like {effect}" if effect in alike else effect
+
+
+def named_in_words(found: AxisDiagnosis) -> str:
+    """Every effect that is named, e.g. "cogging or wear, and lugre"; empty where none is."""
+    each = [" or ".join((effect_in_words(found, name), *alike)) for name, *alike in found.answers]
+    return (", and " if any(alike for _, *alike in found.answers) else " and ").join(each)
+
+
+def ties_in_words(found: AxisDiagnosis) -> list[str]:
+    """What these data cannot separate, one sentence a named effect, each pair once."""
+    ties = {f.effect: f.tied for f in found.findings} or {a[0]: a[1:] for a in found.answers}
+    said: list[str] = []
+    for name, alike in ties.items():
+        if {*alike} - {other for other in said if name in ties[other]}:
+            said.append(name)
+    return [f"these data cannot separate {name} from: {', '.join(ties[name])}" for name in said]
 
 
 def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
@@ -74,13 +100,33 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
         f"{what} {100.0 * finding.explains:.0f} % of the squared error above the noise floor: "
         f"{without} the {error} is {before}, {with_it} {after}"
     )
-    sure = f"confidence {100.0 * finding.confidence:.0f} %"
+    sure = (
+        f"confidence {100.0 * finding.confidence:.0f} %: {finding.left:.3g} times the "
+        f"noise floor is left on the {finding.chosen.on.value} logs"
+    )
+    return "; ".join((text, *_beside_decoys(finding), sure))
+
+
+def shares_in_words(found: AxisDiagnosis) -> list[str]:
+    """That the shares of several findings are no parts of one whole; nothing of a single one."""
+    if len(found.findings) < 2:
+        return []
+    return [
+        "each share is of that effect taken out alone, the others refitted, so the shares need not "
+        "sum to 100 %"
+    ]
+
+
+def _beside_decoys(finding: Finding) -> list[str]:
+    """What an effect takes beside what chance would; nothing where it has no decoys."""
     if finding.proof is None:
-        return f"{text}; {sure}"
+        return []
     gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.decoy))
-    of_it = "that of a typical part" if finding.proof.typical else "it all"
-    rarely = f"one decoy in twenty {decoy:.0f} % or more"
-    return f"{text}; of {of_it} it takes {gain:.0f} %, {rarely}; {sure}"
+    where = " in a typical stretch of the log" if finding.proof.typical else ""
+    return [
+        f"tried beside decoys (its force shifted in time) it takes {gain:.0f} % of the squared "
+        f"error left without it{where}, 1 in 20 of them {decoy:.0f} % or more"
+    ]
 
 
 def named_errors_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str:
@@ -126,39 +172,38 @@ def remainder_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str | 
     fit = found.with_named
     error = numbers.amount(fit.error, fit.axis.units.force)
     beside = " beside the named effects" if found.named else ""
-    return f"what remains{beside} is {error}, {fit.ratio:.1f} times the noise floor"
+    ratio = f"{fit.ratio:.1f} times the noise floor"
+    return f"what remains{beside} is {error} on the fit logs, {ratio}"
 
 
-def change_in_words(change: Change) -> str:
+def change_in_words(change: Change, numbers: Numbers = PLAIN) -> str:
     """E.g. "mass 15 -> 15.6 kg changes the force by 0.57 N (payload_mass gives the same force)"."""
     force = units_of(change.force_unit).words("force")
     same = ""
     if change.alike:
         verb = "give" if len(change.alike) > 1 else "gives"
         same = f" ({' and '.join(change.alike)} {verb} the same {force})"
-    values = f"{change.before:.4g} -> {change.after:.4g} {change.unit}"
-    by = f"{change.force:.3g} {change.force_unit}"
+    values = " -> ".join(numbers.change(change.before, change.after, change.unit))
+    by = numbers.amount(change.force, change.force_unit)
     return f"{change.label} {values} changes the {force} by {by}{same}"
 
 
-def refit_in_words(refit: Refit) -> str | None:
+def refit_in_words(refit: Refit, numbers: Numbers = PLAIN) -> str | None:
     """What fitting changed of the given model, or None where its values were good."""
     if not refit.changes:
         return None
-    changes = ", ".join(change_in_words(c) for c in refit.changes)
+    changes = ", ".join(change_in_words(c, numbers) for c in refit.changes)
     error = units_of(refit.unit).words("force error")
-    return (
-        f"with the given values the {error} is {refit.given:.3g} {refit.unit}, after the fit "
-        f"{refit.refitted:.3g} {refit.unit}: {changes}"
-    )
+    given, refitted = (numbers.amount(e, refit.unit) for e in (refit.given, refit.refitted))
+    return f"with the given values the {error} is {given}, after the fit {refitted}: {changes}"
 
 
-def moved_in_words(moved: MovedParameter) -> str:
+def moved_in_words(moved: MovedParameter, numbers: Numbers = PLAIN) -> str:
     """How a parameter of the base changed when an effect was added."""
-    values = f"from {moved.before:.4g} to {moved.after:.4g} {moved.unit}"
+    values = f"from {' to '.join(numbers.change(moved.before, moved.after, moved.unit))}"
     if moved.collapsed:
         return f"{moved.label} collapsed {values}: it had taken over the missing effect's force"
-    return f"{moved.label} moved {values}: more than its interval"
+    return f"{moved.label} moved {values}: more than it scatters between blocks of the logs"
 
 
 def repeat_in_words(repeat: Repeat) -> str:

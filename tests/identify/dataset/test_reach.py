@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from built_fits import axis_of, fitted
@@ -52,8 +54,15 @@ def test_what_lies_beyond_the_fit_logs_tests_nothing() -> None:
     position = held.test_function.mean(held.motion.position)
     assert position[~held.reached].min() > 0.03
     assert 0.2 < part < 0.6
-    (told,) = [text for text in prepared_in_words(beyond) if "held out" in text]
-    assert told.startswith(f"held 0: held out, but {100 * part:.0f} % of it lies at positions")
+    (told,) = [text for text in prepared_in_words(beyond) if "held-out" in text]
+    assert told.startswith(f"held 0: a held-out log, but {100 * part:.0f} % of it lies at pos")
+
+
+def test_a_test_log_is_not_called_held_out() -> None:
+    beyond = dataset_of(0.02)
+    tested = replace(beyond, holdout=(), test=beyond.holdout)
+    (told,) = [text for text in prepared_in_words(tested) if "no fit log has been" in text]
+    assert told.startswith("held 0: a test log, but ")
 
 
 def test_a_channel_delay_keeps_it() -> None:

@@ -75,10 +75,11 @@ def expected_answer(x):
         "steps": [
             {
                 **expected_candidate(s.candidate), "ambiguous_with": list(s.tied),
-                "dropped": list(s.dropped), "beside": s.beside,
+                "dropped": list(s.dropped), "beside": s.beside, "not_named": None,
             }
             for s in x.steps
         ],
+        "needed_together": [],
         "unexplained": {
             "share_of_error": 0.631, "depends_on": "other_axis_position", "period": 0.0273,
             "unit": "m",

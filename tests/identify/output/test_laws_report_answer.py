@@ -70,15 +70,17 @@ def cards(diagnosis=None, **changes):
 
 def test_the_answer_for_an_ambiguity():
     first, second = cards(made.diagnosed())
-    assert first.headline == "Axis x: cogging or quadratic drag and lugre are missing"
+    assert first.headline == "Axis x: cogging or quadratic drag, and lugre are missing"
     assert (first.sentence, first.tone) == (SEVERAL, Tone.STRONG)
     tiles = [(t.name, t.value, t.remark) for t in first.tiles]
-    ratio = f"{number(8.37 / 2.11)} → {number(1.19 / 1.03)}"
+    ratio = f"{number(8.37 / 2.03)} → {number(3.19 / 2.03)}"
+    chosen = made.diagnosed().axes["x"].chosen
+    held = answer._change("N", chosen.before, chosen.after)
     assert tiles == [
-        ("Force error on the fit logs", "8.37 → 1.19 N", "with cogging, RMS"),
-        ("Held-out force error", "7.13 → 2.17 N", "t = 9.10 over blocks"),
-        ("Error over noise floor", ratio, "floor 2.11 N RMS"),
-        ("Position, free run", "4.29 µm", "RMS of the worst log, without cogging"),
+        ("Force error on the fit logs", "8.37 → 3.19 N", "with all that is named, RMS"),
+        ("Held-out force error", held, "with all that is named, RMS"),
+        ("Error over noise floor", ratio, "fit logs; floor 2.03 N RMS"),
+        ("Position, free run", "4.29 µm", "RMS of the worst log, without all that is named"),
     ]  # fmt: skip
     assert first.remarks == [
         "With cogging the force error is at its noise floor.",
@@ -90,7 +92,7 @@ def test_the_answer_for_an_ambiguity():
     ]
     assert second.headline == "Axis y: nothing is missing"
     assert second.tone is Tone.PLAIN
-    words = refit_in_words(made.refit_of(0.01))
+    words = refit_in_words(made.refit_of(0.01), SCALED)
     assert second.remarks[-1] == f"{words[0].upper()}{words[1:]}."
     assert second.remarks[0].startswith("Nearest candidate: constant force, ΔBIC 66.0")
     assert second.remarks[0].endswith("not supported.")
@@ -104,14 +106,15 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     left = made.diagnosis_of(unexplained=made.STRUCTURE, findings=made.FOUND)
     card, _ = cards(made.diagnosed(left))
     assert card.sentence.startswith(
-        f"{SEVERAL} What remains beside the named effects is 3.19 N, "
+        f"{SEVERAL} What remains beside the named effects is 3.19 N on the fit logs, "
         "1.6 times the noise floor. The error depends most on other axis position"
     )
     where = region_in_words(made.LEFT_OVER, SCALED)
     assert card.sentence.endswith(f"It is largest at {where}.")
     assert [r.split(" explains ")[0] for r in card.remarks[:2]] == ["Cogging", "Lugre"]
-    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N; of it all"
+    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N; tried beside"
     assert told in card.remarks[0]
+    assert "need not sum to 100 %" in card.remarks[2]
     assert not any("is at its noise floor" in r for r in card.remarks)
 
 
@@ -119,7 +122,7 @@ def test_an_effect_that_a_missing_one_resembles():
     like = replace(made.FOUND[0], kind=FindingKind.RESEMBLES)
     card, _ = cards(made.diagnosed(made.diagnosis_of(findings=(like, made.FOUND[1]))))
     assert card.headline == (
-        "Axis x: something like cogging or quadratic drag and lugre are missing"
+        "Axis x: something like cogging or quadratic drag, and lugre are missing"
     )
     assert card.remarks[0].startswith("What is missing resembles cogging, in another shape; that ")
 
@@ -231,7 +234,8 @@ def test_notes_are_said_once():
     (listing,) = notes.section(subject).blocks
     assert listing.items.count("Axis x, cogging added: mass moved.") == 1
     told = [i for i in listing.items if i.startswith("Axis x: ")]
-    expected = remarks_module.remarks(made.diagnosis_of(), made.refit_of(0.0))
+    expected = remarks_module.remarks(made.diagnosis_of(), made.refit_of(0.0), numbers=SCALED)
+    assert "after the fit 127 mN" in expected[0]
     assert told == [f"Axis x: {r.removesuffix('.')}." for r in expected]
     assert notes.section(subject_of(history=())) is None
     refused = replace(made.diagnosed(), next_experiments={}, not_planned={"x": "no travel"})

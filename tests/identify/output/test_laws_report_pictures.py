@@ -157,6 +157,15 @@ def test_the_map_of_each_coordinate_has_its_error_above_its_noise():
     assert first.get_ylabel() == "RMS error (N)"
 
 
+def test_standstill_is_named_not_numbered():
+    rest = replace(
+        made.map_of("standstill", "1", 0.0), low=np.array([-0.5, 0.5]), high=np.array([0.5, 1.5]),
+        rms=np.array([0.2, 0.3]), floor=np.array([0.1, 0.1]), visited=np.ones(2),
+    )  # fmt: skip
+    (axes,) = maps._figure(replace(made.comparison_of(), maps=[rest])).axes
+    assert [t.get_text() for t in axes.get_xticklabels()] == ["moving", "at rest"]
+
+
 def test_the_least_error_of_a_bin_that_was_visited_sets_the_limit():
     low = replace(made.comparison_of().maps[0], rms=np.array([0.011, 0.5, 0.0013]))
     picture = maps.picture(replace(made.comparison_of(), maps=[low]))

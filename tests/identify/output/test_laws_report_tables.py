@@ -243,4 +243,4 @@ def test_values_as_given():
 @pytest.mark.parametrize(("low", "said"), [(0.0, "in motion"), (1.0, "at standstill")])
 def test_standstill_is_told_from_motion(low, said):
     place = Region("standstill", "1", low, low + 1.0, 0.1, 2.0, 0.5)
-    assert _place(place, Numbers(*(lambda *_: "" for _ in range(3)))) == said
+    assert _place(place, Numbers(*(lambda *_: "" for _ in range(4)))) == said

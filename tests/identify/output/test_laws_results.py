@@ -106,7 +106,7 @@ def test_an_added_effect_is_noted_by_what_it_moved_removed_and_replaced() -> Non
     added = built("cogging", fit=built_fit(0.1, axis=axis_of(fitted("cogging"))))
     plain = addition_notes(added, [moved, gone], ["empirical_map"])
     assert plain == (
-        "mass moved from 5 to 5.5 kg: more than its interval",
+        "mass moved from 5 to 5.5 kg: more than it scatters between blocks of the logs",
         "constant_force.F0 collapsed from 0.3 to 0.01 N: it had taken over the missing effect's "
         "force",
         "empirical_map was removed before cogging was added; add it again for the error that is "

@@ -11,7 +11,9 @@ from built_fits import CATALOGUE, built_fit, fitted
 
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import NotExcited
+from identify.experiment_design.candidate_experiments import NotRun
 from identify.experiment_design.missing_excitation import Gap
+from identify.output.as_json import plan_json
 from identify.output.machine_text import check_text, effect_text, effects_text
 from identify.output.text import (
     add_text,
@@ -21,7 +23,7 @@ from identify.output.text import (
     plan_text,
 )
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
-from identify.output.words.experiment_design import gap_in_words
+from identify.output.words.experiment_design import gap_in_words, in_order
 from identify.output.words.selection import (
     moved_in_words,
     refit_in_words,
@@ -113,11 +115,18 @@ def test_a_plan_between_two():
     assert lines[2] == "  missing motion: speed 0.0137 to 0.0591 m/s; 1.2 % of the data is there"
     assert lines[3] == "  cogging is excited by slow passes"
     assert lines[4] == "  the existing logs already favour wear"
-    assert lines[5] == "  no logs given: each effect is assumed at 10 times the noise floor"
-    assert [" ".join(line.split()) for line in lines[6:]] == [
-        "passes 8.3 s 0.0412 N unexplained by the rival (3.6 x noise floor), evidence 57.3",
-        "tracking 9.9 s 0.0287 N unexplained by the rival (2.7 x noise floor), evidence 31.9",
+    assert lines[5] == (
+        "  no logs given: each effect that the model lacks is assumed at 10 times the noise floor"
+    )
+    assert lines[6:] == [
+        "  passes: axis x, span 0.0831 m, speed 0.0127 m/s, repeats 7; 8.3 s: evidence 57.3, 0.0412"
+        " N unexplained by the rival (3.6 x noise floor)",
+        "  tracking: duration 9.7 s; 9.9 s: evidence 31.9, 0.0287 N unexplained by the rival (2.7 x"
+        " noise floor)",
     ]
+    models = made.plan_of("a.toml", "b.toml", supposed=True, excited_by={})
+    assert "the models are compared with the values in their files" in plan_text(models)
+    assert "assumed" not in plan_text(models)
     weak = replace(made.TRIALS[0], gain=10.0)
     text = plan_text(made.plan_of("cogging", "wear", ranking=(weak,)))
     assert "not decided by any experiment of this length" in text
@@ -125,11 +134,26 @@ def test_a_plan_between_two():
     assert len(many.splitlines()) == 4 + 4
 
 
+def test_the_experiments_of_a_plan_are_in_order_of_evidence():
+    """After the chosen one; more than its evidence is a linear step's, which was not refitted."""
+    first, second = made.TRIALS
+    weak, strong = replace(second, gain=9.0), replace(second, gain=91.0)
+    impossible = replace(second, gain=0.0, not_run=NotRun(second.experiment, "too far"))
+    plan = made.plan_of("cogging", "wear", ranking=(first, weak, impossible, strong))
+    assert in_order(plan) == [first, strong, weak]
+    rows = plan_text(plan).splitlines()[4:]
+    assert [re.search(r"evidence (\S+?),", row)[1] for row in rows] == ["57.3", "91.0", "9.0"]
+    assert ["by one linear step" in row for row in rows] == [False, True, False]
+    assert [t["delta_bic"] for t in plan_json(plan)["ranking"]] == [57.3, 91.0, 9.0]
+
+
 def test_a_plan_for_one_model():
     lines = plan_text(made.plan_of("the stage", supposed=True)).splitlines()
     assert lines[0] == "axis x: the parameters of the stage, best constrained by"
     assert [" ".join(line.split()) for line in lines[4:]] == [
-        "passes 8.3 s 57.3 nats on the parameters", "tracking 9.9 s 31.9 nats on the parameters",
+        "passes: axis x, span 0.0831 m, speed 0.0127 m/s, repeats 7; 8.3 s: 57.3 nats on the "
+        "parameters",
+        "tracking: duration 9.7 s; 9.9 s: 31.9 nats on the parameters",
     ]  # fmt: skip
 
 
@@ -167,7 +191,8 @@ def test_an_addition(kept):
     tested = replace(made.addition(kept), step=made.STEPS[1])
     assert "force error on the test logs      5.03 -> 2.83 N" in add_text(tested)
     assert "took part in the choice" not in add_text(tested)
-    unheld = add_text(replace(made.addition(), step=made.STEPS[2]))
+    unheld = add_text(replace(made.addition(kept), step=made.STEPS[2]))
+    assert ("the cross-validation on blocks of the fit logs do not" in unheld) is not kept
     assert "held-out" not in unheld
     assert "added wear to axis y" in unheld
 

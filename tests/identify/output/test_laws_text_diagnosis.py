@@ -14,7 +14,6 @@ from identify.output import remarks as remarks_module
 from identify.output.diagnosis_json import diagnose_json
 from identify.output.remarks import remarks
 from identify.output.text import (
-    _step_line,
     diagnose_text,
     plan_text,
 )
@@ -23,14 +22,26 @@ from identify.output.words.selection import (
     SEVERAL,
     advice,
     change_in_words,
+    finding_in_words,
     moved_in_words,
     named_errors_in_words,
     refit_in_words,
     repeat_in_words,
+    shares_in_words,
+    ties_in_words,
+    verdict_in_words,
+)
+from identify.output.words.steps import (
+    not_named_in_words,
+    step_lines,
+    support_in_words,
+    together_in_words,
 )
 from identify.output.words.validation import region_in_words
 from identify.selection.confounded import Change, Refit
+from identify.selection.decoys import Proof
 from identify.selection.diagnosis import Step, Verdict
+from identify.selection.findings import FindingKind
 
 pytestmark = pytest.mark.usefixtures("nothing_moved")
 
@@ -42,27 +53,34 @@ def test_a_diagnosis():
     text = diagnose_text(result)
     y, lines = text.split("axis x: ", 1)
     lines = lines.splitlines()
-    assert lines[0] == f"{SEVERAL} cogging."
+    assert lines[0] == f"{SEVERAL} cogging or quadratic_drag, and lugre."
     assert lines[1] == "  force error 8.37 N, noise floor 2.11 N (ratio 3.97)"
     tested = x.tested
     assert lines.pop(2) == (
         f"  force error on the selection logs {tested.before:.3g} N, with what is named "
         f"{tested.after:.3g} N"
     )
-    assert lines[2] == "  these data cannot separate it from: quadratic_drag"
+    assert lines[2] == "  these data cannot separate cogging from: quadratic_drag"
     planned = [f"  {line}" for line in plan_text(result.next_experiments["x"]).splitlines()]
     assert lines[3 : 3 + len(planned)] == planned
     rest = [" ".join(line.split()) for line in lines[3 + len(planned) :]]
-    sure = [f"confidence {100.0 * f.confidence:.0f} %" for f in made.FOUND]
-    assert rest[:3] == [
+    sure = [
+        f"confidence {100.0 * f.confidence:.0f} %: {f.left:.3g} times the noise floor is left on "
+        "the selection logs"
+        for f in made.FOUND
+    ]
+    assert rest[:4] == [
         "cogging explains 87 % of the squared error above the noise floor: without it the error "
-        "on the selection logs is 7.17 N, with it 2.19 N; of it all it takes 81 %, "
-        f"one decoy in twenty 14 % or more; {sure[0]}",
+        "on the selection logs is 7.17 N, with it 2.19 N; tried beside decoys (its force shifted "
+        "in time) it takes 81 % of the squared error left without it, 1 in 20 of them 14 % or "
+        f"more; {sure[0]}",
         "lugre explains 12 % of the squared error above the noise floor: without it the error on "
         f"the selection logs is 3.23 N, with it 2.19 N; {sure[1]}",
-        "what remains beside the named effects is 3.19 N, 1.6 times the noise floor",
+        *shares_in_words(x),
+        "what remains beside the named effects is 3.19 N on the fit logs, 1.6 times the noise "
+        "floor",
     ]
-    rest = rest[3:]
+    rest = rest[4:]
     assert rest[:3] == [
         "The error depends most on other axis position, which accounts for 63 % of the squared "
         "error, with a period of 0.0273 m.",
@@ -103,9 +121,99 @@ def test_what_decided_nothing_is_told_apart_from_what_also_chose():
     assert diagnose_json(made.diagnosed(tested))["axes"]["x"]["test_error_on"] == "test"
 
 
+def test_nothing_is_said_of_held_out_logs_where_there_are_none():
+    steps = (Step(made.BEST, ()),)
+    held = made.diagnosis_of(steps=steps)
+    alone = replace(held, dataset=replace(made.DATASET, holdout=()))
+    assert verdict_in_words(held).endswith("the fit logs and the held-out logs prove it.")
+    assert verdict_in_words(alone).endswith(
+        "the fit logs prove it, block by block; no log was held out."
+    )
+    text = diagnose_text(made.diagnosed(alone)).split("axis x: ", 1)[1]
+    assert "with cogging the cross-validated error falls from 7.13 to 2.17 N" in text
+    assert "held-out" not in text
+
+
+def test_a_decoy_is_explained_where_it_is_told():
+    short = replace(made.FOUND[0], proof=Proof(0.94, 0.05, typical=True))
+    assert (
+        "; tried beside decoys (its force shifted in time) it takes 94 % of the squared error left "
+        "without it in a typical stretch of the log, 1 in 20 of them 5 % or more; "
+    ) in finding_in_words(short)
+    assert "decoy" not in finding_in_words(made.FOUND[1])
+
+
+@pytest.mark.parametrize(("left", "sure"), [(1.28, "98 %: 1.28"), (1.33, "89 %: 1.33")])
+def test_a_confidence_tells_what_it_is_read_from(left, sure):
+    """Not from the test error, which may be at its noise floor beside 89 %."""
+    told = finding_in_words(replace(made.FOUND[1], left=left))
+    assert told.endswith(f"confidence {sure} times the noise floor is left on the selection logs")
+
+
+def test_shares_of_several_are_said_to_be_no_parts_of_a_whole():
+    (said,) = shares_in_words(made.diagnosis_of(findings=made.FOUND))
+    assert "the shares need not sum to 100 %" in said
+    assert shares_in_words(made.diagnosis_of(findings=made.FOUND[:1])) == []
+
+
+def test_every_named_effect_is_in_the_headline():
+    two = made.diagnosis_of(steps=(Step(made.BEST, ()), Step(made.LATER, ())))
+    line = diagnose_text(made.diagnosed(two)).split("axis x: ", 1)[1].splitlines()[0]
+    assert line == f"{verdict_in_words(two)} cogging and lugre."
+    assert "several effects" in line
+    both = (replace(made.FOUND[0], tied=("lugre",)), replace(made.FOUND[1], tied=("cogging",)))
+    assert ties_in_words(replace(two, findings=both)) == [
+        "these data cannot separate cogging from: lugre"
+    ]
+
+
 def test_a_step_that_makes_the_rest_noise_has_no_errors():
-    line = _step_line(3, Step(built(NOISE), ()))
-    assert line.strip() == f"step 3: {NOISE.name} explains the remaining error as noise"
+    (line,) = step_lines(made.diagnosis_of(steps=(Step(built(NOISE), ()),)))
+    assert line == f"step 1: {NOISE.name} explains the remaining error as noise"
+
+
+def test_two_effects_that_need_each_other_are_told_as_such(monkeypatch):
+    """Neither is supported alone, so the answer says how both are added."""
+    drag = replace(made.RIVAL, evidence=replace(made.RIVAL.evidence, log_gain=0.0))
+    steps = (Step(made.BEST, (), beside="quadratic_drag"), Step(drag, (), beside="cogging"))
+    x = made.diagnosis_of(steps=steps, ranking=(made.BEST, drag, made.WEAK))
+    assert [support_in_words(x, c) for c in x.ranking] == [
+        "supported", "only together with cogging", "not supported",
+    ]  # fmt: skip
+    (said,) = together_in_words(x)
+    assert said.startswith("cogging and quadratic_drag are needed together")
+    assert "twin add quadratic_drag first.toml LOG... -o both.toml; judge after the second" in said
+    assert "neither alone" in said
+    text = diagnose_text(made.diagnosed(x)).split("axis x: ", 1)[1]
+    assert f"\n  {said}\n" in text
+    assert "N   only together with cogging\n" in text
+    assert diagnose_json(made.diagnosed(x))["axes"]["x"]["needed_together"] == [said]
+    assert together_in_words(made.diagnosis_of()) == []
+
+
+def test_a_step_whose_effect_is_not_named_says_why():
+    cogging, lugre = Step(made.BEST, ()), Step(made.LATER, ())
+    drag = replace(made.RIVAL, fit=made.LATER.fit)
+
+    def why(*steps, **changes):
+        return [not_named_in_words(made.diagnosis_of(steps=steps, **changes), i) for i in (0, 1)]
+
+    assert why(cogging, lugre) == [None, None]
+    unproved = "not proved beside the others, or less than 1 % of the squared error"
+    assert why(cogging, replace(lugre, proved=False)) == [None, unproved]
+    assert why(cogging, lugre, verdict=Verdict.UNEXPLAINED) == [unproved, unproved]
+    assert why(Step(drag, ()), replace(lugre, dropped=("quadratic_drag",))) == [
+        "no longer needed beside lugre", None,
+    ]  # fmt: skip
+    shape = replace(made.FOUND[1], kind=FindingKind.WRONG_SHAPE)
+    named = (made.FOUND[0], shape)
+    assert why(cogging, replace(lugre, proved=False), findings=named)[1].startswith("it is part")
+    assert why(cogging, Step(drag, ()), findings=named) == [
+        None, "a free curve of lugre takes its place",
+    ]  # fmt: skip
+    left = made.diagnosis_of(steps=(cogging, replace(lugre, proved=False)))
+    assert step_lines(left)[1].endswith(f" N; not named: {unproved}")
+    assert diagnose_json(made.diagnosed(left))["axes"]["x"]["steps"][1]["not_named"] == unproved
 
 
 def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
@@ -137,6 +245,18 @@ def test_remarks_are_about_what_a_reader_must_know(monkeypatch):
     quiet = made.diagnosed().axes["y"]
     assert remarks(quiet, None) == ()
     assert remarks(quiet, Refit(1.0, 1.0, ())) == ()
+
+
+def test_numbers_that_differ_look_different():
+    """Where the error is above noise intervals are refused, so none is told of."""
+    moved = moved_in_words(replace(made.MOVED, before=15.2004, after=15.2021))
+    assert moved == (
+        "mass moved from 15.200 to 15.202 kg: more than it scatters between blocks of the logs"
+    )
+    assert "mass 15.200 -> 15.202 kg" in change_in_words(
+        Change("mass", 15.2004, 15.2021, "kg", 0.572)
+    )
+    assert "from 15.2 to 15.2 kg" in moved_in_words(replace(made.MOVED, before=15.2, after=15.2))
 
 
 def test_a_change_has_its_values_and_force_in_place():

@@ -101,7 +101,8 @@ def test_page_says_the_verdict(case: Case, page: str) -> None:
     scale = Scale.of("N", [case.x.base.error])
     before = number(case.x.base.error / scale.size)
     assert f"{before} → {scale.text(best.fit.error)}" in text
-    assert f"{number(case.x.base.ratio)} → {number(best.fit.ratio)}" in text
+    final = case.x.final
+    assert f"{number(case.x.base.error / final.floor)} → {number(final.ratio)}" in text
     assert best.effect.equation in text
     assert best.effect.fingerprint in text
     pitch = best.fit.axis["cogging"].values["p"]
