@@ -87,9 +87,14 @@ class Motion:
         return self._of_blocks(slice(n))
 
     def after(self, instant: float) -> Motion:
-        """What follows its first ``instant`` seconds, as a log that begins there."""
+        """What follows its first ``instant`` seconds; its times stay those of the log."""
         first = min(round(instant / self.period), self.signals.shape[1] - 1)
-        return self._of_blocks(slice(first, None))
+        return replace(self._of_blocks(slice(first, None)), start=self.start + first * self.period)
+
+    @property
+    def left_out(self) -> int:
+        """Samples of the log before its first block."""
+        return round((self.start - 0.5 * self.period) / self.sample_period)
 
     def _of_blocks(self, blocks: slice) -> Motion:
         samples = self.raw.shape[1] // self.signals.shape[1]

@@ -141,7 +141,7 @@ def noises_of(axis: AxisModel, motions: Sequence[Motion]) -> tuple[Noise, ...]:
     return _noises_of(axis, tuple(motions))
 
 
-@lru_cache(maxsize=2)  # a fit, its evidence and its comparison ask for the same
+@lru_cache(maxsize=4)  # a fit, its evidence and its comparison ask for the same
 def _noises_of(axis: AxisModel, motions: tuple[Motion, ...]) -> tuple[Noise, ...]:
     noises = [noise_of(axis, motion) for motion in motions]
     quietest: dict[float, float] = {}

@@ -53,6 +53,8 @@ def _refined(apart: Array, step: float) -> tuple[float, float]:
     """A step by more and more of its multiples, and by how much (1, RMS) they miss whole ones."""
     for reach in (1.5, 4.5, 16.5):
         near = apart[apart < reach * step]
+        if not len(near):
+            return step, 0.0
         counts = np.rint(near / step)
         step = float(near @ counts / (counts @ counts))
     return step, float(np.std(near / step - counts))

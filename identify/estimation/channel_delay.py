@@ -80,7 +80,7 @@ def misalignment(fit: Fit, dataset: Dataset) -> float:
         return 0.0
     shift = -float(own @ left) / power
     after = left + shift * own
-    sample = dataset.fit[0].motion.sample_period
+    sample = max(log.motion.sample_period for log in dataset.fit)
     fall = 1.0 - float(after @ after) / max(float(left @ left), 1e-300)
     significant = fall > RULE.least_fall and evidence(left, after, 1).delta_bic > RULE.least_bic
     in_all = dataset.channel_delay + shift

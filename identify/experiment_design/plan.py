@@ -238,13 +238,14 @@ def _arena(
     between: Sequence[Rival],
     catalogue: Catalogue,
 ) -> Arena:
+    own = model.axes[dataset.axis]
+    if recorded:
+        dataset, base = fit_aligned(own, dataset)
     logs = dataset.fit if recorded else ()
     if between:
         known = explained(between, model, dataset, recorded)
         return Arena(model, dataset.axis, known, logs)
-    own = model.axes[dataset.axis]
     if recorded:
-        dataset, base = fit_aligned(own, dataset)
         found = diagnose_axis(base, dataset, catalogue)
         own = base.axis
         if found.best is not None and len(found.ranking) > 1:

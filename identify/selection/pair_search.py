@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.noise_floor import floor_of
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on
@@ -85,8 +86,7 @@ def _pair(
 
 
 def held_at_floor(fit: Fit, dataset: Dataset) -> bool:
-    """Whether the error on the held-out logs is at the noise floor."""
-    return (
-        bool(dataset.holdout)
-        and rms(error_on(fit.axis, dataset.holdout)) < RULE.at_floor * fit.floor
-    )
+    """Whether the error on the held-out logs is at their noise floor."""
+    return bool(dataset.holdout) and rms(
+        error_on(fit.axis, dataset.holdout)
+    ) < RULE.at_floor * floor_of(fit.axis, dataset.holdout)

@@ -87,15 +87,18 @@ def _signals(
     model: MachineModel, logs: Mapping[str, PreparedLog], noise: np.random.Generator | None
 ) -> tuple[Array, Array]:
     """Readings m and commands N, (n, n_axes) each, at the log's own rate."""
-    n = min(log.motion.raw.shape[1] for log in logs.values())
+    begun = max(log.motion.left_out for log in logs.values())  # what one axis lacks, none has
+    skip = {axis: begun - log.motion.left_out for axis, log in logs.items()}
+    n = min(log.motion.raw.shape[1] - skip[axis] for axis, log in logs.items())
     position, command = np.zeros((2, n, len(model.axes)))
     for i, axis in enumerate(model.axes):
         if axis not in logs:
             position[:, i] = next(iter(logs.values())).motion.others[0].mean()
             continue
         motion = logs[axis].motion
-        position[:, i] = motion.position_at_samples(0.0)[:n]
-        command[:, i] = motion.raw[1][:n]
+        there = slice(skip[axis], skip[axis] + n)
+        position[:, i] = motion.position_at_samples(0.0)[there]
+        command[:, i] = motion.raw[1][there]
         if noise is not None:
             found = noise_of(model.axes[axis], motion)
             for signal, power in ((position, found.reading), (command, found.force)):

@@ -238,7 +238,7 @@ def test_a_stribeck_curve_of_another_exponent_is_told_by_its_exponent(dataset) -
     assert found is not None
     assert found.shape.effect == "stribeck"
     assert found.fit.axis["stribeck"].values["n"] == pytest.approx(0.7, abs=0.05)
-    assert found.fit.ratio < 0.2 * base.ratio
+    assert found.fit.error < 0.2 * base.error
     finding = found_reshaped(found.shape, base, base, found.fit, there)
     assert finding.bend is not None
     assert (finding.bend.parameter, finding.bend.held, finding.bend.unit) == ("n", 2.0, "1")
