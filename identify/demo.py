@@ -26,6 +26,7 @@ from twin.model.machine import Fitted, MachineModel
 from twin.simulator import ReducedSimulator
 
 DURATION = 12.0  # s of each log
+BETTER = "better.toml"  # the model with what was found
 TRAINING, SELECTION, TEST = ("tracking", "moves"), "tracking", "moves"  # run for each role
 FORCE = 0.05  # N RMS of the hidden effect, about 50 times the noise floor
 VISIBLE = 0.5  # least part of the hidden force that a fit without the effect cannot absorb
@@ -84,7 +85,7 @@ def demo(
         )  # fmt: skip
         final = addition.model
         say(_fallen(addition))
-    save_model(final, folder / "better.toml")
+    save_model(final, folder / BETTER)
     report = folder / "report.html"
     write_report(
         report,

@@ -6,13 +6,13 @@ sine; tracking is the rich motion on which models are fitted and tested.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.core.control import Controller
+from twin.entries import near
 from twin.errors import InputError
 from twin.experiments.experiment import Experiment, driven_units, machine_limits
 from twin.experiments.file import format_experiment
@@ -97,9 +97,10 @@ def find_experiment(
     there.
     """
     if name not in EXPERIMENTS:
-        near = difflib.get_close_matches(name, EXPERIMENTS, n=1, cutoff=0.4)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise InputError(f"unknown experiment '{name}'; {hint}there are {', '.join(EXPERIMENTS)}")
+        raise InputError(
+            f"unknown experiment '{name}'; {near(name, EXPERIMENTS)}there are "
+            f"{', '.join(EXPERIMENTS)}"
+        )
     if axis is not None:
         model.axis(axis)
     return EXPERIMENTS[name].make(model, axis or next(iter(model.axes)), duration)
