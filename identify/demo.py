@@ -23,6 +23,7 @@ from twin.files import make_folder
 from twin.log import Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import Fitted, MachineModel
+from twin.numbers import require_seed
 from twin.simulator import ReducedSimulator
 
 DURATION = 12.0  # s of each log
@@ -61,6 +62,7 @@ def demo(
     Writes machine_*.mcap, better.toml and report.html into the folder. Raises InputError where the
     folder cannot be made.
     """
+    require_seed(seed)
     make_folder(folder)
     rng = np.random.default_rng(seed)
     machine, hidden = hidden_machine(model, catalogue, rng)

@@ -42,7 +42,9 @@ def main() -> None:
         code = fail(f"{error.filename}: {error.strerror}; check the name and the permissions")
     except Exception as error:
         if hasattr(error, "format_message"):  # a usage error; its class moves between versions
-            code = fail(f"{error.format_message()} See `{_command_of(error)} --help`.")
+            said = error.format_message()
+            end = "" if said.endswith((".", "?")) else "."
+            code = fail(f"{said}{end} See `{_command_of(error)} --help`.")
         elif "TWIN_TRACEBACK" in os.environ:
             raise
         else:

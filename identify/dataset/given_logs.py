@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from enum import Enum
 from itertools import combinations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from twin.errors import InputError
 from twin.log import Log
 from twin.log.check import moves
+from twin.log.check.content import SHORTEST
 from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]
@@ -74,6 +75,23 @@ def moving_in(logs: Mapping[str, Log], axis: str) -> tuple[dict[str, Log], list[
     for name, log in going.items():
         _require_numbers(name, log, axis, "force", log.axes[axis].force)
     return going, [name for name in held if name not in going]
+
+
+def nothing_moves(axes: Iterable[str], logs: Collection[Log]) -> InputError:
+    """Why no axis of a model moves in any training log, and what to do."""
+    known = sorted({a for log in logs for a in log.axes})
+    longest = max((len(log) * log.period for log in logs), default=0.0)
+    said = f"no axis of the model ({', '.join(axes)})"
+    if not set(axes) & set(known):
+        return InputError(
+            f"{said} is in the logs, which have {', '.join(known)}; name the axes alike"
+        )
+    if longest < SHORTEST:
+        return InputError(
+            f"{said} moves for long enough: the logs last {longest:.3g} s at most, identification "
+            f"needs {SHORTEST:g} s; record longer"
+        )
+    return InputError(f"{said} moves in the logs; give a log in which one moves")
 
 
 def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array) -> None:
