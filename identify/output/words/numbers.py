@@ -20,12 +20,17 @@ class Numbers:
     ratio: Callable[[float], str]
 
 
+def with_unit(number: str, unit: str) -> str:
+    """A number with its unit; one of no dimension has none to be read as another number."""
+    return number if unit == "1" else f"{number} {unit}"
+
+
 def _amount(value: float, unit: str) -> str:
-    return f"{value:.3g} {unit}"
+    return with_unit(f"{value:.3g}", unit)
 
 
 def _span(low: float, high: float, unit: str) -> str:
-    return f"{low:.4g} and {high:.4g} {unit}"
+    return with_unit(f"{low:.4g} and {high:.4g}", unit)
 
 
 def _ratio(value: float) -> str:
