@@ -17,7 +17,6 @@ from identify.cli.shared import (
     say,
 )
 from twin.errors import InputError
-from twin.numbers import require_seed
 
 if TYPE_CHECKING:
     from identify.thesis.chapters import Reproduction
@@ -55,6 +54,7 @@ def reproduce(
     from identify import workflow
     from identify.thesis.chapters import reproduce_on_logs
     from twin.files import make_folder
+    from twin.numbers import require_seed
 
     _require_one_source(log, model, small=small, seed=seed, axis=axis)
     drawn = SEED if seed is None else seed
