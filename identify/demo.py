@@ -23,9 +23,11 @@ from twin.files import make_folder
 from twin.log import Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import Fitted, MachineModel
+from twin.numbers import require_seed
 from twin.simulator import ReducedSimulator
 
 DURATION = 12.0  # s of each log
+BETTER = "better.toml"  # the model with what was found
 TRAINING, SELECTION, TEST = ("tracking", "moves"), "tracking", "moves"  # run for each role
 FORCE = 0.05  # N RMS of the hidden effect, about 50 times the noise floor
 VISIBLE = 0.5  # least part of the hidden force that a fit without the effect cannot absorb
@@ -60,6 +62,7 @@ def demo(
     Writes machine_*.mcap, better.toml and report.html into the folder. Raises InputError where the
     folder cannot be made.
     """
+    require_seed(seed)
     make_folder(folder)
     rng = np.random.default_rng(seed)
     machine, hidden = hidden_machine(model, catalogue, rng)
@@ -84,7 +87,7 @@ def demo(
         )  # fmt: skip
         final = addition.model
         say(_fallen(addition))
-    save_model(final, folder / "better.toml")
+    save_model(final, folder / BETTER)
     report = folder / "report.html"
     write_report(
         report,

@@ -20,6 +20,7 @@ from identify.experiment_design.plan import next_experiments, plan
 from identify.measure import cable_force, velocity_map
 from identify.output.addition import Addition, addition
 from identify.output.results import Comparison, Diagnosis, FitResult, SimulationFit
+from identify.output.words.selection import axis_in_words
 from identify.selection.candidates import try_effect, usable
 from identify.selection.confounded import refit
 from identify.selection.forward_selection import diagnose_axis
@@ -206,7 +207,11 @@ def add(
     tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]
     best = max(tried, key=lambda c: c.delta_bic)
     progress("adding", 1, 1)
-    return addition(best, before.fits[best.axis], before.datasets, before.model, given)
+    having = [n for n in names if n not in open_axes]
+    return addition(
+        best, before.fits[best.axis], before.datasets, before.model, given,
+        why_axis=axis_in_words(effect.name, best.axis, names, having),
+    )  # fmt: skip
 
 
 @parallel()

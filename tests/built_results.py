@@ -98,7 +98,7 @@ def errors(before: float, after: float, on: Role = Role.SELECTION) -> tuple[Erro
 
 FOUND = (
     Finding("cogging", ("quadratic_drag",), 0.871, *errors(7.17, 2.19), "N", {"p": 0.0261},
-            Proof(0.813, 0.137)),
+            Proof(0.813, 0.137), parameter_units={"p": "m"}),
     Finding("lugre", (), 0.119, *errors(3.23, 2.19), "N", {"Fc": 0.31}, None),
 )  # fmt: skip
 STRUCTURE = Dependence(
@@ -207,7 +207,9 @@ MOVED = MovedParameter("mass", 5.31, 5.47, "kg", False)
 
 
 def addition(kept: bool = True) -> Addition:
-    return Addition(MODEL, STEPS[0], BEST, kept, (3.71e-6, 1.93e-6), 1.97e-6, (MOVED,))
+    return Addition(
+        MODEL, STEPS[0], BEST, kept, (3.71e-6, 1.93e-6), 1.97e-6, (MOVED,), position_log="run 1"
+    )
 
 
 class Page(HTMLParser):

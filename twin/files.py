@@ -78,6 +78,15 @@ def recording(path: Path) -> Iterator[BinaryIO]:
             _put_in_place(stream, part, target)
 
 
+def is_same_file(one: Path, other: Path) -> bool:
+    """Whether two paths are one file, through links too; never a device, a pipe or a folder."""
+    if any(_is_direct(path) or path.is_dir() for path in (one, other)):
+        return False
+    if one.exists() and other.exists():
+        return os.path.samefile(one, other)
+    return os.path.realpath(one) == os.path.realpath(other)
+
+
 def write_atomically(path: Path, content: bytes) -> None:
     """Write a file, whole or not at all; raises InputError."""
     with replacing(path) as stream:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 from identify.cli import agree, loop, machine, plan, reproduce, selftest
 from identify.cli.shared import app
@@ -28,19 +30,21 @@ def main() -> None:
     gc.set_threshold(OBJECTS)
     try:
         _require_no_empty(sys.argv[1:])
-        code = app(standalone_mode=False)
+        code = app(sys.argv[1:] or ["--help"], prog_name="twin", standalone_mode=False)
         if code == INTERRUPTED:
             raise KeyboardInterrupt
     except InputError as error:
         code = fail(str(error))
     except KeyboardInterrupt:
-        fail("interrupted")
+        print("twin: interrupted", file=sys.stderr)
         code = INTERRUPTED
     except OSError as error:
         code = fail(f"{error.filename}: {error.strerror}; check the name and the permissions")
     except Exception as error:
         if hasattr(error, "format_message"):  # a usage error; its class moves between versions
-            code = fail(f"{error.format_message()} See `twin --help`.")
+            said = error.format_message()
+            end = "" if said.endswith((".", "?")) else "."
+            code = fail(f"{said}{end} See `{_command_of(error)} --help`.")
         elif "TWIN_TRACEBACK" in os.environ:
             raise
         else:
@@ -62,7 +66,15 @@ def _require_no_empty(arguments: Sequence[str]) -> None:
         raise InputError(" ".join([*arguments[:place][-1:], "'': is empty; give a name"]))
 
 
+def _command_of(error: Any) -> str:
+    """The command that was used wrongly, as a user calls it."""
+    return error.ctx.command_path if getattr(error, "ctx", None) else "twin"
+
+
 def fail(message: str) -> int:
-    """Print one line on standard error; the exit code of bad input."""
-    print(f"twin: {' '.join(message.split())}", file=sys.stderr)
+    """Print one line on standard error, and with --json an object; the exit code of bad input."""
+    line = " ".join(message.split())
+    print(f"twin: {line}", file=sys.stderr)
+    if "--json" in sys.argv[1:]:
+        print(json.dumps({"error": line}))
     return 2

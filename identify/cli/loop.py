@@ -10,8 +10,10 @@ from typing import Annotated
 
 import typer
 
+from identify.cli.apart import require_apart
 from identify.cli.shared import (
     Effects,
+    FitLogs,
     Holdout,
     Json,
     Logs,
@@ -24,6 +26,7 @@ from identify.cli.shared import (
     machine_model,
     read_checked,
     require_folder,
+    require_report,
     say,
     with_roles,
 )
@@ -39,7 +42,7 @@ class Objective(StrEnum):
 @app.command()
 def fit(
     model: Model,
-    logs: Logs,
+    logs: FitLogs,
     holdout: Holdout = None,
     test: Test = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Fitted model to write.")] = None,
@@ -96,8 +99,10 @@ def compare(
     from identify.output import as_json
     from identify.output import text as as_text
 
-    for path in filter(None, (out, mcap)):
-        require_folder(path)
+    if out:
+        require_report(out)
+    if mcap:
+        require_folder(mcap)
     machine = machine_model(model, catalogue_with(effects))
     recorded, findings = read_checked(logs)
     with bars_on_stderr() as bars:
@@ -119,7 +124,7 @@ def compare(
 @app.command()
 def diagnose(
     model: Model,
-    logs: Logs,
+    logs: FitLogs,
     holdout: Holdout = None,
     test: Test = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")] = None,
@@ -133,7 +138,7 @@ def diagnose(
     from identify.output import text as as_text
 
     if out:
-        require_folder(out)
+        require_report(out)
     catalogue = catalogue_with(effects)
     machine = machine_model(model, catalogue)
     result, findings = with_roles(
@@ -162,7 +167,7 @@ def diagnose(
 def add(
     effect: Annotated[str, typer.Argument(metavar="EFFECT", help="Name from `twin effects`.")],
     model: Model,
-    logs: Logs,
+    logs: FitLogs,
     out: Annotated[Path, typer.Option("--out", "-o", help="Model with the effect.")],
     holdout: Holdout = None,
     test: Test = None,
@@ -205,9 +210,11 @@ def demo(
     as_json_: Json = False,
 ) -> None:
     """Run the whole loop on a machine with a hidden effect."""
+    from identify.demo import BETTER
     from identify.demo import demo as run
     from identify.output import as_json, diagnosis_json
 
+    require_apart({"-o": out / BETTER}, {"--model": model})
     catalogue = catalogue_with(effects)
     machine = machine_model(model, catalogue)
 

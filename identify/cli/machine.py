@@ -200,6 +200,8 @@ def effects(
             draw(chosen, catalogue, plot)
         say(machine_text.effect_text(chosen), machine_json.effect_json(chosen), as_json_)
         return
+    if plot is not None:
+        raise InputError(f"--plot {plot}: draws one effect; give its NAME")
     everything = list(catalogue.values())
     say(
         machine_text.effects_text(everything),

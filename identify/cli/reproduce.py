@@ -54,15 +54,17 @@ def reproduce(
     from identify import workflow
     from identify.thesis.chapters import reproduce_on_logs
     from twin.files import make_folder
+    from twin.numbers import require_seed
 
     _require_one_source(log, model, small=small, seed=seed, axis=axis)
+    drawn = SEED if seed is None else seed
+    require_seed(drawn)
     make_folder(out)
     if log is not None and model is not None:
         machine = machine_model(model, catalogue_with(None))
         result = reproduce_on_logs(chapter or (), machine, dict(read_measured(log)), axis=axis)
     else:
         with bars_on_stderr() as bars:
-            drawn = SEED if seed is None else seed
             result = workflow.reproduce(chapter or (), small=small, seed=drawn, progress=bars)
     _write(out, result, as_json_)
 

@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from identify.cli.apart import Command
+from twin.errors import InputError
+
 if TYPE_CHECKING:
     from identify.workflow import Progress
     from twin.effects import Catalogue
@@ -21,15 +24,23 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 MEASURED = ("position", "velocity", "setpoint_position", "current", "force")
 
-app = typer.Typer(
+
+class Commands(typer.Typer):
+    """The commands, none of which overwrites what it reads."""
+
+    def command(self, name: str | None = None, **options: Any) -> Any:
+        return super().command(name, cls=Command, **options)
+
+
+app = Commands(
     help="Find out why the model and the machine disagree.",
     add_completion=False,
-    no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
 
-Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs to fit on.")]
+Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs.")]
+FitLogs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs to fit on.")]
 Model = Annotated[str, typer.Argument(metavar="MODEL", help="Machine model (.toml).")]
 Holdout = Annotated[
     list[Path] | None,
@@ -215,6 +226,13 @@ def said(path: Path, log: Log, every: int) -> Log:
 def sentences(name: str, report: CheckReport) -> list[str]:
     """The findings of the log check, one sentence each."""
     return [f"{name}: {finding.severity.value}: {finding}" for finding in report.findings]
+
+
+def require_report(path: Path) -> None:
+    """Raise InputError where a report could not be written, or its name is that of another kind."""
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{path}: a report is an .html file; give such a name")
+    require_folder(path)
 
 
 def require_folder(path: Path) -> None:

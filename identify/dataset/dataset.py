@@ -16,6 +16,7 @@ from identify.dataset.given_logs import (
     Given,
     Role,
     moving_in,
+    nothing_moves,
     require_apart,
     require_one_kind,
     require_samples,
@@ -23,10 +24,9 @@ from identify.dataset.given_logs import (
 from identify.dataset.motion import LONGEST_BLOCK, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.dataset.reading_ripple import ripples_of_widest
-from identify.dataset.test_function import LEAST_BLOCKS
+from identify.dataset.test_function import LEAST_BLOCKS, require_test_function
 from identify.dataset.time_scale import choose_length
 from twin.effect import Excitation
-from twin.errors import InputError
 from twin.log import Log
 from twin.memory import give_back
 from twin.model.machine import MachineModel
@@ -151,6 +151,8 @@ def datasets(
     """
     parts = zip(Role, (logs, holdout, test or {}), strict=True)
     given = {role: dict(part) for role, part in parts}  # each log is read once
+    training = given[Role.TRAINING].values()
+    require_test_function(test_function, max((len(g) * g.period for g in training), default=0.0))
     out = _prepared(model, given, test_function)
     give_back()
     return out
@@ -170,11 +172,7 @@ def _prepared(model: MachineModel, given: Given, test_function: float | None) ->
             still = tuple(n for _, names in found.values() for n in names)
             out[name] = replace(_of_axis(model, name, going, test_function), still=still)
     if not out:
-        known = sorted({a for log in given[Role.TRAINING].values() for a in log.axes})
-        raise InputError(
-            f"no axis of the model ({', '.join(model.axes)}) moves in the logs, which have "
-            f"{', '.join(known)}; name the axes alike, or give a log in which one moves"
-        )
+        raise nothing_moves(model.axes, given[Role.TRAINING].values())
     return out
 
 

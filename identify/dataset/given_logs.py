@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from enum import Enum
 from itertools import combinations
 
@@ -14,6 +14,7 @@ from identify.dataset.shared_samples import share_samples
 from twin.errors import InputError
 from twin.log import Log
 from twin.log.check import moves
+from twin.log.check.content import SHORTEST
 from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]
@@ -95,6 +96,23 @@ def moving_in(
         for other in other_axes(log, axis, machine):
             _require_numbers(name, log, other, "position", log.axes[other].position)
     return going, [name for name in held if name not in going]
+
+
+def nothing_moves(axes: Iterable[str], logs: Collection[Log]) -> InputError:
+    """Why no axis of a model moves in any training log, and what to do."""
+    known = sorted({a for log in logs for a in log.axes})
+    longest = max((len(log) * log.period for log in logs), default=0.0)
+    said = f"no axis of the model ({', '.join(axes)})"
+    if not set(axes) & set(known):
+        return InputError(
+            f"{said} is in the logs, which have {', '.join(known)}; name the axes alike"
+        )
+    if longest < SHORTEST:
+        return InputError(
+            f"{said} moves for long enough: the logs last {longest:.3g} s at most, identification "
+            f"needs {SHORTEST:g} s; record longer"
+        )
+    return InputError(f"{said} moves in the logs; give a log in which one moves")
 
 
 def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array) -> None:

@@ -19,6 +19,15 @@ OVERLAP = 4  # test functions that cover one instant
 LEAST_BLOCKS = 8  # that a test function spans
 
 
+def require_test_function(length: float | None, longest: float) -> None:
+    """Raise InputError for a length (s) that is not above zero and below that of the data (s)."""
+    if length is not None and not 0.0 < length < longest:
+        raise InputError(
+            f"a test function of {length:g} s: give a length above 0 s and below that of the data, "
+            f"{longest:g} s"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class TestFunction:
     """A smooth weight over blocks of ``period`` (s).

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 HEART = (0.25, 0.75)  # quantiles of the squared difference that bound the range of a feature
 SELDOM = 0.01  # share of the data below which all motions count as equally rare
+DUST = 1e-5  # of the axis' own motion, below which the other axis is at rest
 RARE = 0.05  # share of the data below which a motion counts as missing
 
 
@@ -24,13 +25,23 @@ RARE = 0.05  # share of the data below which a motion counts as missing
 class Feature:
     """A property of motion: its name, its unit, and its values (n_test_functions,) on a log.
 
-    unit: on a linear axis. other: whether it is a property of the other axis.
+    unit: on a linear axis. own: of the other axis: the same property of this axis, beside which
+    little of it is rest.
     """
 
     name: str
     unit: str
     of: Callable[[PreparedLog], Array]
-    other: bool = False
+    own: Callable[[PreparedLog], Array] | None = None
+
+    @property
+    def other(self) -> bool:
+        """Whether it is a property of the other axis."""
+        return self.own is not None
+
+    def at_rest(self, log: PreparedLog, high: float) -> bool:
+        """Whether values up to ``high`` are what a closed loop makes of an axis at rest."""
+        return self.own is not None and high < DUST * float(np.max(self.own(log), initial=0.0))
 
     def on(self, motion: Motion) -> tuple[str, str]:
         """Its name and its unit on that motion."""
@@ -62,6 +73,10 @@ def _speed(log: PreparedLog) -> Array:
     return np.abs(log.test_function.mean(log.motion.velocity))
 
 
+def _acceleration(log: PreparedLog) -> Array:
+    return np.abs(log.acceleration)
+
+
 def _rest(log: PreparedLog) -> Array:
     """Rest (s) before the last start of motion, rounded to 0.1 s because settling is gradual."""
     m = log.motion
@@ -83,7 +98,7 @@ def _reversal(log: PreparedLog) -> Array:
 
 FEATURES = (
     Feature("speed", LINEAR.velocity, _speed),
-    Feature("acceleration", LINEAR.acceleration, lambda log: np.abs(log.acceleration)),
+    Feature("acceleration", LINEAR.acceleration, _acceleration),
     Feature("motor force", LINEAR.force, lambda log: np.abs(log.command)),
     Feature("rate of change of the motor force", "N/s", _force_rate),
     Feature("distance since the last reversal", LINEAR.position, _reversal),
@@ -92,13 +107,13 @@ FEATURES = (
         "speed of the other axis",
         LINEAR.velocity,
         lambda log: np.abs(log.test_function.mean(log.motion.others[1])),
-        other=True,
+        own=_speed,
     ),
     Feature(
         "acceleration of the other axis",
         LINEAR.acceleration,
         lambda log: np.abs(log.test_function.mean(log.motion.others[2])),
-        other=True,
+        own=_acceleration,
     ),
 )
 
@@ -113,7 +128,7 @@ def gap(motion: PreparedLog, where: Array, logs: Sequence[PreparedLog]) -> Gap:
     for feature in FEATURES:
         values = feature.of(motion)
         low, high = _weighted_quantiles(values, where)
-        if not high > 0.0:
+        if not high > 0.0 or feature.at_rest(motion, high):
             continue
         share = None
         if logs:

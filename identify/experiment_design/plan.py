@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.test_function import require_test_function
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.decision import RULE
 from identify.experiment_design.candidate_experiments import NotRun, proposals
@@ -33,6 +34,7 @@ from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.file import in_short
+from twin.experiments.trajectory.setpoint import require_length
 from twin.log import Log
 from twin.model.machine import MachineModel
 from twin.parallel import parallel
@@ -102,10 +104,13 @@ def plan(
     """
     if axis is not None:
         model.axis(axis)
+    require_length(duration, model.sample_rate)
     require_different(between)
     for rival in between:
         if isinstance(rival, Effect):
             model.require_usable(rival, axis or next(iter(model.axes)))
+    if not logs:
+        require_test_function(test_function, duration)
     catalogue = usable(catalogue, model)
     dataset = _dataset(model, logs or {}, holdout or {}, between, axis, test_function)
     arena = replace(

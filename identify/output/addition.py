@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from identify.dataset.dataset import Dataset
+from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import error_if_any
 from identify.estimation.fit import Fit
@@ -27,8 +27,10 @@ class Addition:
 
     step: errors before and after. kept: whether evidence and held-out logs support the effect.
     position_error: free-running RMS error before and after; replayed: the same after, stepped by
-    MuJoCo. Both in the units of the axis, None where the motion is imposed. moved: parameters that
-    the effect changed. set_aside: nonparametric effects that were removed from the model before.
+    MuJoCo. Both in the units of the axis, None where the motion is imposed. position_log: the log
+    that they are of. moved: parameters that the effect changed. set_aside: nonparametric effects
+    that were removed from the model before. why_axis: why it went to this axis, where none was
+    asked for.
     """
 
     model: MachineModel
@@ -39,13 +41,15 @@ class Addition:
     replayed: float | None
     moved: tuple[MovedParameter, ...] = ()
     set_aside: tuple[str, ...] = ()
+    position_log: str | None = None
+    why_axis: str | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader should know beside the errors, one sentence each."""
         reshaped = self.step.effect if self.step.action == "shape" else None
         notes = addition_notes(self.candidate, self.moved, self.set_aside, reshaped)
-        return notes if self.also_chose is None else (*notes, self.also_chose)
+        return tuple(n for n in (self.why_axis, *notes, self.also_chose) if n is not None)
 
     @property
     def also_chose(self) -> str | None:
@@ -80,12 +84,13 @@ def addition(
     model: MachineModel,
     given: MachineModel,
     shape: WrongShape | None = None,
+    why_axis: str | None = None,
 ) -> Addition:
     """The candidate added to a fitted model; ``given``: the model before that was fitted.
 
     shape: that of a law of the model which the candidate is; None where it is a missing effect. It
     is kept if it is proved and lowers the test error: one that differs at a few places lowers the
-    error of a few blocks alone.
+    error of a few blocks alone. why_axis: why it went to its axis, where none was asked for.
     """
     name = best.axis
     moved = moved_parameters(base, best.fit)
@@ -105,6 +110,8 @@ def addition(
         replayed=replayed,
         moved=moved,
         set_aside=set_aside,
+        why_axis=why_axis,
+        position_log=None if moving is None else next(iter(by_log(prepared))),
     )
 
 

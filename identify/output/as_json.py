@@ -13,6 +13,7 @@ from identify.output.words.estimation import no_interval_in_words, outcome_in_wo
 from identify.output.words.experiment_design import gap_in_words, in_order, not_run_in_words
 from identify.output.words.validation import loop_in_words, region_in_words
 from identify.selection.confounded import Refit
+from identify.selection.scoring import Candidate
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import ResidualTests
 from twin.experiments.file import parameters
@@ -166,6 +167,15 @@ def _simulated(t: SimulatedExperiment, several: bool) -> dict[str, Any]:
     }
 
 
+def parameters_json(c: Candidate) -> dict[str, Any]:
+    """The values of the effect of a candidate, and their units."""
+    axis = c.fit.axis
+    return {
+        "parameters": dict(axis[c.effect.name].values),
+        "parameter_units": axis.parameter_units(c.effect.name),
+    }
+
+
 def add_json(result: Addition) -> dict[str, Any]:
     """Errors before and after, whether the effect is supported, and what it changed."""
     step, (before, after) = result.step, result.position_error or (None, None)
@@ -186,7 +196,8 @@ def add_json(result: Addition) -> dict[str, Any]:
         "position_error_before": before,
         "position_error_after": after,
         "position_error_in_mujoco": result.replayed,
+        "position_error_on": result.position_log,
         "position_unit": result.units.position,
-        "parameters": dict(result.candidate.fit.axis[result.candidate.effect.name].values),
+        **parameters_json(result.candidate),
         "notes": list(result.notes),
     }

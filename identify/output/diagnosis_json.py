@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from identify.estimation.errors import Errors
-from identify.output.as_json import plan_json, refit_json
+from identify.output.as_json import parameters_json, plan_json, refit_json
 from identify.output.remarks import remarks_on
 from identify.output.results import Diagnosis
 from identify.output.words.selection import advice, verdict_in_words
@@ -89,6 +89,7 @@ def _finding(f: Finding) -> dict[str, Any]:
         **_test_errors(f.tested),
         "unit": f.unit,
         "parameters": f.parameters,
+        "parameter_units": f.parameter_units,
         "gain": f.proof and f.proof.gain,
         "decoy": f.proof and f.proof.decoy,
         "of_typical_block": f.proof and f.proof.typical,
@@ -171,5 +172,5 @@ def _candidate(c: Candidate) -> dict[str, Any]:
         "holdout_error_after": c.gain.after,
         "unit": c.fit.axis.units.force,
         "supported": c.supported,
-        "parameters": dict(c.fit.axis[c.effect.name].values),
+        **parameters_json(c),
     }

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from identify.estimation.simulated_motion import MotionFit
 from identify.output.words.estimation import MOTION_OUTCOMES, motion_fit_in_words
+from identify.output.words.numbers import with_unit
 from twin.model.parameters import free_parameters, read
 
 if TYPE_CHECKING:  # results print themselves by these functions
@@ -21,7 +22,7 @@ def simulation_fit_text(result: SimulationFit) -> str:
         said = motion_fit_in_words(axis, fit, result.holdout_error[axis])
         lines += [said[0], *(f"  {line}" for line in said[1:])]
         lines += [
-            f"  {label:34s} {value:.6g} {unit} (force fit {before:.6g})"
+            f"  {label:34s} {with_unit(f'{value:.6g}', unit)} (force fit {before:.6g})"
             for label, value, before, unit in _values(fit)
         ]
     return "\n".join(lines)

@@ -89,7 +89,7 @@ def fit_text(result: FitResult) -> str:
 
 def _with_interval(e: Estimate, common: NoInterval | None) -> str:
     """A value with its interval, or why it has none, unless the reason is common to all."""
-    text = f"{e.value:12.6g} {e.unit:10s}"
+    text = f"{e.value:12.6g} {'' if e.unit == '1' else e.unit:10s}"
     if not e.free:
         return text + " fixed"
     if e.low is None:
@@ -210,13 +210,14 @@ def add_text(result: Addition) -> str:
         (before, after), unit = result.position_error, result.units.position
         lines.append(
             f"  {words('free-running position error'):33s} {before:.3g} -> {after:.3g} {unit} "
-            f"(MuJoCo: {result.replayed:.3g} {unit})"
+            f"on {result.position_log} (MuJoCo: {result.replayed:.3g} {unit})"
         )
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
         lines.append(
             f"  the data do not support this effect: the evidence and {result.judged_by} do not "
-            "both favour it alone; if a diagnosis says that it needs another beside it, add that "
-            "to the new model and judge then"
+            "both favour it alone. The model has it nevertheless, as asked for; go on with the "
+            "model before, or, if a diagnosis says that it needs another beside it, add that to "
+            "the new model and judge then"
         )
     return "\n".join(lines)

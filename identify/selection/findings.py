@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from identify.dataset.dataset import Dataset
@@ -52,10 +52,11 @@ class Finding:
     above the noise floor that comes back when it alone is taken out, at most 1. tested: test
     errors in ``unit`` without it and with it; of a wrong shape with the law and with a free curve,
     as one linear step predicts where no refit was made. chosen: the same on the logs that chose;
-    without test logs the test errors are these. parameters: of its law. proof: beside decoys; None
-    where a shift in time makes none. shape: the curve that is assumed and the one found, where they
-    differ. bend: what would give the law that curve, where it has such a parameter. left: over the
-    noise floor, the error that all findings together leave on the logs that chose.
+    without test logs the test errors are these. parameters, parameter_units: of its law. proof:
+    beside decoys; None where a shift in time makes none. shape: the curve that is assumed and the
+    one found, where they differ. bend: what would give the law that curve, where it has such a
+    parameter. left: over the noise floor, the error that all findings together leave on the logs
+    that chose.
     """
 
     effect: str
@@ -70,6 +71,7 @@ class Finding:
     shape: FoundShape | None = None
     bend: Bend | None = None
     left: float = 1.0
+    parameter_units: dict[str, str] = field(default_factory=dict)
 
     @property
     def confidence(self) -> float:
@@ -91,6 +93,7 @@ def found(
         chosen=chosen,
         unit=final.axis.units.force,
         parameters=dict(fitted.values),
+        parameter_units=final.axis.parameter_units(effect.name),
         proof=proof(without, fitted, dataset, gain_held_out(without, final, dataset)),
     )
 
@@ -164,6 +167,7 @@ def _of_shape(
         chosen=chosen,
         unit=axis.units.force,
         parameters=dict(axis[shape.effect].values),
+        parameter_units=axis.parameter_units(shape.effect),
         proof=shape.proof,
         kind=FindingKind.WRONG_SHAPE,
         shape=drawn,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container
+from collections.abc import Collection, Container
 from dataclasses import dataclass
 
 from twin.errors import InputError
@@ -34,7 +34,7 @@ class Case:
         return f"{planted}@{self.strength:g}/{self.variation}/{self.seed}{out}"
 
 
-def parse_case(text: str, effects: Container[str], variations: Container[str]) -> Case:
+def parse_case(text: str, effects: Container[str], variations: Collection[str]) -> Case:
     """The case of a name such as "cogging@5/bumps/17"; InputError for any other text.
 
     effects, variations: those there are.
@@ -50,7 +50,10 @@ def parse_case(text: str, effects: Container[str], variations: Container[str]) -
         if name not in effects:
             raise InputError(f"case '{text:.60}': no effect '{name}'; `twin effects` lists them")
     if found["variation"] not in variations:
-        raise InputError(f"case '{text:.60}': no variation '{found['variation']}'")
+        raise InputError(
+            f"case '{text:.60}': no variation '{found['variation']}'; there are "
+            f"{', '.join(variations)}"
+        )
     return Case(
         names, float(found["strength"]), int(found["seed"]), found["variation"], not found["out"]
     )

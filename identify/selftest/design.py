@@ -22,6 +22,7 @@ from twin.effect import Kind
 from twin.effects import Catalogue, load_catalogue
 from twin.log.writer import software_version
 from twin.model.file import load_model
+from twin.numbers import require_seed
 
 T = TypeVar("T")
 
@@ -52,6 +53,7 @@ class Design:
         Effects and variations come in turn, each in an order that the seed draws, so that every one
         is met about as often.
         """
+        require_seed(seed)
         rng = np.random.default_rng(seed)
         hidden = list(names or plantable(load_catalogue()))
         pairs = _pairs(hidden)

@@ -27,10 +27,14 @@ SEED = 0  # of the added noise
 
 @dataclass(frozen=True, eq=False)
 class FreeRun:
-    """Simulated minus measured position, axis -> (n,) m, with a restart every ``horizon`` s."""
+    """Simulated minus measured position, axis -> (n,) m, with a restart every ``horizon`` s.
+
+    begun: samples of the log before the run, which some axis leaves out.
+    """
 
     error: dict[str, Array]
     horizon: float
+    begun: int = 0
 
 
 def free_run(
@@ -68,7 +72,9 @@ def free_run(
         span = slice(start, end)
         simulated = open_loop(model, table, simulation, int(start), command[span])
         out[span] = simulated - position[span]
-    return FreeRun({a: out[:, i] for i, a in enumerate(model.axes) if a in logs}, HORIZON)
+    return FreeRun(
+        {a: out[:, i] for i, a in enumerate(model.axes) if a in logs}, HORIZON, _begun(logs)
+    )
 
 
 def drift_of_noise(model: MachineModel, logs: Mapping[str, PreparedLog], run: FreeRun) -> FreeRun:
@@ -87,8 +93,7 @@ def _signals(
     model: MachineModel, logs: Mapping[str, PreparedLog], noise: np.random.Generator | None
 ) -> tuple[Array, Array]:
     """Readings m and commands N, (n, n_axes) each, at the log's own rate."""
-    begun = max(log.motion.left_out for log in logs.values())  # what one axis lacks, none has
-    skip = {axis: begun - log.motion.left_out for axis, log in logs.items()}
+    skip = {axis: _begun(logs) - log.motion.left_out for axis, log in logs.items()}
     n = min(log.motion.raw.shape[1] - skip[axis] for axis, log in logs.items())
     position, command = np.zeros((2, n, len(model.axes)))
     for i, axis in enumerate(model.axes):
@@ -104,6 +109,11 @@ def _signals(
             for signal, power in ((position, found.reading), (command, found.force)):
                 signal[:, i] += np.sqrt(0.5 * power / model.period) * noise.standard_normal(n)
     return position, command
+
+
+def _begun(logs: Mapping[str, PreparedLog]) -> int:
+    """Samples of the log before the last axis begins: what one leaves out, no other has."""
+    return max(log.motion.left_out for log in logs.values())
 
 
 def _time_origin(logs: Mapping[str, PreparedLog]) -> float:

@@ -33,8 +33,9 @@ def side_by_side(model: MachineModel, parts: Mapping[str, PreparedLog]) -> SideB
     for axis, log in parts.items():
         off = np.nan_to_num(run.error[axis])
         # Blocks of another length may end at another sample; the run is as long as the shorter.
-        position, velocity, command = log.motion.at_samples(0.0)[:, : len(off)]
-        times = log.motion.sample_period * np.arange(len(off))
+        skip = run.begun - log.motion.left_out
+        position, velocity, command = log.motion.at_samples(0.0)[:, skip : skip + len(off)]
+        times = log.motion.sample_period * np.arange(skip, skip + len(off))
         left = np.interp(times, log.time - log.motion.time[0], residual(model.axes[axis], [log]))
         force = np.interp(times, log.time - log.motion.time[0], log.command)
         columns = {

@@ -74,6 +74,10 @@ def test_unknown_names_suggest_the_nearest(folder):
         "add", "coging", "proton_xy", "log.mcap", "-o", "b.toml", folder=folder
     )
     assert "proton_xy.toml" in refusal("fit", "proton_yx", "log.mcap", folder=folder)
+    assert "proton_xy.toml" in refusal("fit", "no/proton_xy.toml", "log.mcap", folder=folder)
+    for far in ("m.toml", "cogging"):
+        assert "package has" not in refusal("fit", far, "log.mcap", folder=folder)
+    assert "--effects FILE adds your own" in refusal("effects", "my_effect", folder=folder)
 
 
 @pytest.mark.parametrize("value", ["-1.0", "nan", "1e9"])

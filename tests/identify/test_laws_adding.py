@@ -34,7 +34,7 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
     seen = []
     monkeypatch.setattr(workflow, "fit", lambda *a, **k: seen.append((a, k)) or both)
     monkeypatch.setattr(workflow, "try_effect", attempt)
-    monkeypatch.setattr(workflow, "addition", lambda best, base, *_: (best, base))
+    monkeypatch.setattr(workflow, "addition", lambda best, base, *_, why_axis: (best, base))
     wear = CATALOGUE["wear"]
     best, base = add(wear, made.MODEL, "logs", "held", "test", test_function=0.07)
     assert (best.axis, base) == ("y", both.fits["y"])
@@ -98,4 +98,5 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     assert "empirical_map was removed" in found.notes[1]
     assert found.model.axes["x"] is best.fit.axis
     assert found.model.history == (step,)
+    assert (found.position_log, found.why_axis) == (dataset.fit[0].motion.name, None)
     assert found.kept is kept

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ from stubbed_cli import stubbed
 
 from identify import workflow
 from identify.cli import machine, main
+from identify.cli.apart import OUTPUTS, Command
 from identify.cli.shared import (
+    app,
     catalogue_with,
     machine_model,
     read_checked,
@@ -51,9 +55,11 @@ def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, sai
     monkeypatch.delenv("TWIN_TRACEBACK", raising=False)
     monkeypatch.setattr(workflow, "compare", fails)
     code, out, err = cli("compare", "m.toml", "a.mcap", "--json")
-    assert (code, out) == (130 if isinstance(error, KeyboardInterrupt) else 2, "")
+    interrupted = isinstance(error, KeyboardInterrupt)
+    assert code == (130 if interrupted else 2)
     assert err.startswith(said)
     assert err.count("\n") == 1
+    assert out == ("" if interrupted else json.dumps({"error": err[6:-1]}) + "\n")
 
 
 @pytest.mark.parametrize(
@@ -79,14 +85,96 @@ def test_a_traceback_is_shown_where_it_is_asked_for(monkeypatch):
 @pytest.mark.parametrize(
     "command",
     [
-        ("fit", "m", "a"), ("compare", "m", "a"), ("diagnose", "m", "a"), ("add", "wear", "m", "a"),
-        ("simulate", "moves"), ("recover", "a"), ("plan", "m"), ("selftest",),
+        ("fit", "m", "a"), ("add", "wear", "m", "a"), ("simulate", "moves"), ("recover", "a"),
+        ("plan", "m"), ("selftest",),
     ],
 )  # fmt: skip
 def test_a_missing_folder_is_said_before_the_work(cli, command):
     code, out, err = cli(*command, "-o", "no/where.toml")
     assert (code, out) == (2, "")
     assert "no/where.toml: its folder does not exist" in err
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose"])
+def test_a_report_is_html_in_a_folder_that_is_there(cli, command):
+    for name, said in (
+        ("no/where.html", "no/where.html: its folder does not exist"),
+        ("a.pdf", "a.pdf: a report is an .html file; give such a name"),
+    ):
+        code, out, err = cli(command, "m", "a", "-o", name)
+        assert (code, out) == (2, "")
+        assert said in err
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (("fit", "m", "a", "-o", "a"), "-o a: is the file that is read as LOG"),
+        (("fit", "m", "b", "--holdout", "a", "-o", "link"), "-o link: is the file that is read as "
+         "--holdout"),
+        (("add", "wear", "m", "b", "--test", "a", "-o", "hard"), "read as --test"),
+        (("compare", "m", "a", "--mcap", "./a"), "--mcap a: is the file that is read as LOG"),
+        (("compare", "m", "b", "-o", "n.html", "--mcap", "n.html"), "are one file; give two names"),
+        (("diagnose", "m", "a", "-o", "a"), "read as LOG"),
+        (("import", "b", "--map", "a", "-o", "link"), "read as --map"),
+        (("import", "--guess", "a", "-o", "a"), "read as FILE"),
+        (("new", "a", "-o", "a"), "read as LOG"),
+        (("recover", "a", "-o", "hard"), "read as LOG"),
+        (("plan", "a", "-o", "a"), "read as MODEL"),
+        (("plan", "m", "--between", "wear", "a", "-o", "a"), "read as --between"),
+        (("simulate", "a", "-o", "a"), "read as EXPERIMENT"),
+        (("simulate", "moves", "--model", "a", "-o", "a"), "read as --model"),
+        (("effects", "wear", "--effects", "a", "--plot", "a"), "read as --effects"),
+        (("demo", "--model", "better.toml", "-o", "."), "read as --model"),
+    ],
+)  # fmt: skip
+def test_no_command_overwrites_what_it_reads(cli, tmp_path, command, said):
+    for name in ("a", "better.toml"):
+        (tmp_path / name).write_text("whole")
+    (tmp_path / "link").symlink_to("a")
+    (tmp_path / "hard").hardlink_to(tmp_path / "a")
+    before = sorted(tmp_path.iterdir())
+    code, out, err = cli(*command)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert (tmp_path / "a").read_text() == (tmp_path / "better.toml").read_text() == "whole"
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_every_path_of_a_command_is_known_as_read_or_written():
+    """A path of a new command must be among what is written, or it counts as read."""
+    read = {"logs", "holdout", "test", "effects", "files", "sources", "mapping", "log"}
+    assert all(info.cls is Command for info in app.registered_commands)
+    hints = [get_type_hints(info.callback) for info in app.registered_commands]
+    paths = {name for own in hints for name, kind in own.items() if "Path" in str(kind)}
+    assert paths == {*read, *OUTPUTS}
+
+
+def test_a_model_may_be_updated_in_its_place(monkeypatch, cli, tmp_path):
+    (tmp_path / "m.toml").write_text("old")
+    monkeypatch.setattr(workflow, "fit", lambda *_, **__: SimpleNamespace(model="new"))
+    monkeypatch.setattr("identify.output.text.fit_text", lambda r: "fitted")
+    monkeypatch.setattr("identify.output.as_json.fit_json", lambda r: {})
+    monkeypatch.setattr("twin.model.file.save_model", lambda m, path: path.write_text(m))
+    assert cli("fit", "m.toml", "a.mcap", "-o", "m.toml")[0] == 0
+    assert (tmp_path / "m.toml").read_text() == "new"
+
+
+def test_wrong_use_names_the_help_of_its_command(cli):
+    assert cli("fit")[2] == "twin: Missing argument 'MODEL'. See `twin fit --help`.\n"
+    assert cli("simulat")[2].endswith("See `twin --help`.\n")
+
+
+def test_the_help_says_what_the_logs_are_for(cli):
+    for command, fits in (("fit", True), ("compare", False), ("check", False), ("new", False)):
+        assert ("MCAP logs to fit on." in cli(command, "--help")[1]) is fits
+
+
+def test_twin_alone_prints_the_help(cli):
+    code, out, err = cli()
+    assert (code, err) == (0, "")
+    assert out.count("\n") > 10
+    assert "diagnose" in out
 
 
 def test_what_is_said_goes_to_its_own_stream(capsys, tmp_path):

@@ -69,7 +69,7 @@ def test_the_loop_is_called_with_what_was_given(monkeypatch, cli, name):
     save = stub(monkeypatch, twin.model.file, "save_model")
     write = stub(monkeypatch, identify.output.report, "write_report")
     held = (*HELD, *TESTED) if name != "compare" else ()
-    out = ("-o", "out.x")
+    out = ("-o", "out.html")
     code, text, warned = cli(name, "m.toml", "a.mcap", "b.mcap", *held, *COMMON, *out)
     assert (code, text.strip()) == (0, f"text of {name}")
     assert warned.splitlines() == ["twin: warned of a.mcap", "twin: warned of b.mcap"]
@@ -81,10 +81,10 @@ def test_the_loop_is_called_with_what_was_given(monkeypatch, cli, name):
     assert (catalogue or {}).get("all") == (None if name == "compare" else ["e1.py", "e2.py"])
     assert named == {}
     if name == "fit":
-        assert save.only == ((model, Path("out.x")), {})
+        assert save.only == ((model, Path("out.html")), {})
     else:
         (path,), told = write.only
-        assert path == Path("out.x")
+        assert path == Path("out.html")
         diagnosis = result if name == "diagnose" else None
         comparison = result if name == "compare" else "the comparison"
         assert (told["diagnosis"], told["comparison"]) == (diagnosis, comparison)
@@ -220,6 +220,8 @@ def test_effects(monkeypatch, cli):
     monkeypatch.setattr(machine_json, "effect_json", lambda effect: {"is": effect})
     draw = stub(monkeypatch, identify.output.signature, "draw")
     assert cli("effects") == (0, "all 2\n", "")
+    code, out, err = cli("effects", "--plot", "w.svg")
+    assert (code, out, err) == (2, "", "twin: --plot w.svg: draws one effect; give its NAME\n")
     assert json.loads(cli("effects", "--json")[1]) == {"effects": [{"is": []}, {"is": "W"}]}
     assert cli("effects", "wear", "--plot", "w.svg") == (0, "one W\n", "")
     (chosen, catalogue, path), _ = draw.only

@@ -5,7 +5,6 @@ A file defines ``EFFECT``, a twin.effect.Effect, and takes its name from the fil
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import importlib.util
 import itertools
@@ -17,6 +16,7 @@ from pathlib import Path
 from types import ModuleType
 
 from twin.effect import Effect
+from twin.entries import near
 from twin.errors import InputError
 
 MOST_OF_ONE = 6  # of one effect on an axis
@@ -61,9 +61,10 @@ class Catalogue(Mapping[str, Effect]):
             yield from itertools.islice(free, 1)
 
     def _unknown(self, name: str) -> str:
-        near = difflib.get_close_matches(name, self._effects, n=1, cutoff=0.4)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        return f"unknown effect '{name}'; {hint}`twin effects` lists the {len(self)} that exist"
+        return (
+            f"unknown effect '{name}'; {near(name, self._effects)}`twin effects` lists the "
+            f"{len(self)} that exist; --effects FILE adds your own"
+        )
 
 
 def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:

@@ -6,13 +6,13 @@ sine; tracking is the rich motion on which models are fitted and tested.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.core.control import Controller
+from twin.entries import near
 from twin.errors import InputError
 from twin.experiments.experiment import Experiment, driven_units, machine_limits
 from twin.experiments.file import format_experiment
@@ -27,9 +27,11 @@ from twin.experiments.kinds import (
     kind_of,
 )
 from twin.experiments.trajectory import Limits
+from twin.experiments.trajectory.setpoint import require_length
 from twin.log import Log
 from twin.log.log import joined
 from twin.model.machine import AxisModel, MachineModel
+from twin.numbers import require_seed
 from twin.simulator import MujocoSimulator, Progress, ReducedSimulator
 
 MAP_SPEEDS = (0.0005, 0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.02, 0.04, 0.08)  # m/s
@@ -94,14 +96,16 @@ def find_experiment(
     """The experiment of that name for this machine, on its first axis where None is given.
 
     duration: s. InputError names the nearest where there is none, and for an axis that is not
-    there.
+    there; CannotRun for a duration of no sample, or beyond the longest setpoint.
     """
     if name not in EXPERIMENTS:
-        near = difflib.get_close_matches(name, EXPERIMENTS, n=1, cutoff=0.4)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise InputError(f"unknown experiment '{name}'; {hint}there are {', '.join(EXPERIMENTS)}")
+        raise InputError(
+            f"unknown experiment '{name}'; {near(name, EXPERIMENTS)}there are "
+            f"{', '.join(EXPERIMENTS)}"
+        )
     if axis is not None:
         model.axis(axis)
+    require_length(duration, model.sample_rate)
     return EXPERIMENTS[name].make(model, axis or next(iter(model.axes)), duration)
 
 
@@ -141,6 +145,7 @@ def simulate_parts(
     progress: Progress | None = None,
 ) -> Iterator[Log]:
     """``simulate`` in parts of two seconds or so, to be recorded while the twin runs."""
+    require_seed(seed)
     motion_rng, noise_rng, current_rng = np.random.default_rng(seed).spawn(3)
     if isinstance(experiment, str):
         name = experiment

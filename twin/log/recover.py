@@ -16,6 +16,7 @@ from pathlib import Path
 from mcap.opcode import Opcode
 
 from twin.errors import InputError, at
+from twin.files import is_same_file
 from twin.log.assemble import EVERYTHING, Extras
 from twin.log.chunks import has_checksum
 from twin.log.container import open_mcap, reading
@@ -82,6 +83,9 @@ def recover_file(
     with _recovered(path, unproved) as (kept, recovery):
         names = (out.with_name(f"{out.stem}.part{n}{out.suffix}") for n in range(1, len(kept)))
         files = dict(zip((out, *names), kept, strict=True))
+        for name in files:
+            if is_same_file(name, path):
+                raise InputError(f"{path}: would be overwritten; give another name than {out}")
         for name, stretch in files.items():
             write_parts(stretch.logs(), name)
     return recovery, {name: stretch.text for name, stretch in files.items()}

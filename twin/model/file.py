@@ -53,17 +53,23 @@ def find_model(name: str | Path) -> Path:
 
     Raises InputError where there is none.
     """
+    found = next(iter(model_files(name)), None)
+    if found is not None:
+        return found
     path = Path(name)
-    if path.is_file():
-        return path
-    own = models_folder() / path.with_suffix(".toml").name
-    if path.parent in (Path(), Path("models")) and own.is_file():
-        return own
     near = difflib.get_close_matches(
-        path.name, [p.name for p in models_folder().glob("*.toml")], n=1, cutoff=0.3
+        path.stem, [p.stem for p in models_folder().glob("*.toml")], n=1
     )
-    hint = f"; the package has {near[0]}" if near else ""
+    hint = f"; the package has {near[0]}.toml" if near else ""
     raise InputError(f"{path}: no such model file{hint}; give the path of a .toml machine model")
+
+
+def model_files(name: str | Path) -> list[Path]:
+    """The file of that path and that of that name among the package's own, where they exist."""
+    path = Path(name)
+    own = models_folder() / path.with_suffix(".toml").name
+    known = [path] if path.parent not in (Path(), Path("models")) else [path, own]
+    return [file for file in known if file.is_file()]
 
 
 def load_model(name: str | Path, catalogue: Catalogue) -> MachineModel:

@@ -169,6 +169,10 @@ class AxisModel:
     def __getitem__(self, effect: str) -> Fitted:
         return next(f for f in self.effects if f.effect.name == effect)
 
+    def parameter_units(self, effect: str) -> dict[str, str]:
+        """Units of the parameters of an effect of this axis, by name."""
+        return {p.name: self.units(p.unit) for p in self[effect].effect.parameters}
+
     def with_effect(self, new: Fitted) -> AxisModel:
         """This axis with the effect added, or exchanged where it is there already.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from identify.output.words.numbers import PLAIN, Numbers
+from identify.output.words.numbers import PLAIN, Numbers, with_unit
 from identify.validation.agreement import AxisAgreement, Difference
 from twin.model.units import units_of
 
@@ -10,9 +10,9 @@ from twin.model.units import units_of
 def difference_in_words(d: Difference, numbers: Numbers = PLAIN) -> str:
     """One parameter that differs."""
     return (
-        f"{d.label} differs by {numbers.amount(d.b - d.a, d.unit)} ({d.a:.6g} and {d.b:.6g} "
-        f"{d.unit}), {numbers.ratio(abs(d.ratio))} joint standard errors; allowed are "
-        f"{numbers.ratio(d.limit)}"
+        f"{d.label} differs by {numbers.amount(d.b - d.a, d.unit)} "
+        f"({with_unit(f'{d.a:.6g} and {d.b:.6g}', d.unit)}), {numbers.ratio(abs(d.ratio))} joint "
+        f"standard errors; allowed are {numbers.ratio(d.limit)}"
     )
 
 

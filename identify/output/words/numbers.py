@@ -24,12 +24,17 @@ class Numbers:
     change: Callable[[float, float, str], tuple[str, str]]
 
 
+def with_unit(number: str, unit: str) -> str:
+    """A number with its unit; one of no dimension has none to be read as another number."""
+    return number if unit == "1" else f"{number} {unit}"
+
+
 def _amount(value: float, unit: str) -> str:
-    return f"{value:.3g} {unit}"
+    return with_unit(f"{value:.3g}", unit)
 
 
 def _span(low: float, high: float, unit: str) -> str:
-    return f"{low:.4g} and {high:.4g} {unit}"
+    return with_unit(f"{low:.4g} and {high:.4g}", unit)
 
 
 def _ratio(value: float) -> str:
@@ -48,7 +53,7 @@ def told_apart(before: float, after: float) -> tuple[str, str]:
 
 def _change(before: float, after: float, unit: str) -> tuple[str, str]:
     first, second = told_apart(before, after)
-    return first, f"{second} {unit}"
+    return first, with_unit(second, unit)
 
 
 PLAIN = Numbers(_amount, _span, _ratio, _change)  # SI units, for a terminal and for JSON

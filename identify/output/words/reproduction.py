@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.output.words.numbers import with_unit
 from identify.thesis.cable import CableOfLogs, CableResult
 from identify.thesis.chapter import Recovered
 from identify.thesis.printed import ROLLER_PITCH
@@ -21,7 +22,7 @@ def recovered_in_words(name: str, r: Recovered) -> str:
     """One parameter: planted, found and printed."""
     printed = "" if r.printed is None else f", thesis {r.printed:.7g}"
     return (
-        f"{name}: planted {r.true:.7g} {r.unit}, found {r.mean:.7g} +- {r.sd:.1g} "
+        f"{name}: planted {with_unit(f'{r.true:.7g}', r.unit)}, found {r.mean:.7g} +- {r.sd:.1g} "
         f"({100.0 * r.error:+.4f} %){printed}"
     )
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.given_logs import Role
-from identify.output.words.numbers import PLAIN, Numbers
+from identify.output.words.numbers import PLAIN, Numbers, with_unit
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
@@ -92,7 +92,7 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
         without, with_it = "with the law", "with the curve"
     if bend := finding.bend:
         with_it, without = (
-            f"with {bend.parameter} = {value:.3g}{'' if bend.unit == '1' else f' {bend.unit}'}"
+            f"with {bend.parameter} = {with_unit(f'{value:.3g}', bend.unit)}"
             for value in (bend.found, bend.held)
         )
         what = f"{finding.effect} has another shape, which its law {with_it} has: that explains"
@@ -257,6 +257,20 @@ def advice(findings: Sequence[Finding] = ()) -> str:
     every = load_catalogue().values()
     known = [e.name for e in every if e.is_nonparametric and not e.free_shape]
     return f"twin add {' or '.join(known)} lowers the error by fitted curves, without explaining it"
+
+
+def axis_in_words(
+    effect: str, axis: str, tried: Sequence[str], having: Sequence[str]
+) -> str | None:
+    """Why an effect was added to an axis that nobody named, or None where there is no other.
+
+    tried: axes that it was tried on. having: axes that have it already.
+    """
+    if having:
+        return f"axis {', '.join(having)} has {effect} already, so it went to axis {axis}"
+    if len(tried) > 1:
+        return f"of axes {', '.join(tried)}, axis {axis} has the most evidence for it"
+    return None
 
 
 def step_in_words(step: HistoryStep) -> str:

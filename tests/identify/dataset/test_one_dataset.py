@@ -320,5 +320,22 @@ def test_standstill_is_the_same_to_check_and_fit_and_told(kind):
     told = fit_json(result)
     assert told["axes"]["x"]["left_out"] == ["rest", "held"]
     assert told["not_fitted"] == ["y"]
-    with pytest.raises(InputError, match="no axis of the model"):
+    with pytest.raises(InputError, match="no axis of the model \\(x, y\\) moves in the logs; give"):
         fit(model, {"rest": log})
+
+
+def test_a_log_too_short_to_show_motion_is_told_by_its_length():
+    short = {"a": logged(STAGE, seconds=0.2)}
+    with pytest.raises(InputError, match=r"last 0\.2 s at most, identification needs 1 s"):
+        datasets(PLAIN, short, {})
+    other = MachineModel("s", {"z": PLAIN.axes["x"]}, RATE)
+    with pytest.raises(InputError, match=r"\(z\) is in the logs, which have x; name the axes"):
+        datasets(other, short, {})
+
+
+@pytest.mark.parametrize("length", [0.0, -1.0, float("nan"), float("inf"), 4.0, 1e9])
+def test_a_test_function_is_above_zero_and_shorter_than_the_logs(length):
+    with pytest.raises(
+        InputError, match="s: give a length above 0 s and below that of the data, 4 s"
+    ):
+        datasets(PLAIN, {"a": logged(STAGE, seconds=4.0)}, {}, length)

@@ -89,6 +89,23 @@ def test_the_gap_is_where_the_difference_is_and_the_data_are_not():
     assert held.share > 0.4
 
 
+def test_dust_of_an_axis_at_rest_is_no_motion():
+    """Its speed alone tells where the difference is; a loop that settles makes one as small."""
+    planned = windowed(moved(np.random.default_rng(2), 2.0, 1000.0))
+    where = np.zeros(len(planned))
+    where[: len(where) // 2] = 1.0
+    early = planned.time < np.median(planned.time)
+
+    def found_at(speed):
+        rests = replace(planned.motion, others=np.zeros_like(planned.motion.others))
+        log = replace(planned, motion=rests)
+        rests.others[1] = speed * np.interp(rests.time, planned.time, early)
+        return gap(log, where, [windowed(SHORT)])
+
+    assert found_at(5e-8).feature != "speed of the other axis"
+    assert found_at(5e-2).feature == "speed of the other axis"
+
+
 class Windows(dict):
     """Features by name, of a motion in linear units."""
 

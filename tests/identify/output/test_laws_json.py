@@ -160,7 +160,9 @@ def test_an_addition(kept):
         "test_error_before": s.test_error_before, "test_error_after": s.test_error_after,
         "unit": "N", "position_error_before": a.position_error[0],
         "position_error_after": a.position_error[1], "position_error_in_mujoco": a.replayed,
+        "position_error_on": "run 1",
         "position_unit": "m", "parameters": dict(made.BEST.fit.axis["cogging"].values),
+        "parameter_units": {p.name: p.unit for p in made.BEST.effect.parameters},
         "notes": list(a.notes),
     }  # fmt: skip
     unheld = replace(a, step=made.STEPS[2], candidate=made.candidate("wear", 0.5))

@@ -27,6 +27,7 @@ def expected_candidate(c):
         "effect": c.effect.name, "delta_bic": c.delta_bic, "holdout_error_before": c.gain.before,
         "holdout_error_after": c.gain.after, "unit": "N", "supported": c.supported,
         "parameters": dict(c.fit.axis[c.effect.name].values),
+        "parameter_units": {p.name: p.unit for p in c.effect.parameters},
     }  # fmt: skip
 
 
@@ -92,7 +93,7 @@ FINDINGS = [
         "effect": "cogging", "kind": "missing", "explains": 0.871,
         "indistinguishable_from": ["quadratic_drag"], "test_error_before": 7.17,
         "test_error_after": 2.19, "test_error_on": "selection", "unit": "N",
-        "parameters": {"p": 0.0261},
+        "parameters": {"p": 0.0261}, "parameter_units": {"p": "m"},
         "gain": 0.813, "decoy": 0.137, "of_typical_block": False, "shape": None, "bend": None,
         "confidence": made.FOUND[0].confidence,
     },
@@ -100,6 +101,7 @@ FINDINGS = [
         "effect": "lugre", "kind": "missing", "explains": 0.119,
         "indistinguishable_from": [], "test_error_before": 3.23, "test_error_after": 2.19,
         "test_error_on": "selection", "unit": "N", "parameters": {"Fc": 0.31},
+        "parameter_units": {},
         "gain": None, "decoy": None, "of_typical_block": None, "shape": None, "bend": None,
         "confidence": made.FOUND[1].confidence,
     },

@@ -22,7 +22,8 @@ from identify.output.report import (
     render,
     sections,
 )
-from identify.output.report.blocks import Heading, Picture, Table, Tone
+from identify.output.report.blocks import Answer, Heading, Picture, Section, Table, Tile, Tone
+from identify.output.report.html import page
 from identify.output.report.subject import Subject
 from identify.output.report.units import SCALED, number, quantity
 from identify.output.words.experiment_design import gap_in_words
@@ -274,3 +275,12 @@ def test_only_sections_with_something_to_show_are_made(monkeypatch):
 
     monkeypatch.setattr("identify.output.report.SECTIONS", (empty, one, empty))
     assert [s.anchor for s in sections(subject_of())] == ["one"]
+
+
+@pytest.mark.parametrize(("count", "columns"), [(1, 1), (3, 3), (4, 4), (5, 3), (6, 3), (7, 4)])
+def test_tiles_stand_in_even_rows_and_none_is_cut_off(count, columns):
+    tiles = [Tile("Torque error", "0.671 to 0.239 mN m", "RMS")] * count
+    text = page("t", (), [Section("answer", "Answer", [Answer("h", "s", tiles, (), Tone.STRONG)])])
+    assert f'<div class="tiles" style="--columns: {columns}">' in text
+    (rule,) = [line for line in text.splitlines() if line.startswith(".tiles strong")]
+    assert "nowrap" not in rule

@@ -24,7 +24,9 @@ from identify.output.text import (
 )
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
 from identify.output.words.experiment_design import gap_in_words, in_order
+from identify.output.words.numbers import PLAIN, with_unit
 from identify.output.words.selection import (
+    axis_in_words,
     moved_in_words,
     refit_in_words,
 )
@@ -182,11 +184,12 @@ def test_an_addition(kept):
     assert lines[:5] == [
         "added cogging to axis x", "force error on the fit logs 7.31 -> 4.57 N",
         "force error on the held-out logs 7.83 -> 4.91 N",
-        "free-running position error 3.71e-06 -> 1.93e-06 m (MuJoCo: 1.97e-06 m)",
+        "free-running position error 3.71e-06 -> 1.93e-06 m on run 1 (MuJoCo: 1.97e-06 m)",
         moved_in_words(made.MOVED),
     ]  # fmt: skip
     assert "are of the selection logs, which took part in the choice" in lines[5]
     assert ("do not support" in lines[-1]) is not kept
+    assert ("has it nevertheless, as asked for" in lines[-1]) is not kept
     assert len(lines) == (6 if kept else 7)
     tested = replace(made.addition(kept), step=made.STEPS[1])
     assert "force error on the test logs      5.03 -> 2.83 N" in add_text(tested)
@@ -195,6 +198,26 @@ def test_an_addition(kept):
     assert ("the cross-validation on blocks of the fit logs do not" in unheld) is not kept
     assert "held-out" not in unheld
     assert "added wear to axis y" in unheld
+
+
+def test_why_an_axis_was_chosen_is_said():
+    both = ("x", "y")
+    assert axis_in_words("wear", "x", ["x"], []) is None
+    assert (
+        axis_in_words("wear", "y", both, ["x"]) == "axis x has wear already, so it went to axis y"
+    )
+    assert axis_in_words("wear", "y", both, []) == (
+        "of axes x, y, axis y has the most evidence for it"
+    )
+    told = replace(made.addition(), why_axis="axis x has it")
+    assert "\n  axis x has it\n" in add_text(told)
+
+
+def test_a_number_without_dimension_has_no_unit():
+    moved = replace(made.MOVED, before=0.2261, after=0.201, unit="1", collapsed=False)
+    assert " moved from 0.2261 to 0.201: more than" in moved_in_words(moved)
+    assert (PLAIN.amount(0.5, "1"), PLAIN.span(1.0, 2.0, "1")) == ("0.5", "1 and 2")
+    assert (PLAIN.amount(0.5, "N"), with_unit("3", "m/s")) == ("0.5 N", "3 m/s")
 
 
 def test_the_catalogue_and_one_effect():

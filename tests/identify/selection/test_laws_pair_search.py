@@ -28,7 +28,7 @@ def names(found) -> list[str]:
 
 
 def test_held_out_logs_are_explained_where_their_error_is_at_the_floor(monkeypatch):
-    fit = built_fit(9.0, 2.0)
+    fit = built_fit(9.0, 3.0)  # the floor of the held-out logs counts, not of those fitted
     dataset = dataset_stub(holdout=("log",))
     for error, held in ((2.0 * AT_FLOOR - 0.01, True), (2.0 * AT_FLOOR + 0.01, False)):
 
@@ -37,6 +37,7 @@ def test_held_out_logs_are_explained_where_their_error_is_at_the_floor(monkeypat
             return e * np.array([1.0, -1.0])
 
         monkeypatch.setattr(lookahead, "error_on", error_on)
+        monkeypatch.setattr(lookahead, "floor_of", lambda axis, logs: {("log",): 2.0}[logs])
         assert held_at_floor(fit, dataset) is held
         assert not held_at_floor(fit, dataset_stub())
 

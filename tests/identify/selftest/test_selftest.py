@@ -113,6 +113,7 @@ def test_a_failing_machine_is_named():
         (["-o", "no/m.png"], "folder does not exist"),
         (["--reliability", "no/m.png"], "folder does not exist"),
         (["--case", "cogging"], "give EFFECT@STRENGTH/VARIATION/SEED"),
+        (["--case", "cogging@5/cabel/17"], "no variation 'cabel'; there are plain, bumps, cable,"),
     ],
 )
 def test_bad_input_is_one_line(given, said, capsys, monkeypatch):

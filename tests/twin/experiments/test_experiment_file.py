@@ -94,6 +94,23 @@ BAD_INPUT = (
     (("plan", "proton_xy", "--between", "cogging", "cogging"), "different"),
     (("plan", "proton_xy", "--axis", "z"), "x, y"),
     (("plan", "proton_xy", "--duration", "-1"), "0 s"),
+    (("plan", "proton_xy", "--duration", "1e9"), "allowed are 1 to 36000000"),
+    *(
+        (("simulate", name, "--duration", seconds), said)
+        for name in ("moves", "velocity_map", "cable_pass")
+        for seconds, said in (
+            ("nan", "above 0 s"),
+            ("inf", "above 0 s"),
+            ("-3", "above 0 s"),
+            ("0", "above 0 s"),
+            ("1e9", "allowed are 1 to 36000000"),
+        )
+    ),
+    (("simulate", "moves", "--seed", "-1"), "seed -1: is not allowed; give a whole number of 0 or"),
+    (("demo", "--seed", "-1", "-o", "d"), "seed -1: is not allowed"),
+    (("selftest", "--seed", "-1"), "seed -1: is not allowed"),
+    (("reproduce", "--seed", "-1", "-o", "d"), "seed -1: is not allowed"),
+    (("plan", "proton_xy", "--test-function", "nan"), "a test function of nan s: give a length"),
     (("plan", "proton_xy", "-o", "next.mcap"), ".toml"),
     (("plan", "proton_xy", "-o", "no/where.toml"), "no/where.toml"),
     (("simulate", "nowhere.toml"), "twin plan"),

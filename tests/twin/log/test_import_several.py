@@ -63,6 +63,19 @@ def test_what_is_wrong_with_several_files_is_said(tmp_path, change, message):
         import_log(paths, mapping(tmp_path, TWO.replace(*change)))
 
 
+@pytest.mark.parametrize("stated", ["", 'delimiter = ","\n'])
+def test_a_file_may_be_one_column_alone(tmp_path, stated):
+    paths = write_two(tmp_path)
+    force = [line.partition(",")[2] for line in paths[1].read_text().splitlines()]
+    for head in (["F"], []):
+        paths[1].write_text("\n".join([*head, *force[1:]]))
+        name = head[0] if head else "1"
+        text = TWO.replace('force = {column = "q"', f'force = {{column = "{name}"')
+        log = import_log(paths, mapping(tmp_path, stated + text))
+        t = 1.5 + np.arange(len(log)) / 1000.0
+        np.testing.assert_allclose(log.axes["x"].force, np.cos(t), atol=1e-9)
+
+
 def test_as_many_files_as_tables(tmp_path):
     paths = write_two(tmp_path)
     with pytest.raises(InputError, match=r"1 files are given, the map has 2 \[\[files\]\]"):

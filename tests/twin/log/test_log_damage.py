@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType
 
 from twin.errors import InputError
-from twin.log import AxisLog, Log, encode, read_log, recover_log, write_log
+from twin.log import AxisLog, Log, encode, read_log, recover_file, recover_log, write_log
 from twin.log.log import FIELDS
 
 TRIALS = 100  # of each kind of damage; none may get through, so more only find rarer faults
@@ -282,3 +282,14 @@ def test_a_newer_schema_version_is_refused(tmp_path, monkeypatch, small_log):
     write_log(small_log, tmp_path / "a.mcap")
     with pytest.raises(InputError, match="log schema version is '2', this program reads '1'"):
         read_log(tmp_path / "a.mcap")
+
+
+def test_no_other_stretch_is_written_over_the_damaged_log(tmp_path, intact):
+    damaged = tmp_path / "good.part1.mcap"
+    broken = bytearray(intact)
+    broken[chunk_offsets(tmp_path / "intact.mcap")[4] + 200] ^= 0xFF
+    damaged.write_bytes(broken)
+    with pytest.raises(InputError, match="would be overwritten; give another name"):
+        recover_file(damaged, tmp_path / "good.mcap")
+    assert not (tmp_path / "good.mcap").exists()
+    assert damaged.read_bytes() == broken

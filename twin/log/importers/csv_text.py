@@ -51,10 +51,10 @@ class _Style:
             return False
         return True
 
-    def share_of_numbers(self, lines: Sequence[str]) -> float:
-        """Of the cells of ``lines``; 0 where there are not two columns."""
+    def share_of_numbers(self, lines: Sequence[str], columns: int) -> float:
+        """Of the cells of ``lines``; 0 where there are fewer columns."""
         rows = [self.cells(line) for line in lines]
-        if len(rows[-1]) < 2:
+        if len(rows[-1]) < columns:
             return 0.0
         cells = list(itertools.chain.from_iterable(rows))
         return sum(map(self.is_number, cells)) / len(cells)
@@ -142,10 +142,11 @@ def _find_style(lines: Sequence[str], stated: CsvLayout) -> _Style:
     delimiters = (stated.delimiter,) if stated.delimiter else _DELIMITERS
     decimals = (stated.decimal,) if stated.decimal else (".", ",")
     styles = [_Style(d, p) for d in delimiters for p in decimals if d != p]
-    best = max(styles, key=lambda style: style.share_of_numbers(lines))
-    if best.share_of_numbers(lines) == 0.0:
-        raise InputError("has no rows of numbers; state delimiter and decimal in the map")
-    return best
+    for columns in (2, 1):  # 1,5 is two columns, unless the map states delimiter or decimal
+        best = max(styles, key=lambda style: style.share_of_numbers(lines, columns))
+        if best.share_of_numbers(lines, columns) > 0.0:
+            return best
+    raise InputError("has no rows of numbers; state delimiter and decimal in the map")
 
 
 def _first_row(rows: Sequence[Sequence[str]], style: _Style, header_line: int | None) -> int:
