@@ -104,20 +104,15 @@ def test_a_recovery_takes_little_memory(tmp_path: Path, monkeypatch: pytest.Monk
     assert peak < noise.nbytes
 
 
-@pytest.mark.parametrize("name", ["a.mcap", "b.mcap"])
-def test_what_is_recovered_from_is_there_to_the_last(
-    name: str, tmp_path: Path, monkeypatch
-) -> None:
-    """Also where the log replaces itself, or bears the name of the recording that it becomes."""
+def test_what_is_recovered_from_is_there_to_the_last(tmp_path: Path, monkeypatch) -> None:
+    """Also where it bears the name of the recording that it becomes."""
     monkeypatch.setattr(encode, "CHUNK_BYTES", 20_000)
     write_log(LOG, tmp_path / "b.mcap")
     ends = chunks((tmp_path / "b.mcap").read_bytes())
     source = (tmp_path / "b.mcap").rename(tmp_path / f"a.mcap{UNFINISHED}")
     damaged(source, *(end - 50 for end in ends[12:15]))
     wanted, told = recover_log(source)
-    if name == "b.mcap":
-        source = source.rename(tmp_path / name)
-    _, files = recover_file(source, tmp_path / name)
+    _, files = recover_file(source, tmp_path / "a.mcap")
     assert len(files) == 2
     for file, log in zip(files, (wanted, *told.others), strict=True):
         assert_same_samples(read_log(file), log)
