@@ -152,6 +152,8 @@ class AxisDiagnosis:
         if not told and (shape := wrong_shape(beside, self.dataset)):
             wrong = found_wrong(shape, self.base, self.with_named, self.dataset)
             findings = with_shape(findings, wrong)
+        # A curve whose band holds the law everywhere tells nothing beside other findings.
+        findings = tuple(f for f in findings if f.is_sure) or findings
         shapes = bool(findings) and all(f.kind is FindingKind.WRONG_SHAPE for f in findings)
         verdict = Verdict.WRONG_SHAPE if shapes else self.verdict
         findings = as_a_whole(findings, self.with_named, self.dataset)

@@ -74,6 +74,13 @@ class Finding:
     parameter_units: dict[str, str] = field(default_factory=dict)
 
     @property
+    def is_sure(self) -> bool:
+        """Whether a wrong shape differs from the law somewhere by more than its band."""
+        if self.kind is not FindingKind.WRONG_SHAPE or self.shape is None:
+            return True
+        return self.bend is not None or self.shape.differs
+
+    @property
     def confidence(self) -> float:
         """How often such an answer was right on machines of the self-test, 0..1."""
         return confidence(self.left)

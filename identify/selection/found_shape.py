@@ -51,6 +51,12 @@ class FoundShape:
     force_unit: str
     curves: Mapping[str, Drawn]
 
+    @property
+    def differs(self) -> bool:
+        """Whether the curve found surely differs from the one assumed, by its band, anywhere."""
+        pairs = (np.abs(c.found - c.assumed) - c.band for c in self.curves.values())
+        return any(bool(np.any(beyond > 0.0)) for beyond in pairs)
+
 
 def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
     """Draw a law of a fit and the free curve for it. The correction is smoothed, not the whole.

@@ -30,6 +30,7 @@ from twin.effect import Effect, Kind
 
 Array = NDArray[np.float64]
 
+MOST_INERTIA = 3.0  # times the moved mass of the base, that an effect may leave or ask for
 EDGE = 1e-3  # relative distance from a bound at which a value ended there
 RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion does not excite
 
@@ -105,7 +106,7 @@ def score(base: Fit, fit: Fit, dataset: Dataset, effect: Effect) -> Candidate:
         return candidate
     return replace(
         candidate,
-        plausible=_is_plausible(fit, effect, dataset),
+        plausible=_is_plausible(fit, effect, dataset) and _keeps_inertia(base, fit),
         beats_decoys=gain.t < RULE.least_t and _beats_decoys(base, candidate, dataset),
     )
 
@@ -130,6 +131,15 @@ def _is_clear(candidate: Candidate) -> bool:
     gain, rubs = candidate.gain, candidate.effect.kind is Kind.FRICTION
     clearly = gain.left < RULE.beside_decoys
     return bool(rubs and gain.t > RULE.friction_t and clearly)
+
+
+def _keeps_inertia(base: Fit, fit: Fit) -> bool:
+    """Whether an effect leaves the moved mass about what the base found.
+
+    In a motion that repeats in time, a sine in time can hold the force of the inertia.
+    """
+    before, after = base.axis.mass, fit.axis.mass
+    return max(before, after) <= MOST_INERTIA * min(before, after)
 
 
 def _is_plausible(fit: Fit, effect: Effect, dataset: Dataset) -> bool:

@@ -12,12 +12,14 @@ from constructed import STICKY, effect, log_of, moved, windowed
 from noisy_motion import MASS, PLACE, PUSH, RATE, noisy
 from scipy.signal import welch
 
+import identify.dataset.noise_floor as noise_floor_module
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.motion import motion_of
 from identify.dataset.noise_floor import (
     _at_rest,
     _between_samples,
     _median_spectrum,
+    _together,
     floor_of,
     noise_floor,
     noise_of,
@@ -27,6 +29,7 @@ from identify.dataset.prepared_log import REST_SPEED, PreparedLog, on_blocks, to
 from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
 from identify.dataset.whittle import _underneath, fitted_levels
+from identify.estimation.force_balance import residual
 from twin.errors import InputError
 from twin.log.check import moves
 from twin.model.machine import AxisModel, MachineModel
@@ -65,6 +68,33 @@ def test_the_floor_is_in_proportion_to_the_noise_and_falls_with_the_window():
     assert ratio == pytest.approx(np.sqrt(2.0), rel=0.02)
     short, long = (noisy(3, 1e-5, 4e-7, length=n) for n in (0.1, 0.2))
     assert floor_of(axis, [short]) / floor_of(axis, [long]) == pytest.approx(2.0**2.5, rel=0.05)
+
+
+def test_a_floor_that_what_is_left_refutes_is_that_of_the_residual(monkeypatch):
+    """As where readings that the log does not hold made the command."""
+    axis, log = AxisModel(MASS), noisy(6, 0.02, duration=20.0)
+    left = residual(axis, [log])
+    told = floor_of(axis, [log])
+    assert floor_of(axis, [log], [left]) == told
+    found = noise_floor_module.noises_of
+
+    def much(axis, motions):
+        return tuple(replace(n, force=30.0 * n.force) for n in found(axis, motions))
+
+    monkeypatch.setattr(noise_floor_module, "noises_of", much)
+    assert floor_of(axis, [log]) == pytest.approx(np.sqrt(30.0) * told, rel=0.01)
+    assert floor_of(axis, [log], [left]) == pytest.approx(told, rel=0.15)
+    # What a model lacks is slower than the noise, and stays above the floor.
+    slow = 3.0 * told * np.sin(2.0 * np.pi * np.arange(len(left)) / 64.0)
+    assert floor_of(axis, [log], [left + slow]) == pytest.approx(told, rel=0.15)
+
+
+def test_logs_weigh_by_how_long_they_last_not_by_their_blocks():
+    short, long = noisy(7, 0.02, duration=3.0), noisy(8, 0.04, duration=9.0)
+    coarse = replace(long.motion, period=10.0 * long.motion.period)
+    assert _together([1.0, 4.0], [short.motion, coarse]) ** 2 == pytest.approx(
+        (1.0 * 3.0 + 4.0 * 90.0) / 93.0, rel=1e-2
+    )
 
 
 def test_the_square_of_a_floor_of_logs_is_the_mean_of_theirs_weighed_by_their_lengths():

@@ -238,3 +238,12 @@ def test_a_noise_is_told_where_it_makes_a_good_part_of_the_error(monkeypatch, se
     gain = seen**2 / LESS**2 - seen**2 / FLOOR**2 - 2.0 * np.log(FLOOR / LESS) if told else 0.0
     assert found.evidence.log_gain == pytest.approx(gain)
     assert found.gain.t == pytest.approx(max(found.evidence.samples * gain, 0.0) ** 0.5)
+
+
+@pytest.mark.parametrize(("mass", "kept"), [(2.9, True), (3.1, False), (0.34, True), (0.32, False)])
+def test_an_effect_that_takes_the_place_of_the_inertia_is_not_plausible(mass, kept):
+    base = built_fit(8.0, axis=replace(axis_of(), mass=1.5))
+    assert (
+        scoring._keeps_inertia(base, built_fit(1.0, axis=replace(axis_of(), mass=1.5 * mass)))
+        is kept
+    )

@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from built_fits import built_dataset, built_fit, dataset_stub, step
 
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.findings import share_explained
+from identify.selection.findings import Bend, Finding, FindingKind, share_explained
+from identify.selection.found_shape import Drawn, FoundShape
+from twin.curve import Coordinate
 
 
 def test_a_share_is_of_the_squared_error_above_the_noise_floor():
@@ -30,6 +33,20 @@ def test_a_share_is_of_the_squared_error_above_the_noise_floor():
     assert share_explained(replace(more, after=0.1), base, without) == 1.0
     base.__dict__["floor"] = 0.8  # the base is at the floor: nothing is left to share
     assert share_explained(fall, base, without) == 0.0
+
+
+@pytest.mark.parametrize(("band", "differs"), [(0.9, True), (1.1, False)])
+def test_a_curve_whose_band_holds_the_law_is_no_finding_beside_others(band, differs):
+    assumed, found = np.array([0.0, 1.0, np.nan]), np.array([0.5, 2.0, np.nan])
+    drawn = {"forwards": Drawn(assumed, found, np.full(3, band))}
+    shape = FoundShape(Coordinate.POSITION, np.arange(3.0), "m", None, False, "N", drawn)
+    assert shape.differs is differs
+    errors = Errors(2.0, 1.0, Role.TEST)
+    finding = Finding("cable_slab", (), 0.5, errors, errors, "N", {}, None, shape=shape)
+    assert replace(finding, kind=FindingKind.WRONG_SHAPE).is_sure is differs
+    assert replace(finding, kind=FindingKind.RESEMBLES).is_sure
+    bend = Bend("n", 2.0, 0.7, "1")
+    assert replace(finding, kind=FindingKind.WRONG_SHAPE, bend=bend).is_sure
 
 
 def test_what_was_added_in_a_step_of_its_own_is_no_alternative_to_another():

@@ -95,6 +95,12 @@ def test_what_is_larger_on_the_held_out_logs_is_no_noise():
     assert not is_unpredictable(fit_to(data), replace(data, holdout=more))
 
 
+def test_one_log_alone_does_not_show_that_what_is_left_is_noise():
+    data = left(noise)
+    alone = replace(data, fit=data.fit[:1], holdout=())
+    assert not is_unpredictable(fit_to(alone), alone)
+
+
 def test_a_tone_keeps_its_amplitude_and_noise_does_not():
     """Kurtosis 1.5 and 3; the limit of n independent samples is 3 - 3 sqrt(24 / n)."""
     rng = np.random.default_rng(4)
