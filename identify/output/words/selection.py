@@ -152,10 +152,8 @@ def shape_in_words(effect: str, shape: FoundShape, numbers: Numbers = PLAIN) -> 
     sure = {name: np.abs(c.found - c.assumed) - c.band for name, c in shape.curves.items()}
     direction = max(sure, key=lambda name: np.nanmax(sure[name]))
     curve, at = shape.curves[direction], int(np.nanargmax(sure[direction]))
-    assumed, found, band = (
-        numbers.amount(float(values[at]), shape.force_unit)
-        for values in (curve.assumed, curve.found, curve.band)
-    )
+    unit, band = shape.force_unit, numbers.amount(float(curve.band[at]), shape.force_unit)
+    assumed, found = numbers.change(float(curve.assumed[at]), float(curve.found[at]), unit)
     place = numbers.amount(float(shape.coordinate[at]), shape.unit)
     within = "" if shape.period is None else " of its period"
     rest = " The force is gone at standstill." if shape.lets_go else ""

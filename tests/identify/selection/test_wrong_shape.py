@@ -341,4 +341,4 @@ def test_the_place_told_is_where_the_curves_surely_differ_most() -> None:
     }
     shape = FoundShape(Coordinate.SPEED, speed, "m/s", None, False, "N", curves)
     told = shape_in_words("lugre", shape)
-    assert "speed 0.02 m/s, forwards: it assumes -0.3 N, the logs show -0.32 N" in told
+    assert "speed 0.02 m/s, forwards: it assumes -0.3, the logs show -0.32 N" in told
