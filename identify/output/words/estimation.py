@@ -27,6 +27,8 @@ OUTCOMES = {
     ),
 }
 
+HALF = 0.15  # samples, within which a shift of half a sample is told as such
+
 
 def outcome_in_words(outcome: Outcome) -> str:
     """How a fit ended."""
@@ -124,8 +126,16 @@ def channel_delay_in_words(dataset: Dataset) -> str | None:
         return None
     samples = dataset.channel_delay / dataset.fit[0].motion.sample_period
     words = dataset.units.words
+    why = (
+        f"which no drive can do; the log was corrected. Check how {words('force and position')} "
+        "are sampled"
+    )
+    if abs(samples - 0.5) < HALF:
+        why = (
+            f"as where {words('force and position')} are read at the same instant, while a command "
+            "would be held over the sample; the log was corrected"
+        )
     return (
         f"axis {dataset.axis}: the {words('force')} acts {1e6 * dataset.channel_delay:.0f} us "
-        f"({samples:.2f} samples) before its time stamp, which no drive can do; the log was "
-        f"corrected. Check how {words('force and position')} are sampled"
+        f"({samples:.2f} samples) before its time stamp, {why}"
     )
