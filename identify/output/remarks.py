@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from identify.dataset.noise_floor import floor_of
 from identify.estimation.fit import Outcome
 from identify.output.words.estimation import outcome_in_words, prepared_in_words
 from identify.output.words.numbers import PLAIN, Numbers
@@ -15,7 +16,8 @@ from identify.output.words.selection import (
     repeat_in_words,
 )
 from identify.selection.confounded import Refit, moved_parameters
-from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from identify.selection.pair_search import held_at_floor
 
 if TYPE_CHECKING:  # results print themselves, with these sentences
     from identify.output.results import Diagnosis
@@ -64,6 +66,8 @@ def remarks(
             "no log was held out, so candidates were judged by cross-validation on blocks of the "
             "training logs, which is a weaker test. Give --holdout a log of another experiment."
         )
+    if found.verdict is Verdict.NOTHING_MISSING and (beyond := _beyond_in_words(found)):
+        out.append(words(beyond))
     if found.findings and (also := also_chose_in_words(found.dataset.tested_on)):
         out.append(also)
     if not_planned is not None:
@@ -74,3 +78,16 @@ def remarks(
             "more than two axes it is not known which that is; diagnose a model of two axes alone"
         )
     return tuple(out)
+
+
+def _beyond_in_words(found: AxisDiagnosis) -> str | None:
+    """That the held-out logs show what the fit logs do not; None where they do not."""
+    held = found.dataset.holdout
+    if not held or held_at_floor(found.base, found.dataset):
+        return None
+    ratio = found.chosen.before / floor_of(found.base.axis, held)
+    return (
+        "what was said holds for the training logs: on the selection logs the force error is "
+        f"{ratio:.1f} times its noise floor. Give such a log as a training log too, so that what "
+        "it shows is looked for"
+    )

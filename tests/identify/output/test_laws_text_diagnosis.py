@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import built_results as made
 import pytest
-from built_fits import NOISE, built, built_fit
+from built_fits import NOISE, built, built_fit, dataset_stub
 
 from identify.dataset.given_logs import Role
 from identify.estimation.fit import Outcome
@@ -273,3 +274,17 @@ def test_a_change_has_its_values_and_force_in_place():
         f"{change_in_words(change)}, mass 15.1 -> 15.7 kg changes the force by 0.572 N"
     )
     assert refit_in_words(Refit(0.913, 0.127, ())) is None
+
+
+@pytest.mark.parametrize(("held", "explained"), [(("log",), False), (("log",), True), ((), False)])
+def test_nothing_missing_of_the_training_logs_alone_is_told_as_such(monkeypatch, held, explained):
+    found = SimpleNamespace(
+        dataset=dataset_stub(holdout=held), base=built_fit(1.0), chosen=SimpleNamespace(before=6.0)
+    )
+    monkeypatch.setattr(remarks_module, "held_at_floor", lambda fit, dataset: explained)
+    monkeypatch.setattr(remarks_module, "floor_of", lambda axis, logs: 2.0)
+    told = remarks_module._beyond_in_words(found)
+    if not held or explained:
+        assert told is None
+    else:
+        assert "the force error is 3.0 times its noise floor" in told
