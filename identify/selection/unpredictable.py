@@ -20,7 +20,7 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.estimation.decision import RULE
 from identify.estimation.errors import holdout_error
-from identify.estimation.evidence import effective_samples
+from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit, Outcome, finished
 from identify.selection.decoys import Trial
 from identify.selection.residual_dependence import coordinates_of, find_dependence, gathered
@@ -33,6 +33,7 @@ MOVED = ("velocity", "acceleration", "direction")
 RIDGE = 0.03  # of a column's length, which keeps hats that are seldom visited small
 DECOYS = 20
 LEAST_LOGS = 2
+MOST_NOISE = 0.5  # of the force, RMS, that its noise may be
 ALIKE = 1.5  # times the error of the fit logs that noise may have on the held-out ones
 
 Columns = Callable[[Sequence[PreparedLog]], list[Array]]
@@ -58,8 +59,12 @@ def is_unpredictable(fit: Fit, dataset: Dataset) -> bool:
 
     Neither on the held-out logs nor on blocks left out of the fit logs; noise is as large on both.
     No line stands out of its spectrum, and it has no amplitude that it keeps. One log alone does
-    not tell: what depends on where the axis is cannot be foretold where it comes by once.
+    not tell: what depends on where the axis is cannot be foretold where it comes by once. What is
+    nearly as large as the whole force is no noise: the force may be of another machine.
     """
+    command = np.concatenate([log.command for log in fit.logs])[fit.kept]
+    if fit.error > MOST_NOISE * rms(command):
+        return False
     if len(dataset.fit) + len(dataset.holdout) < LEAST_LOGS or keeps_its_amplitude(fit.residual):
         return False
     held = holdout_error(fit, dataset)

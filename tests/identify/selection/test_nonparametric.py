@@ -90,8 +90,8 @@ def honest(seed: int) -> FitResult:
 @pytest.mark.parametrize(
     ("force", "height", "name", "fall"),
     [
-        ("chirp", CHIRP, MAP, 20.0),
-        ("hill", 0.1, MAP, 20.0),
+        ("chirp", CHIRP, MAP, 15.0),  # of an error that the physics before it has fitted to its end
+        ("hill", 0.1, MAP, 15.0),
         ("sawtooth", 0.05, MAP, 3.5),
         ("bend", 0.05, LEARNED, 4.0),
     ],
