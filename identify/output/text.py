@@ -128,7 +128,7 @@ def diagnose_text(result: Diagnosis) -> str:
     lines = []
     for axis, d in result.axes.items():
         unit, words = d.base.axis.units.force, d.base.axis.units.words
-        named = f" {named_in_words(d)}." if d.named else ""
+        named = f" Missing: {named_in_words(d)}." if d.named else ""
         lines.append(f"axis {axis}: {words(verdict_in_words(d))}{named}")
         lines.append(
             f"  {words('force error')} {d.base.error:.4g} {unit}, noise floor "

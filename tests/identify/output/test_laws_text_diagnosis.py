@@ -54,7 +54,7 @@ def test_a_diagnosis():
     text = diagnose_text(result)
     y, lines = text.split("axis x: ", 1)
     lines = lines.splitlines()
-    assert lines[0] == f"{SEVERAL} cogging or quadratic_drag, and lugre."
+    assert lines[0] == f"{SEVERAL} Missing: cogging or quadratic_drag, and lugre."
     assert lines[1] == "  force error 8.37 N, noise floor 2.11 N (ratio 3.97)"
     tested = x.tested
     assert lines.pop(2) == (
@@ -160,7 +160,7 @@ def test_shares_of_several_are_said_to_be_no_parts_of_a_whole():
 def test_every_named_effect_is_in_the_headline():
     two = made.diagnosis_of(steps=(Step(made.BEST, ()), Step(made.LATER, ())))
     line = diagnose_text(made.diagnosed(two)).split("axis x: ", 1)[1].splitlines()[0]
-    assert line == f"{verdict_in_words(two)} cogging and lugre."
+    assert line == f"{verdict_in_words(two)} Missing: cogging and lugre."
     assert "several effects" in line
     both = (replace(made.FOUND[0], tied=("lugre",)), replace(made.FOUND[1], tied=("cogging",)))
     assert ties_in_words(replace(two, findings=both)) == [
