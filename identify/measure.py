@@ -11,7 +11,7 @@ from identify.dataset.excitation import excitation
 from identify.dataset.given_logs import require_samples
 from identify.dataset.motion import Motion, motion_of
 from identify.dataset.reading_ripple import ripples_of_widest
-from identify.dataset.test_function import LEAST_BLOCKS, TestFunction
+from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import inertia
 from identify.estimation.cable_force import CableForce
 from identify.estimation.cable_force import cable_force as of_cable
@@ -87,10 +87,7 @@ def _first_axis(
     motions: Sequence[Motion], force_constant: float | None, friction: Effect
 ) -> AxisModel:
     mass, covered, units = inertia(motions), excitation(motions, None), motions[0].units
-    window = [
-        TestFunction.of_length(max(TEST_FUNCTION, LEAST_BLOCKS * m.period), m.period)
-        for m in motions
-    ]
+    window = [TestFunction.at_least(TEST_FUNCTION, m.period) for m in motions]
     reached = max(
         float(np.abs(w.acceleration(m.velocity)).max())
         for w, m in zip(window, motions, strict=True)

@@ -65,7 +65,7 @@ def built_fit(
     kept = np.ones(len(residual), dtype=bool) if kept is None else kept
     scaling = Scaling(free_parameters(axis))
     fit = Fit(axis, logs, scaling, outcome, residual, kept, begun or axis)
-    fit.__dict__.update(floor=floor, told_floor=floor, lessened=lessened, at_bound=())
+    fit.__dict__.update(floor=floor, floor_of_logs=floor, lessened=lessened, at_bound=())
     if jacobian is not None:
         fit.__dict__["jacobian"] = jacobian
     return fit

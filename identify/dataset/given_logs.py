@@ -14,7 +14,6 @@ from identify.dataset.shared_samples import share_samples
 from twin.errors import InputError
 from twin.log import Log
 from twin.log.check import moves
-from twin.log.check.content import SHORTEST
 from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]
@@ -107,10 +106,10 @@ def nothing_moves(axes: Iterable[str], logs: Collection[Log]) -> InputError:
         return InputError(
             f"{said} is in the logs, which have {', '.join(known)}; name the axes alike"
         )
-    if longest < SHORTEST:
+    if longest < SHORTEST_LOG:
         return InputError(
             f"{said} moves for long enough: the logs last {longest:.3g} s at most, identification "
-            f"needs {SHORTEST:g} s; record longer"
+            f"needs {SHORTEST_LOG:g} s; record longer"
         )
     return InputError(f"{said} moves in the logs; give a log in which one moves")
 

@@ -64,31 +64,30 @@ class Noise:
         return np.asarray(self.force + self.reading * self.bend)
 
 
-def floor_of(
-    axis: AxisModel, logs: Sequence[PreparedLog], left: Sequence[Array] | None = None
+def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
+    """RMS noise floor in N of the force residual of these logs."""
+    sensors = noise_floor(axis, [(log.motion, log.test_function) for log in logs])
+    return _with_own(sensors, logs)
+
+
+def floor_beside(
+    axis: AxisModel, logs: Sequence[PreparedLog], known: float, left: Sequence[Array]
 ) -> float:
-    """RMS noise floor in N of the force residual of these logs.
+    """The noise floor ``known`` (N RMS) of these logs, or less where what is left refutes it.
 
     left: of each log (n,) N, what the axis leaves, zero where it tells nothing. A noise of the
     force that alone would leave clearly more is refuted: it was the controller's answer to readings
     that the log does not hold, or a load that strikes within its play. Its level is then what the
     residual leaves room for.
     """
-    motions = [log.motion for log in logs]
-    noises = noises_of(axis, motions)
-
-    def floor(noises: Sequence[Noise]) -> float:
-        each = (
-            _variance(axis, noise, log.motion, log.test_function)
-            for noise, log in zip(noises, logs, strict=True)
-        )
-        return _with_own(_together([*each], motions), logs)
-
-    known = floor(noises)
-    if left is None or _rms_of(left) > REFUTED * known:
+    if _rms_of(left) > REFUTED * known:
         return known
-    room = [_room_in(r, n, log) for r, n, log in zip(left, noises, logs, strict=True)]
-    return min(floor([replace(n, force=a) for n, a in zip(noises, room, strict=True)]), known)
+    given = [(log.motion, log.test_function) for log in logs]
+    noises = [
+        replace(n, force=_room_in(r, n, log))
+        for r, n, log in zip(left, noises_of(axis, [m for m, _ in given]), logs, strict=True)
+    ]
+    return min(_with_own(_passed_together(axis, noises, given), logs), known)
 
 
 def _rms_of(left: Sequence[Array]) -> float:
@@ -130,10 +129,15 @@ def unrounded_floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
     """RMS in N of what measurement noise alone leaves in the force residual of these logs."""
-    motions = [motion for motion, _ in logs]
-    noises = noises_of(axis, motions)
+    return _passed_together(axis, noises_of(axis, [motion for motion, _ in logs]), logs)
+
+
+def _passed_together(
+    axis: AxisModel, noises: Sequence[Noise], logs: Sequence[tuple[Motion, TestFunction]]
+) -> float:
+    """RMS in N of what the test functions of these logs pass of their noise."""
     each = [_variance(axis, n, *log) for n, log in zip(noises, logs, strict=True)]
-    return _together(each, motions)
+    return _together(each, [motion for motion, _ in logs])
 
 
 def noises_of(axis: AxisModel, motions: Sequence[Motion]) -> tuple[Noise, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +101,11 @@ def on_blocks(axis: AxisModel) -> Table:
 def sticks(axis: AxisModel) -> bool:
     """Whether the axis has static friction, whose force at rest the motion does not determine."""
     return any(f.effect.sticks for f in axis.effects)
+
+
+def split_by_log(values: NDArray[Any], logs: Sequence[PreparedLog]) -> list[NDArray[Any]]:
+    """Values of all test functions of some logs (n, ...), log after log, as those of each."""
+    return np.split(values, np.cumsum([len(log) for log in logs])[:-1])
 
 
 def at_rest(velocity: Array) -> NDArray[np.bool_]:

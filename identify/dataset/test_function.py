@@ -59,6 +59,11 @@ class TestFunction:
         return cls._of_blocks(n, period, max(n // OVERLAP, 1))
 
     @classmethod
+    def at_least(cls, length: float, period: float) -> TestFunction:
+        """The same, but as short as can be where blocks are too long for that length (s)."""
+        return cls.of_length(max(length, LEAST_BLOCKS * period), period)
+
+    @classmethod
     def _of_blocks(cls, n: int, period: float, stride: int) -> TestFunction:
         edges = (1.0 - (np.arange(n + 1) / n * 2.0 - 1.0) ** 2) ** 2
         phi = 0.5 * (edges[1:] + edges[:-1])

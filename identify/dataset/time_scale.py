@@ -117,7 +117,7 @@ def regressors(motions: Motions, length: float) -> tuple[Array, Array, list[Test
     """
     columns, forces, test_functions = [], [], []
     for m in motions:
-        w = TestFunction.of_length(max(length, LEAST_BLOCKS * m.period), m.period)
+        w = TestFunction.at_least(length, m.period)
         direction = w.mean(np.sign(m.velocity))
         columns.append(
             np.stack(

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.drive import forces_lessened
-from identify.dataset.noise_floor import floor_of
-from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.dataset.noise_floor import floor_beside, floor_of
+from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.dataset.spectral_lines import lines_in_time
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples, rms
@@ -76,17 +76,17 @@ class Fit:
         """The residual (n,) N of each log, zero where a test function carries no information."""
         every = np.zeros(len(self.kept))
         every[self.kept] = self.residual
-        return np.split(every, np.cumsum([len(log) for log in self.logs])[:-1])
+        return split_by_log(every, self.logs)
 
     @cached_property
-    def told_floor(self) -> float:
-        """RMS noise floor in N, as the logs tell it before what is left is known."""
+    def floor_of_logs(self) -> float:
+        """RMS noise floor in N, as the logs give it before what is left is known."""
         return floor_of(self.axis, self.logs)
 
     @cached_property
     def floor(self) -> float:
-        """RMS noise floor in N; less than the one told first where what is left refutes that."""
-        return floor_of(self.axis, self.logs, self.by_log)
+        """RMS noise floor in N; less than that of the logs where what is left refutes it."""
+        return floor_beside(self.axis, self.logs, self.floor_of_logs, self.by_log)
 
     @cached_property
     def samples(self) -> float:
@@ -169,11 +169,11 @@ class Fit:
 
     @property
     def may_be_noise(self) -> bool:
-        """Whether what is left may be noise: at its floor, or too small for the floor told first.
+        """Whether what is left may be noise: at its floor, or too small for the floor of the logs.
 
         How noisy the force is, which the readings hide, is then no more than a guess.
         """
-        return self.at_floor or self.floor < self.told_floor
+        return self.at_floor or self.floor < self.floor_of_logs
 
     @property
     def ratio(self) -> float:

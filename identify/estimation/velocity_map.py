@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from identify.dataset.drive import parts_of
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import total_force
-from identify.dataset.test_function import LEAST_BLOCKS, TestFunction
+from identify.dataset.test_function import TestFunction
 from twin.effect import Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
@@ -102,7 +102,7 @@ def plateaus(motion: Motion) -> list[tuple[int, int]]:
 
     From the end of its first test function to the start of its last, so that no ramp is inside.
     """
-    window = TestFunction.of_length(max(LENGTH, LEAST_BLOCKS * motion.period), motion.period)
+    window = TestFunction.at_least(LENGTH, motion.period)
     velocity = window.mean(motion.velocity)
     change = np.abs(window.acceleration(motion.velocity)) * window.length
     moving = np.abs(velocity) > STEADY * np.abs(motion.velocity).max()

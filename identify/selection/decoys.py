@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import Gain, blocks_of, by_blocks
 from identify.estimation.fit import Fit
@@ -80,8 +80,7 @@ def proof(without: Fit, fitted: Fitted, dataset: Dataset, fit: Gain | None = Non
     size = _ridge(jacobian(axis, dataset.fit, where))
 
     def columns(logs: Sequence[PreparedLog]) -> list[Array]:
-        ends = np.cumsum([len(log) for log in logs])[:-1]
-        return np.split(jacobian(axis, logs, where) / size, ends)
+        return split_by_log(jacobian(axis, logs, where) / size, logs)
 
     whole, typical = Trial.of(without, dataset).proofs(columns, sticking=sticks(axis))
     if fit is not None:

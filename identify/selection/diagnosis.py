@@ -148,9 +148,9 @@ class AxisDiagnosis:
             if finding in findings:  # not one that a missing effect resembles
                 findings = self._against_shapes(finding, without, findings)
         beside = self.with_named
-        told = self.unexplained is None or beside.may_be_noise
-        if not told and (shape := wrong_shape(beside, self.dataset)):
-            wrong = found_wrong(shape, self.base, self.with_named, self.dataset)
+        is_open = self.unexplained is not None and not beside.may_be_noise
+        if is_open and (shape := wrong_shape(beside, self.dataset)):
+            wrong = found_wrong(shape, self.base, beside, self.dataset)
             findings = with_shape(findings, wrong)
         # A curve whose band holds the law everywhere tells nothing beside other findings.
         findings = tuple(f for f in findings if f.is_sure) or findings

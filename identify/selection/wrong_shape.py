@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian
@@ -267,11 +267,10 @@ def _columns(
         scales.append(np.linalg.inv(np.linalg.cholesky(rows.T @ rows)).T)
 
     def columns(logs: Sequence[PreparedLog]) -> list[Array]:
-        ends = np.cumsum([len(log) for log in logs])[:-1]
         every = []
         for part, scale in zip(parts, scales, strict=True):
             where = [ParameterReference(effect.name, effect.parameter(n)) for n in part.strengths]
             every.append(jacobian(alone, logs, where) @ scale)
-        return np.split(np.hstack(every), ends)
+        return split_by_log(np.hstack(every), logs)
 
     return columns

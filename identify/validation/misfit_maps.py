@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset, by_log
-from identify.dataset.noise_floor import floor_of
-from identify.dataset.prepared_log import PreparedLog, at_rest, moving, sticks
+from identify.dataset.noise_floor import floor_beside, floor_of
+from identify.dataset.prepared_log import PreparedLog, at_rest, moving, split_by_log, sticks
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
@@ -123,8 +123,8 @@ def compare_axis(
     kept = moving(dataset.fit, sticks(axis))
     every = residual(axis, dataset.fit)
     force = every[kept]
-    ends = np.cumsum([len(log) for log in dataset.fit])[:-1]
-    floor = floor_of(axis, dataset.fit, np.split(np.where(kept, every, 0.0), ends))
+    left = split_by_log(np.where(kept, every, 0.0), dataset.fit)
+    floor = floor_beside(axis, dataset.fit, floor_of(axis, dataset.fit), left)
     where = {k: v[kept] for k, v in _coordinates(axis, dataset.fit).items()}
     maps = _maps(axis, dataset, floor, force, where)
     maps.append(misfit_by_frequency(axis, dataset.fit))

@@ -16,7 +16,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.prepared_log import PreparedLog
+from identify.dataset.prepared_log import PreparedLog, split_by_log
 
 Array = NDArray[np.float64]
 NORMAL = NormalDist()
@@ -99,11 +99,8 @@ def residual_tests(
     logs: Sequence[PreparedLog], force: Array, kept: NDArray[np.bool_], floor: float, loop: Loop
 ) -> ResidualTests:
     """Tests of the force residual (n,) N of some logs; kept (n,): which values are used."""
-    parts = np.cumsum([len(log) for log in logs])[:-1]
-    series = [
-        _series(log, own, used)
-        for log, own, used in zip(logs, np.split(force, parts), np.split(kept, parts), strict=True)
-    ]
+    parts = zip(logs, split_by_log(force, logs), split_by_log(kept, logs), strict=True)
+    series = [_series(log, own, used) for log, own, used in parts]
     residual = [s["residual"] for s in series]
     left = np.concatenate(residual)
     left = left[np.isfinite(left)]

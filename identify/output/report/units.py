@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identify.output.words.numbers import RAISED, Numbers, told_apart
+from identify.output.words.numbers import RAISED, Numbers, distinct
 
 PREFIXED = frozenset({"m", "m/s", "m/s^2", "N", "N m", "s", "A", "rad", "rad/s", "rad/s^2"})
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -121,7 +121,7 @@ def spaced(name: str) -> str:
 def change(before: float, after: float, unit: str) -> tuple[str, str]:
     """Two SI values in the unit that suits them, with digits that tell them apart."""
     scale = Scale.of(unit, [before, after])
-    first, second = map(with_minus, told_apart(before / scale.size, after / scale.size))
+    first, second = map(with_minus, distinct(before / scale.size, after / scale.size))
     return first, f"{second} {scale.unit}".rstrip()
 
 

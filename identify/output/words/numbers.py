@@ -41,7 +41,7 @@ def _ratio(value: float) -> str:
     return f"{value:.1f}"
 
 
-def told_apart(before: float, after: float) -> tuple[str, str]:
+def distinct(before: float, after: float) -> tuple[str, str]:
     """Two numbers with four digits, or with as many more as it takes to see that they differ."""
     pair = f"{before:.4g}", f"{after:.4g}"
     digits = 4
@@ -52,7 +52,7 @@ def told_apart(before: float, after: float) -> tuple[str, str]:
 
 
 def _change(before: float, after: float, unit: str) -> tuple[str, str]:
-    first, second = told_apart(before, after)
+    first, second = distinct(before, after)
     return first, with_unit(second, unit)
 
 

@@ -20,6 +20,7 @@ from identify.dataset.noise_floor import (
     _between_samples,
     _median_spectrum,
     _together,
+    floor_beside,
     floor_of,
     noise_floor,
     noise_of,
@@ -74,19 +75,20 @@ def test_a_floor_that_what_is_left_refutes_is_that_of_the_residual(monkeypatch):
     """As where readings that the log does not hold made the command."""
     axis, log = AxisModel(MASS), noisy(6, 0.02, duration=20.0)
     left = residual(axis, [log])
-    told = floor_of(axis, [log])
-    assert floor_of(axis, [log], [left]) == told
+    true = floor_of(axis, [log])
+    assert floor_beside(axis, [log], true, [left]) == true
     found = noise_floor_module.noises_of
 
     def much(axis, motions):
         return tuple(replace(n, force=30.0 * n.force) for n in found(axis, motions))
 
     monkeypatch.setattr(noise_floor_module, "noises_of", much)
-    assert floor_of(axis, [log]) == pytest.approx(np.sqrt(30.0) * told, rel=0.01)
-    assert floor_of(axis, [log], [left]) == pytest.approx(told, rel=0.15)
+    known = floor_of(axis, [log])
+    assert known == pytest.approx(np.sqrt(30.0) * true, rel=0.01)
+    assert floor_beside(axis, [log], known, [left]) == pytest.approx(true, rel=0.15)
     # What a model lacks is slower than the noise, and stays above the floor.
-    slow = 3.0 * told * np.sin(2.0 * np.pi * np.arange(len(left)) / 64.0)
-    assert floor_of(axis, [log], [left + slow]) == pytest.approx(told, rel=0.15)
+    slow = 3.0 * true * np.sin(2.0 * np.pi * np.arange(len(left)) / 64.0)
+    assert floor_beside(axis, [log], known, [left + slow]) == pytest.approx(true, rel=0.15)
 
 
 def test_logs_weigh_by_how_long_they_last_not_by_their_blocks():

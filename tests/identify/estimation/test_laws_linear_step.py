@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, fitted
+from built_fits import CATALOGUE, built_dataset
 
-from identify.estimation.fit import Outcome, finished
+from identify.estimation.fit import Outcome
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import (
     _bounded_step,
@@ -22,18 +22,6 @@ from twin.model.parameters import ParameterReference
 
 RNG = np.random.default_rng(3)
 SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
-
-
-@pytest.fixture(scope="module")
-def dataset():
-    return built_dataset("one", "two")
-
-
-@pytest.fixture(scope="module")
-def base(dataset):
-    """The axis off its best values, with the residual and Jacobian that it has there."""
-    off = replace(axis_of(fitted("constant_force", F0=0.2)), mass=5.6)
-    return finished(off, PLAIN, dataset.fit, Outcome.CONVERGED)
 
 
 def test_a_step_within_bounds_is_the_least_squares_beside_the_base():

@@ -29,18 +29,6 @@ NOTHING = np.zeros(0)
 SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
 
 
-@pytest.fixture(scope="module")
-def dataset():
-    return built_dataset("one", "two")
-
-
-@pytest.fixture(scope="module")
-def base(dataset):
-    """The axis off its best values, with the residual and Jacobian that it has there."""
-    off = replace(axis_of(fitted("constant_force", F0=0.2)), mass=5.6)
-    return finished(off, PLAIN, dataset.fit, Outcome.CONVERGED)
-
-
 # --- fitted thoroughly ----------------------------------------------------------------------
 
 
