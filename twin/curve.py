@@ -26,7 +26,7 @@ class Curve:
     None where it does not. by_direction: whether each direction of motion has a curve of its own.
     rubs: whether it is a level of friction, so that only a curve that turns with the direction is
     another shape of it. bent_by: name of a parameter, held by design, that bends the law's own
-    curve; None where the law has none.
+    curve, such as an exponent; None where the law has none.
     """
 
     over: Coordinate

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,7 +38,17 @@ def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
 
     place: m; velocity: m/s, not zero.
     """
+    rubbing = [f for f in axis.effects if f.effect.kind in (Kind.FRICTION, Kind.MODIFIER)]
+    force = steady_force(replace(axis, effects=tuple(rubbing)), place, velocity)
+    return float(-np.sign(velocity) * force)
+
+
+def steady_force(axis: AxisModel, place: float, velocity: float) -> float:
+    """Force (N) of an axis' forces and friction after a long way at one place.
+
+    place: m; velocity: m/s, not zero.
+    """
     period = STEADY_TRAVEL / STEPS / abs(velocity)
     places, velocities = np.repeat([[place], [velocity]], STEPS, axis=1)
-    force = force_along(axis, places, velocities, period, Kind.FRICTION, Kind.MODIFIER)
-    return float(-np.sign(velocity) * force[-1])
+    acting = (Kind.FORCE, Kind.FRICTION, Kind.MODIFIER)
+    return float(force_along(axis, places, velocities, period, *acting)[-1])

@@ -1,13 +1,16 @@
-"""The curve of a friction law over speed, with what bends it as it was held and as it was found."""
+"""The curve of a law over speed, with what bends it as it was held and as it was found."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.curve_band import with_band
 from identify.estimation.fit import Fit
-from identify.estimation.prescribed_motion import steady_friction
+from identify.estimation.prescribed_motion import steady_force
 from identify.selection.found_shape import AHEAD, BEHIND, UNITS, Drawn, FoundShape
 from twin.curve import Coordinate
 from twin.effect import Kind
@@ -20,32 +23,29 @@ RUBBING = (Kind.FRICTION, Kind.MODIFIER)
 
 
 def bent_curve(held: Fitted, final: Fit, dataset: Dataset) -> FoundShape:
-    """The steady friction of a final fit with its 90 % band, and that of the law as it was held.
+    """The steady force of a law of a final fit with its 90 % band, and that of it as it was held.
 
-    In the middle of the travel, positive or negative as the force of the law is.
+    Of a friction with what modifies it. In the middle of the travel, positive or negative as the
+    force of the law is.
     """
     covered = dataset.excitation
     speed = covered.speed_max * np.geomspace(SLOWEST, 1.0, SPEEDS)
     place = 0.5 * (covered.position_low + covered.position_high)
-    before = final.axis.with_effect(held)
-    curves = {
-        name: _drawn(before, final, place, way * speed) for name, way in ((AHEAD, 1), (BEHIND, -1))
-    }
+    rubs = held.effect.kind in RUBBING
+    names = [f.effect.name for f in final.axis.effects if rubs and f.effect.kind in RUBBING]
+    names = names or [held.effect.name]
+    among = [c for c in final.scaling.where if c.effect in names]
+
+    def force(axis: AxisModel, velocity: Array) -> Array:
+        acting = replace(axis, effects=tuple(f for f in axis.effects if f.effect.name in names))
+        return np.array([steady_force(acting, place, float(v)) for v in velocity])
+
+    curves = {}
+    for name, way in ((AHEAD, 1), (BEHIND, -1)):
+        at = partial(force, velocity=way * speed)
+        found, band = with_band(final, at, among)
+        curves[name] = Drawn(at(final.axis.with_effect(held)), found, band)
     units = final.axis.units
     return FoundShape(
         Coordinate.SPEED, speed, units(UNITS[Coordinate.SPEED]), None, False, units.force, curves
     )
-
-
-def _drawn(before: AxisModel, final: Fit, place: float, velocity: Array) -> Drawn:
-    """Force (k,) N of two axes at velocities (k,) m/s, and half the band of the fitted one."""
-    rubs = [f.effect.name for f in final.axis.effects if f.effect.kind in RUBBING]
-    among = [c for c in final.scaling.where if c.effect in rubs]
-    found, band = with_band(final, lambda axis: _force(axis, place, velocity), among)
-    return Drawn(_force(before, place, velocity), found, band)
-
-
-def _force(axis: AxisModel, place: float, velocity: Array) -> Array:
-    """Force (k,) N that friction makes at velocities (k,) m/s after a long way."""
-    level = [steady_friction(axis, place, float(v)) for v in velocity]
-    return -np.sign(velocity) * np.array(level)

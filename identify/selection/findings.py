@@ -10,6 +10,7 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors, error_in, gain_held_out
 from identify.estimation.fit import Fit, fit_axis
+from identify.selection.bends import Bend, bend_of, straight
 from identify.selection.bent_curve import bent_curve
 from identify.selection.confidence import confidence
 from identify.selection.decoys import Proof, proof
@@ -32,19 +33,6 @@ class FindingKind(Enum):
 
 
 @dataclass(frozen=True)
-class Bend:
-    """A parameter of a law, held by design, with which its curve comes nearest to the one found.
-
-    held, found: in ``unit``.
-    """
-
-    parameter: str
-    held: float
-    found: float
-    unit: str
-
-
-@dataclass(frozen=True)
 class Finding:
     """A missing effect, or one whose law has the wrong shape, that the data prove.
 
@@ -54,7 +42,7 @@ class Finding:
     as one linear step predicts where no refit was made. chosen: the same on the logs that chose;
     without test logs the test errors are these. parameters, parameter_units: of its law. proof:
     beside decoys; None where a shift in time makes none. shape: the curve that is assumed and the
-    one found, where they differ. bend: what would give the law that curve, where it has such a
+    one found, where they differ. bend: what gives the law that curve, where it has such a
     parameter. left: over the noise floor, the error that all findings together leave on the logs
     that chose.
     """
@@ -89,10 +77,14 @@ class Finding:
 def found(
     effect: Effect, tied: tuple[str, ...], base: Fit, final: Fit, without: Fit, dataset: Dataset
 ) -> Finding:
-    """The finding of one effect of a final fit; without: the same fit less this effect alone."""
+    """The finding of one effect of a final fit; without: the same fit less this effect alone.
+
+    An effect with another bend than its law holds by design resembles what is missing.
+    """
     chosen, tested = _errors(without, final, dataset)
     fitted = final.axis[effect.name]
-    return Finding(
+    bend = bend_of(fitted)
+    finding = Finding(
         effect=effect.name,
         tied=tied,
         explains=share_explained(tested, base, dataset),
@@ -102,7 +94,13 @@ def found(
         parameters=dict(fitted.values),
         parameter_units=final.axis.parameter_units(effect.name),
         proof=proof(without, fitted, dataset, gain_held_out(without, final, dataset)),
+        bend=bend,
     )
+    if bend is None or not bend.differs:
+        return finding
+    law = straight(final, dataset, fitted, bend).axis[effect.name]
+    drawn = bent_curve(law, final, dataset)
+    return replace(finding, kind=FindingKind.RESEMBLES, shape=drawn)
 
 
 def found_wrong(shape: WrongShape, base: Fit, final: Fit, dataset: Dataset) -> Finding:
@@ -122,11 +120,9 @@ def found_reshaped(
 
     As of a missing effect, the final fit less this curve tells what it explains.
     """
-    if shape.shape.curve.rubs:
-        return _found_bent(shape, base, before, final, dataset)
     curve = shape.shape.empty.effect.name
     if curve not in final.axis.names:
-        return found_wrong(shape, base, before, dataset)
+        return _found_bent(shape, base, before, final, dataset)
     axis = final.axis.without(curve)
     if shape.effect not in axis.names:
         axis = axis.with_effect(before.axis[shape.effect])
@@ -137,17 +133,16 @@ def found_reshaped(
 
 
 def _found_bent(shape: WrongShape, base: Fit, before: Fit, final: Fit, dataset: Dataset) -> Finding:
-    """The same of a friction whose own curve is bent in a final fit, if that has it still."""
-    bend = shape.shape.curve.bent_by
-    if bend is None or shape.effect not in final.axis.names:
+    """The same of a law whose own curve is bent in a final fit, if that has it still."""
+    held = before.axis[shape.effect]
+    law = final.axis[shape.effect] if shape.effect in final.axis.names else held
+    bend = bend_of(law)
+    if bend is None or bend.parameter not in held.fixed:
         return found_wrong(shape, base, before, dataset)
-    held, law = before.axis[shape.effect], final.axis[shape.effect]
-    straight = replace(law, values={**law.values, bend: held.values[bend]}, fixed=held.fixed)
-    without = fit_axis(final.axis.with_effect(straight), dataset.fit)
-    drawn, errors = bent_curve(held, final, dataset), _errors(without, final, dataset)
-    found = _of_shape(shape, drawn, base, final.axis, dataset, errors)
-    unit = held.effect.parameter(bend).unit
-    return replace(found, bend=Bend(bend, held.values[bend], law.values[bend], unit))
+    bend = replace(bend, held=held.values[bend.parameter])
+    errors = _errors(straight(final, dataset, law, bend), final, dataset)
+    drawn = bent_curve(held, final, dataset)
+    return replace(_of_shape(shape, drawn, base, final.axis, dataset, errors), bend=bend)
 
 
 def _errors(without: Fit, final: Fit, dataset: Dataset) -> tuple[Errors, Errors]:

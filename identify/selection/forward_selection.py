@@ -13,6 +13,7 @@ from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.scaling import Scaling
 from identify.estimation.thorough_fit import fit_thoroughly
 from identify.estimation.time_origin import synchronised
+from identify.selection.bends import straightened
 from identify.selection.diagnosis import AxisDiagnosis, SelectionState, Step, kept
 from identify.selection.pair_search import held_at_floor, search_pairs
 from identify.selection.ranking import (
@@ -24,7 +25,7 @@ from identify.selection.ranking import (
     tie,
     took_friction,
 )
-from identify.selection.reshaping import Reshaped, curve_in_place
+from identify.selection.reshaping import Reshaped, bent_in_place, curve_in_place
 from identify.selection.scoring import Candidate, score
 from identify.selection.unpredictable import is_unpredictable, with_own_noise
 from identify.selection.verdict import decided
@@ -56,12 +57,17 @@ def diagnose_axis(
     final, found = base, ranking
     curves: list[Reshaped] = []
     while len(steps) < RULE.most_steps:
-        while curve := curve_in_place(final, dataset, found, base.axis.names):
+        if as_bent := bent_in_place(final, dataset, found, base.axis.names):
+            final, found = ranked(as_bent, dataset)
+            states[-1] = replace(states[-1], fit=final)
+            continue
+        if curve := curve_in_place(final, dataset, found, base.axis.names):
             curves.append(curve)
             steps, final = _needed_beside(curves, steps, base, dataset)
             dataset, final = synchronised(final, dataset)  # what repeats in time shows only now
             final, found = ranked(final, dataset)
             states[-1] = SelectionState(tuple(steps), final)
+            continue
         if not (more := _next(final, dataset, found, ranked)):
             break
         final, dropped = _eliminated_backwards(
@@ -70,6 +76,8 @@ def diagnose_axis(
         steps += [*more[:-1], replace(more[-1], dropped=dropped)]
         states.append(SelectionState(tuple(steps), final))
         if is_all_noise(final):
+            final = bent_in_place(final, dataset, (), base.axis.names) or final
+            states[-1] = replace(states[-1], fit=final)
             break
         if shifts and (moved := moved_by(final, dataset)):
             again = fit_axis(base.axis, moved.fit)
@@ -123,7 +131,7 @@ def _next(
     ranked: Callable[[Fit, Dataset], tuple[Fit, tuple[Candidate, ...]]],
 ) -> list[Step]:
     """The next steps: the best effect, a pair that is needed together, or none."""
-    if ranking and _is_added(ranking[0], base):
+    if ranking and ranking[0].is_added_to(base):
         best = ranking[0]
         near = tuple(c for c in _near(best, ranking) if c.supported)
         tied = tuple(c.effect.name for c in near if tie(dataset, best, c))
@@ -147,14 +155,6 @@ def _next(
         Step(first, tuple(alike), beside=second.effect.name, rivals=_near(alone, ranking)),
         Step(second, (), beside=first.effect.name, rivals=_near(second, pair.seconds)),
     ]
-
-
-def _is_added(best: Candidate, base: Fit) -> bool:
-    """Whether the best candidate is added; at the noise floor it needs far more evidence.
-
-    The noise floor is an estimate, so an effect may be significant although the error is at it.
-    """
-    return best.supported and (best.is_beyond_doubt or not base.may_be_noise)
 
 
 def _friction_instead(
@@ -196,7 +196,8 @@ def _eliminated_backwards(
 ) -> tuple[Fit, tuple[str, ...]]:
     """The fit without the earlier effects that are not needed any more, and their names.
 
-    Where a first of several is not, the second takes its place.
+    Nor is a bend of a law that another effect had asked for. Where a first of several is not, the
+    second takes its place.
     """
     dropped = []
     for candidate in earlier:
@@ -212,6 +213,7 @@ def _eliminated_backwards(
         if not needed:
             fit = without
             dropped.append(candidate.effect.name)
+    fit = straightened(fit, dataset, base.axis.names)
     for candidate in earlier:
         fit, later = _in_its_place(fit, candidate.effect)
         dropped = [later if name == candidate.effect.name else name for name in dropped]
@@ -220,7 +222,7 @@ def _eliminated_backwards(
 
 def _is_needed(effect: Effect, fit: Fit, without: Fit, dataset: Dataset) -> bool:
     """Whether an effect of a fit would be added to the fit without it."""
-    return _is_added(score(without, fit, dataset, effect), without)
+    return score(without, fit, dataset, effect).is_added_to(without)
 
 
 def _in_its_place(fit: Fit, effect: Effect) -> tuple[Fit, str]:

@@ -9,14 +9,15 @@ contain what modifies friction.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
 from identify.estimation.errors import Errors, error_in, gain_held_out
-from identify.estimation.fit import Fit, fit_axis
+from identify.estimation.fit import Fit
+from identify.selection.bends import bent, held_bends
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.ranking import less
 from identify.selection.scoring import Candidate, score
@@ -60,14 +61,31 @@ def curve_in_place(
 def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Reshaped | None:
     """The free curve that does clearly better than each absent effect; None where none does.
 
-    That which takes most; the next where that is of a friction whose own curve cannot be bent so.
+    That which takes most, by what bends the law's own curve where the law has such a parameter; the
+    next where that is of a friction whose curve cannot be bent so.
     """
     rivals = [c for c in ranking if c.supported]
     for shape in wrong_shapes(fit, dataset):
+        if by_bend := _bent(shape, fit, dataset, rivals):
+            return by_bend
         if not shape.shape.curve.rubs:
             return _in_place(shape, fit, dataset, rivals)
-        if bent := _bent(shape, fit, dataset, rivals):
-            return bent
+    return None
+
+
+def bent_in_place(
+    fit: Fit, dataset: Dataset, ranking: Sequence[Candidate], given: Collection[str]
+) -> Fit | None:
+    """The fit with the law of an added effect bent; None where the data do not ask for it.
+
+    given: names of the effects that the model had before the selection.
+    """
+    rivals = [c for c in ranking if c.supported]
+    for law in fit.axis.effects:
+        for bend in held_bends(law) if law.effect.name not in given else ():
+            tried = bent(fit, dataset, law, bend)
+            if tried.is_added_to(fit) and _is_better(tried, rivals):
+                return tried.fit
     return None
 
 
@@ -86,12 +104,11 @@ def _in_place(
 def _bent(
     shape: WrongShape, fit: Fit, dataset: Dataset, rivals: Sequence[Candidate]
 ) -> Reshaped | None:
-    """The friction with what bends its own curve free, where that does clearly better."""
+    """A law with what bends its own curve free, where that does clearly better."""
     law, bend = fit.axis[shape.effect], shape.shape.curve.bent_by
-    if bend is None or bend not in law.fixed:
+    if bend is None or bend not in held_bends(law):
         return None
-    bent = fit.axis.with_effect(replace(law, fixed=law.fixed - {bend}))
-    curve = score(fit, fit_axis(bent, dataset.fit), dataset, law.effect)
+    curve = bent(fit, dataset, law, bend)
     return (
         Reshaped(shape, fit, curve.fit) if curve.supported and _is_better(curve, rivals) else None
     )

@@ -76,6 +76,13 @@ class Candidate:
         """Whether the evidence is enough where noise may be all that is left."""
         return self.delta_bic > RULE.beyond_doubt
 
+    def is_added_to(self, base: Fit) -> bool:
+        """Whether the effect is added to the fit without it; at the noise floor it needs far more.
+
+        The noise floor is an estimate, so an effect may be significant although the error is at it.
+        """
+        return self.supported and (self.is_beyond_doubt or not base.may_be_noise)
+
     @property
     def is_noise(self) -> bool:
         """Whether the effect lowers no error but raises the noise floor."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from identify.dataset.given_logs import Role
 from identify.output.words.numbers import PLAIN, Numbers, with_unit
+from identify.selection.bends import Bend
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
@@ -86,15 +87,12 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
     before, after = (numbers.amount(e, unit) for e in (tested.before, tested.after))
     what, without, with_it = f"{finding.effect} explains", "without it", "with it"
     if finding.kind is FindingKind.RESEMBLES:
-        what = f"what is missing resembles {finding.effect}, in another shape; that law explains"
+        what = f"what is missing resembles {finding.effect}, {_in_which_shape(finding)} explains"
     if finding.kind is FindingKind.WRONG_SHAPE:
         what = f"{finding.effect} has another shape: a free curve beside its law explains"
         without, with_it = "with the law", "with the curve"
-    if bend := finding.bend:
-        with_it, without = (
-            f"with {bend.parameter} = {with_unit(f'{value:.3g}', bend.unit)}"
-            for value in (bend.found, bend.held)
-        )
+    if finding.bend and finding.kind is FindingKind.WRONG_SHAPE:
+        with_it, without = _bends_in_words(finding.bend)
         what = f"{finding.effect} has another shape, which its law {with_it} has: that explains"
     text = (
         f"{what} {100.0 * finding.explains:.0f} % of the squared error above the noise floor: "
@@ -105,6 +103,22 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
         f"noise floor is left on the {finding.chosen.on.value} logs"
     )
     return "; ".join((text, *_beside_decoys(finding), sure))
+
+
+def _in_which_shape(finding: Finding) -> str:
+    """What of a law it is that explains: itself, or it with what bends its curve."""
+    if finding.bend is None:
+        return "in another shape; that law"
+    found, held = _bends_in_words(finding.bend)
+    return f"{found} in place of {held.removeprefix('with ')}; that law"
+
+
+def _bends_in_words(bend: Bend) -> list[str]:
+    """With what bends a law as it was found, and as it was held."""
+    return [
+        f"with {bend.parameter} = {with_unit(f'{value:.3g}', bend.unit)}"
+        for value in (bend.found, bend.held)
+    ]
 
 
 def shares_in_words(found: AxisDiagnosis) -> list[str]:
@@ -230,6 +244,12 @@ def dependence_in_words(dependence: Dependence, numbers: Numbers = PLAIN) -> str
     )
 
 
+def _held_beside(effect: str, bend: Bend) -> str:
+    """The parameters that stay held where what bends a law is free, as TOML."""
+    held = (p.name for p in load_catalogue()[effect].parameters if p.fixed)
+    return f"[{', '.join(repr(name) for name in held if name != bend.parameter)}]"
+
+
 def nonparametric_in_words(fitted: Fitted) -> str:
     """What a nonparametric effect depends on, and that it is no physical law."""
     used = followed(fitted)
@@ -244,8 +264,9 @@ def advice(findings: Sequence[Finding] = ()) -> str:
     """What lowers the error where no physical effect explains it, or a law has the wrong shape."""
     for f in findings:
         if f.bend is not None:
+            first = f"twin add {f.effect}; then " if f.kind is FindingKind.RESEMBLES else ""
             return (
-                f"fixed = [] for {f.effect} in the model file lets `twin fit` find its "
+                f"{first}fixed = {_held_beside(f.effect, f.bend)} for {f.effect} in the model file lets `twin fit` find its "
                 f"{f.bend.parameter}, which gives the model the shape that the logs show"
             )
         if f.shape is not None:
