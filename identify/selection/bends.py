@@ -54,6 +54,16 @@ def bent(fit: Fit, dataset: Dataset, law: Fitted, bend: str) -> Candidate:
     return score(fit, fit_axis(fit.axis.with_effect(free), dataset.fit), dataset, law.effect)
 
 
+def is_needed(with_bend: Candidate, fit: Fit) -> bool:
+    """Whether the data ask for a bend: as for an effect, or beyond doubt if held-out logs agree.
+
+    One more number of a law that is there cannot imitate much else, and blocks of the held-out logs
+    differ by what is left of other laws.
+    """
+    agreed = with_bend.is_beyond_doubt and with_bend.plausible and with_bend.gain.falls
+    return agreed or with_bend.is_added_to(fit)
+
+
 def straight(fit: Fit, dataset: Dataset, law: Fitted, bend: Bend) -> Fit:
     """The fit with what bends one of its laws held again."""
     values = {**law.values, bend.parameter: bend.held}
@@ -70,7 +80,7 @@ def straightened(fit: Fit, dataset: Dataset, given: Collection[str]) -> Fit:
         if law.effect.name in given or (bend := bend_of(law)) is None:
             continue
         without = straight(fit, dataset, fit.axis[law.effect.name], bend)
-        if not score(without, fit, dataset, law.effect).is_added_to(without):
+        if not is_needed(score(without, fit, dataset, law.effect), without):
             fit = without
     return fit
 

@@ -2,8 +2,8 @@
 
 Where a law that is there has another shape than the machine's force, what it leaves hides other
 effects, or is taken for one. Where its free curve leaves clearly less of the held-out logs than the
-best absent effect, the selection goes on beside the curve. Friction does not take part: its curves
-contain what modifies friction.
+best absent effect, the selection goes on beside the curve. Friction takes part by its curve over
+speed alone: that over position contains what modifies friction along the track.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.decision import RULE
 from identify.estimation.errors import Errors, error_in, gain_held_out
 from identify.estimation.fit import Fit
-from identify.selection.bends import bent, held_bends
+from identify.selection.bends import bent, held_bends, is_needed
 from identify.selection.nonparametric import fit_in_place
 from identify.selection.ranking import less
 from identify.selection.scoring import Candidate, score
 from identify.selection.unpredictable import is_unpredictable
 from identify.selection.wrong_shape import WrongShape, wrong_shapes
+from twin.curve import Coordinate
 
 MOST_TRIED = 3  # effects beside which a curve is sought
 MOST_CURVES = 3  # on one axis
@@ -62,14 +63,18 @@ def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Resha
     """The free curve that does clearly better than each absent effect; None where none does.
 
     That which takes most, by what bends the law's own curve where the law has such a parameter; the
-    next where that is of a friction whose curve cannot be bent so.
+    next where that is of friction over position, or a friction that does not do clearly better.
     """
     rivals = [c for c in ranking if c.supported]
     for shape in wrong_shapes(fit, dataset):
         if by_bend := _bent(shape, fit, dataset, rivals):
             return by_bend
-        if not shape.shape.curve.rubs:
-            return _in_place(shape, fit, dataset, rivals)
+        curve = shape.shape.curve
+        if curve.rubs and curve.over is Coordinate.POSITION:
+            continue
+        by_curve = _in_place(shape, fit, dataset, rivals)
+        if by_curve or not curve.rubs:
+            return by_curve
     return None
 
 
@@ -84,7 +89,7 @@ def bent_in_place(
     for law in fit.axis.effects:
         for bend in held_bends(law) if law.effect.name not in given else ():
             tried = bent(fit, dataset, law, bend)
-            if tried.is_added_to(fit) and _is_better(tried, rivals):
+            if is_needed(tried, fit) and _is_better(tried, rivals):
                 return tried.fit
     return None
 
@@ -98,7 +103,17 @@ def _in_place(
     if least * error_in(dataset.chosen_on, fit, dataset) ** 2 > whole and least > typical:
         return None
     curve = fit_in_place(fit, dataset, shape.shape)
-    return Reshaped(shape, fit, curve.fit) if _is_better(curve, rivals) else None
+    better = _is_clearly_better if shape.shape.curve.rubs else _is_better
+    if not (better(curve, rivals) and better(curve, _bent_rivals(rivals, fit, dataset))):
+        return None
+    return Reshaped(shape, fit, curve.fit)
+
+
+def _bent_rivals(rivals: Sequence[Candidate], fit: Fit, dataset: Dataset) -> list[Candidate]:
+    """The rivals whose laws can be bent, as they are with what bends them free."""
+    laws = [(c, c.fit.axis[c.effect.name]) for c in rivals]
+    every = [bent(c.fit, dataset, law, bend) for c, law in laws for bend in held_bends(law)]
+    return [score(fit, c.fit, dataset, c.effect) for c in every]
 
 
 def _bent(
@@ -112,6 +127,16 @@ def _bent(
     return (
         Reshaped(shape, fit, curve.fit) if curve.supported and _is_better(curve, rivals) else None
     )
+
+
+def _is_clearly_better(curve: Candidate, rivals: Sequence[Candidate]) -> bool:
+    """Whether a curve leaves clearly less than each rival of the whole and of a typical block.
+
+    The curve of a friction over speed holds every other friction's.
+    """
+    gain, (whole, typical) = curve.gain, _least_left(rivals)
+    less_of_all = gain.after**2 <= RULE.beside_decoys * whole
+    return less_of_all and gain.typical <= RULE.beside_decoys * typical
 
 
 def _is_better(curve: Candidate, rivals: Sequence[Candidate]) -> bool:

@@ -266,8 +266,9 @@ def advice(findings: Sequence[Finding] = ()) -> str:
         if f.bend is not None:
             first = f"twin add {f.effect}; then " if f.kind is FindingKind.RESEMBLES else ""
             return (
-                f"{first}fixed = {_held_beside(f.effect, f.bend)} for {f.effect} in the model file lets `twin fit` find its "
-                f"{f.bend.parameter}, which gives the model the shape that the logs show"
+                f"{first}fixed = {_held_beside(f.effect, f.bend)} for {f.effect} in the model file "
+                f"lets `twin fit` find its {f.bend.parameter}, which gives the model the shape "
+                "that the logs show"
             )
         if f.shape is not None:
             first = f"twin add {f.effect}, then " if f.kind is FindingKind.RESEMBLES else ""
