@@ -173,9 +173,9 @@ def periodic_disturbance(p: Values, q: Columns) -> Results:
     return {OUT: (p["a"] * np.sin(angle) + p["b"] * np.cos(angle)) @ weights / 2.0}
 
 
-@written_from("F = -c v |v|")
+@written_from("F = -c vc^2 |v/vc|^n sgn(v);  with n = 2: -c v |v|")
 def quadratic_drag(p: Values, q: Columns) -> Results:
-    return {OUT: -p["c"] * np.sign(q.v) * q.v**2}
+    return {OUT: -p["c"] * q.v * np.abs(q.v) * np.abs(q.v / p["vc"]) ** (p["n"] - 2.0)}
 
 
 @written_from(

@@ -120,8 +120,8 @@ def _bent(
     shape: WrongShape, fit: Fit, dataset: Dataset, rivals: Sequence[Candidate]
 ) -> Reshaped | None:
     """A law with what bends its own curve free, where that does clearly better."""
-    law, bend = fit.axis[shape.effect], shape.shape.curve.bent_by
-    if bend is None or bend not in held_bends(law):
+    bend = shape.shape.curve.bent_by
+    if bend is None or bend not in held_bends(law := fit.axis[shape.effect]):
         return None
     curve = bent(fit, dataset, law, bend)
     return (

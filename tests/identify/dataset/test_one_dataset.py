@@ -279,7 +279,7 @@ def test_what_is_not_a_number_is_refused_in_one_line():
     assert datasets(TWO, {"log": both}, {})  # that has two axes, no z
     wild = with_effect(STAGE, "quadratic_drag", c=1e6)
     law = wild.axes["x"]["quadratic_drag"]
-    endless = replace(law, values={"c": np.inf})
+    endless = replace(law, values={**law.values, "c": np.inf})
     told = one_line(fit, STAGE.with_axis("x", STAGE.axes["x"].with_effect(endless)), {"log": run})
     assert told.startswith("axis x: the force of the model is not a finite number in")
 

@@ -15,6 +15,7 @@ from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import FindingKind
 from identify.selection.wrong_shape import Shape, WrongShape
+from twin.curve import Coordinate, Curve
 
 module = importlib.import_module("identify.selection.reshaping")
 BASE, CURVED = built_fit(8.0), built_fit(2.0)
@@ -86,7 +87,7 @@ def test_a_curve_is_not_refitted_where_even_a_good_refit_could_not_win(monkeypat
     # A curve may leave as much as the best effect, a refit 0.3 of what a linear step leaves.
     asked = []
     shape = WrongShape(object.__new__(Shape), Proof(gain, 0.0), gain)
-    object.__setattr__(shape.shape, "curve", type("Plain", (), {"rubs": False}))
+    object.__setattr__(shape.shape, "curve", Curve(Coordinate.POSITION))
 
     def in_place(fit, dataset, shape):
         asked.append(shape)
@@ -115,9 +116,10 @@ def test_a_curve_competes_by_the_whole_error_or_by_that_of_a_typical_block(
 ):
     """A friction with load beside a cable of another form: one end of the test log decides."""
     shape = WrongShape(object.__new__(Shape), Proof(0.9, 0.1), 0.9)
-    object.__setattr__(shape.shape, "curve", type("Plain", (), {"rubs": False}))
+    object.__setattr__(shape.shape, "curve", Curve(Coordinate.POSITION))
     curve = built(before=8.0, after=after, typical=typical, fit=built_fit(fitted_to))
-    effect = built(t=9.0, before=8.0, after=4.0, typical=0.25, fit=built_fit(3.0))
+    cogs = built_fit(3.0, axis=axis_of(fitted("cogging")))
+    effect = built(t=9.0, before=8.0, after=4.0, typical=0.25, fit=cogs)
     monkeypatch.setattr(module, "wrong_shapes", lambda fit, dataset: iter([shape]))
     monkeypatch.setattr(module, "error_in", lambda role, fit, dataset: 8.0)
     monkeypatch.setattr(module, "fit_in_place", lambda fit, dataset, shape: curve)
@@ -158,58 +160,71 @@ def test_a_friction_is_bent_where_that_does_clearly_better(monkeypatch, bend, he
     law = law if held else replace(law, fixed=law.fixed - {"n"})
     base = built_fit(8.0, axis=replace(axis_of(), effects=(law,)))
     shape = WrongShape(object.__new__(Shape), Proof(0.6, 0.2), 0.6)
-    object.__setattr__(shape.shape, "curve", SimpleNamespace(rubs=True, bent_by=bend))
+    curve = Curve(Coordinate.POSITION, rubs=True, bent_by=bend)
+    object.__setattr__(shape.shape, "curve", curve)
     object.__setattr__(shape.shape, "effect", "stribeck")
     asked = []
 
-    def fit_axis(axis, logs):
-        asked.append(axis["stribeck"].fixed)
-        return built_fit(after)
-
-    def score(fit, again, dataset, effect):
-        assert (fit, effect) == (base, law.effect)
-        return built("stribeck", t=t, before=8.0, after=again.error, fit=again)
+    def bent_so(fit, dataset, its_law, name):
+        assert (fit, its_law) == (base, law)
+        asked.append(name)
+        return built("stribeck", t=t, before=8.0, after=after)
 
     monkeypatch.setattr(module, "wrong_shapes", lambda fit, dataset: iter([shape]))
-    monkeypatch.setattr(module, "fit_axis", fit_axis)
-    monkeypatch.setattr(module, "score", score)
+    monkeypatch.setattr(module, "bent", bent_so)
     rival = built("wear", t=9.0, before=8.0, after=4.0)
     found = module._reshaped(base, DATASET, [rival])
     assert bool(found) is bent
-    assert asked == ([law.fixed - {"n"}] if bend and held else [])
+    assert asked == (["n"] if bend and held else [])
+
+
+CURVES = {
+    "lugre": Curve(Coordinate.SPEED, by_direction=True, rubs=True),
+    "along": Curve(Coordinate.POSITION, by_direction=True, rubs=True),
+    "cable_slab": Curve(Coordinate.POSITION),
+    "cogging": Curve(Coordinate.POSITION, period="p"),
+}
 
 
 @pytest.mark.parametrize(
-    ("laws", "bends", "tried", "found"),
+    ("laws", "succeeds", "tried", "found"),
     [
-        (("lugre", "cable_slab"), False, ["lugre", "cable_slab"], "cable_slab"),
-        (("lugre", "cable_slab"), True, ["lugre"], "lugre"),
-        (("cable_slab", "cogging"), True, ["cable_slab"], "cable_slab"),
-        (("lugre",), False, ["lugre"], None),
+        (("lugre",), ["bent lugre"], ["bent lugre"], "lugre"),
+        (("lugre",), ["lugre"], ["bent lugre", "lugre"], "lugre"),
+        (("along",), ["along"], ["bent along"], None),  # it holds what modifies friction
+        (
+            ("lugre", "along", "cable_slab"), ["cable_slab"],
+            ["bent lugre", "lugre", "bent along", "bent cable_slab", "cable_slab"], "cable_slab",
+        ),
+        (
+            ("cable_slab", "cogging"), ["cogging"],
+            ["bent cable_slab", "cable_slab"], None,  # the foremost is none
+        ),
+        (("cable_slab",), ["bent cable_slab"], ["bent cable_slab"], "cable_slab"),
     ],
-)
-def test_a_friction_that_cannot_be_bent_leaves_the_place_to_the_next(
-    monkeypatch, laws, bends, tried, found
+)  # fmt: skip
+def test_a_friction_that_is_not_clearly_better_leaves_the_place_to_the_next(
+    monkeypatch, laws, succeeds, tried, found
 ):
     """A cable that folds, beside hysteresis: what the friction's curve takes is no exponent's."""
     asked = []
 
     def shape_of(name):
         shape = WrongShape(object.__new__(Shape), Proof(0.6, 0.1), 0.6)
-        object.__setattr__(shape.shape, "curve", SimpleNamespace(rubs=name == "lugre"))
+        object.__setattr__(shape.shape, "curve", CURVES[name])
         object.__setattr__(shape.shape, "effect", name)
         return shape
 
-    def attempt(succeeds):
+    def attempt(how):
         def try_it(shape, fit, dataset, rivals):
-            asked.append(shape.effect)
-            return shape if succeeds else None
+            asked.append(how + shape.effect)
+            return shape if asked[-1] in succeeds else None
 
         return try_it
 
     monkeypatch.setattr(module, "wrong_shapes", lambda fit, dataset: map(shape_of, laws))
-    monkeypatch.setattr(module, "_bent", attempt(bends))
-    monkeypatch.setattr(module, "_in_place", attempt(True))
+    monkeypatch.setattr(module, "_bent", attempt("bent "))
+    monkeypatch.setattr(module, "_in_place", attempt(""))
     answer = module._reshaped(BASE, DATASET, [])
     assert asked == tried
     assert (answer and answer.effect) == found

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from built_fits import NOISE, PLAIN, built, built_fit, dataset_stub, stage, step
 
-from identify.selection.forward_selection import _friction_instead, _is_added, _near
+from identify.selection.forward_selection import _friction_instead, _near
 from identify.selection.ranking import part_explained
 from identify.selection.verdict import _convincing, _gone
 
@@ -54,7 +54,7 @@ def test_no_part_is_explained_of_an_error_within_its_floor():
     ],
 )
 def test_at_the_floor_only_much_evidence_asks_for_an_effect(bic, t, base, asked):
-    assert _is_added(built(bic=bic, t=t), base) is asked
+    assert built(bic=bic, t=t).is_added_to(base) is asked
 
 
 def test_a_rival_gains_more_than_four_fifths_of_the_best():

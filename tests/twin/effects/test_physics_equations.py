@@ -38,9 +38,19 @@ def test_cogging_is_its_fourier_series() -> None:
     require(force, wanted)
 
 
-def test_quadratic_drag_opposes_motion_with_the_square_of_speed() -> None:
+def test_quadratic_drag_opposes_motion_with_a_power_of_speed() -> None:
     p, force = law("quadratic_drag", 3, OUT)
-    require(force, -p["c"] * np.sign(RANDOM.v) * RANDOM.v**2)
+    assert p["n"] != CATALOGUE["quadratic_drag"].parameter("n").start == 2.0
+    ratio = np.where(RANDOM.v, np.abs(RANDOM.v) / p["vc"], 1.0)
+    require(force, -p["c"] * RANDOM.v * np.abs(RANDOM.v) * np.exp((p["n"] - 2) * np.log(ratio)))
+
+
+@pytest.mark.parametrize("vc", [0.01, 0.1, 3.0])
+def test_quadratic_drag_is_the_square_of_speed_by_design_whatever_its_speed(vc: float) -> None:
+    effect = CATALOGUE["quadratic_drag"]
+    values = {**effect.starts(), "c": 4.0, "vc": vc}
+    force = trace(effect, values, RANDOM).after[:, OUT]
+    require(force, -4.0 * np.sign(RANDOM.v) * RANDOM.v**2)
 
 
 def test_constant_force_is_constant() -> None:
