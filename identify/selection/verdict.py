@@ -81,7 +81,8 @@ def _without_small(
 ) -> tuple[tuple[Step, ...], Fit]:
     """The steps and the fit without those that explain next to nothing beside the others.
 
-    What a large effect's law leaves of it may be significant, and be taken by any other law.
+    What a large effect's law leaves of it may be significant, and any other law may take a part of
+    it; one that takes nearly all of it is no chance.
     """
 
     named = [s for s in kept(steps) if s.proved and s.candidate.effect.name in final.axis.names]
@@ -91,11 +92,20 @@ def _without_small(
     without = [less(s.candidate.effect, final, base, dataset) for s in named]
     falls = [Errors.of(fit, final, dataset, dataset.chosen_on) for fit in without]
     shares = [share_explained(fall, base, dataset) for fall in falls]
+    shares = [
+        np.inf if _takes_the_rest(f, final) else s for f, s in zip(falls, shares, strict=True)
+    ]
     least = int(np.argmin(shares))
     if shares[least] >= RULE.least_finding:
         return steps, final
     rest = tuple(replace(s, proved=False) if s is named[least] else s for s in steps)
     return _without_small(rest, without[least], base, dataset)
+
+
+def _takes_the_rest(fall: Errors, final: Fit) -> bool:
+    """Whether an effect takes nearly all that the others leave above the noise floor."""
+    above, left = (error**2 - final.floor**2 for error in (fall.before, fall.after))
+    return above - left > RULE.nearly_all * above > 0.0
 
 
 def _is_proved(effect: Effect, final: Fit, base: Fit, dataset: Dataset) -> bool:
