@@ -2,8 +2,8 @@
 
 Where a law that is there has another shape than the machine's force, what it leaves hides other
 effects, or is taken for one. Where its free curve leaves clearly less of the held-out logs than the
-best absent effect, the selection goes on beside the curve. Friction takes part by its curve over
-speed alone: that over position contains what modifies friction along the track.
+best absent effect, the selection goes on beside the curve. The curves of friction hold those of
+what modifies friction too, and must leave less by every measure.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from identify.selection.ranking import less
 from identify.selection.scoring import Candidate, score
 from identify.selection.unpredictable import is_unpredictable
 from identify.selection.wrong_shape import WrongShape, wrong_shapes
-from twin.curve import Coordinate
 
 MOST_TRIED = 3  # effects beside which a curve is sought
 MOST_CURVES = 3  # on one axis
@@ -63,17 +62,14 @@ def _reshaped(fit: Fit, dataset: Dataset, ranking: Sequence[Candidate]) -> Resha
     """The free curve that does clearly better than each absent effect; None where none does.
 
     That which takes most, by what bends the law's own curve where the law has such a parameter; the
-    next where that is of friction over position, or a friction that does not do clearly better.
+    next where that is of a friction that does not do clearly better.
     """
     rivals = [c for c in ranking if c.supported]
     for shape in wrong_shapes(fit, dataset):
         if by_bend := _bent(shape, fit, dataset, rivals):
             return by_bend
-        curve = shape.shape.curve
-        if curve.rubs and curve.over is Coordinate.POSITION:
-            continue
         by_curve = _in_place(shape, fit, dataset, rivals)
-        if by_curve or not curve.rubs:
+        if by_curve or not shape.shape.curve.rubs:
             return by_curve
     return None
 
@@ -132,7 +128,7 @@ def _bent(
 def _is_clearly_better(curve: Candidate, rivals: Sequence[Candidate]) -> bool:
     """Whether a curve leaves clearly less than each rival of the whole and of a typical block.
 
-    The curve of a friction over speed holds every other friction's.
+    The curves of a friction hold those of other frictions, and of what modifies it.
     """
     gain, (whole, typical) = curve.gain, _least_left(rivals)
     less_of_all = gain.after**2 <= RULE.beside_decoys * whole

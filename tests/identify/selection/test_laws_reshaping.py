@@ -172,6 +172,7 @@ def test_a_friction_is_bent_where_that_does_clearly_better(monkeypatch, bend, he
 
     monkeypatch.setattr(module, "wrong_shapes", lambda fit, dataset: iter([shape]))
     monkeypatch.setattr(module, "bent", bent_so)
+    monkeypatch.setattr(module, "_in_place", lambda *_: None)
     rival = built("wear", t=9.0, before=8.0, after=4.0)
     found = module._reshaped(base, DATASET, [rival])
     assert bool(found) is bent
@@ -191,10 +192,14 @@ CURVES = {
     [
         (("lugre",), ["bent lugre"], ["bent lugre"], "lugre"),
         (("lugre",), ["lugre"], ["bent lugre", "lugre"], "lugre"),
-        (("along",), ["along"], ["bent along"], None),  # it holds what modifies friction
+        (
+            ("lugre", "along", "cable_slab"), ["along", "cable_slab"],
+            ["bent lugre", "lugre", "bent along", "along"], "along",
+        ),
         (
             ("lugre", "along", "cable_slab"), ["cable_slab"],
-            ["bent lugre", "lugre", "bent along", "bent cable_slab", "cable_slab"], "cable_slab",
+            ["bent lugre", "lugre", "bent along", "along", "bent cable_slab", "cable_slab"],
+            "cable_slab",
         ),
         (
             ("cable_slab", "cogging"), ["cogging"],
