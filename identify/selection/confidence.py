@@ -1,10 +1,11 @@
 """Confidence of a finding: how often such an answer was right on machines of the self-test.
 
-It is read from what all findings together leave of the logs that chose: where that is noise, names
-were nearly always right; where error is left, one of them may stand for what is not in the
-catalogue. How clearly an effect beats its decoys says no more: small margins were right as often as
-large ones. The table is not fitted to the machines on which it is judged: `twin selftest --full`
-draws those with the seed of the release and prints stated confidence beside how often right.
+It is read from what all findings together leave, of the training logs or of those that chose,
+whichever is less: where that is noise, names were nearly always right; where error is left on both,
+one of them may stand for what is not in the catalogue. How clearly an effect beats its decoys says
+no more: small margins were right as often as large ones. The table is not fitted to the machines on
+which it is judged: `twin selftest --full` draws those with the seed of the release and prints
+stated confidence beside how often right.
 """
 
 from __future__ import annotations

@@ -143,7 +143,8 @@ class AxisDiagnosis:
             wrong = found_reshaped(
                 curve.shape, self.base, curve.before, self.with_named, self.dataset
             )
-            findings = with_shape(findings, wrong)
+            tied = tuple(name for name in curve.tied if name not in self.named)
+            findings = with_shape(findings, replace(wrong, tied=tied))
         for finding, without in each:
             if finding in findings:  # not one that a missing effect resembles
                 findings = self._against_shapes(finding, without, findings)

@@ -43,8 +43,8 @@ class Finding:
     without test logs the test errors are these. parameters, parameter_units: of its law. proof:
     beside decoys; None where a shift in time makes none. shape: the curve that is assumed and the
     one found, where they differ. bend: what gives the law that curve, where it has such a
-    parameter. left: over the noise floor, the error that all findings together leave on the logs
-    that chose.
+    parameter. left, left_fitted: over the noise floor, the error that all findings together leave
+    on the logs that chose, and on the training logs.
     """
 
     effect: str
@@ -59,6 +59,7 @@ class Finding:
     shape: FoundShape | None = None
     bend: Bend | None = None
     left: float = 1.0
+    left_fitted: float = 1.0
     parameter_units: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -71,7 +72,12 @@ class Finding:
     @property
     def confidence(self) -> float:
         """How often such an answer was right on machines of the self-test, 0..1."""
-        return confidence(self.left)
+        return confidence(self.least_left)
+
+    @property
+    def least_left(self) -> float:
+        """What is left over the noise floor where it is least: on training or on other logs."""
+        return min(self.left, self.left_fitted)
 
 
 def found(
@@ -192,7 +198,7 @@ def as_a_whole(findings: tuple[Finding, ...], final: Fit, dataset: Dataset) -> t
     """The findings with what they leave together, beside a final fit with the missing effects."""
     errors = [f.chosen.after for f in findings if f.kind is FindingKind.WRONG_SHAPE]
     least = min([error_in(dataset.chosen_on, final, dataset), *errors])
-    return tuple(replace(f, left=least / final.floor) for f in findings)
+    return tuple(replace(f, left=least / final.floor, left_fitted=final.ratio) for f in findings)
 
 
 def squared_left(finding: Finding) -> float:

@@ -9,7 +9,7 @@ what modifies friction too, and must leave less by every measure.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,11 +31,16 @@ BY_REFIT = 0.3  # of the squared error that a curve's linear step leaves, a refi
 
 @dataclass(frozen=True, eq=False)
 class Reshaped:
-    """A law's free curve, the fit beside which it was found, and the fit with it."""
+    """A law's free curve, the fit beside which it was found, and the fit with it.
+
+    tied: absent effects that explain about as much, with values that are hardly their own, such as
+    an end stop as soft as a cable.
+    """
 
     shape: WrongShape
     before: Fit
     fit: Fit
+    tied: tuple[str, ...] = ()
 
 
 def curve_in_place(
@@ -53,8 +58,10 @@ def curve_in_place(
     alone = _reshaped(fit, dataset, ranking)
     if alone and alone.shape.effect not in given and any(c.supported for c in ranking):
         return None
-    if alone or any(c.supported for c in ranking) or is_unpredictable(fit, dataset):
-        return alone
+    if alone:
+        return replace(alone, tied=_level(alone, dataset, ranking))
+    if any(c.supported for c in ranking) or is_unpredictable(fit, dataset):
+        return None
     return _beside_an_effect(fit, dataset, ranking)
 
 
@@ -149,6 +156,20 @@ def _is_better(curve: Candidate, rivals: Sequence[Candidate]) -> bool:
         return all(curve.fit.error <= c.fit.error for c in rivals)
     parted = all(curve.evidence.over(c.evidence) > RULE.least_separation for c in rivals)
     return parted and gain.after**2 <= whole and gain.typical <= typical
+
+
+def _level(found: Reshaped, dataset: Dataset, ranking: Sequence[Candidate]) -> tuple[str, ...]:
+    """The implausible candidates that leave about as little of the held-out logs as a curve."""
+    gain = gain_held_out(found.before, found.fit, dataset)
+    if gain is None:
+        return ()
+
+    def is_level(c: Candidate) -> bool:
+        as_little = RULE.near * c.gain.after**2 <= gain.after**2
+        return as_little or RULE.near * c.gain.typical <= gain.typical
+
+    proven = [c for c in ranking if not c.plausible and replace(c, plausible=True).supported]
+    return tuple(c.effect.name for c in proven if is_level(c))
 
 
 def _least_left(rivals: Sequence[Candidate]) -> tuple[float, float]:

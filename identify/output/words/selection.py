@@ -102,6 +102,8 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
         f"confidence {100.0 * finding.confidence:.0f} %: {finding.left:.3g} times the "
         f"noise floor is left on the {finding.chosen.on.value} logs"
     )
+    if finding.chosen.on is not Role.TRAINING:
+        sure += f", {finding.left_fitted:.3g} times on the training logs"
     return "; ".join((text, *_beside_decoys(finding), sure))
 
 

@@ -39,6 +39,7 @@ from identify.output.words.steps import (
     together_in_words,
 )
 from identify.output.words.validation import region_in_words
+from identify.selection.confidence import LEVELS
 from identify.selection.confounded import Change, Refit
 from identify.selection.decoys import Proof
 from identify.selection.diagnosis import Step, Verdict
@@ -67,7 +68,7 @@ def test_a_diagnosis():
     rest = [" ".join(line.split()) for line in lines[3 + len(planned) :]]
     sure = [
         f"confidence {100.0 * f.confidence:.0f} %: {f.left:.3g} times the noise floor is left on "
-        "the selection logs"
+        f"the selection logs, {f.left_fitted:.3g} times on the training logs"
         for f in made.FOUND
     ]
     assert rest[:4] == [
@@ -144,11 +145,19 @@ def test_a_decoy_is_explained_where_it_is_told():
     assert "decoy" not in finding_in_words(made.FOUND[1])
 
 
-@pytest.mark.parametrize(("left", "sure"), [(1.28, "98 %: 1.28"), (1.33, "89 %: 1.33")])
-def test_a_confidence_tells_what_it_is_read_from(left, sure):
-    """Not from the test error, which may be at its noise floor beside 89 %."""
-    told = finding_in_words(replace(made.FOUND[1], left=left))
-    assert told.endswith(f"confidence {sure} times the noise floor is left on the selection logs")
+@pytest.mark.parametrize(
+    ("left", "fitted", "level"), [(1.28, 2.5, 0), (2.5, 1.28, 0), (1.33, 2.5, 1), (2.5, 1.33, 1)]
+)
+def test_a_confidence_tells_what_it_is_read_from(left, fitted, level):
+    """Not from the test error, which may be at its noise floor beside the lower level."""
+    told = finding_in_words(replace(made.FOUND[1], left=left, left_fitted=fitted))
+    assert told.endswith(
+        f"; confidence {100 * LEVELS[level].right:.0f} %: {left} times the noise floor is left on "
+        f"the selection logs, {fitted} times on the training logs"
+    )
+    on_fit = replace(made.FOUND[1].chosen, on=Role.TRAINING)
+    alone = finding_in_words(replace(made.FOUND[1], chosen=on_fit, left=1.33, left_fitted=1.33))
+    assert alone.endswith(" %: 1.33 times the noise floor is left on the training logs")
 
 
 def test_shares_of_several_are_said_to_be_no_parts_of_a_whole():

@@ -135,6 +135,34 @@ def test_a_rival_competes_with_what_bends_its_law_free(monkeypatch) -> None:
     assert [c.gain.after for c in found] == [1.0]
 
 
+@pytest.mark.parametrize(
+    ("plausible", "bic", "t", "after", "typical", "level"),
+    [
+        (False, 40.0, 5.0, 4.4, 0.9, True),  # the curve leaves 4 N: 0.83 of the square
+        (False, 40.0, 5.0, 4.6, 0.9, False),
+        (False, 40.0, 5.0, 4.6, 0.3, True),  # and 0.25 of a typical block's
+        (False, 40.0, 5.0, 4.6, 0.32, False),
+        (False, 9.0, 5.0, 4.4, 0.9, False),
+        (False, 40.0, 2.9, 4.4, 0.9, False),
+        (True, 40.0, 5.0, 4.4, 0.9, False),  # it competes by itself
+    ],
+)
+def test_what_explains_as_much_with_values_hardly_its_own_is_told_beside_a_curve(
+    monkeypatch, plausible, bic, t, after, typical, level
+):
+    """An end stop as soft as a cable: a force of position that only its ends tell apart."""
+    gain = built(before=8.0, after=4.0, typical=0.25).gain
+    monkeypatch.setattr(reshaping, "gain_held_out", lambda before, fit, dataset: gain)
+    soft = replace(
+        built("end_stop", bic=bic, t=t, before=8.0, after=after, typical=typical),
+        plausible=plausible,
+    )
+    found = reshaping.Reshaped(None, HIGH, LOW)
+    assert reshaping._level(found, DATASET, [soft, built("wear")]) == (
+        ("end_stop",) if level else ()
+    )
+
+
 # --- on motions -----------------------------------------------------------------------------------
 
 

@@ -128,7 +128,7 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
     assert [a.right for a in out.answers] == [True, True, False, True, False]
     assert out.answers[0].names == ("wear", "cogging")
     assert (out.answers[0].left, out.answers[0].confidence) == (
-        finding.left, finding.confidence,
+        finding.least_left, finding.confidence,
     )  # fmt: skip
     assert [a.coordinate for a in out.answers] == [None, None, None, "velocity", "position"]
     assert out.named_coordinates == {"time", "velocity", "position", None}
