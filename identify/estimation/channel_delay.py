@@ -39,14 +39,14 @@ def fit_aligned(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
         if shift == 0.0:
             break
         moved = realigned(dataset, dataset.channel_delay + shift)
-        again = fit_thoroughly(fit.axis, moved)
+        again = fit_thoroughly(fit.axis, moved, fit.begun)
         if again.error > np.sqrt(1.0 - RULE.least_fall) * fit.error:
             break
-        dataset, fit = moved, replace(again, begun=fit.begun)
+        dataset, fit = moved, again
     if not depends_on_time_origin(fit.axis, dataset):
         return synchronised(fit, dataset)
     dataset = with_time_origins(fit.axis, dataset)
-    return dataset, replace(fit_thoroughly(fit.axis, dataset), begun=fit.begun)
+    return dataset, fit_thoroughly(fit.axis, dataset, fit.begun)
 
 
 def aligned(axis: AxisModel, dataset: Dataset) -> Dataset:

@@ -19,9 +19,14 @@ from twin.model.machine import AxisModel, Fitted
 BETTER = 0.99  # part of the error that a new start must reach to be taken
 
 
-def fit_thoroughly(axis: AxisModel, dataset: Dataset) -> Fit:
-    """Fit an axis; scan its effects' shapes again where the error is above the noise floor."""
+def fit_thoroughly(axis: AxisModel, dataset: Dataset, begun: AxisModel | None = None) -> Fit:
+    """Fit an axis; scan its effects' shapes again where the error is above the noise floor.
+
+    begun: what the fit counts as begun with; the axis itself where None.
+    """
     best = fit_axis(axis, dataset.fit)
+    if begun is not None:
+        best = replace(best, begun=begun)
     for name in axis.names:
         effect = axis[name].effect
         if best.at_floor or not any(p.scan for p in effect.parameters):

@@ -208,7 +208,7 @@ def _eliminated_backwards(
         needed = _is_needed(candidate.effect, fit, without, dataset)
         if needed:
             # The shapes of later effects were found beside this one; they may differ without it.
-            without = fit_thoroughly(without.axis, dataset)
+            without = fit_thoroughly(without.axis, dataset, base.begun)
             needed = _is_needed(candidate.effect, fit, without, dataset)
         if not needed:
             fit = without

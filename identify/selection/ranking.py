@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,8 +113,12 @@ def part_explained(base: Fit, final: Fit) -> float:
 
 
 def less(effect: Effect, fit: Fit, base: Fit, dataset: Dataset) -> Fit:
-    """The fit without an effect, refitted; a friction is replaced by that of the base."""
-    return fit_axis(axis_less(effect, fit.axis, base.axis), dataset.fit)
+    """The fit without an effect, refitted; a friction is replaced by that of the base.
+
+    It counts as begun where the base was.
+    """
+    again = fit_axis(axis_less(effect, fit.axis, base.axis), dataset.fit)
+    return replace(again, begun=base.begun)
 
 
 def axis_less(effect: Effect, axis: AxisModel, base: AxisModel) -> AxisModel:

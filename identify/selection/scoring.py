@@ -30,7 +30,9 @@ from twin.effect import Effect, Kind
 
 Array = NDArray[np.float64]
 
-MOST_INERTIA = 3.0  # times the moved mass of the base, that an effect may leave or ask for
+MOST_INERTIA = (
+    3.0  # times the moved mass of the base or its start, that an effect may leave or ask for
+)
 EDGE = 1e-3  # relative distance from a bound at which a value ended there
 RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion does not excite
 
@@ -141,12 +143,16 @@ def _is_clear(candidate: Candidate) -> bool:
 
 
 def _keeps_inertia(base: Fit, fit: Fit) -> bool:
-    """Whether an effect leaves the moved mass about what the base found.
+    """Whether an effect leaves the moved mass about what the base found, or began with.
 
-    In a motion that repeats in time, a sine in time can hold the force of the inertia.
+    In a motion that repeats in time, a sine in time can hold the force of the inertia. Without the
+    effect, as a motor's saturation, the base may have found a mass that is none.
     """
-    before, after = base.axis.mass, fit.axis.mass
-    return max(before, after) <= MOST_INERTIA * min(before, after)
+    after = fit.axis.mass
+    return any(
+        max(mass, after) <= MOST_INERTIA * min(mass, after)
+        for mass in (base.axis.mass, base.begun.mass)
+    )
 
 
 def _is_plausible(fit: Fit, effect: Effect, dataset: Dataset) -> bool:

@@ -65,7 +65,7 @@ def test_the_next_of_several_move_up_once_all_needless_ones_are_gone(monkeypatch
 
     monkeypatch.setattr(module, "score", score)
     monkeypatch.setattr(module, "less", less)
-    monkeypatch.setattr(module, "fit_thoroughly", lambda axis, dataset: built_fit(1.0, axis=axis))
+    monkeypatch.setattr(module, "fit_thoroughly", lambda axis, *_: built_fit(1.0, axis=axis))
     full, earlier = built_fit(1.0, axis=axis), [SimpleNamespace(effect=e) for e in effects]
     for gone, left, dropped in (
         (("cogging",), (0.02, 0.03), ("cogging_3",)),
@@ -96,7 +96,7 @@ def test_where_the_fit_without_it_is_at_the_floor_an_effect_needs_far_more_evide
     needed = built(effect, bic=evidence)
     monkeypatch.setattr(module, "score", lambda *_: needed)
     monkeypatch.setattr(module, "less", lambda *_: without)
-    monkeypatch.setattr(module, "fit_thoroughly", lambda axis, dataset: without)
+    monkeypatch.setattr(module, "fit_thoroughly", lambda *_: without)
     fit, dropped = _eliminated_backwards(
         without, with_it, dataset_stub(), [SimpleNamespace(effect=effect)]
     )

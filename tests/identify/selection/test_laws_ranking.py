@@ -233,19 +233,20 @@ def test_without_support_the_base_stays(monkeypatch):
 
 
 def test_less_an_effect_the_friction_that_it_replaced_is_back(monkeypatch):
-    monkeypatch.setattr(ranking, "fit_axis", lambda axis, logs: (axis, logs))
-    dataset = dataset_stub(fit=("log",))
-    rich = axis_of(fitted("cogging")).with_effect(fitted("lugre"))
-    axis, logs = less(CATALOGUE["lugre"], built_fit(1.0, axis=rich), built_fit(1.0), dataset)
-    assert axis.names == ("cogging", "coulomb_viscous")
-    assert axis["coulomb_viscous"] is PLAIN["coulomb_viscous"]
-    assert logs == ("log",)
-    bare = built_fit(1.0, axis=replace(PLAIN, effects=()))
-    assert less(CATALOGUE["lugre"], built_fit(1.0, axis=rich), bare, dataset)[0].names == (
-        "cogging",
+    monkeypatch.setattr(
+        ranking, "fit_axis", lambda axis, logs: built_fit(2.0, axis=axis, logs=logs)
     )
-    axis, _ = less(CATALOGUE["cogging"], built_fit(1.0, axis=rich), built_fit(1.0), dataset)
-    assert axis.names == ("lugre",)
+    dataset = dataset_stub(fit=("log",))
+    rich = built_fit(1.0, axis=axis_of(fitted("cogging")).with_effect(fitted("lugre")))
+    base = built_fit(1.0, begun=replace(PLAIN, mass=7.7))
+    found = less(CATALOGUE["lugre"], rich, base, dataset)
+    assert found.axis.names == ("cogging", "coulomb_viscous")
+    assert found.axis["coulomb_viscous"] is PLAIN["coulomb_viscous"]
+    assert found.logs == ("log",)
+    assert found.begun is base.begun
+    bare = built_fit(1.0, axis=replace(PLAIN, effects=()))
+    assert less(CATALOGUE["lugre"], rich, bare, dataset).axis.names == ("cogging",)
+    assert less(CATALOGUE["cogging"], rich, base, dataset).axis.names == ("lugre",)
 
 
 # --- ties -----------------------------------------------------------------------------------

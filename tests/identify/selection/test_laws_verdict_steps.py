@@ -96,7 +96,7 @@ def looked_back(monkeypatch, needed):
 
     monkeypatch.setattr(searched, "less", less)
     monkeypatch.setattr(searched, "score", score)
-    monkeypatch.setattr(searched, "fit_thoroughly", lambda axis, dataset: built_fit(3.0, axis=axis))
+    monkeypatch.setattr(searched, "fit_thoroughly", lambda axis, *_: built_fit(3.0, axis=axis))
     earlier = [built("cogging"), built("wear")]
     fit, dropped = _eliminated_backwards(HIGH, full, DATASET, earlier)
     return fit, dropped, scored, full
