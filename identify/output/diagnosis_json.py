@@ -10,7 +10,8 @@ from identify.estimation.errors import Errors
 from identify.output.as_json import parameters_json, plan_json, refit_json
 from identify.output.remarks import remarks_on
 from identify.output.results import Diagnosis
-from identify.output.words.selection import advice, verdict_in_words
+from identify.output.words.findings import advice
+from identify.output.words.selection import verdict_in_words
 from identify.output.words.steps import not_named_in_words, together_in_words
 from identify.selection.diagnosis import AxisDiagnosis, Step
 from identify.selection.findings import Finding

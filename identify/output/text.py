@@ -19,17 +19,19 @@ from identify.output.words.experiment_design import (
     not_run_in_words,
     supposed_in_words,
 )
-from identify.output.words.selection import (
+from identify.output.words.findings import (
     advice,
-    dependence_in_words,
     finding_in_words,
+    shape_in_words,
+    shares_in_words,
+)
+from identify.output.words.selection import (
+    dependence_in_words,
     named_errors_in_words,
     named_in_words,
     nonparametric_in_words,
     refit_in_words,
     remainder_in_words,
-    shape_in_words,
-    shares_in_words,
     step_in_words,
     tested_on,
     ties_in_words,

@@ -10,15 +10,13 @@ from identify.output.report.blocks import Answer, Section, Tile, Tone
 from identify.output.report.subject import Subject
 from identify.output.report.units import SCALED, Scale, number, quantity, spaced
 from identify.output.words.experiment_design import gap_in_words
+from identify.output.words.findings import advice, finding_in_words, shares_in_words
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import (
-    advice,
     dependence_in_words,
-    finding_in_words,
     named_in_words,
     refit_in_words,
     remainder_in_words,
-    shares_in_words,
     tested_on,
     verdict_in_words,
 )

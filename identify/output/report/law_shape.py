@@ -9,7 +9,7 @@ from identify.output.report.blocks import Block, Heading, Picture, Section
 from identify.output.report.drawing import BLUE, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import SCALED, Scale, spaced
-from identify.output.words.selection import advice, shape_in_words
+from identify.output.words.findings import advice, shape_in_words
 from identify.selection.findings import Finding
 from identify.selection.found_shape import BEHIND, FoundShape
 from twin.model.units import units_of

@@ -15,7 +15,8 @@ from identify.output.as_json import (
     plan_json,
 )
 from identify.output.diagnosis_json import _finding, diagnose_json
-from identify.output.words.selection import SEVERAL, advice
+from identify.output.words.findings import advice
+from identify.output.words.selection import SEVERAL
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import Bend
 

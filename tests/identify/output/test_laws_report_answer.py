@@ -27,8 +27,9 @@ from identify.output.report.html import page
 from identify.output.report.subject import Subject
 from identify.output.report.units import SCALED, number, quantity
 from identify.output.words.experiment_design import gap_in_words
+from identify.output.words.findings import advice
 from identify.output.words.numbers import capitalised
-from identify.output.words.selection import SEVERAL, VERDICTS, advice, refit_in_words
+from identify.output.words.selection import SEVERAL, VERDICTS, refit_in_words
 from identify.output.words.validation import region_in_words
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind

@@ -19,16 +19,14 @@ from identify.output.text import (
     plan_text,
 )
 from identify.output.words.estimation import outcome_in_words
+from identify.output.words.findings import advice, finding_in_words, shares_in_words
 from identify.output.words.selection import (
     SEVERAL,
-    advice,
     change_in_words,
-    finding_in_words,
     moved_in_words,
     named_errors_in_words,
     refit_in_words,
     repeat_in_words,
-    shares_in_words,
     ties_in_words,
     verdict_in_words,
 )

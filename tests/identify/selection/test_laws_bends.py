@@ -10,7 +10,7 @@ import pytest
 from built_fits import CATALOGUE, axis_of, built, built_dataset, built_fit, dataset_stub, fitted
 
 from identify.estimation.fit import Outcome, finished, fit_axis
-from identify.output.words.selection import advice, finding_in_words
+from identify.output.words.findings import advice, finding_in_words
 from identify.selection.bends import Bend, bend_of, held_bends, is_needed, straightened
 from identify.selection.findings import FindingKind, found_reshaped
 from identify.selection.forward_selection import diagnose_axis

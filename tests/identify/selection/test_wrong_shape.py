@@ -12,7 +12,7 @@ from identify.dataset.given_logs import Role
 from identify.estimation.errors import error_in
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
-from identify.output.words.selection import advice, finding_in_words, shape_in_words
+from identify.output.words.findings import advice, finding_in_words, shape_in_words
 from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Step, Verdict
 from identify.selection.findings import (

@@ -1,0 +1,127 @@
+"""Findings in words: what each explains, the shape found, and what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identify.dataset.given_logs import Role
+from identify.output.words.numbers import PLAIN, Numbers, with_unit
+from identify.selection.bends import Bend
+from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.findings import Finding, FindingKind
+from identify.selection.found_shape import FoundShape
+from twin.effects import load_catalogue
+
+ERROR = {
+    Role.TEST: "test error",
+    Role.SELECTION: "error on the selection logs",
+    Role.TRAINING: "error on the training logs",
+}
+
+
+def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
+    """E.g. "cogging explains 93 % of the squared error above the noise floor: ..."."""
+    unit = finding.unit
+    error, tested = ERROR[finding.tested.on], finding.tested
+    before, after = (numbers.amount(e, unit) for e in (tested.before, tested.after))
+    what, without, with_it = f"{finding.effect} explains", "without it", "with it"
+    if finding.kind is FindingKind.RESEMBLES:
+        what = f"what is missing resembles {finding.effect}, {_in_which_shape(finding)} explains"
+    if finding.kind is FindingKind.WRONG_SHAPE:
+        what = f"{finding.effect} has another shape: a free curve beside its law explains"
+        without, with_it = "with the law", "with the curve"
+    if finding.bend and finding.kind is FindingKind.WRONG_SHAPE:
+        with_it, without = _bends_in_words(finding.bend)
+        what = f"{finding.effect} has another shape, which its law {with_it} has: that explains"
+    text = (
+        f"{what} {100.0 * finding.explains:.0f} % of the squared error above the noise floor: "
+        f"{without} the {error} is {before}, {with_it} {after}"
+    )
+    sure = (
+        f"confidence {100.0 * finding.confidence:.0f} %: {finding.left:.3g} times the "
+        f"noise floor is left on the {finding.chosen.on.value} logs"
+    )
+    if finding.chosen.on is not Role.TRAINING:
+        sure += f", {finding.left_fitted:.3g} times on the training logs"
+    return "; ".join((text, *_beside_decoys(finding), sure))
+
+
+def _in_which_shape(finding: Finding) -> str:
+    """What of a law it is that explains: itself, or it with what bends its curve."""
+    if finding.bend is None:
+        return "in another shape; that law"
+    found, held = _bends_in_words(finding.bend)
+    return f"{found} in place of {held.removeprefix('with ')}; that law"
+
+
+def _bends_in_words(bend: Bend) -> list[str]:
+    """With what bends a law as it was found, and as it was held."""
+    return [
+        f"with {bend.parameter} = {with_unit(f'{value:.3g}', bend.unit)}"
+        for value in (bend.found, bend.held)
+    ]
+
+
+def shares_in_words(found: AxisDiagnosis) -> list[str]:
+    """That the shares of several findings are no parts of one whole; nothing of a single one."""
+    if len(found.findings) < 2:
+        return []
+    return [
+        "each share is of that effect taken out alone, the others refitted, so the shares need not "
+        "sum to 100 %"
+    ]
+
+
+def _beside_decoys(finding: Finding) -> list[str]:
+    """What an effect takes beside what chance would; nothing where it has no decoys."""
+    if finding.proof is None:
+        return []
+    gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.decoy))
+    where = " in a typical stretch of the log" if finding.proof.typical else ""
+    return [
+        f"tried beside decoys (its force shifted in time) it takes {gain:.0f} % of the squared "
+        f"error left without it{where}, 1 in 20 of them {decoy:.0f} % or more"
+    ]
+
+
+def shape_in_words(effect: str, shape: FoundShape, numbers: Numbers = PLAIN) -> str:
+    """Where a law surely differs most from the curve found, and what that does at standstill."""
+    sure = {name: np.abs(c.found - c.assumed) - c.band for name, c in shape.curves.items()}
+    direction = max(sure, key=lambda name: np.nanmax(sure[name]))
+    curve, at = shape.curves[direction], int(np.nanargmax(sure[direction]))
+    unit, band = shape.force_unit, numbers.amount(float(curve.band[at]), shape.force_unit)
+    assumed, found = numbers.change(float(curve.assumed[at]), float(curve.found[at]), unit)
+    place = numbers.amount(float(shape.coordinate[at]), shape.unit)
+    within = "" if shape.period is None else " of its period"
+    rest = " The force is gone at standstill." if shape.lets_go else ""
+    return (
+        f"The law of {effect} is off most at {shape.over.value} {place}{within}, {direction}: it "
+        f"assumes {assumed}, the logs show {found} ± {band}.{rest}"
+    )
+
+
+def _held_beside(effect: str, bend: Bend) -> str:
+    """The parameters that stay held where what bends a law is free, as TOML."""
+    held = (p.name for p in load_catalogue()[effect].parameters if p.fixed)
+    return f"[{', '.join(repr(name) for name in held if name != bend.parameter)}]"
+
+
+def advice(findings: Sequence[Finding] = ()) -> str:
+    """What lowers the error where no physical effect explains it, or a law has the wrong shape."""
+    for f in findings:
+        if f.bend is not None:
+            first = f"twin add {f.effect}; then " if f.kind is FindingKind.RESEMBLES else ""
+            return (
+                f"{first}fixed = {_held_beside(f.effect, f.bend)} for {f.effect} in the model file "
+                f"lets `twin fit` find its {f.bend.parameter}, which gives the model the shape "
+                "that the logs show"
+            )
+        if f.shape is not None:
+            first = f"twin add {f.effect}, then " if f.kind is FindingKind.RESEMBLES else ""
+            shaped = f"{first}twin add --shape {f.effect}"
+            return f"{shaped} gives the model the shape that the logs show"
+    every = load_catalogue().values()
+    known = [e.name for e in every if e.is_nonparametric and not e.free_shape]
+    return f"twin add {' or '.join(known)} lowers the error by fitted curves, without explaining it"
