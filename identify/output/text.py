@@ -151,6 +151,7 @@ def diagnose_text(result: Diagnosis) -> str:
             lines.append(f"  {words(dependence_in_words(d.unexplained))}")
             if axis in result.left_over:
                 lines.append(f"  it is largest at {words(region_in_words(result.left_over[axis]))}")
+        if d.unexplained or any(f.shape for f in d.findings):
             lines.append(f"  {advice(d.findings)}")
         lines += [_ranking_line(c, d) for c in d.ranking[:4]]
         lines += [f"  {line}" for line in step_lines(d)]

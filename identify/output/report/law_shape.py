@@ -10,6 +10,7 @@ from identify.output.report.drawing import BLUE, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import SCALED, Scale, spaced
 from identify.output.words.findings import advice, shape_in_words
+from identify.output.words.numbers import capitalised
 from identify.selection.findings import Finding
 from identify.selection.found_shape import BEHIND, FoundShape
 from twin.model.units import units_of
@@ -31,7 +32,7 @@ def _picture(finding: Finding, shape: FoundShape) -> Picture:
     words = units_of(finding.unit).words
     caption = (
         f"{shape_in_words(finding.effect, shape, SCALED)} Where the band holds the dashed line, "
-        f"these logs do not tell the two apart. {advice([finding])}."
+        f"these logs do not tell the two apart. {capitalised(advice([finding]))}"
     )
     return Picture(_figure(shape), words(caption))
 

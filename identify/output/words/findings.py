@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 
 import numpy as np
@@ -105,14 +106,14 @@ def shape_in_words(effect: str, shape: FoundShape, numbers: Numbers = PLAIN) -> 
 def _held_beside(effect: str, bend: Bend) -> str:
     """The parameters that stay held where what bends a law is free, as TOML."""
     held = (p.name for p in load_catalogue()[effect].parameters if p.fixed)
-    return f"[{', '.join(repr(name) for name in held if name != bend.parameter)}]"
+    return json.dumps([name for name in held if name != bend.parameter])
 
 
 def advice(findings: Sequence[Finding] = ()) -> str:
     """What lowers the error where no physical effect explains it, or a law has the wrong shape."""
     for f in findings:
         if f.bend is not None:
-            first = f"twin add {f.effect}; then " if f.kind is FindingKind.RESEMBLES else ""
+            first = f"after `twin add {f.effect}`, " if f.kind is FindingKind.RESEMBLES else ""
             return (
                 f"{first}fixed = {_held_beside(f.effect, f.bend)} for {f.effect} in the model file "
                 f"lets `twin fit` find its {f.bend.parameter}, which gives the model the shape "

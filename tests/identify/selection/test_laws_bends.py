@@ -207,7 +207,7 @@ def test_a_drag_with_the_cube_of_speed_is_told_by_its_exponent(cubic) -> None:
     assert "resembles quadratic_drag, with n = 3" in words
     assert "in place of n = 2; that law explains" in words
     assert advice(found.findings) == (
-        "twin add quadratic_drag; then fixed = ['vc'] for quadratic_drag in the model file lets "
+        'after `twin add quadratic_drag`, fixed = ["vc"] for quadratic_drag in the model file lets '
         "`twin fit` find its n, which gives the model the shape that the logs show"
     )
 
