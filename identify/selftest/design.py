@@ -75,7 +75,7 @@ class Design:
 
 
 QUICK = Design()
-FULL = Design(empty=80, strong=72, weak=48, outside=32, pairs=16, left_out=12)
+FULL = Design(empty=80, strong=72, weak=48, outside=64, pairs=16, left_out=12)
 
 
 def release_seed() -> int:
