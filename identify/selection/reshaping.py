@@ -159,7 +159,10 @@ def _is_better(curve: Candidate, rivals: Sequence[Candidate]) -> bool:
 
 
 def _level(found: Reshaped, dataset: Dataset, ranking: Sequence[Candidate]) -> tuple[str, ...]:
-    """The implausible candidates that leave about as little of the held-out logs as a curve."""
+    """The candidates that would leave about as little as a curve, were their values their own.
+
+    Not those of which too few cycles are seen: they are any force of position by another name.
+    """
     gain = gain_held_out(found.before, found.fit, dataset)
     if gain is None:
         return ()
@@ -168,7 +171,8 @@ def _level(found: Reshaped, dataset: Dataset, ranking: Sequence[Candidate]) -> t
         as_little = RULE.near * c.gain.after**2 <= gain.after**2
         return as_little or RULE.near * c.gain.typical <= gain.typical
 
-    proven = [c for c in ranking if not c.plausible and replace(c, plausible=True).supported]
+    hardly = [c for c in ranking if c.effect.is_itself and not c.plausible]
+    proven = [c for c in hardly if replace(c, plausible=True).supported]
     return tuple(c.effect.name for c in proven if is_level(c))
 
 

@@ -157,10 +157,11 @@ def test_what_explains_as_much_with_values_hardly_its_own_is_told_beside_a_curve
         built("end_stop", bic=bic, t=t, before=8.0, after=after, typical=typical),
         plausible=plausible,
     )
+    # One cycle over the travel is any force of position, and no cogging.
+    slow = replace(built("cogging", bic=40.0, before=8.0, after=3.0), plausible=False)
     found = reshaping.Reshaped(None, HIGH, LOW)
-    assert reshaping._level(found, DATASET, [soft, built("wear")]) == (
-        ("end_stop",) if level else ()
-    )
+    told = reshaping._level(found, DATASET, [soft, built("wear"), slow])
+    assert told == (("end_stop",) if level else ())
 
 
 # --- on motions -----------------------------------------------------------------------------------
