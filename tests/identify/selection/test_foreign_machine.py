@@ -11,6 +11,7 @@ from foreign_machine import AHEAD, BEHIND, FORCE, PLACE, drawn, gaussian, logs_o
 
 from identify import workflow
 from identify.selection.diagnosis import Verdict
+from twin.curve import Coordinate
 from twin.effects import Catalogue
 from twin.model.machine import Fitted
 
@@ -65,8 +66,12 @@ def test_an_effect_of_the_catalogue_is_named_whatever_its_form(effect, size, ter
 def test_an_effect_of_no_catalogue_is_not_given_a_name(effect, size, terms):
     answer = found(OUTSIDE[effect], size, terms)
     assert answer.best is None
-    # What nothing measured foretells, as a random walk, is told as noise of that size.
-    assert answer.verdict is Verdict.UNEXPLAINED or answer.dataset.force_noise > 0.0
+    # What nothing measured foretells, as a random walk, is told as noise of that size; a drag that
+    # levels off is another curve of the friction over speed.
+    if curves := [(c.shape.effect, c.shape.shape.curve.over) for c in answer.curves]:
+        assert (effect, curves) == ("saturating drag", [("lugre", Coordinate.SPEED)])
+    else:
+        assert answer.verdict is Verdict.UNEXPLAINED or answer.dataset.force_noise > 0.0
 
 
 @pytest.mark.parametrize(
