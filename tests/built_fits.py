@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,7 @@ from identify.dataset.given_logs import Role
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import Evidence, Gain
-from identify.estimation.fit import Fit, Outcome
+from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.scaling import Scaling
 from identify.selection.diagnosis import SelectionState, Step
 from identify.selection.scoring import Candidate
@@ -143,3 +144,28 @@ def built_dataset(*names: str, held: Sequence[str] = (), window: float = 0.04) -
 
     seen = Excitation(-0.05, 0.05, 0.4, 0.3, 3.0, PERIOD)
     return Dataset("x", logs(names or ("run",), 1), logs(held, 11), lambda: seen)
+
+
+def built_machine(
+    dataset: Dataset, model: AxisModel, force: Callable[[Array, Array], Array] | None = None
+) -> Dataset:
+    """The dataset of a machine with the forces of a model, and noise of 1 mN.
+
+    force: (position, direction) -> N, beside them.
+    """
+    rng = np.random.default_rng(4)
+
+    def moved(log: PreparedLog) -> PreparedLog:
+        motion = log.motion
+        beside = (
+            force(motion.position, np.sign(motion.velocity)) if force else 0.0 * motion.position
+        )
+        own = finished(model, model, (log,), Outcome.CONVERGED)
+        rest = np.zeros(len(log))
+        rest[own.kept] = own.residual
+        noise = 1e-3 * rng.standard_normal(len(log))
+        return replace(log, command=log.command - rest - log.test_function.mean(beside) + noise)
+
+    return replace(
+        dataset, fit=tuple(map(moved, dataset.fit)), holdout=tuple(map(moved, dataset.holdout))
+    )

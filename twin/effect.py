@@ -83,6 +83,9 @@ class Kind(Enum):
     STRUCTURE = 5
 
 
+RUBBING = (Kind.FRICTION, Kind.MODIFIER)  # what makes friction together
+
+
 @dataclass(frozen=True)
 class Excitation:
     """What a log's motion covers; start rules and scans are computed from it.

@@ -18,7 +18,7 @@ from identify.dataset.prepared_log import PreparedLog, moving, sticks, total_for
 from twin.core.calling import P_AT
 from twin.core.columns import averaged_columns, reading_columns
 from twin.core.native import Table
-from twin.effect import Kind
+from twin.effect import RUBBING, Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
 from twin.model.parameters import ParameterReference, read, write
@@ -115,7 +115,7 @@ def group_of(axis: AxisModel, effect: str) -> AxisModel:
     kind = axis[effect].effect.kind
     if kind is Kind.SENSING:
         return axis
-    friction, chain = (Kind.FRICTION, Kind.MODIFIER), (Kind.ACTUATION,)
+    friction, chain = RUBBING, (Kind.ACTUATION,)
     joined = any(f.effect.kind in friction and f.effect.reads("U") for f in axis.effects)
     for joint in ((*friction, *chain),) if joined else (friction, chain):
         if kind in joint:

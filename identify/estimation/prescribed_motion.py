@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from identify.dataset.drive import parts_of
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import total_force
-from twin.effect import Kind
+from twin.effect import RUBBING, Kind
 from twin.model.machine import AxisModel, axis_table
 
 Array = NDArray[np.float64]
@@ -38,9 +38,8 @@ def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
 
     place: m; velocity: m/s, not zero.
     """
-    rubbing = [f for f in axis.effects if f.effect.kind in (Kind.FRICTION, Kind.MODIFIER)]
-    force = steady_force(replace(axis, effects=tuple(rubbing)), place, velocity)
-    return float(-np.sign(velocity) * force)
+    rubbing = tuple(f for f in axis.effects if f.effect.kind in RUBBING)
+    return float(-np.sign(velocity) * steady_force(replace(axis, effects=rubbing), place, velocity))
 
 
 def steady_force(axis: AxisModel, place: float, velocity: float) -> float:
@@ -50,5 +49,4 @@ def steady_force(axis: AxisModel, place: float, velocity: float) -> float:
     """
     period = STEADY_TRAVEL / STEPS / abs(velocity)
     places, velocities = np.repeat([[place], [velocity]], STEPS, axis=1)
-    acting = (Kind.FORCE, Kind.FRICTION, Kind.MODIFIER)
-    return float(force_along(axis, places, velocities, period, *acting)[-1])
+    return float(force_along(axis, places, velocities, period, Kind.FORCE, *RUBBING)[-1])

@@ -18,7 +18,7 @@ from identify.dataset.drive import parts_of
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import total_force
 from identify.dataset.test_function import TestFunction
-from twin.effect import Kind
+from twin.effect import RUBBING, Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
 
@@ -67,7 +67,7 @@ def velocity_map(axis: AxisModel, motion: Motion, used: float = USED) -> Velocit
 
     used: last part of each plateau that is averaged. Raises InputError where no plateau is found.
     """
-    beside = parts_of(axis, *(set(Kind) - {Kind.FRICTION, Kind.MODIFIER}))
+    beside = parts_of(axis, *(set(Kind) - {*RUBBING}))
     force = motion.command + total_force(axis_table({"": beside}), motion)
     rows = [
         _averaged(axis.mass, motion, force, last - round(used * (last - first)), last)

@@ -13,13 +13,12 @@ from identify.estimation.fit import Fit
 from identify.estimation.prescribed_motion import steady_force
 from identify.selection.found_shape import AHEAD, BEHIND, UNITS, Drawn, FoundShape
 from twin.curve import Coordinate
-from twin.effect import Kind
+from twin.effect import RUBBING
 from twin.model.machine import AxisModel, Fitted
 from twin.signals import Array
 
 SPEEDS = 24
 SLOWEST = 0.01  # of the highest speed, the least that is drawn
-RUBBING = (Kind.FRICTION, Kind.MODIFIER)
 
 
 def bent_curve(held: Fitted, final: Fit, dataset: Dataset) -> FoundShape:
@@ -31,9 +30,9 @@ def bent_curve(held: Fitted, final: Fit, dataset: Dataset) -> FoundShape:
     covered = dataset.excitation
     speed = covered.speed_max * np.geomspace(SLOWEST, 1.0, SPEEDS)
     place = 0.5 * (covered.position_low + covered.position_high)
-    rubs = held.effect.kind in RUBBING
-    names = [f.effect.name for f in final.axis.effects if rubs and f.effect.kind in RUBBING]
-    names = names or [held.effect.name]
+    kinds = {f.effect.name: f.effect.kind for f in final.axis.effects}
+    rubbing = [name for name, kind in kinds.items() if kind in RUBBING]
+    names = rubbing if held.effect.name in rubbing else [held.effect.name]
     among = [c for c in final.scaling.where if c.effect in names]
 
     def force(axis: AxisModel, velocity: Array) -> Array:

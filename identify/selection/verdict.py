@@ -91,9 +91,9 @@ def _without_small(
         return steps, final
     without = [less(s.candidate.effect, final, base, dataset) for s in named]
     falls = [Errors.of(fit, final, dataset, dataset.chosen_on) for fit in without]
-    shares = [share_explained(fall, base, dataset) for fall in falls]
     shares = [
-        np.inf if _takes_the_rest(f, final) else s for f, s in zip(falls, shares, strict=True)
+        np.inf if _takes_the_rest(fall, final) else share_explained(fall, base, dataset)
+        for fall in falls
     ]
     least = int(np.argmin(shares))
     if shares[least] >= RULE.least_finding:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.effect import Effect, Kind
+from twin.effect import RUBBING, Effect, Kind
 from twin.laws import checks, physics
 from twin.laws.checks import LawBroken
 
@@ -34,7 +34,7 @@ LAWS = (
     Law(
         "takes energy in every closed cycle",
         physics.check_takes_energy,
-        frozenset({Kind.FRICTION, Kind.MODIFIER}),
+        frozenset(RUBBING),
     ),
     Law(
         "leaves no work around a loop, where it depends on position alone",

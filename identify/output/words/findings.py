@@ -34,7 +34,7 @@ def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
         what = f"{finding.effect} has another shape: a free curve beside its law explains"
         without, with_it = "with the law", "with the curve"
     if finding.bend and finding.kind is FindingKind.WRONG_SHAPE:
-        with_it, without = _bends_in_words(finding.bend)
+        with_it, without = (f"with {value}" for value in _bends_in_words(finding.bend))
         what = f"{finding.effect} has another shape, which its law {with_it} has: that explains"
     text = (
         f"{what} {100.0 * finding.explains:.0f} % of the squared error above the noise floor: "
@@ -54,13 +54,13 @@ def _in_which_shape(finding: Finding) -> str:
     if finding.bend is None:
         return "in another shape; that law"
     found, held = _bends_in_words(finding.bend)
-    return f"{found} in place of {held.removeprefix('with ')}; that law"
+    return f"with {found} in place of {held}; that law"
 
 
 def _bends_in_words(bend: Bend) -> list[str]:
-    """With what bends a law as it was found, and as it was held."""
+    """What bends a law as it was found, and as it was held, e.g. "n = 3"."""
     return [
-        f"with {bend.parameter} = {with_unit(f'{value:.3g}', bend.unit)}"
+        f"{bend.parameter} = {with_unit(f'{value:.3g}', bend.unit)}"
         for value in (bend.found, bend.held)
     ]
 

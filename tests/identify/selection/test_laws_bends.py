@@ -7,9 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, axis_of, built, built_dataset, built_fit, dataset_stub, fitted
+from built_fits import (
+    CATALOGUE,
+    axis_of,
+    built,
+    built_dataset,
+    built_fit,
+    built_machine,
+    dataset_stub,
+    fitted,
+)
 
-from identify.estimation.fit import Outcome, finished, fit_axis
+from identify.estimation.fit import fit_axis
 from identify.output.words.findings import advice, finding_in_words
 from identify.selection.bends import Bend, bend_of, held_bends, is_needed, straightened
 from identify.selection.findings import FindingKind, found_reshaped
@@ -170,20 +179,8 @@ def test_what_explains_as_much_with_values_hardly_its_own_is_told_beside_a_curve
 @pytest.fixture(scope="module")
 def cubic():
     """A dataset whose machine has a drag with the cube of speed, the fit without any, and law."""
-    dataset = built_dataset("one", "two", held=("held",))
-    rng = np.random.default_rng(4)
     law = replace(fitted("quadratic_drag", c=4.0, n=3.0, vc=0.2), fixed=frozenset({"vc"}))
-    axis = axis_of(law)
-
-    def moved(log):
-        own = finished(axis, axis, (log,), Outcome.CONVERGED)
-        rest = np.zeros(len(log))
-        rest[own.kept] = own.residual
-        return replace(log, command=log.command - rest + 1e-3 * rng.standard_normal(len(log)))
-
-    there = replace(
-        dataset, fit=tuple(map(moved, dataset.fit)), holdout=tuple(map(moved, dataset.holdout))
-    )
+    there = built_machine(built_dataset("one", "two", held=("held",)), axis_of(law))
     return there, fit_axis(axis_of(), there.fit)
 
 

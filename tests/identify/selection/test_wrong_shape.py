@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import PLAIN, axis_of, built, built_dataset, fitted
+from built_fits import PLAIN, axis_of, built, built_dataset, built_machine, fitted
 
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import error_in
@@ -36,26 +36,11 @@ from twin.model.machine import MachineModel
 CATALOGUE = load_catalogue()
 CABLE = fitted("cable_slab", k1=1.5)
 MODEL = axis_of(CABLE, fitted("cogging", p=0.017, a1=0.1))
-NOISE = 1e-3  # N
 OWN = MODEL.names
 
 
 def machine(dataset, force, model=MODEL):
-    """The dataset with a force (position, direction) -> N and noise beside the model's own."""
-    rng = np.random.default_rng(4)
-
-    def moved(log):
-        motion = log.motion
-        added = log.test_function.mean(force(motion.position, np.sign(motion.velocity)))
-        own = finished(model, model, (log,), Outcome.CONVERGED)
-        rest = np.zeros(len(log))
-        rest[own.kept] = own.residual
-        noise = NOISE * rng.standard_normal(len(log))
-        return replace(log, command=log.command - rest - added + noise)
-
-    return replace(
-        dataset, fit=tuple(map(moved, dataset.fit)), holdout=tuple(map(moved, dataset.holdout))
-    )
+    return built_machine(dataset, model, force)
 
 
 @pytest.fixture(
