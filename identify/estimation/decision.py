@@ -61,6 +61,11 @@ class DecisionRule:
     samples; less is no delay, more is a fault of the log that its check finds.
     """
 
+    hardly: float = 1.0
+    level_t: float = 2.0
+    beside_controls: float = 0.8
+    most_ways: int = 2
+    not_above: float = 0.85
     at_floor: float = 1.3
     least_bic: float = 10.0
     no_evidence: float = 2.0
@@ -71,7 +76,7 @@ class DecisionRule:
     beyond_doubt: float = 100.0
     partial_bic: float = 50.0
     nearly_all: float = 0.95
-    least_part: float = 0.4
+    least_part: float = 0.2
     floor_sure: tuple[float, float] = (0.85, 1.15)
     most_steps: int = 5
     most_shifts: int = 2
@@ -82,7 +87,7 @@ class DecisionRule:
     settled: float = 0.999
     collapse: float = 0.3
 
-    promise: float = 0.3
+    promise: float = 0.5
     contender: float = 0.1
     same_error: float = 1.01
     pair_first: float = 0.1

@@ -1,33 +1,29 @@
-"""Absent effects as candidates: scan the shape of each, refit the model with it, score it."""
+"""Candidates: a model with one effect more, its score, and whether its values can be its own."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
-from identify.dataset.prepared_log import moving, sticks
+from identify.dataset.noise_floor import floor_of, unrounded_floor_of
 from identify.estimation.decision import RULE
-from identify.estimation.evidence import effective_samples, evidence
-from identify.estimation.fit import Fit, Outcome, finished, fit_axis, fit_roughly
-from identify.estimation.force_balance import residual
-from identify.estimation.thorough_fit import fit_thoroughly
-from identify.estimation.variable_projection import Start, one_linear_step, starts
-from identify.selection.scoring import Candidate, score
+from identify.estimation.evidence import Evidence, Gain, evidence, held_out_gain, rms
+from identify.estimation.fit import Fit, error_on
+from identify.estimation.time_origin import phases_found
+from identify.selection.acceptance import Judged, Score, Taken, score
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel, MachineModel
 
 Array = NDArray[np.float64]
 
-FIRST_EVALUATIONS = 12  # of a refit, after which it must show some evidence to go on
-HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
-HOPELESS = 2.0  # times the squared error of the present friction, after a rough fit of another
+MOST_INERTIA = 3.0  # times the moved mass of the base or its start, that an effect may leave
+EDGE = 1e-3  # relative distance from a bound at which a value ended there
+NO_SCORE = "a linear step takes too little for a refit"
 
 
 def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
@@ -47,124 +43,137 @@ def usable(catalogue: Catalogue, model: MachineModel) -> Catalogue:
     return Catalogue([e for e in catalogue.values() if model.can_use(e)])
 
 
-@dataclass(frozen=True, eq=False)
-class Look:
-    """What a cheap estimate tells of an effect: its starts, best first, or the candidate it is.
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidate:
+    """A model with one effect more: its fit, and what speaks for the effect.
 
-    share: part of the base's squared error that one linear step takes; None for a friction, which
-    no linear step can put in the place of another. candidate: None where a refit is promising.
+    evidence, gain: Schwarz's criterion on the training logs, and the errors on the logs that were
+    not fitted, for the report; neither decides. score: the acceptance test; None where one linear
+    step takes so little that no refit was made. doubt: why its values cannot be its own, in words;
+    None where they can.
     """
 
     effect: Effect
-    starts: tuple[Start, ...]
-    share: float | None
-    candidate: Candidate | None
+    axis: str
+    fit: Fit
+    evidence: Evidence
+    gain: Gain
+    score: Score | None = None
+    doubt: str | None = None
+
+    @classmethod
+    def looked(cls, before: Judged, fit: Fit, effect: Effect, promise: float) -> Candidate:
+        """An effect that was not refitted; promise: part of the error that a linear step takes."""
+        error = before.other_error
+        gain = Gain(error, error * np.sqrt(max(1.0 - max(promise, 0.0), 0.0)), 0.0)
+        return cls(effect, before.dataset.axis, fit, Evidence(0.0, 1, 2.0), gain)
+
+    def __repr__(self) -> str:
+        return f"<Candidate {self.effect.name} on {self.axis}: {self.refused or 'accepted'}>"
+
+    @property
+    def delta_bic(self) -> float:
+        """BIC without minus BIC with the effect; positive supports it."""
+        return self.evidence.delta_bic
+
+    @property
+    def refused(self) -> str | None:
+        """Why the data do not prove it, in words; None where they do."""
+        if self.score is None:
+            return NO_SCORE
+        return self.doubt or self.score.refused
+
+    @property
+    def supported(self) -> bool:
+        """Whether the data prove the effect."""
+        return self.refused is None
+
+    @property
+    def part(self) -> float:
+        """Part of the error above the floor that it takes; 0 where it was not refitted."""
+        return self.score.part if self.score else 0.0
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether the effect lowers no error but raises the noise floor."""
+        return is_noise(self.effect)
 
 
-def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
-    """Refit the model together with the effect and score it against the base.
+def candidate_of(
+    before: Judged, after: Judged, effect: Effect, control: float, own: Sequence[str]
+) -> Candidate:
+    """What speaks for a fitted larger model.
 
-    Where a look at it is far from any evidence, that is scored and no refit is made.
+    control: what its controls take. own: names of the parameters whose values must be its own.
     """
-    look = look_at(base, dataset, effect)
-    return look.candidate or refitted(base, dataset, look)
+    base, fit, dataset = before.fit, after.fit, before.dataset
+    shared = base.kept & fit.kept
+    pair = [f.residual[shared[f.kept]] / f.lessened for f in (base, fit)]
+    added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
+    added += phases_found(fit.axis, effect.name, dataset) if effect.name in fit.axis.names else 0
+    both = np.isfinite(before.other) & np.isfinite(after.other)
+    return Candidate(
+        effect=effect,
+        axis=dataset.axis,
+        fit=fit,
+        evidence=evidence(*pair, added),
+        gain=held_out_gain(before.other[both], after.other[both], base.floor),
+        score=score(before, after, control),
+        doubt=doubt(before, fit, effect, own),
+    )
 
 
-def look_at(base: Fit, dataset: Dataset, effect: Effect) -> Look:
-    """One linear step beside the base; for a friction a fit to the heads of the logs."""
-    found = tuple(starts(base, dataset, effect))
-    best, share = found[0], None
-    fit: Fit | None = None
-    if is_noise(effect):
-        axis = base.axis.with_effect(best.fitted)
-        fit = finished(axis, base.begun, dataset.fit, base.outcome)
-    elif effect.kind is Kind.FRICTION:
-        fit, best = _fitted_to_heads(base, dataset, found)
-        found = (best, *(s for s in found if s is not best))
-    else:
-        share = best.share(base)
-        fit = None if _promising(base, best) else one_linear_step(base, best)
-    candidate = None if fit is None else score(base, fit, dataset, effect)
-    return Look(effect, found, share, candidate)
+def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str | None:
+    """Why the values that an effect was fitted with cannot be its own; None where they can.
 
-
-def as_looked(base: Fit, dataset: Dataset, look: Look) -> Candidate:
-    """The candidate as its linear step predicts it, without a refit."""
-    return score(base, one_linear_step(base, look.starts[0]), dataset, look.effect)
-
-
-def refitted(base: Fit, dataset: Dataset, look: Look) -> Candidate:
-    """The candidate with all parameters fitted, from where the look ended."""
-    effect, (best, *others) = look.effect, look.starts
-    fit = fit_axis(base.axis.with_effect(best.fitted), dataset.fit, FIRST_EVALUATIONS)
-    first = score(base, fit, dataset, effect)
-    if first.delta_bic < 0.0:
-        return first
-    if fit.outcome is Outcome.NOT_CONVERGED:
-        fit = fit_axis(fit.axis, dataset.fit)
-    fit = simplified(fit, dataset, effect)
-    first = first if fit is first.fit else score(base, fit, dataset, effect)
-    if first.fit.at_floor or first.delta_bic < RULE.least_bic:
-        return first
-    # It helps but does not explain everything. The effect was missing when the base was fitted,
-    # which distorts its values, so the fit also starts from where the base started.
-    fits = [first.fit, fit_axis(base.begun.with_effect(best.fitted), dataset.fit)]
-    fits += [fit_axis(base.axis.with_effect(other.fitted), dataset.fit) for other in others]
-    best_fit = min(fits, key=lambda f: f.error)
-    if not best_fit.at_floor:
-        best_fit = fit_thoroughly(best_fit.axis, dataset)
-    return score(base, simplified(best_fit, dataset, effect), dataset, effect)
-
-
-def _promising(base: Fit, start: Start) -> bool:
-    """Whether the gain of the linear step is large enough that a refit may give evidence."""
-    free = len(start.fitted.effect.parameters) - len(start.fitted.fixed)
-    asked = RULE.least_bic + free * np.log(base.samples)
-    return bool(start.gain(base) > RULE.promise * asked)
-
-
-def _fitted_to_heads(
-    base: Fit, dataset: Dataset, found: Sequence[Start]
-) -> tuple[Fit | None, Start]:
-    """Another friction fitted to the heads, if it is no better there than the present one.
-
-    And the start that led furthest.
+    A value that ended at a bound belongs to another law, whatever the bound's sign; a strength at
+    zero is no bound but absence. What repeats along the track has to be seen a few times. An effect
+    that takes the place of the inertia explains nothing: in a motion that repeats in time a sine in
+    time can hold its force. Without the effect, as a motor's saturation, the base may have found a
+    mass that is none.
     """
-    if sum(map(len, dataset.heads)) > 0.5 * sum(map(len, dataset.fit)):
-        return None, found[0]
-    old = _on_heads(base, dataset)
-    fits = [_to_heads(base.axis.with_effect(s.fitted), dataset, old) for s in found]
-    new, start = min(zip(fits, found, strict=True), key=lambda pair: pair[0].error)
-    either = moving(dataset.heads, sticks(old.axis) or sticks(new.axis))
-    before, after = (residual(f.axis, dataset.heads)[either] for f in (old, new))
-    gain = effective_samples(before) * evidence(before, after, 1).log_gain
-    if gain > RULE.promise * RULE.least_bic:
-        return None, start
-    return finished(new.axis, base.begun, dataset.fit, new.outcome), start
+    dataset = before.dataset
+    for fitted in (f for f in fit.axis.effects if f.effect.name == effect.name):
+        free = [p for p in effect.parameters if p.name in own and p.name not in fitted.fixed]
+        for p in free:
+            value = fitted.values[p.name]
+            low = p.lower > 0.0 and value <= p.lower * (1.0 + EDGE)
+            if low or (p.upper > 0.0 and value >= p.upper * (1.0 - EDGE)):
+                return f"{p.name} ends at its bound of {value:.3g} {fit.axis.units(p.unit)}"
+        if effect.is_itself and not effect.is_itself(fitted.values, dataset.excitation):
+            return "its values make another force of it"
+        periods = [fitted.values[p.name] for p in effect.parameters if p.period]
+        travel = np.ptp(np.concatenate([log.motion.position for log in fit.logs]))
+        if periods and travel < RULE.fewest_cycles * max(periods):
+            return "too few of its periods are seen"
+    masses = (before.fit.axis.mass, before.fit.begun.mass)
+    if not any(max(m, fit.axis.mass) <= MOST_INERTIA * min(m, fit.axis.mass) for m in masses):
+        return "it takes the place of the inertia"
+    return None
 
 
-def _to_heads(axis: AxisModel, dataset: Dataset, old: Fit) -> Fit:
-    """An axis with another friction fitted to the heads, to its end unless that is hopeless."""
-    fit = fit_roughly(axis, dataset.heads, HEAD_EVALUATIONS)
-    both = fit.kept & old.kept
-    left, present = (f.residual[both[f.kept]] for f in (fit, old))
-    if left @ left > HOPELESS * (present @ present):
-        return fit
-    return fit_axis(fit.axis, dataset.heads, HEAD_EVALUATIONS)
+def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
+    """An effect that is noise: it raises the floor that readings without it would have.
+
+    It counts where it makes a good part of the error on all logs that choose, and no more than it.
+    """
+    dataset, fit = before.dataset, after.fit
+    logs = (*dataset.fit, *dataset.holdout)
+    error = rms(error_on(fit.axis, logs))
+    less, floor = unrounded_floor_of(fit.axis, logs), floor_of(fit.axis, logs)
+    part = (floor**2 - less**2) / error**2
+    explained = RULE.least_part < part and RULE.not_above * floor < error < RULE.at_floor * floor
+    plain = Candidate(
+        effect, dataset.axis, fit, Evidence(0.0, 1, fit.samples), Gain(error, error, 0.0)
+    )
+    if not explained:
+        return plain
+    taken = Taken(np.inf, part, part)
+    return replace(plain, score=Score(taken, taken), gain=Gain(error, error, np.inf))
 
 
-@lru_cache(maxsize=1)  # every friction is compared with the same base
-def _on_heads(base: Fit, dataset: Dataset) -> Fit:
-    return fit_axis(base.axis, dataset.heads)
-
-
-def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
-    """The fit with the simplest values of the effect, where they explain as much."""
-    if effect.simplest is None:
-        return fit
-    fitted = fit.axis[effect.name]
-    simple = effect.simplest(fitted.values)
-    if simple == dict(fitted.values):
-        return fit
-    again = fit_axis(fit.axis.with_effect(replace(fitted, values=simple)), dataset.fit)
-    return again if again.error < RULE.same_error * fit.error else fit
+def ordered(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Proved ones first, then by the part that they take, then by evidence."""
+    return tuple(
+        sorted(candidates, key=lambda c: (not c.supported, -round(c.part, 2), -c.delta_bic))
+    )

@@ -12,8 +12,8 @@ from identify.dataset.prepared_log import moving
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import averaged_force
+from identify.selection.curves import Shape, sticking
 from identify.selection.smoothed import Linearised, solve
-from identify.selection.wrong_shape import Shape, sticking
 from twin.curve import Coordinate
 from twin.model.units import LINEAR
 from twin.signals import Array
@@ -63,7 +63,7 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
 
     The force of the law is read off where the curve lies: its mean over what else it depends on.
     """
-    mask = moving(dataset.fit, sticking(fit, shape))[fit.kept]
+    mask = moving(dataset.fit, sticking(fit.axis, shape))[fit.kept]
     without = fit.axis.without(shape.effect)
     linear = Linearised.about(fit, dataset, shape.empty, mask).less(shape.effect)
     law = averaged_force(fit.axis, dataset.fit) - averaged_force(without, dataset.fit)

@@ -10,23 +10,21 @@ evidence and held-out logs support it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.excitation import excitation
-from identify.dataset.prepared_log import moving, sticks
-from identify.estimation.evidence import Evidence, effective_samples, held_out_gain
 from identify.estimation.fit import Fit, finished, fit_axis
-from identify.estimation.force_balance import residual
 from identify.estimation.thorough_fit import fit_without
-from identify.selection.scoring import Candidate
+from identify.selection.acceptance import Judged
+from identify.selection.candidates import Candidate, candidate_of
+from identify.selection.controls import change_control
+from identify.selection.curves import Shape
 from identify.selection.smoothed import Linearised, choose_stiffness
-from identify.selection.wrong_shape import Shape, WrongShape, best_shape
 from twin.effect import Effect
-from twin.errors import InputError
 from twin.model.machine import AxisModel, Fitted, MachineModel
 
 Array = NDArray[np.float64]
@@ -43,71 +41,48 @@ def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     """
     covered = effect.starts(excitation([log.motion for log in dataset.fit], None))
     empty = Fitted.at_start(effect, covered)
-    best = _attempt(base, base, dataset, empty)
+    best = _attempt(base, dataset, empty)
     for _ in range(ROUNDS):
         # The missing force had distorted the physics of the base, so choose again beside the refit.
-        again = _attempt(base, fit_without(best.fit, dataset, effect.name), dataset, empty)
+        again = _attempt(fit_without(best.fit, dataset, effect.name), dataset, empty)
         if not again.fit.error < BETTER * best.fit.error:
             break
         best = again
-    return best
+    before, after = Judged(base, dataset), Judged(best.fit, dataset)
+    found = candidate_of(before, after, effect, change_control(before, after), ())
+    return replace(found, evidence=replace(found.evidence, parameters=best.parameters))
 
 
-def fit_in_place(base: Fit, dataset: Dataset, shape: Shape) -> Candidate:
+def fit_in_place(base: Fit, dataset: Dataset, shape: Shape) -> Fit:
     """Fit a free curve in the place of a law, or beside it, see ``Shape.beside``."""
     axis = base.axis if shape.beside else base.axis.without(shape.effect)
-    first = _attempt(base, _as_it_is(base, axis, dataset), dataset, shape.empty)
+    first = _attempt(_as_it_is(base, axis, dataset), dataset, shape.empty)
     # The law's own shape had distorted the other values, so choose again beside the refit.
     again = first.fit.axis.without(shape.empty.effect.name)
-    second = _attempt(base, _as_it_is(base, again, dataset), dataset, shape.empty)
-    return min(first, second, key=lambda c: c.fit.error)
-
-
-def reshaped(
-    effect: Effect, fits: Mapping[str, Fit], prepared: Mapping[str, Dataset]
-) -> tuple[Candidate, WrongShape]:
-    """The shape of an effect's law on the axis that it helps most; fits: by axis that has it.
-
-    Raises InputError where the logs ask for none.
-    """
-    tried = [
-        (fit_in_place(fit, prepared[name], found.shape), found)
-        for name, fit in fits.items()
-        if (found := best_shape(fit, prepared[name], effect.name))
-    ]
-    if not tried:
-        raise InputError(
-            f"the logs show no other shape of {effect.name}: no curve in its place lowers their "
-            "error; `twin diagnose` says what the model lacks"
-        )
-    return max(tried, key=lambda one: one[0].delta_bic)
+    second = _attempt(_as_it_is(base, again, dataset), dataset, shape.empty)
+    return min(first, second, key=lambda c: c.fit.error).fit
 
 
 def _as_it_is(base: Fit, axis: AxisModel, dataset: Dataset) -> Fit:
     return finished(axis, base.begun, dataset.fit, base.outcome)
 
 
-def _attempt(base: Fit, ground: Fit, dataset: Dataset, empty: Fitted) -> Candidate:
-    """Choose the smoothing beside the physics of ``ground``, refit, and judge against the base."""
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """A fit with curves, and how many parameters these are worth."""
+
+    fit: Fit
+    parameters: int
+
+
+def _attempt(ground: Fit, dataset: Dataset, empty: Fitted) -> _Curve:
+    """Choose the smoothing beside the physics of ``ground``, and refit."""
     linear = Linearised.about(ground, dataset, empty)
     stiffness = choose_stiffness(linear)
     change, freedom = linear.solution(stiffness)
     first = _filled(empty, linear, stiffness, change)
     fit = fit_axis(ground.axis.with_effect(first), dataset.fit)
-    if dataset.holdout:
-        held = moving(dataset.holdout, sticks(base.axis) or sticks(fit.axis))
-        pair = [residual(f.axis, dataset.holdout)[held] for f in (base, fit)]
-    else:
-        pair = [linear.left_out(s) for s in ({}, stiffness)]
-    gain = np.log(np.sum(base.residual**2) / np.sum(fit.residual**2))
-    added = max(round(freedom - linear.solution({})[1]), 1)
-    return Candidate(
-        effect=empty.effect,
-        axis=dataset.axis,
-        fit=fit,
-        evidence=Evidence(float(gain), added, effective_samples(fit.residual)),
-        gain=held_out_gain(pair[0], pair[1], fit.floor),
-    )
+    return _Curve(fit, max(round(freedom - linear.solution({})[1]), 1))
 
 
 def followed(fitted: Fitted) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from identify.estimation.decision import RULE
 from identify.estimation.errors import holdout_error
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit, Outcome, finished
-from identify.selection.decoys import Trial
+from identify.selection.old_decoys import Trial
 from identify.selection.residual_dependence import coordinates_of, find_dependence, gathered
 from twin.model.machine import AxisModel
 from twin.signals import Array

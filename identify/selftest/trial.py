@@ -17,9 +17,8 @@ from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates, half_widths
 from identify.estimation.subspace import unabsorbed
-from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.findings import Finding, FindingKind
-from identify.selection.forward_selection import diagnose_axis
 from identify.selection.residual_dependence import dependences
 from identify.selftest.case import Case
 from identify.selftest.cases import AXIS, Machine, NotShown, machine, own_error, prepared
@@ -126,7 +125,7 @@ def run(case: Case) -> TrialResult:
         return TrialResult(case, shown=False, seconds=process_time() - begun)
     known = [e for e in catalogue.values() if case.known or e.name not in case.effects]
     dataset, base = fit_aligned(built.model.axes[AXIS], dataset)
-    found = diagnose_axis(base, dataset, Catalogue(known)).with_findings()
+    found = diagnose_axis(base, dataset, Catalogue(known))
     return TrialResult(
         case=case,
         verdict=found.verdict.name,

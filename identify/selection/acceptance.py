@@ -1,0 +1,185 @@
+"""The acceptance test: whether one model explains the logs better than another, and by how much.
+
+One function, used wherever something is decided: an effect more, an effect less, one effect against
+another, a free curve, an exponent, two effects together. Three numbers are compared with three
+thresholds (``RULE``):
+
+* part: of what the smaller model leaves of the squared force error above the noise floor, the part
+  that the larger one takes. Of all of it or of that of a typical block (geometric mean over blocks),
+  whichever is more, as a few blocks may hold most of an error; on the training logs or on logs that
+  were not fitted, whichever is less, as either alone can be imitated.
+* t: the logarithmic gain over blocks over its standard error; on the training logs less what
+  Schwarz's criterion charges for the parameters that were added.
+* control: the part that the same change takes where it is true to nothing (``controls``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.noise_floor import floor_of
+from identify.dataset.prepared_log import moving, sticks
+from identify.estimation.decision import RULE
+from identify.estimation.evidence import blocks_of, effective_samples, left_out, rms
+from identify.estimation.fit import Fit
+from identify.estimation.force_balance import residual
+
+Array = NDArray[np.float64]
+
+UNSURE = RULE.at_floor**2 - 1.0  # squared floors: no less is ever left above a floor so uncertain
+RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion does not excite
+TINY = 1e-300  # N^2, of a residual that is nothing
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What a change takes of the squared error of some logs.
+
+    t: logarithmic gain over blocks, over its standard error. whole, typical: part of what is left
+    above the noise floor, of all of it and of that of a typical block, at most 1.
+    """
+
+    t: float
+    whole: float
+    typical: float
+
+    @property
+    def part(self) -> float:
+        """The larger of the two parts."""
+        return max(self.whole, self.typical)
+
+
+@dataclass(frozen=True)
+class Score:
+    """A change against the model without it, on the training logs and on logs not fitted to.
+
+    control: the part that all but one in twenty of its controls stay below.
+    """
+
+    training: Taken
+    other: Taken
+    control: float = 0.0
+
+    @property
+    def t(self) -> float:
+        """The smaller of the two."""
+        return min(self.training.t, self.other.t)
+
+    @property
+    def part(self) -> float:
+        """The smaller of the two."""
+        return min(self.training.part, self.other.part)
+
+    @property
+    def refused(self) -> str | None:
+        """Why the change is not accepted, in words; None where it is."""
+        if self.part < RULE.least_part:
+            return f"takes {100.0 * max(self.part, 0.0):.0f} % of what is left"
+        if self.t < RULE.hardly:
+            return f"gain uncertain (t = {self.t:.1f})"
+        clearly = 1.0 - self.part < RULE.beside_controls * (1.0 - self.control)
+        if not (clearly or (self.t > RULE.least_t and self.part > self.control)):
+            return f"its controls take {100.0 * self.control:.0f} %"
+        return None
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the larger model is the better one."""
+        return self.refused is None
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A fit with what it leaves of logs that it was not fitted to: the selection logs.
+
+    Where there are none, of each block of the training logs by a fit to the others.
+    """
+
+    fit: Fit
+    dataset: Dataset
+
+    @cached_property
+    def training(self) -> Array:
+        """Residual (n,) N of the training logs; not a number where it tells nothing."""
+        out = np.full(len(self.fit.kept), np.nan)
+        out[self.fit.kept] = self.fit.residual / self.fit.lessened
+        return out
+
+    @cached_property
+    def other(self) -> Array:
+        """The same (m,) N of logs that were not fitted."""
+        fit, logs = self.fit, self.dataset.holdout
+        if not logs:
+            columns, out = fit.jacobian, np.full(len(fit.kept), np.nan)
+            weak = RIDGE * np.linalg.norm(columns, axis=0)
+            out[fit.kept] = left_out(fit.residual, columns, weak) / fit.lessened
+            return out
+        kept = moving(logs, sticks(fit.axis))
+        return np.where(kept, residual(fit.axis, logs) / fit.lessened, np.nan)
+
+    @cached_property
+    def other_error(self) -> float:
+        """RMS of it, N; no number where all of it rests."""
+        return rms(self.other[np.isfinite(self.other)])
+
+    @cached_property
+    def other_floor(self) -> float:
+        """Noise floor of the logs that were not fitted, N RMS."""
+        holdout = self.dataset.holdout
+        return floor_of(self.fit.axis, holdout) if holdout else self.fit.floor
+
+    @property
+    def at_floor(self) -> bool:
+        """Whether noise is all that is left, on the training logs or on the others."""
+        return self.fit.at_floor or bool(
+            self.dataset.holdout and self.other_error < RULE.at_floor * self.other_floor
+        )
+
+
+def score(before: Judged, after: Judged, control: float = 0.0) -> Score:
+    """What ``after`` takes of the error that ``before`` leaves."""
+    fit = after.fit
+    added = max(len(fit.scaling.where) - len(before.fit.scaling.where), 0)
+    samples = effective_samples(fit.residual)
+    charge = added * np.log(samples) / samples
+    training = taken(before.training, after.training, before.fit.floor, charge)
+    other = taken(before.other, after.other, before.other_floor)
+    return Score(training, other, control)
+
+
+def taken(before: Array, after: Array, floor: float, charge: float = 0.0) -> Taken:
+    """What ``after`` takes of residuals (n,) N, over the test functions that both tell something of.
+
+    floor: N RMS. charge: logarithmic gain that the added parameters alone would bring.
+    """
+    both = np.isfinite(before) & np.isfinite(after)
+    if not both.any():
+        return Taken(0.0, 0.0, 0.0)
+    spans, quiet = blocks_of(int(both.sum())), floor**2
+    first = [span.start for span in spans]
+    count = np.array([span.stop - span.start for span in spans])
+    squares = [np.add.reduceat(r[both] ** 2, first) / count + TINY for r in (before, after)]
+    gains = np.log((squares[0] + quiet) / (squares[1] + quiet))
+    spread = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+    t = (gains.mean() - charge) / spread if spread > 0.0 else 0.0
+    return Taken(float(t), *parts(squares[0], squares[1], count, quiet))
+
+
+def parts(before: Array, after: Array, count: Array, quiet: float) -> tuple[float, float]:
+    """Part that is taken of mean squares (b,) N^2 of blocks with so many samples each (b,).
+
+    Of the whole and of a typical block. quiet: squared noise floor, N^2.
+    """
+    whole = [float(np.average(s, weights=count)) for s in (before, after)]
+    typical = [float(np.exp(np.log(s + quiet).mean())) - quiet for s in (before, after)]
+    return _part(*whole, quiet), _part(*typical, quiet)
+
+
+def _part(before: float, after: float, quiet: float) -> float:
+    left = max(before - quiet, UNSURE * quiet, TINY)
+    return min((before - after) / left, 1.0)

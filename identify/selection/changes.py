@@ -1,0 +1,276 @@
+"""Changes of a model that a diagnosis may make: an effect more, an exponent free, a free curve.
+
+Each can be looked at by one linear step, be refitted, and be undone, whatever it is; so one search
+and one acceptance test serve them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
+from identify.estimation.decision import RULE
+from identify.estimation.fit import Fit, fit_axis, fit_roughly
+from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.thorough_fit import fit_thoroughly
+from identify.estimation.variable_projection import starts
+from identify.selection.acceptance import Judged
+from identify.selection.bends import held_bends
+from identify.selection.controls import Columns, Trial, change_of, unit_penalty
+from identify.selection.curves import Shape, columns_of, shapes_of, sticking
+from identify.selection.nonparametric import fit_in_place
+from twin.effect import Effect, Kind
+from twin.model.machine import AxisModel, Fitted
+from twin.model.parameters import ParameterReference
+
+Array = NDArray[np.float64]
+
+HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
+HOPELESS = 2.0  # times the squared error of the present friction, after a rough fit of another
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What is known of a change before any refit.
+
+    promise: part of the error above the floor that it takes in one linear step (``acceptance``).
+    axes: values to begin a refit from, the most promising first; none where a step tells no more.
+    """
+
+    change: Change
+    promise: float
+    axes: tuple[AxisModel, ...] = ()
+
+
+class Change(Protocol):
+    """What a model may lack."""
+
+    @property
+    def name(self) -> str:
+        """Name of the effect that it is about."""
+
+    def look(self, judged: Judged, trial: Trial) -> Look:
+        """One linear step beside a fit."""
+
+    def refit(self, judged: Judged, look: Look) -> Fit:
+        """The fit with the change, from its first start."""
+
+    def undone(self, axis: AxisModel, base: AxisModel) -> AxisModel | None:
+        """An axis without the change, as the base has it; None where it is not there any more."""
+
+    def columns(self, without: Judged, fit: Judged) -> tuple[Columns, bool]:
+        """Its columns as found, beside a fit without it, and whether standstill is left out."""
+
+
+@dataclass(frozen=True)
+class Added:
+    """An effect of the catalogue that the model does not have."""
+
+    effect: Effect
+
+    @property
+    def name(self) -> str:
+        return self.effect.name
+
+    def look(self, judged: Judged, trial: Trial) -> Look:
+        fit, dataset = judged.fit, judged.dataset
+        found = starts(fit, dataset, self.effect)
+        if self.effect.kind is Kind.FRICTION:
+            return self._on_heads(judged, [s.fitted for s in found])
+        axes = tuple(fit.axis.with_effect(s.fitted) for s in found)
+        left = fit.error**2 - fit.floor**2
+        if found[0].share(fit) * fit.error**2 < RULE.promise * RULE.least_part * left:
+            return Look(self, 0.0, axes)
+        columns = _strength_columns(axes[0], self.name, dataset.fit)
+        return Look(self, trial.part(columns, sticking=sticks(axes[0])), axes)
+
+    def _on_heads(self, judged: Judged, found: Sequence[Fitted]) -> Look:
+        """Another friction, which no linear step puts in the place of one: a fit on the heads."""
+        fit, dataset = judged.fit, judged.dataset
+        old = fit_axis(fit.axis, dataset.heads)
+        tried = [_to_heads(fit.axis.with_effect(f), dataset, old) for f in found]
+        best = sorted(tried, key=lambda f: f.error)
+        both = moving(dataset.heads, sticks(old.axis) or sticks(best[0].axis))
+        before, after = (
+            float(np.mean(residual(f.axis, dataset.heads)[both] ** 2)) for f in (old, best[0])
+        )
+        above = max(before - old.floor**2, 1e-300)
+        return Look(self, (before - after) / above, tuple(f.axis for f in best))
+
+    def refit(self, judged: Judged, look: Look) -> Fit:
+        return simplified(fit_axis(look.axes[0], judged.dataset.fit), judged.dataset, self.effect)
+
+    def undone(self, axis: AxisModel, base: AxisModel) -> AxisModel | None:
+        return axis_less(self.effect, axis, base) if self.name in axis.names else None
+
+    def columns(self, without: Judged, fit: Judged) -> tuple[Columns, bool]:
+        if self.effect.kind is Kind.FRICTION or not self.effect.strengths:
+            return change_of(without, fit), _resting(without, fit)
+        axis = without.fit.axis.with_effect(fit.fit.axis[self.name])
+        return _strength_columns(axis, self.name, without.dataset.fit), sticks(axis)
+
+
+@dataclass(frozen=True)
+class Freed:
+    """A parameter that a law holds by design, such as an exponent, and that bends its curve."""
+
+    effect: Effect
+    parameter: str
+    held: float
+
+    @property
+    def name(self) -> str:
+        return self.effect.name
+
+    def look(self, judged: Judged, trial: Trial) -> Look:
+        axis = self._free(judged.fit.axis)
+        where = [ParameterReference(self.name, self.effect.parameter(self.parameter))]
+        columns = _scaled_columns(axis, where, judged.dataset.fit)
+        return Look(self, trial.part(columns, sticking=sticks(axis)), (axis,))
+
+    def refit(self, judged: Judged, look: Look) -> Fit:
+        return fit_axis(look.axes[0], judged.dataset.fit)
+
+    def undone(self, axis: AxisModel, base: AxisModel) -> AxisModel | None:
+        law = axis[self.name] if self.name in axis.names else None
+        if law is None or self.parameter in law.fixed:
+            return None
+        values = {**law.values, self.parameter: self.held}
+        return axis.with_effect(replace(law, values=values, fixed=law.fixed | {self.parameter}))
+
+    def columns(self, without: Judged, fit: Judged) -> tuple[Columns, bool]:
+        return change_of(without, fit), _resting(without, fit)
+
+    def _free(self, axis: AxisModel) -> AxisModel:
+        law = axis[self.name]
+        return axis.with_effect(replace(law, fixed=law.fixed - {self.parameter}))
+
+
+@dataclass(frozen=True, eq=False)
+class Reshaped:
+    """A free curve in the place of a law, or beside it. law: as it was before."""
+
+    shape: Shape
+    law: Fitted
+
+    @property
+    def name(self) -> str:
+        return self.shape.effect
+
+    def look(self, judged: Judged, trial: Trial) -> Look:
+        columns, resting = self.columns(judged, judged)
+        return Look(self, trial.part(columns, sticking=resting))
+
+    def refit(self, judged: Judged, look: Look) -> Fit:
+        return fit_in_place(judged.fit, judged.dataset, self.shape)
+
+    def undone(self, axis: AxisModel, base: AxisModel) -> AxisModel | None:
+        curve = self.shape.empty.effect.name
+        if curve not in axis.names:
+            return None
+        axis = axis.without(curve)
+        return axis if self.name in axis.names else axis.with_effect(self.law)
+
+    def columns(self, without: Judged, fit: Judged) -> tuple[Columns, bool]:
+        axis, logs = without.fit.axis, without.dataset.fit
+        resting = sticking(axis, self.shape)
+        samples = int(np.count_nonzero(moving(logs, resting)))
+        return columns_of(axis, self.shape, samples), resting
+
+
+def freed_of(axis: AxisModel) -> list[Freed]:
+    """The parameters that bend the laws of an axis and are held."""
+    return [
+        Freed(law.effect, name, law.values[name])
+        for law in axis.effects
+        for name in held_bends(law)
+    ]
+
+
+def reshaped_of(fit: Fit, dataset: Dataset) -> list[Reshaped]:
+    """The free curves that the training logs ask for."""
+    return [Reshaped(shape, fit.axis[shape.effect]) for shape in shapes_of(fit, dataset)]
+
+
+def control(change: Change, without: Judged, fit: Judged) -> float:
+    """The part that a change's controls take beside a fit without it (``controls``)."""
+    columns, resting = change.columns(without, fit)
+    return Trial.beside(without).control(columns, sticking=resting)
+
+
+def refit_thoroughly(judged: Judged, look: Look, first: Fit) -> Fit:
+    """The best of a first fit and of those from all other starts, with shapes scanned again.
+
+    The effect was missing when the base was fitted, which distorts its values, so one start has
+    those that the base began with.
+    """
+    if not look.axes or not isinstance(look.change, Added):
+        return first
+    logs, name = judged.dataset.fit, look.change.name
+    begun = judged.fit.begun.with_effect(look.axes[0][name])
+    fits = [first, *(fit_axis(axis, logs) for axis in (begun, *look.axes[1:]))]
+    best = min(fits, key=lambda f: f.error)
+    if not best.at_floor:
+        best = fit_thoroughly(best.axis, judged.dataset)
+    return simplified(best, judged.dataset, look.change.effect)
+
+
+def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
+    """The fit with the simplest values of the effect, where they explain as much."""
+    if effect.simplest is None:
+        return fit
+    fitted = fit.axis[effect.name]
+    simple = effect.simplest(fitted.values)
+    if simple == dict(fitted.values):
+        return fit
+    again = fit_axis(fit.axis.with_effect(replace(fitted, values=simple)), dataset.fit)
+    return again if again.error < RULE.same_error * fit.error else fit
+
+
+def axis_less(effect: Effect, axis: AxisModel, base: AxisModel) -> AxisModel:
+    """The axis without an effect; a friction is replaced by that of the base."""
+    own = next((f for f in base.effects if f.effect.kind is Kind.FRICTION), None)
+    if effect.kind is Kind.FRICTION and own:
+        return axis.with_effect(own)
+    return axis.without(effect.name)
+
+
+def _strength_columns(axis: AxisModel, name: str, training: Sequence[PreparedLog]) -> Columns:
+    """The forces of an effect's free strengths."""
+    law = axis[name]
+    free = [p for p in law.effect.strengths if p.name not in law.fixed]
+    return _scaled_columns(axis, [ParameterReference(name, p) for p in free], training)
+
+
+def _scaled_columns(
+    axis: AxisModel, where: Sequence[ParameterReference], training: Sequence[PreparedLog]
+) -> Columns:
+    """Derivatives of the residual by parameters, for a unit penalty on the training logs."""
+    own = jacobian(axis, training, where)
+    size = unit_penalty(own)
+
+    def columns(logs: Sequence[PreparedLog]) -> list[Array]:
+        every = own if logs is training else jacobian(axis, logs, where)
+        return split_by_log(every / size, logs)
+
+    return columns
+
+
+def _resting(without: Judged, fit: Judged) -> bool:
+    return sticks(without.fit.axis) or sticks(fit.fit.axis)
+
+
+def _to_heads(axis: AxisModel, dataset: Dataset, old: Fit) -> Fit:
+    """An axis with another friction fitted to the heads, to its end unless that is hopeless."""
+    fit = fit_roughly(axis, dataset.heads, HEAD_EVALUATIONS)
+    both = fit.kept & old.kept
+    left, present = (f.residual[both[f.kept]] for f in (fit, old))
+    if left @ left > HOPELESS * (present @ present):
+        return fit
+    return fit_axis(fit.axis, dataset.heads, HEAD_EVALUATIONS)

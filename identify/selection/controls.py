@@ -1,0 +1,239 @@
+"""Controls of a change: what it would take of an error if it were true to nothing.
+
+Where something else remains above the noise floor, noise is no yardstick: smooth columns take part
+of any smooth remainder. A control has the change's own columns, shifted in time within each log by
+a random part of it: as many, as smooth, as large. Where a shift hardly changes them, as of a
+constant or of a sine in time, stretches of each log get random signs instead: a control has to be
+able to fail. What has no columns, as another friction, has its change of the residual as one.
+Base and columns are solved together in one linear step on the training logs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
+from identify.estimation.evidence import blocks_of, by_blocks
+from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.subspace import orthonormal
+from identify.selection.acceptance import Judged, parts
+from twin.parallel import spread
+
+Array = NDArray[np.float64]
+Columns = Callable[[Sequence[PreparedLog]], list[Array]]
+Falsify = Callable[[Array, np.random.Generator], Array]
+
+CONTROLS = 40
+RARE = 0.05  # of the controls take more than that which a change is set against
+SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
+STRETCHES = 8  # of a log, each with a sign of its own
+SAME = (
+    0.5  # of the square of shifted columns, within the span of the true ones, from which they are
+)
+COMPARED = 4  # shifts by which that is told
+SEED = 0  # of the shifts and signs, the same for each change
+RIDGE = 1e-4  # of a column's length, which keeps what the motion does not excite finite
+ROUNDING = 1e-12  # of a squared force, below which its remainder is not told
+TINY = 1e-100  # of anything that is nothing, as a column where the motion excites none
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A fit beside which columns are tried, on its own logs and on those that it was not fitted to.
+
+    other: None where blocks of the training logs are left out instead. quiet, other_quiet: squared
+    noise floors, N^2.
+    """
+
+    training: _Part
+    other: _Part | None
+    quiet: float
+    other_quiet: float
+
+    @classmethod
+    def beside(cls, judged: Judged) -> Trial:
+        """The trial beside a fit."""
+        fit, holdout = judged.fit, judged.dataset.holdout
+        size = unit_penalty(fit.jacobian)
+        own = _Part.of(judged, fit.logs, size)
+        other = _Part.of(judged, holdout, size) if holdout else None
+        return cls(own, other, fit.floor**2, judged.other_floor**2)
+
+    def part(self, columns: Columns, *, sticking: bool) -> float:
+        """Part of the error above the floor that a linear step with columns takes (``acceptance``).
+
+        columns: logs -> forces (m, j) N of each log, for strengths with a unit penalty. sticking:
+        whether test functions with standstill are left out.
+        """
+        return self._with(columns, sticking).part(None)
+
+    def control(self, columns: Columns, *, sticking: bool) -> float:
+        """The part that all but RARE of the columns' controls stay below."""
+        tried = self._with(columns, sticking)
+        falsify = _signed if _survives_shifts(tried.training.columns) else _shifted
+        found = spread(lambda i: tried.part((falsify, SEED + i)), range(CONTROLS))
+        return float(np.quantile(found, 1.0 - RARE, method="inverted_cdf"))
+
+    def _with(self, columns: Columns, sticking: bool) -> _Tried:
+        training = self.training.with_columns(columns, sticking)
+        other = self.other and self.other.with_columns(columns, sticking)
+        return _Tried(training, other, self.quiet, self.other_quiet)
+
+
+def change_of(before: Judged, after: Judged) -> Columns:
+    """What a change does to the residual, as one column (m, 1) N of each log."""
+    size: list[float] = []
+
+    def columns(logs: Sequence[PreparedLog]) -> list[Array]:
+        both = [residual(j.fit.axis, logs) / j.fit.lessened for j in (before, after)]
+        column = (both[1] - both[0])[:, None]
+        if not size:  # the training logs come first
+            size.append(float(unit_penalty(column)[0]))
+        return split_by_log(column / size[0], logs)
+
+    return columns
+
+
+def change_control(before: Judged, after: Judged) -> float:
+    """The part that the controls of a change take that is only known by what it does."""
+    resting = sticks(before.fit.axis) or sticks(after.fit.axis)
+    return Trial.beside(before).control(change_of(before, after), sticking=resting)
+
+
+def unit_penalty(columns: Array) -> Array:
+    """The size (k,) of columns (n, k), N per unit, by which a weak penalty on them is one.
+
+    Infinite where the training logs do not excite a strength: it stays, whatever it does in others.
+    """
+    norms = np.linalg.norm(columns, axis=0)
+    return np.where(norms > TINY, RIDGE * norms, np.inf)
+
+
+def _shifted(column: Array, rng: np.random.Generator) -> Array:
+    return np.roll(column, round(rng.uniform(*SHIFTS) * len(column)), axis=0)
+
+
+def _signed(column: Array, rng: np.random.Generator) -> Array:
+    signs = rng.choice([-1.0, 1.0], STRETCHES)
+    return column * np.repeat(signs, -(-len(column) // STRETCHES))[: len(column), None]
+
+
+def _survives_shifts(columns: Sequence[Array]) -> bool:
+    """Whether columns (m, j) of logs span about the same as themselves shifted in time."""
+    own, rng = orthonormal(np.concatenate(columns)), np.random.default_rng(SEED)
+    inside = []
+    for _ in range(COMPARED):
+        moved = np.concatenate([_shifted(c, rng) for c in columns])
+        inside.append(float(np.sum((own.T @ moved) ** 2) / max(np.sum(moved**2), TINY)))
+    return float(np.mean(inside)) > SAME
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Some logs: residual (n,) N and the base's columns (n, k), of the test functions kept.
+
+    columns: those that are tried, (m, j) for each log. All are for strengths with a unit penalty.
+    """
+
+    logs: Sequence[PreparedLog]
+    force: Array
+    base: Array
+    kept: NDArray[np.bool_]
+    columns: Sequence[Array] = ()
+
+    @classmethod
+    def of(cls, judged: Judged, logs: Sequence[PreparedLog], size: Array) -> _Part:
+        axis = judged.fit.axis
+        force = residual(axis, logs)
+        own = jacobian(axis, logs, judged.fit.scaling.where)
+        own /= size
+        return cls(logs, force, own, np.ones(len(force), dtype=bool))
+
+    def with_columns(self, columns: Columns, sticking: bool) -> _Part:
+        """The same with columns to try; sticking: without test functions with standstill."""
+        kept = moving(self.logs, sticking)
+        return _Part(self.logs, self.force[kept], self.base[kept], kept, columns(self.logs))
+
+    @cached_property
+    def spans(self) -> list[slice]:
+        """Samples of each block."""
+        return blocks_of(len(self.force))
+
+    @cached_property
+    def own(self) -> Array:
+        """Inner products (b, p, p), by blocks, of force and the base's columns, force first."""
+        both = np.column_stack([self.force, self.base])
+        return by_blocks(both, both, self.spans)
+
+    def products(self, false: tuple[Falsify, np.random.Generator] | None) -> Array:
+        """The same with the columns that are tried last; false: made controls."""
+        tried, own, first = self._tried(false), self.own, self.own.shape[1]
+        both = first + tried.shape[1]
+        out = np.empty((len(own), both, both))
+        out[:, :first, :first] = own
+        out[:, first:, first:] = by_blocks(tried, tried, self.spans)
+        out[:, first:, 0] = by_blocks(tried, self.force, self.spans)
+        out[:, first:, 1:first] = by_blocks(tried, self.base, self.spans)
+        out[:, :first, first:] = out[:, first:, :first].swapaxes(1, 2)
+        return out
+
+    def _tried(self, false: tuple[Falsify, np.random.Generator] | None) -> Array:
+        made = [c if false is None else false[0](c, false[1]) for c in self.columns]
+        return np.concatenate(made)[self.kept]
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """Columns beside a fit, on both groups of logs."""
+
+    training: _Part
+    other: _Part | None
+    quiet: float
+    other_quiet: float
+
+    def part(self, false: tuple[Falsify, int] | None) -> float:
+        """Part of the error above the floor that a linear step takes, the smaller of two groups."""
+        rng = None if false is None else (false[0], np.random.default_rng(false[1]))
+        blocks = self.training.products(rng)
+        steps, without = _steps(blocks), _steps(self.training.own)
+        own = _parts(self.training, blocks, steps, without, self.quiet)
+        if self.other is None:
+            left = _steps(blocks, leave_out=True)
+            held = _steps(self.training.own, leave_out=True)
+            return min(own, _parts(self.training, blocks, left, held, self.quiet))
+        there = self.other.products(rng)
+        return min(own, _parts(self.other, there, steps, without, self.other_quiet))
+
+
+def _steps(products: Array, leave_out: bool = False) -> Array:
+    """Steps (b, p - 1) that minimise the squared force; each block's by the others if left out."""
+    whole = products.sum(axis=0)
+    penalty = np.eye(len(whole) - 1)
+    if leave_out:
+        others = whole - products
+        return np.linalg.solve(others[:, 1:, 1:] + penalty, others[:, 1:, :1])[..., 0]
+    step = np.linalg.solve(whole[1:, 1:] + penalty, whole[1:, 0])
+    return np.broadcast_to(step, (len(products), len(step)))
+
+
+def _parts(part: _Part, products: Array, steps: Array, without: Array, quiet: float) -> float:
+    count = np.array([span.stop - span.start for span in part.spans])
+    before, after = (
+        np.maximum(_squares(p, s), ROUNDING * p[:, 0, 0] + TINY) / count
+        for p, s in ((part.own, without), (products, steps))
+    )
+    return max(parts(before, after, count, quiet))
+
+
+def _squares(products: Array, steps: Array) -> Array:
+    """What steps (b, p - 1) leave of the squared force, (b,) N^2, by products (b, p, p).
+
+    Force is F, a column X, a step s, and what is left |F - X s|^2.
+    """
+    change = np.column_stack([np.ones(len(steps)), -steps])
+    return np.asarray(np.einsum("bi,bij,bj->b", change, products, change))

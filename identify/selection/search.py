@@ -1,0 +1,340 @@
+"""The search for what a model lacks: one list of changes a round, one acceptance test.
+
+Forward: of all changes that are accepted, the one that leaves least; of those that are level with
+it, the one with the fewest parameters. Backward: an earlier change that is not accepted beside the
+later ones goes. Where no change is accepted alone, those that come nearest are followed one round
+further: two that are accepted together, and each beside the other, are needed together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.drive import is_noise
+from identify.estimation.channel_delay import moved_by
+from identify.estimation.decision import RULE
+from identify.estimation.fit import Fit, finished, fit_axis
+from identify.estimation.scaling import Scaling
+from identify.estimation.thorough_fit import fit_thoroughly
+from identify.estimation.time_origin import synchronised
+from identify.estimation.variable_projection import starts
+from identify.selection.acceptance import Judged, score
+from identify.selection.candidates import (
+    Candidate,
+    absent_effects,
+    candidate_of,
+    noise_candidate,
+    ordered,
+)
+from identify.selection.changes import (
+    Added,
+    Change,
+    Freed,
+    Look,
+    Reshaped,
+    control,
+    freed_of,
+    refit_thoroughly,
+    reshaped_of,
+)
+from identify.selection.controls import Trial
+from twin.effect import Effect
+from twin.effects import Catalogue
+from twin.memory import give_back
+from twin.model.machine import AxisModel
+from twin.model.parameters import free_parameters
+from twin.parallel import counting, spread
+
+Progress = Callable[[int, int], None]
+LEADERS = 2  # looks that are refitted first, and tell what others must promise
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A change beside a fit, refitted: the fit with it, and what speaks for it."""
+
+    change: Change
+    look: Look
+    judged: Judged
+    candidate: Candidate
+
+    @property
+    def parameters(self) -> int:
+        """Free parameters of the fit; of a free curve the effective ones."""
+        free = len(self.judged.fit.scaling.where)
+        if not isinstance(self.change, Reshaped):
+            return free
+        return free + self.candidate.evidence.parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A change that was accepted, and those that are level with it.
+
+    with_others: whether it is accepted only together with another step. dropped: names of earlier
+    changes that were not needed any more beside it.
+    """
+
+    tried: Tried
+    level: tuple[Tried, ...] = ()
+    with_others: bool = False
+    dropped: tuple[str, ...] = ()
+
+    @property
+    def change(self) -> Change:
+        """What was changed."""
+        return self.tried.change
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search found.
+
+    base: the fit before, at its best. steps: the changes that were accepted and are needed still.
+    passed: all that were accepted on the way. final: the fit with the steps. ranking: every absent
+    effect beside the base. small: changes that the data show and that take too little to matter.
+    """
+
+    dataset: Dataset
+    base: Judged
+    final: Judged
+    steps: tuple[Step, ...]
+    passed: tuple[Step, ...]
+    ranking: tuple[Candidate, ...]
+    last: tuple[Tried, ...]
+
+
+def search(
+    base: Fit,
+    dataset: Dataset,
+    catalogue: Catalogue,
+    progress: Progress | None = None,
+    shifts: int = RULE.most_shifts,
+) -> Found:
+    """Change one fitted axis while changes are accepted.
+
+    shifts: how often the search may still begin again as a change alters the channel delay.
+    """
+    first = judged = Judged(base, dataset)
+    steps: tuple[Step, ...] = ()
+    passed: list[Step] = []
+    ranking: tuple[Candidate, ...] = ()
+    last: list[Tried] = []
+    while len(steps) < RULE.most_steps:
+        judged, last, candidates = tried_beside(judged, catalogue, progress)
+        if not ranking:
+            first, ranking = judged, ordered(candidates)
+        new = _accepted(judged, last) or _together(judged, last, catalogue)
+        if not new:
+            break
+        passed += new
+        judged = new[-1].tried.judged
+        judged, steps = _needed(judged, (*steps, *new), first)
+        if judged.at_floor:
+            break
+        if shifts and (moved := moved_by(judged.fit, dataset)):
+            return search(
+                fit_axis(first.fit.axis, moved.fit), moved, catalogue, progress, shifts - 1
+            )
+        dataset, fit = synchronised(judged.fit, dataset)
+        judged = judged if dataset is judged.dataset else Judged(fit, dataset)
+    return Found(dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
+
+
+def tried_beside(
+    judged: Judged, catalogue: Catalogue, progress: Progress | None = None
+) -> tuple[Judged, list[Tried], list[Candidate]]:
+    """Every change beside a fit: the fit at its best, those refitted, and all absent effects.
+
+    If the values of the best without its change are a better start for the fit, it is refitted from
+    there: a fit short of its optimum would let every change in.
+    """
+    effects = absent_effects(judged.fit.axis, catalogue)
+    plain = [Added(e) for e in effects if not is_noise(e)]
+    changes: list[Change] = [*plain, *freed_of(judged.fit.axis)]
+    one_more = counting(len(changes), progress)
+    done = judged.at_floor
+    trial = Trial.beside(judged)
+
+    def look(change: Change) -> Look:
+        found = change.look(judged, trial)
+        one_more()
+        return found
+
+    looks = spread(look, changes)
+    tried = [] if done else _refitted(judged, looks)
+    if not done and not any(t.judged.at_floor and t.candidate.supported for t in tried):
+        curves = [c.look(judged, trial) for c in reshaped_of(judged.fit, judged.dataset)]
+        best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
+        tried += _refitted(judged, best, tried)
+    judged, tried = _at_its_best(judged, tried)
+    give_back()
+    noise = [_as_noise(judged, e) for e in effects if is_noise(e)]
+    ranked = {t.candidate.effect.name: t.candidate for t in tried if isinstance(t.change, Added)}
+    looked = [_as_looked(judged, k) for k in looks if isinstance(k.change, Added)]
+    candidates = [ranked.get(c.effect.name, c) for c in looked] + [n.candidate for n in noise]
+    return judged, [*tried, *noise], candidates
+
+
+def is_level(one: Tried, best: Tried) -> bool:
+    """Whether the logs do not tell two changes apart, or by too little to matter."""
+    effects = [t.change.effect for t in (one, best) if isinstance(t.change, Added)]
+    if len(effects) == 2 and all(e.dead_time for e in effects):
+        return True  # which of the two is late, no log of both can tell
+    by = score(one.judged, best.judged)
+    return by.t < RULE.level_t or by.part < RULE.least_part
+
+
+def _refitted(judged: Judged, looks: Sequence[Look], known: Sequence[Tried] = ()) -> list[Tried]:
+    """The changes that promise enough, refitted; the better ones thoroughly if none is enough."""
+    asked = RULE.promise * RULE.least_part
+    waiting = sorted((k for k in looks if k.promise >= asked), key=lambda k: -k.promise)
+    first = spread(lambda k: (k, _fit_of(judged, k)), waiting[:LEADERS])
+    most = max((_roughly(judged, f) for _, f in first), default=0.0)
+    most = max([most, *(t.candidate.part for t in known)])
+    rest = [k for k in waiting[LEADERS:] if k.promise >= RULE.promise * most]
+    fits = [*first, *spread(lambda k: (k, _fit_of(judged, k)), rest)]
+    if not any(f.at_floor for _, f in fits):
+        fits.sort(key=lambda pair: -_roughly(judged, pair[1]))
+        better = spread(lambda p: (p[0], refit_thoroughly(judged, *p)), fits[:LEADERS])
+        fits[:LEADERS] = better
+    return spread(lambda pair: _tried(judged, *pair), fits)
+
+
+def _fit_of(judged: Judged, look: Look) -> Fit:
+    return look.change.refit(judged, look)
+
+
+def _roughly(judged: Judged, fit: Fit) -> float:
+    """Part of the error above the floor that a fit takes of the training logs."""
+    above = max(judged.fit.error**2 - judged.fit.floor**2, 1e-300)
+    return (judged.fit.error**2 - fit.error**2) / above
+
+
+def _tried(judged: Judged, look: Look, fit: Fit) -> Tried:
+    """A refitted change with its score; its controls are asked only where they could decide."""
+    change, after = look.change, Judged(fit, judged.dataset)
+    found = candidate_of(judged, after, _effect(change), 0.0, parameters(change))
+    if found.supported:
+        taken = control(change, judged, after)
+        found = replace(found, score=replace(found.score, control=taken))
+    return Tried(change, look, after, found)
+
+
+def _effect(change: Change) -> Effect:
+    return change.shape.empty.effect if isinstance(change, Reshaped) else change.effect  # type: ignore[attr-defined]
+
+
+def parameters(change: Change) -> tuple[str, ...]:
+    """Names of the parameters by which a change is told to be plausible."""
+    if isinstance(change, Added):
+        return tuple(p.name for p in change.effect.parameters)
+    return (change.parameter,) if isinstance(change, Freed) else ()
+
+
+def _as_looked(judged: Judged, look: Look) -> Candidate:
+    """An absent effect that was not refitted, as its linear step predicts it."""
+    axis = look.axes[0]
+    fit = replace(judged.fit, axis=axis, scaling=Scaling(free_parameters(axis)))
+    return Candidate.looked(judged, fit, look.change.effect, look.promise)  # type: ignore[attr-defined]
+
+
+def _as_noise(judged: Judged, effect: Effect) -> Tried:
+    """An effect that only raises the noise floor."""
+    fit, dataset = judged.fit, judged.dataset
+    axis = fit.axis.with_effect(starts(fit, dataset, effect)[0].fitted)
+    after = Judged(finished(axis, fit.begun, dataset.fit, fit.outcome), dataset)
+    change = Added(effect)
+    return Tried(change, Look(change, 0.0), after, noise_candidate(judged, after, effect))
+
+
+def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried]]:
+    """The fit refitted from where the best change left it, and the changes scored against it."""
+    proved = [t for t in tried if t.candidate.supported]
+    if not proved:
+        return judged, tried
+    best = max(proved, key=lambda t: t.candidate.part)
+    axis = best.change.undone(best.judged.fit.axis, judged.fit.axis)
+    if axis is None or best.candidate.part > RULE.nearly_all:
+        return judged, tried
+    again = replace(fit_axis(axis, judged.dataset.fit), begun=judged.fit.begun)
+    if again.error > RULE.settled * judged.fit.error:
+        return judged, tried
+    judged = Judged(again, judged.dataset)
+    return judged, [_tried(judged, t.look, t.judged.fit) for t in tried]
+
+
+def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
+    """The step that the search takes: the simplest of those level with the best."""
+    proved = [t for t in tried if t.candidate.supported]
+    lowering = [t for t in proved if not t.candidate.is_noise]
+    noise = [t for t in proved if t.candidate.is_noise]
+    if noise and not any(t.judged.at_floor for t in lowering):
+        return [Step(noise[0])]
+    if not lowering:
+        return []
+    best = max(lowering, key=lambda t: t.candidate.part)
+    level = [t for t in lowering if t is not best and is_level(t, best)]
+    first = min((best, *level), key=lambda t: (t.parameters, -t.candidate.part))
+    return [Step(first, tuple(t for t in (best, *level) if t is not first))]
+
+
+def _together(judged: Judged, tried: Sequence[Tried], catalogue: Catalogue) -> list[Step]:
+    """Two changes that are accepted together, and each beside the other; none where there are not.
+
+    While one is missing, it distorts what the other leaves, so that neither is accepted alone.
+    """
+
+    def may_help(t: Tried) -> bool:
+        found = t.candidate
+        return bool(
+            found.score and not found.doubt
+            and found.part > RULE.promise * RULE.least_part and found.score.t > RULE.hardly
+        )  # fmt: skip
+
+    ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[: RULE.most_ways]
+    for way in ways:
+        beside, seconds, _ = tried_beside(way.judged, catalogue)
+        if not (then := _accepted(beside, seconds)):
+            continue
+        both, second = then[0].tried.judged, then[0]
+        axis = way.change.undone(both.fit.axis, judged.fit.axis)
+        if axis is None or score(judged, both).refused:
+            continue
+        alone = Judged(fit_axis(axis, both.dataset.fit), both.dataset)
+        if _is_needed(way.change, alone, both):
+            return [Step(way, with_others=True), replace(second, with_others=True)]
+    return []
+
+
+def _is_needed(change: Change, without: Judged, fit: Judged) -> bool:
+    """Whether a change is accepted beside a fit without it."""
+    plain = score(without, fit)
+    return plain.accepted and replace(plain, control=control(change, without, fit)).accepted
+
+
+def _needed(
+    judged: Judged, steps: tuple[Step, ...], first: Judged
+) -> tuple[Judged, tuple[Step, ...]]:
+    """The fit and the steps without earlier ones that are not accepted beside the later ones."""
+    for step in steps[:-1]:
+        axis = step.change.undone(judged.fit.axis, first.fit.axis)
+        if axis is not None:
+            without = Judged(_refit(axis, judged), judged.dataset)
+            if _is_needed(step.change, without, judged):
+                # The shapes of later effects were found beside this one; they may differ without.
+                again = fit_thoroughly(without.fit.axis, judged.dataset, judged.fit.begun)
+                without = Judged(again, judged.dataset)
+                if _is_needed(step.change, without, judged):
+                    continue
+            judged = without
+        kept = [s for s in steps if s is not step]
+        dropped = (*kept[-1].dropped, step.change.name)
+        steps = (*kept[:-1], replace(kept[-1], dropped=dropped))
+    return judged, steps
+
+
+def _refit(axis: AxisModel, judged: Judged) -> Fit:
+    return replace(fit_axis(axis, judged.dataset.fit), begun=judged.fit.begun)
