@@ -5,11 +5,11 @@ another, a free curve, an exponent, two effects together. Three numbers are comp
 thresholds (``RULE``):
 
 * part: of what the smaller model leaves of the squared force error above the noise floor, the part
-  that the larger one takes. Of all of it or of that of a typical block (geometric mean over blocks),
-  whichever is more, as a few blocks may hold most of an error; on the training logs or on logs that
-  were not fitted, whichever is less, as either alone can be imitated.
+  that the larger one takes. Of all of it or of that of a typical block (geometric mean),
+  whichever is more, as a few blocks may hold most of an error; on the training logs or on logs
+  that were not fitted, whichever is less, as either alone can be imitated.
 * t: the logarithmic gain over blocks over its standard error; on the training logs less what
-  Schwarz's criterion charges for the parameters that were added.
+  what as many parameters take of noise.
 * control: the part that the same change takes where it is true to nothing (``controls``).
 """
 
@@ -28,6 +28,8 @@ from identify.estimation.decision import RULE
 from identify.estimation.evidence import blocks_of, effective_samples, left_out, rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
+from identify.estimation.smoothing import has_nonparametric, smoothing
+from identify.selection.smoothed import solve
 
 Array = NDArray[np.float64]
 
@@ -133,6 +135,15 @@ class Judged:
         holdout = self.dataset.holdout
         return floor_of(self.fit.axis, holdout) if holdout else self.fit.floor
 
+    @cached_property
+    def parameters(self) -> float:
+        """Free parameters; of a free curve the effective ones, by how smooth it is."""
+        fit, where = self.fit, self.fit.scaling.where
+        if not has_nonparametric(fit.axis):
+            return float(len(where))
+        gram, rows = fit.jacobian.T @ fit.jacobian, smoothing(fit.axis, where, len(fit.residual))
+        return float(np.trace(solve(gram + rows.T @ rows, gram)))
+
     @property
     def at_floor(self) -> bool:
         """Whether noise is all that is left, on the training logs or on the others."""
@@ -143,17 +154,15 @@ class Judged:
 
 def score(before: Judged, after: Judged, control: float = 0.0) -> Score:
     """What ``after`` takes of the error that ``before`` leaves."""
-    fit = after.fit
-    added = max(len(fit.scaling.where) - len(before.fit.scaling.where), 0)
-    samples = effective_samples(fit.residual)
-    charge = added * np.log(samples) / samples
+    samples = effective_samples(after.fit.residual)
+    charge = max(after.parameters - before.parameters, 0.0) / samples
     training = taken(before.training, after.training, before.fit.floor, charge)
     other = taken(before.other, after.other, before.other_floor)
     return Score(training, other, control)
 
 
 def taken(before: Array, after: Array, floor: float, charge: float = 0.0) -> Taken:
-    """What ``after`` takes of residuals (n,) N, over the test functions that both tell something of.
+    """What ``after`` takes of residuals (n,) N, where both tell something.
 
     floor: N RMS. charge: logarithmic gain that the added parameters alone would bring.
     """

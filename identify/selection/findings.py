@@ -135,6 +135,11 @@ def _finding(step: Step, shaped: Sequence[Step], found: Found) -> Finding:
     return finding
 
 
+def _needed_with(step: Step, found: Found) -> tuple[str, ...]:
+    others = [s for s in found.steps if s.with_others and step.with_others and s is not step]
+    return tuple(s.change.name for s in others)
+
+
 def _shaped(
     finding: Finding, change: Added | Freed | Reshaped, less: Judged, found: Found
 ) -> Finding:

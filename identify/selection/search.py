@@ -60,14 +60,6 @@ class Tried:
     judged: Judged
     candidate: Candidate
 
-    @property
-    def parameters(self) -> int:
-        """Free parameters of the fit; of a free curve the effective ones."""
-        free = len(self.judged.fit.scaling.where)
-        if not isinstance(self.change, Reshaped):
-            return free
-        return free + self.candidate.evidence.parameters
-
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -277,7 +269,7 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         return []
     best = max(lowering, key=lambda t: t.candidate.part)
     level = [t for t in lowering if t is not best and is_level(t, best)]
-    first = min((best, *level), key=lambda t: (t.parameters, -t.candidate.part))
+    first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))
     return [Step(first, tuple(t for t in (best, *level) if t is not first))]
 
 
