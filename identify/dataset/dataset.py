@@ -109,6 +109,23 @@ class Dataset:
         each = max(TRIED / len(self.fit), SHORTEST_HEAD)
         return tuple(PreparedLog.of(w.motion.head(each), w.test_function.length) for w in self.fit)
 
+    def shortened(self, seconds: float) -> Dataset:
+        """The same with the beginnings of its training and selection logs, each role that long."""
+        if all(sum(map(_length, logs)) <= seconds for logs in (self.fit, self.holdout)):
+            return self
+
+        def cut(logs: tuple[PreparedLog, ...]) -> tuple[PreparedLog, ...]:
+            each = seconds / max(len(logs), 1)
+            return tuple(
+                replace(
+                    PreparedLog.of(w.motion.head(each), w.test_function.length, w.reach),
+                    force_noise=w.force_noise,
+                )
+                for w in logs
+            )
+
+        return replace(self, fit=cut(self.fit), holdout=cut(self.holdout))
+
     @cached_property
     def in_heads(self) -> NDArray[np.bool_]:
         """Which test functions of the fit logs are in their heads."""
@@ -231,6 +248,11 @@ def _within_reach(
     if sum(np.count_nonzero(w.reached) for w in within) < LEAST_SHARED * sum(map(len, within)):
         return tuple(PreparedLog.of(m, length) for m in motions)
     return tuple(within)
+
+
+def _length(log: PreparedLog) -> float:
+    """Of its motion, s."""
+    return float(log.motion.signals.shape[1] * log.motion.period)
 
 
 def by_log(found: Mapping[str, Dataset]) -> dict[str, dict[str, PreparedLog]]:
