@@ -183,12 +183,12 @@ def quadratic_drag(p: Values, q: Columns) -> Results:
     "r = 2 (x - phase - k pitch)/width"
 )
 def roller_spikes(p: Values, q: Columns) -> Results:
-    """d follows the direction within 20 um of travel; the sum runs over every roller."""
+    """d follows the direction within a 200th of the width; the sum runs over every roller."""
     bump = np.zeros(len(q))
     for k in range(-60, 61):
         r = 2.0 * (q.x - p["phase"] - k * p["pitch"]) / p["width"]
         bump += np.where(np.abs(r) < 1.0, (1.0 - r**2) ** 2, 0.0)
-    d = followed(q, 2e-5)
+    d = followed(q, p["width"] / 200.0)
     return {OUT: -(p["ahead"] * (1.0 + d) / 2.0 - p["behind"] * (1.0 - d) / 2.0) * bump}
 
 

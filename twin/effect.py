@@ -55,6 +55,9 @@ COLUMNS = IO_SIZE  # how many strengths act at a sample; then the number and the
 
 Law = Callable[[Any, Any, Any], None]
 
+# Bounds of what has a force or a length in its unit where physics gives none: beyond any machine.
+LEAST, MOST = 1e-15, 1e15
+
 ELEMENTS = "elements"  # the parameter that counts the elements of an effect with ``of_size``
 
 

@@ -7,16 +7,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from twin.core.native import Table, build_table
-from twin.effect import ELEMENTS, Effect, Kind, Parameter
+from twin.effect import ELEMENTS, LEAST, MOST, Effect, Kind, Parameter
 from twin.errors import CannotRun, InputError
 from twin.model.history import HistoryStep
 from twin.model.intervals import AxisIntervals
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 from twin.numbers import is_number
 
-MASS = Parameter(LINEAR.mass_name, LINEAR.mass, 1.0, 1e-6, 1e6, "moved mass")
-# Declared linear as all parameters are; a small motor has a millionth of a kg m^2.
-INERTIA = Parameter(ROTARY.mass_name, LINEAR.mass, 1.0, 1e-12, 1e6, "moment of inertia")
+MASS = Parameter(LINEAR.mass_name, LINEAR.mass, 1.0, LEAST, MOST, "moved mass")
+# Declared linear as all parameters are.
+INERTIA = Parameter(ROTARY.mass_name, LINEAR.mass, 1.0, LEAST, MOST, "moment of inertia")
 MOST_ELEMENTS = 1000
 OF_IMPOSED_MOTION = (Kind.FORCE, Kind.MODIFIER, Kind.FRICTION)  # need neither mass nor motor
 MOST_AXES_OF_A_PAIR = 2  # with more, which is the other axis?
