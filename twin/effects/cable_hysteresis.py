@@ -10,6 +10,7 @@ and exact for motion in one direction within a sample.
 """
 
 from twin.effect import DT, LEAST, MOST, OUT, WHEN, Effect, Kind, Parameter, V
+from twin.effects.cable_slab import on_a_cable
 
 
 def law(p, s, io):
@@ -46,4 +47,5 @@ EFFECT = Effect(
     law=law,
     fingerprint="residual bends over millimetres after each reversal, at every speed alike",
     excited_by="slow passes with reversals at many places, and inner loops of millimetres",
+    suits=on_a_cable,
 )  # fmt: skip

@@ -133,7 +133,7 @@ class AxisModel:
                 f"an axis has one friction model, given {' and '.join(frictions)}; remove one"
             )
         for f in self.effects:
-            if not self.can_have(f.effect):
+            if not self._moves_with(f.effect):
                 raise InputError(
                     f"{f.effect.name} acts through the motor or the moved mass, and {name} = 0 "
                     f"{unit} says that the motion is imposed; remove it, or give the {name}"
@@ -145,6 +145,12 @@ class AxisModel:
         return self.mass == 0.0
 
     def can_have(self, effect: Effect) -> bool:
+        """Whether a diagnosis offers the effect: it acts, and no other has its law on this axis."""
+        present = [f.effect for f in self.effects]
+        suits = effect.suits is None or effect.suits(present, self.rotary)
+        return suits and self._moves_with(effect)
+
+    def _moves_with(self, effect: Effect) -> bool:
         """Whether the effect acts on this axis at all: imposed motion has no motor and no mass.
 
         A law that reads the motor's force would read there what it is to explain.

@@ -23,7 +23,7 @@ EVERY = pytest.mark.parametrize(
     ("effect", "p"), PARAMETERS[:], ids=[f"{e.name}-{p.name}" for e, p in PARAMETERS]
 )
 
-PLACES_AND_TIMES = ("start", "low", "high", "phase", "tau", "relaxation", "b", "n")
+PLACES_AND_TIMES = ("start", "middle", "low", "high", "phase", "tau", "relaxation", "b", "n")
 
 
 @pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))
