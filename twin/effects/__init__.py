@@ -1,4 +1,4 @@
-"""The catalogue: every file in this folder is one effect, named by no other but its like.
+"""The catalogue: every file in this folder is one effect, and no other file names it.
 
 A file defines ``EFFECT``, a twin.effect.Effect, and takes its name from the file.
 """

@@ -5,18 +5,9 @@ F(x) = -(offset + k1 x + k2 x^2 + k3 x^3); it falls with x because the fold of t
 choice: the thesis prints a measured curve, no formula.
 """
 
-from collections.abc import Collection
-
 from twin.curve import Coordinate, Curve
 from twin.effect import MOST, OUT, Effect, Kind, Parameter, X
-
-
-def on_a_cable(present: Collection[Effect], turns: bool) -> bool:
-    """Whether an axis with these effects has a cable; without one the same laws have other names.
-
-    spring and presliding_hysteresis.
-    """
-    return any(effect.name in ("cable_slab", "cable_hysteresis") for effect in present)
+from twin.one_law import on_a_cable
 
 
 def law(p, s, io):

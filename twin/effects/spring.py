@@ -2,13 +2,12 @@
 
 F(x) = -(offset + k1 d + k2 d^2 + k3 d^3), d = x - middle. The power series of a force about the
 middle of the travel; with k3 > 0 the hardening spring of G. Duffing, Erzwungene Schwingungen bei
-veranderlicher Eigenfrequenz (1918). On a machine whose model has a cable, the force of the cable
-slab is the same law.
+veranderlicher Eigenfrequenz (1918). The force of a cable slab is the same law.
 """
 
 from twin.curve import Coordinate, Curve
 from twin.effect import MOST, OUT, Effect, Kind, Parameter, X
-from twin.effects.cable_slab import on_a_cable
+from twin.one_law import without_a_cable
 
 
 def law(p, s, io):
@@ -35,5 +34,5 @@ EFFECT = Effect(
     curves=(Curve(Coordinate.POSITION),),
     fingerprint="residual is one smooth curve of position, the same in both directions",
     excited_by="slow passes over the whole travel in both directions",
-    suits=lambda present, turns: not on_a_cable(present, turns),
+    suits=without_a_cable,
 )  # fmt: skip
