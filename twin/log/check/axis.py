@@ -246,8 +246,8 @@ def _built_up(position: Array, width: float) -> Array:
 
     The stop operator: M. A. Krasnosel'skii, A. V. Pokrovskii, Systems with Hysteresis, 1989.
     """
-    held, out = 0.0, []
-    for step in (np.diff(position, prepend=position[0]) / width).tolist():
+    held, out, way = 0.0, [], position / width
+    for step in np.diff(way, prepend=way[0]).tolist():
         held = min(max(held + step, -1.0), 1.0)
         out.append(held)
     return np.array(out)
