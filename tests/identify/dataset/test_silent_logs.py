@@ -58,13 +58,13 @@ REASONS = {
 
 @pytest.mark.parametrize("name", SILENT)
 @pytest.mark.parametrize("role", ["logs", "holdout", "test"])
-def test_a_fit_is_as_without_it_and_says_so(caplog, name, role):
-    given = {"logs": MOVING, "holdout": {}, "test": {}}
-    without = fit(MODEL, **given, test_function=LENGTH)
+def test_a_fit_is_as_without_it_and_says_so(caplog, name: str, role: str) -> None:
+    without = fit(MODEL, MOVING, test_function=LENGTH)
     caplog.clear()
+    given: dict[str, dict[str, Log]] = {"logs": MOVING, "holdout": {}, "test": {}}
+    given[role] = {**given[role], name: SILENT[name]}
     with caplog.at_level(logging.WARNING, "identify"):
-        silent = {**given[role], name: SILENT[name]}
-        found = fit(MODEL, **{**given, role: silent}, test_function=LENGTH)
+        found = fit(MODEL, *given.values(), test_function=LENGTH)
     (line,) = (record.getMessage() for record in caplog.records)
     assert line.startswith(REASONS[name])
     assert "; give " in line
@@ -80,7 +80,9 @@ def test_one_that_shares_no_travel_is_told_beside_one_that_does(caplog):
         found = fit(MODEL, {"run": elsewhere(1e-4)}, held, test_function=LENGTH)
     (line,) = (record.getMessage() for record in caplog.records)
     assert line.startswith("far is left out: axis x is nowhere where a training log has been")
-    assert np.isfinite(found.holdout_error["x"])
+    error = found.holdout_error["x"]
+    assert error is not None
+    assert np.isfinite(error)
 
 
 def test_where_no_log_is_left_it_is_an_error_of_one_line():
