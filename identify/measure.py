@@ -136,10 +136,16 @@ def _first_effects(
     values = {"Fc": found.coulomb, "Fs": static, "sigma2": found.viscous}
     own = {n: _shown(v) for n, v in values.items() if n in friction.starts(covered)}
     effects = [Fitted.at_start(friction, {**friction.starts(covered), **own}, units)]
-    if found.constant and "constant_force" in catalogue:
-        given = {"F0": _shown(-found.constant)}
-        effects.append(Fitted.at_start(catalogue["constant_force"], given, units))
+    for force in filter(_is_constant, catalogue.values() if found.constant else ()):
+        (own_force,) = force.parameters
+        effects.append(Fitted.at_start(force, {own_force.name: _shown(-found.constant)}, units))
     return tuple(effects)
+
+
+def _is_constant(effect: Effect) -> bool:
+    """Whether an effect is one force, N, and nothing else."""
+    force = effect.kind is Kind.FORCE and not effect.states and not effect.is_nonparametric
+    return force and [p.unit for p in effect.parameters] == ["N"]
 
 
 def _shown(value: float) -> float:
