@@ -137,3 +137,11 @@ def test_one_count_is_neither_stuck_nor_lost(every: int) -> None:
     stuck[at : at + round(0.3 * rate)] = seen[at]
     for broken in (lost, stuck):
         assert faults(check_log(log(goal, broken, torque, rate))) & BROKEN
+
+
+def test_text_of_few_digits_is_neither_stuck_nor_lost() -> None:
+    """A motor behind a gear, written with four digits: far from 0 a step is a hundred times one."""
+    goal = steps_and_rests()
+    reading, torque = joint(goal, 20.0, 0.5)
+    text = np.array([float(f"{24.0 * q:.4g}") for q in reading]) / 24.0
+    assert not faults(check_log(log(goal, text, torque))) & BROKEN

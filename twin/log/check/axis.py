@@ -24,10 +24,8 @@ _MOST_HELD = 20  # samples
 _PHASE = 0.95  # of the changes fall on one of every m samples where a signal is held
 _FEWEST_CHANGES = 50
 _PASSED_IN, _FEWEST_COUNTS = 4, 5  # samples in which a count is passed; counts that tell it
-_ONE_COUNT, _WHOLE = (
-    0.1,
-    0.05,
-)  # part of the ways that may be less; how far others are off whole ones
+_ONE_COUNT = (0.5, 0.25, 0.1)  # parts of the ways that may be less, as text far from 0 is coarser
+_WHOLE, _OF_WHOLE = 0.05, 0.9  # how far a way is off a whole one; least part of them in whole ones
 _SAME_LAG = 0.3  # largest difference of a lag with and without a memory, as a part of it
 _PRESLIDING = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the way covered, over which friction may build up
 _SHORT = 0.8  # of the setpoint's spread, up to which a position falls short of it
@@ -264,9 +262,11 @@ def count_of(signal: Array) -> float:
     ways = ways[ways > 0.0]
     if len(ways) < _FEWEST_COUNTS:
         return 0.0
-    count = float(np.quantile(ways, _ONE_COUNT))
-    off = np.abs(ways / count - np.round(ways / count))
-    return count if np.mean(off < _WHOLE) > 1.0 - _ONE_COUNT else 0.0
+    for count in np.quantile(ways, _ONE_COUNT):
+        off = np.abs(ways / count - np.round(ways / count))
+        if ways[(off < _WHOLE) & (ways > 0.5 * count)].sum() > _OF_WHOLE * ways.sum():
+            return float(count)
+    return 0.0
 
 
 def held_samples(signal: Array) -> int:
