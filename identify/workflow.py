@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.given_logs import Role
+from identify.dataset.prepared_log import sticks
+from identify.dataset.silent_logs import telling
 from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.errors import error_if_any
 from identify.estimation.fit import Fit
@@ -72,6 +74,7 @@ def fit(
     fits: dict[str, Fit] = {}
     for i, (axis, dataset) in enumerate(list(found.items())):
         fits = {a: replace(f) for a, f in fits.items()}  # less the matrices that they computed
+        dataset = telling(dataset, sticks(model.axes[axis]))
         require_residual(model.axes[axis], dataset)
         dataset, fitted = fit_aligned(model.axes[axis], dataset)
         found[axis], fits[axis] = with_own_noise(fitted, dataset)
@@ -114,7 +117,10 @@ def compare(
     progress: Progress = silent,
 ) -> Comparison:  # fmt: skip
     """The errors of a model with its present values, and where it fails. Raises InputError."""
-    found = datasets(model, logs, {}, test_function)
+    found = {
+        axis: telling(dataset, sticks(model.axes[axis]))
+        for axis, dataset in datasets(model, logs, {}, test_function).items()
+    }
     for axis, dataset in found.items():
         require_residual(model.axes[axis], dataset)
     given = model.axes

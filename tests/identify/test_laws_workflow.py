@@ -120,6 +120,7 @@ def handed(monkeypatch):
     monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
     monkeypatch.setattr(errors, "error_on", lambda axis, logs: np.full(5, axis.mass * len(logs)))
     monkeypatch.setattr(results, "refit", lambda *given: given)
+    monkeypatch.setattr(workflow, "telling", lambda dataset, sticks: dataset)
     monkeypatch.setattr(workflow, "require_residual", lambda axis, dataset: None)
     return seen
 
@@ -149,6 +150,7 @@ def test_a_comparison_is_of_the_axes_that_move(monkeypatch):
     moving = {"y": "dataset y"}
     monkeypatch.setattr(workflow, "datasets", lambda *given: moving if given[1:] == (
         "logs", {}, 0.07) else None)  # fmt: skip
+    monkeypatch.setattr(workflow, "telling", lambda dataset, sticks: dataset)
     monkeypatch.setattr(workflow, "require_residual", lambda axis, dataset: None)
     monkeypatch.setattr(workflow, "aligned", lambda axis, dataset: (axis.mass, dataset))
     monkeypatch.setattr(workflow, "noise_known", lambda axis, dataset: (*dataset, axis.mass + 1))
