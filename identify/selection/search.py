@@ -44,7 +44,6 @@ from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.memory import give_back
 from twin.model.machine import AxisModel
-from twin.model.parameters import free_parameters
 from twin.parallel import counting, spread
 
 Progress = Callable[[int, int], None]
@@ -257,7 +256,7 @@ def parameters(change: Change) -> tuple[str, ...]:
 def _as_looked(judged: Judged, look: Look) -> Candidate:
     """An absent effect that was not refitted, as its linear step predicts it."""
     axis = look.axes[0]
-    fit = replace(judged.fit, axis=axis, scaling=Scaling(free_parameters(axis)))
+    fit = replace(judged.fit, axis=axis, scaling=Scaling.of(axis, judged.fit.logs))
     return Candidate.looked(judged, fit, look.change.effect, look.promise)  # type: ignore[attr-defined]
 
 
