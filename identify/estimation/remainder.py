@@ -6,7 +6,7 @@ test: curves over each coordinate of the motion, and what moved before, are lear
 of the logs and foretell the block that is left out. The controls are the residual itself, shifted
 in time within each log: as large, as slow, and owed to nothing. All are tried with the same shifts,
 so that the best of them is set against the best of its controls (P. H. Westfall, S. S. Young,
-Resampling-Based Multiple Testing, 1993). The same is asked of its square: a force whose size the
+Resampling-Based Multiple Testing, 1993). The same is asked of its size: a force whose size the
 motion foretells is one that a law of the motion makes. What curves cannot tell is asked of its
 spectrum and of its distribution: noise has no line, and no amplitude that it keeps.
 """
@@ -25,7 +25,7 @@ from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.spectral_lines import find_lines
 from identify.dataset.spectrum import Record
 from identify.estimation.evidence import blocks_of, by_blocks, effective_samples, rms
-from identify.estimation.fit import Fit, Outcome, finished
+from identify.estimation.fit import Fit, Outcome, error_on, finished
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.model.machine import AxisModel
@@ -34,7 +34,7 @@ from twin.signals import Array
 HATS = 16  # knots of a curve over a coordinate; finer ones would learn the noise
 LAGS = (1, 2, 4, 8, 16, 32, 64)  # test functions, by which what moved before may act
 MOVED = ("velocity", "acceleration", "direction")
-RIDGE = 1e-3  # of the largest column's square: what is seldom visited stays small
+RIDGES = (0.01, 1.0)  # of a column's square: for many samples, and for few that slow noise leaves
 CONTROLS = 40  # of which none may do as well: 1 noise in 41 is refused
 SHIFTS = (0.1, 0.9)  # of a log, by which its residual is shifted
 SEED = 0  # of the shifts
@@ -43,10 +43,16 @@ MOST = 0.5  # of the force, RMS: a larger rest is of another machine
 ALL = 1.1  # of the floor: it is known to a tenth, and nothing more is left
 ALIKE = 1.5  # times the error of the fit logs that noise may have on others
 FORETOLD = 0.1  # of its square, below which what is foretold is too little to matter
-FORETOLD_SIZE = 0.05  # of its square's variance: the square scatters by itself
+FORETOLD_SIZE = 0.05  # the same of the variance of its size, most of which is chance
 LINE = (1e-3, 0.2)  # chance and share of a spectral line that is no noise
-CYCLES, SAMPLES = 2.0, 4.0  # of a line: least over the span, least test functions a period
-KURTOSIS = 3.0  # standard errors by which a tone's kurtosis is below that of noise
+LINES = 6  # least likely by chance, of which none may be strong
+CYCLES = (
+    0.5 * HATS
+)  # of a line over the span at least: of fewer curves tell, and slow noise has some
+SAMPLES = 4.0  # test functions a period at least
+GAUSSIAN, LAPLACE = 3.0, 6.0  # kurtosis of these noises
+SURE = 3.0  # standard errors by which a tone's kurtosis is below that of noise
+QUIET = 0.1  # of the mean square, below which the size of a force does not matter
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +79,25 @@ class Remainder:
         where = {name: values[kept] for name, values in every.items()}
         return cls(unabsorbed(force, basis), basis, where, _past(every, log)[kept], log[kept])
 
-    def foretold(self, force: Array, least: float) -> bool:
-        """Whether a part of a force (n,), and more than of any control, is foretold by something.
+    def is_foretold(self) -> bool:
+        """Whether something foretells a part of the force that matters."""
+        return self._foretold(self.force, self.basis, FORETOLD)
 
-        least: part of its square, 0..1.
+    def size_is_foretold(self) -> bool:
+        """The same of its size, the logarithm of its square; a few large values do not decide."""
+        squares = self.force**2
+        size = np.log(squares + QUIET * squares.mean())
+        return self._foretold(size - size.mean(), np.zeros((len(size), 0)), FORETOLD_SIZE)
+
+    def _foretold(self, values: Array, basis: Array, least: float) -> bool:
+        """Whether a part of values (n,), and more than of any control, is foretold by something.
+
+        basis (n, k): of what was fitted already. least: part of the square, 0..1.
         """
-        tried = np.column_stack([force, self._controls(force)])
-        tried = unabsorbed(tried - tried.mean(axis=0), self.basis)
-        best = np.max([self._parts(columns, tried) for columns in self._predictors()], axis=0)
+        tried = np.column_stack([values, self._controls(values)])
+        tried = unabsorbed(tried, basis)
+        columns = (unabsorbed(c, basis) for c in self._predictors())
+        best = np.max([self._parts(c, tried) for c in columns], axis=0)
         return bool(best[0] > least and best[0] > best[1:].max())
 
     def _controls(self, force: Array) -> Array:
@@ -98,17 +115,17 @@ class Remainder:
 
         Each block by what the others teach; ridge regression, by inner products of blocks.
         """
-        columns = unabsorbed(columns, self.basis)
         spans = blocks_of(len(tried))
         squares, products = by_blocks(columns, columns, spans), by_blocks(columns, tried, spans)
-        whole = squares.sum(axis=0)
-        small = RIDGE * max(float(whole.diagonal().max()), np.finfo(float).tiny)
-        learned = np.linalg.solve(
-            whole - squares + small * np.eye(len(whole)), products.sum(axis=0) - products
-        )
-        missed = 2.0 * np.einsum("bkm,bkm->m", learned, products)
-        missed -= np.einsum("bkm,bkl,blm->m", learned, squares, learned, optimize=True)
-        return np.asarray(missed / np.maximum(np.sum(tried**2, axis=0), np.finfo(float).tiny))
+        own = squares.sum(axis=0).diagonal().mean() * np.eye(columns.shape[1])
+        others = squares.sum(axis=0) - squares, products.sum(axis=0) - products
+        whole = np.maximum(np.sum(tried**2, axis=0), np.finfo(float).tiny)
+        parts = []
+        for ridge in RIDGES:
+            learned = np.linalg.solve(others[0] + ridge * own, others[1])
+            told = 2.0 * products - squares @ learned
+            parts.append(np.sum(learned * told, axis=(0, 1)) / whole)
+        return np.asarray(np.max(parts, axis=0))
 
     def _predictors(self) -> Iterator[Array]:
         """Columns (n, k) over each coordinate, alike both ways and not, and of the past."""
@@ -133,11 +150,16 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
     if len(logs) < LEAST_LOGS or fit.error > MOST * rms(command):
         return False
     rest = Remainder.of(fit, logs)
-    if rms(rest.force) > ALIKE * fit.error or keeps_its_amplitude(rest.force):
+    kurtosis = _kurtosis(rest.force)
+    least = GAUSSIAN - SURE * np.sqrt(24.0 / effective_samples(rest.force))
+    if kurtosis < least or rest.is_foretold() or rest.has_line():
         return False
-    if rest.foretold(rest.force, FORETOLD) or rest.has_line():
+    if fit.noise.follows_motion:
+        return True
+    if kurtosis > LAPLACE:
         return False
-    return fit.noise.follows_motion or not rest.foretold(rest.force**2, FORETOLD_SIZE)
+    larger = dataset.holdout and rms(error_on(fit.axis, dataset.holdout)) > ALIKE * fit.error
+    return not larger and not rest.size_is_foretold()
 
 
 def with_own_noise(fit: Fit, dataset: Dataset) -> tuple[Dataset, Fit]:
@@ -154,15 +176,15 @@ def noise_known(axis: AxisModel, dataset: Dataset) -> Dataset:
     return with_own_noise(finished(axis, axis, dataset.fit, Outcome.CONVERGED), dataset)[0]
 
 
-def keeps_its_amplitude(force: Array) -> bool:
-    """Whether a force (n,) swings between bounds, as a tone does, also one of moving frequency.
+def _kurtosis(force: Array) -> float:
+    """Kurtosis of a force (n,): 3 of Gaussian noise, 1.5 of a tone, also of moving frequency.
 
-    By its kurtosis: 3 of Gaussian noise, 1.5 of a sine; that of n samples scatters by sqrt(24 / n)
-    (R. A. Fisher, Statistical Methods for Research Workers, section 14).
+    That of n samples scatters by sqrt(24 / n) (R. A. Fisher, Statistical Methods for Research
+    Workers, section 14). What test functions average is nearer to Gaussian than Laplace's noise,
+    whose kurtosis is 6; more have forces that come in bursts.
     """
     squares = force**2
-    kurtosis = np.mean(squares**2) / np.mean(squares) ** 2
-    return bool(kurtosis < 3.0 - KURTOSIS * np.sqrt(24.0 / effective_samples(force)))
+    return float(np.mean(squares**2) / np.mean(squares) ** 2)
 
 
 def _repeats(force: Array, at: Array, runs: Sequence[int] | NDArray[np.int64]) -> bool:
@@ -174,7 +196,7 @@ def _repeats(force: Array, at: Array, runs: Sequence[int] | NDArray[np.int64]) -
     parts = zip(np.split(at, runs), np.split(force, runs), strict=True)
     highest = len(force) / (SAMPLES * span)
     found = find_lines(
-        [Record(*part) for part in parts], CYCLES / span, highest, most=1, chance=chance
+        [Record(*part) for part in parts], CYCLES / span, highest, most=LINES, chance=chance
     )
     return any(line.share > share for line in found)
 
