@@ -16,6 +16,7 @@ from identify.estimation.errors import error_if_any
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import require_finite, require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
+from identify.estimation.remainder import noise_known, with_own_noise
 from identify.estimation.replay import simulated_error
 from identify.estimation.simulated_motion import fit_simulated_motion
 from identify.experiment_design.plan import next_experiments, plan
@@ -28,7 +29,6 @@ from identify.selection.confounded import refit
 from identify.selection.forward_selection import diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone, reshaped
 from identify.selection.scoring import score
-from identify.selection.unpredictable import noise_known, with_own_noise
 from identify.selection.wrong_shape import having_shape
 from identify.validation.agreement import Agreement, agreement
 from identify.validation.misfit_maps import compare_axis, position_errors, worst_region

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.drive import forces_lessened
-from identify.dataset.noise_floor import floor_beside, floor_of
+from identify.dataset.floor import NoiseFloor, noise_beside
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.dataset.spectral_lines import lines_in_time
 from identify.estimation.decision import RULE
@@ -78,14 +78,14 @@ class Fit:
         return split_by_log(every, self.logs)
 
     @cached_property
-    def floor_of_logs(self) -> float:
-        """RMS noise floor in N, as the logs give it before what is left is known."""
-        return floor_of(self.axis, self.logs)
+    def noise(self) -> NoiseFloor:
+        """The noise floor with its parts and its uncertainty, N RMS."""
+        return noise_beside(self.axis, self.logs, self.by_log)
 
-    @cached_property
+    @property
     def floor(self) -> float:
         """RMS noise floor in N; less than that of the logs where what is left refutes it."""
-        return floor_beside(self.axis, self.logs, self.floor_of_logs, self.by_log)
+        return self.noise.value
 
     @cached_property
     def samples(self) -> float:
@@ -168,11 +168,11 @@ class Fit:
 
     @property
     def may_be_noise(self) -> bool:
-        """Whether what is left may be noise: at its floor, or too small for the floor of the logs.
+        """Whether what is left may be noise: at the floor, or no more than it can be.
 
-        How noisy the force is, which the readings hide, is then no more than a guess.
+        How noisy the force is, which the readings hide, is no more than a guess.
         """
-        return self.at_floor or self.floor < self.floor_of_logs
+        return self.at_floor or self.error < self.noise.high
 
     @property
     def ratio(self) -> float:
