@@ -21,13 +21,13 @@ from identify.measure import cable_force, velocity_map
 from identify.output.addition import Addition, addition
 from identify.output.results import Comparison, Diagnosis, FitResult, SimulationFit
 from identify.output.words.selection import axis_in_words
-from identify.selection.candidates import try_effect, usable
+from identify.selection.candidates import usable
 from identify.selection.confounded import refit
-from identify.selection.forward_selection import diagnose_axis
-from identify.selection.nonparametric import fit_nonparametric, physics_alone, reshaped
-from identify.selection.scoring import score
+from identify.selection.curves import having_shape
+from identify.selection.diagnosis import diagnose_axis
+from identify.selection.nonparametric import fit_nonparametric, physics_alone
+from identify.selection.trying import reshape, try_effect
 from identify.selection.unpredictable import noise_known, with_own_noise
-from identify.selection.wrong_shape import having_shape
 from identify.validation.agreement import Agreement, agreement
 from identify.validation.misfit_maps import compare_axis, position_errors, worst_region
 from twin.effect import Effect
@@ -156,7 +156,7 @@ def diagnose(
             result.datasets[axis],
             known,
             partial(progress, f"trying effects on {axis}"),
-        ).with_findings()
+        )
         for axis, fitted in result.fits.items()
     }
     plans, not_planned = next_experiments(axes, result.model, test_function)
@@ -205,7 +205,7 @@ def add(
         )
     attempt = fit_nonparametric if effect.is_nonparametric else try_effect
     tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]
-    best = max(tried, key=lambda c: c.delta_bic)
+    best = max(tried, key=lambda c: (c.supported, c.part, c.delta_bic))
     progress("adding", 1, 1)
     having = [n for n in names if n not in open_axes]
     return addition(
@@ -236,7 +236,7 @@ def add_shape(
     names = having_shape(effect, model, axis)
     before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
     fits = {n: before.fits[n] for n in names if n in before.fits}
-    best, shape = reshaped(effect, fits, before.datasets)
+    best, shape = reshape(effect, fits, before.datasets)
     progress("adding", 1, 1)
     return addition(best, fits[best.axis], before.datasets, before.model, model, shape)
 
@@ -247,7 +247,7 @@ def add_named(found: Diagnosis) -> Addition | None:
     None where it names none, or names it as one of a pair.
     """
     leading, best = found.leading, found.leading.best
-    if best is None or not any(c is best for c in leading.ranking):
+    if best is None or not best.supported or not any(c is best for c in leading.ranking):
         return None
     prepared = {axis: one.dataset for axis, one in found.axes.items()}
     return addition(best, leading.base, prepared, found.model, found.model)
@@ -301,6 +301,5 @@ __all__ = [
     "fit_simulation",
     "plan",
     "reproduce",
-    "score",
     "velocity_map",
 ]

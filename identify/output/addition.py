@@ -12,9 +12,9 @@ from identify.estimation.fit import Fit
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.output.text import add_text
 from identify.output.words.selection import addition_notes, also_chose_in_words
+from identify.selection.candidates import Candidate
+from identify.selection.changes import Reshaped
 from identify.selection.confounded import MovedParameter, moved_parameters
-from identify.selection.scoring import Candidate
-from identify.selection.wrong_shape import WrongShape
 from identify.validation.free_run import errors_of_both
 from twin.model.history import HistoryStep
 from twin.model.machine import MachineModel
@@ -25,7 +25,7 @@ from twin.model.units import AxisUnits
 class Addition:
     """A model with one added effect.
 
-    step: errors before and after. kept: whether evidence and held-out logs support the effect.
+    step: errors before and after. kept: whether training and selection logs prove the effect.
     position_error: free-running RMS error before and after; replayed: the same after, stepped by
     MuJoCo. Both in the units of the axis, None where the motion is imposed. position_log: the log
     that they are of. moved: parameters that the effect changed. set_aside: nonparametric effects
@@ -60,12 +60,6 @@ class Addition:
         return also_chose_in_words(Role.SELECTION if held else Role.TRAINING)
 
     @property
-    def judged_by(self) -> str:
-        """What judged the effect beside the evidence of the fit logs."""
-        held = self.step.holdout_error_after is not None
-        return "the held-out logs" if held else "the cross-validation on blocks of the fit logs"
-
-    @property
     def units(self) -> AxisUnits:
         """Of the axis that the effect was added to."""
         return self.candidate.fit.axis.units
@@ -83,20 +77,19 @@ def addition(
     prepared: Mapping[str, Dataset],
     model: MachineModel,
     given: MachineModel,
-    shape: WrongShape | None = None,
+    shape: Reshaped | None = None,
     why_axis: str | None = None,
 ) -> Addition:
     """The candidate added to a fitted model; ``given``: the model before that was fitted.
 
-    shape: that of a law of the model which the candidate is; None where it is a missing effect. It
-    is kept if it is proved and lowers the test error: one that differs at a few places lowers the
-    error of a few blocks alone. why_axis: why it went to its axis, where none was asked for.
+    shape: that of a law of the model which the candidate is; None where it is a missing effect.
+    why_axis: why it went to its axis, where none was asked for.
     """
     name = best.axis
     moved = moved_parameters(base, best.fit)
     left = model.axes[name].names
     set_aside = tuple(n for n in given.axes[name].names if n not in left)
-    notes = addition_notes(best, moved, set_aside, shape.effect if shape else None)
+    notes = addition_notes(best, moved, set_aside, shape.name if shape else None)
     step = _step(best, base, prepared[name], shape, notes)
     new = model.with_axis(name, best.fit.axis).with_history(step)
     new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
@@ -105,7 +98,7 @@ def addition(
         model=new,
         step=step,
         candidate=best,
-        kept=best.supported if shape is None else shape.proof.holds and best.gain.falls,
+        kept=best.supported,
         position_error=moving,
         replayed=replayed,
         moved=moved,
@@ -116,7 +109,7 @@ def addition(
 
 
 def _step(
-    best: Candidate, base: Fit, dataset: Dataset, shape: WrongShape | None, notes: tuple[str, ...]
+    best: Candidate, base: Fit, dataset: Dataset, shape: Reshaped | None, notes: tuple[str, ...]
 ) -> HistoryStep:
     """What an addition did to the errors on the logs of each role."""
     (held, held_after), (tested, tested_after) = (
@@ -125,7 +118,7 @@ def _step(
     )
     return HistoryStep(
         action="shape" if shape else "add",
-        effect=shape.effect if shape else best.effect.name,
+        effect=shape.name if shape else best.effect.name,
         axis=best.axis,
         fit_error_before=base.error,
         fit_error_after=best.fit.error,

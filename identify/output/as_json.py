@@ -12,8 +12,8 @@ from identify.output.results import Comparison, FitResult
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
 from identify.output.words.experiment_design import gap_in_words, in_order, not_run_in_words
 from identify.output.words.validation import loop_in_words, region_in_words
+from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
-from identify.selection.scoring import Candidate
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import ResidualTests
 from twin.experiments.file import parameters
@@ -185,6 +185,8 @@ def add_json(result: Addition) -> dict[str, Any]:
         "axis": step.axis,
         "is_nonparametric": result.candidate.effect.is_nonparametric,
         "kept": result.kept,
+        "part": result.candidate.part,
+        "why_not": result.candidate.refused,
         "fit_error_before": step.fit_error_before,
         "fit_error_after": step.fit_error_after,
         "holdout_error_before": step.holdout_error_before,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from identify.dataset.noise_floor import floor_of
+from identify.estimation.decision import RULE
 from identify.estimation.fit import Outcome
 from identify.output.words.estimation import outcome_in_words, prepared_in_words
 from identify.output.words.numbers import PLAIN, Numbers
@@ -15,9 +15,9 @@ from identify.output.words.selection import (
     refit_in_words,
     repeat_in_words,
 )
+from identify.selection.acceptance import Judged
 from identify.selection.confounded import Refit, moved_parameters
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.pair_search import held_at_floor
 
 if TYPE_CHECKING:  # results print themselves, with these sentences
     from identify.output.results import Diagnosis
@@ -82,10 +82,10 @@ def remarks(
 
 def _beyond_in_words(found: AxisDiagnosis) -> str | None:
     """That the held-out logs show what the fit logs do not; None where they do not."""
-    held = found.dataset.holdout
-    if not held or held_at_floor(found.base, found.dataset):
+    judged = Judged(found.base, found.dataset)
+    ratio = judged.other_error / judged.other_floor
+    if not found.dataset.holdout or ratio < RULE.at_floor:
         return None
-    ratio = found.chosen.before / floor_of(found.base.axis, held)
     return (
         "what was said holds for the training logs: on the selection logs the force error is "
         f"{ratio:.1f} times its noise floor. Give such a log as a training log too, so that what "

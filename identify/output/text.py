@@ -21,9 +21,12 @@ from identify.output.words.experiment_design import (
 )
 from identify.output.words.findings import (
     advice,
+    also_seen_in_words,
     finding_in_words,
+    next_command,
     shape_in_words,
     shares_in_words,
+    together_in_words,
 )
 from identify.output.words.selection import (
     dependence_in_words,
@@ -37,14 +40,14 @@ from identify.output.words.selection import (
     ties_in_words,
     verdict_in_words,
 )
-from identify.output.words.steps import step_lines, support_in_words, together_in_words
+from identify.output.words.steps import step_lines, why_not
 from identify.output.words.validation import (
     correlation_in_words,
     loop_in_words,
     region_in_words,
 )
+from identify.selection.candidates import Candidate
 from identify.selection.nonparametric import nonparametric_labels
-from identify.selection.scoring import Candidate
 from twin.experiments.file import in_short
 
 if TYPE_CHECKING:  # results print themselves by these functions
@@ -142,7 +145,7 @@ def diagnose_text(result: Diagnosis) -> str:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         lines += [f"  {words(finding_in_words(f))}" for f in d.findings]
         lines += [f"  {shares}" for shares in shares_in_words(d)]
-        lines += [f"  {together}" for together in together_in_words(d)]
+        lines += [f"  {told}" for told in (*together_in_words(d), *also_seen_in_words(d))]
         shapes = [shape_in_words(f.effect, f.shape) for f in d.findings if f.shape]
         lines += [f"  {words(text)}" for text in shapes]
         if remains := remainder_in_words(d):
@@ -153,6 +156,7 @@ def diagnose_text(result: Diagnosis) -> str:
                 lines.append(f"  it is largest at {words(region_in_words(result.left_over[axis]))}")
         if d.unexplained or any(f.shape for f in d.findings):
             lines.append(f"  {advice(d.findings)}")
+        lines += [f"  {command}" for command in next_command(d)]
         lines += [_ranking_line(c, d) for c in d.ranking[:4]]
         lines += [f"  {line}" for line in step_lines(d)]
         lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]
@@ -161,7 +165,7 @@ def diagnose_text(result: Diagnosis) -> str:
 
 def _ranking_line(c: Candidate, found: AxisDiagnosis) -> str:
     unit = c.fit.axis.units.force
-    tail = "" if c.supported else f"   {support_in_words(found, c)}"
+    tail = f"   {why}" if (why := why_not(found, c)) else ""
     return (
         f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   {tested_on(found)} error "
         f"{c.gain.before:.4g} -> {c.gain.after:.4g} {unit}{tail}"
@@ -218,9 +222,8 @@ def add_text(result: Addition) -> str:
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
         lines.append(
-            f"  the data do not support this effect: the evidence and {result.judged_by} do not "
-            "both favour it alone. The model has it nevertheless, as asked for; go on with the "
-            "model before, or, if a diagnosis says that it needs another beside it, add that to "
-            "the new model and judge then"
+            f"  the logs do not prove it: {result.candidate.refused}. The model has it "
+            "nevertheless, as asked for; go on with the model before, or, if a diagnosis says that "
+            "it needs another beside it, add that to the new model and judge then"
         )
     return "\n".join(lines)

@@ -10,20 +10,26 @@ from identify.output.report.blocks import Answer, Section, Tile, Tone
 from identify.output.report.subject import Subject
 from identify.output.report.units import SCALED, Scale, number, quantity, spaced
 from identify.output.words.experiment_design import gap_in_words
-from identify.output.words.findings import advice, finding_in_words, shares_in_words
+from identify.output.words.findings import (
+    advice,
+    also_seen_in_words,
+    finding_in_words,
+    shares_in_words,
+    together_in_words,
+)
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import (
     dependence_in_words,
     named_in_words,
+    not_confirmed_in_words,
     refit_in_words,
     remainder_in_words,
     tested_on,
     verdict_in_words,
 )
-from identify.output.words.steps import support_in_words, together_in_words
+from identify.output.words.steps import why_not
 from identify.output.words.validation import region_in_words
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.scoring import Candidate
 from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
 from twin.model.units import AxisUnits
@@ -61,9 +67,8 @@ def _diagnosed(
         for f in found.findings
     )
     remarks.extend(capitalised(text) for text in shares_in_words(found))
-    if found.best is not None and not found.findings:
-        remarks.append(_left_over(found.best))
-    remarks.extend(capitalised(text) for text in together_in_words(found))
+    told = (*together_in_words(found), *also_seen_in_words(found))
+    remarks.extend(capitalised(text) for text in told)
     remarks.extend(_runner_up(found))
     if found.unexplained is not None:
         remarks.append(f"{advice(found.findings)}.")
@@ -85,6 +90,11 @@ def _diagnosed(
 
 
 def _headline(found: AxisDiagnosis) -> str:
+    against = not_confirmed_in_words(found)
+    return _answer(found) + (f" ({spaced(against)})" if against else "")
+
+
+def _answer(found: AxisDiagnosis) -> str:
     match found.verdict:
         case Verdict.MISSING_EFFECTS:
             return f"{spaced(named_in_words(found))} {'are' if found.named[1:] else 'is'} missing"
@@ -96,17 +106,6 @@ def _headline(found: AxisDiagnosis) -> str:
             return "nothing is missing"
 
 
-def _left_over(best: Candidate) -> str:
-    name, fit = spaced(best.effect.name), best.fit
-    error = fit.axis.units.words("force error")
-    if fit.at_floor:
-        return f"With {name} the {error} is at its noise floor."
-    return (
-        f"With {name} the {error} is still {number(fit.ratio)} times its noise floor: add it, "
-        "then diagnose again."
-    )
-
-
 def _runner_up(found: AxisDiagnosis) -> list[str]:
     others = found.ranking[1:] if found.best else found.ranking
     if not others:
@@ -114,7 +113,7 @@ def _runner_up(found: AxisDiagnosis) -> list[str]:
     second = others[0]
     change = _change(found.dataset.units.force, second.gain.before, second.gain.after)
     role = "Runner-up" if found.best else "Nearest candidate"
-    verdict = support_in_words(found, second)
+    verdict = why_not(found, second) or "proved too"
     return [
         f"{role}: {spaced(second.effect.name)}, ΔBIC {number(second.delta_bic)}, "
         f"{tested_on(found)} error {change}, {verdict}."
@@ -248,10 +247,10 @@ def _added(addition: Addition) -> Answer:
         replayed = f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo"
         tiles.append(Tile(words("Position, free run"), moved, replayed))
     outcome = "given the shape found" if step.action == "shape" else "added"
-    sentence = f"The evidence and {addition.judged_by} support the effect."
+    sentence = "The logs prove the effect."
     if not addition.kept:
         sentence = (
-            f"The evidence and {addition.judged_by} do not both support this effect; leave it out, "
+            f"The logs do not prove this effect: {addition.candidate.refused}; leave it out, "
             "unless a diagnosis says that it needs another beside it."
         )
     return Answer(

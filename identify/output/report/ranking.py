@@ -9,9 +9,9 @@ from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, number, quantity, spaced, title_case
 from identify.output.words.selection import tested_on
-from identify.output.words.steps import partner
+from identify.output.words.steps import why_not
+from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
-from identify.selection.scoring import Candidate
 
 WITH_VALUES = 3  # candidates whose parameter values are printed
 UNBROKEN = "\u00a0"  # space at which no line ends
@@ -81,7 +81,8 @@ def _table(found: AxisDiagnosis) -> Table:
                 number(c.delta_bic),
                 scale.text(c.gain.before),
                 scale.text(c.gain.after),
-                "yes" if c.supported else _unsupported(found, c),
+                f"{100.0 * max(c.part, 0.0):.0f} %" if c.score else "",
+                spaced(why_not(found, c)),
                 values_of(c) if rank < WITH_VALUES else "",
             ),
             _tone(found, c),
@@ -93,20 +94,15 @@ def _table(found: AxisDiagnosis) -> Table:
         Column("ΔBIC", numeric=True),
         Column("Error before", numeric=True),
         Column("Error after", numeric=True),
-        Column("Supported"),
+        Column("Part removed", numeric=True),
+        Column("Why not"),
         Column("Values"),
     )
     caption = (
-        f"Error: RMS force, {tested_on(found)}. Supported: the evidence (ΔBIC above 10) and the "
-        "data left out of the fit both favour the effect."
+        f"Error: RMS force, {tested_on(found)}. Part removed: of the squared error above the noise "
+        "floor, on the training logs or on data left out of the fit, whichever is less."
     )
     return Table(columns, rows, found.dataset.units.words(caption))
-
-
-def _unsupported(found: AxisDiagnosis, candidate: Candidate) -> str:
-    """No, unless it is one of two that are needed together."""
-    other = partner(found, candidate.effect.name)
-    return f"only together with {spaced(other)}" if other else "no"
 
 
 def _tone(found: AxisDiagnosis, candidate: Candidate) -> Tone:

@@ -14,9 +14,9 @@ from identify.estimation.force_balance import residual
 from identify.experiment_design.plan import Plan
 from identify.output.addition import Addition
 from identify.output.results import Comparison, Diagnosis
+from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.scoring import Candidate
 from identify.validation.misfit_maps import AxisComparison, Region
 from twin.model.history import HistoryStep
 from twin.model.machine import AxisModel

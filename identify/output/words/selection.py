@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.given_logs import Role
-from identify.output.words.numbers import PLAIN, Numbers
+from identify.output.words.numbers import PLAIN, Numbers, capitalised
+from identify.selection.candidates import Candidate
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import FindingKind
 from identify.selection.nonparametric import followed
 from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
-from identify.selection.scoring import Candidate
 from twin.model.history import HistoryStep
 from twin.model.machine import Fitted
 from twin.model.units import units_of
@@ -33,16 +33,23 @@ SEVERAL = "Several effects explain the error equally well; these data cannot sep
 
 def verdict_in_words(found: AxisDiagnosis) -> str:
     """The answer of a diagnosis."""
-    if found.ambiguous_with or any(f.tied for f in found.findings):
-        return SEVERAL
+    against = f" {capitalised(but)}." if (but := not_confirmed_in_words(found)) else ""
+    if any(f.tied for f in found.findings):
+        return f"{SEVERAL}{against}"
     if found.verdict is not Verdict.MISSING_EFFECTS:
-        return VERDICTS[found.verdict]
+        return f"{VERDICTS[found.verdict]}{against}"
     lacks, them = ("several effects", "them") if len(found.named) > 1 else ("an effect", "it")
     if found.dataset.holdout:
-        return f"The model lacks {lacks}: the fit logs and the held-out logs prove {them}."
-    return (
-        f"The model lacks {lacks}: the fit logs prove {them}, block by block; no log was held out."
-    )
+        proved = f"the training logs and the selection logs prove {them}"
+    else:
+        proved = f"the training logs prove {them}, block by block; no log was held out"
+    return f"The model lacks {lacks}: {proved}.{against}"
+
+
+def not_confirmed_in_words(found: AxisDiagnosis) -> str | None:
+    """Which findings the test logs contradict; None where they contradict none."""
+    against = [f.effect for f in found.findings if f.contradicted]
+    return f"not confirmed by the test logs: {', '.join(against)}" if against else None
 
 
 def tested_on(found: AxisDiagnosis) -> str:
@@ -64,7 +71,7 @@ def named_in_words(found: AxisDiagnosis) -> str:
 
 def ties_in_words(found: AxisDiagnosis) -> list[str]:
     """What these data cannot separate, one sentence a named effect, each pair once."""
-    ties = {f.effect: f.tied for f in found.findings} or {a[0]: a[1:] for a in found.answers}
+    ties = {f.effect: f.tied for f in found.findings}
     said: list[str] = []
     for name, alike in ties.items():
         if {*alike} - {other for other in said if name in ties[other]}:
