@@ -7,6 +7,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+from identify.selection.scoring import Candidate
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
@@ -17,7 +18,6 @@ from identify.estimation.evidence import Evidence, Gain
 from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.scaling import Scaling
 from identify.selection.diagnosis import SelectionState, Step
-from identify.selection.scoring import Candidate
 from twin.effect import Effect, Excitation
 from twin.effects import load_catalogue
 from twin.model.machine import AxisModel, Fitted, Hardware

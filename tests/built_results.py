@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted
+from identify.selection.decoys import Proof
 
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors
@@ -15,10 +16,9 @@ from identify.estimation.intervals import Estimate, NotExcited
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
-from identify.output.addition import Addition
-from identify.output.results import Comparison, Diagnosis, FitResult
+from identify.results.addition import Addition
+from identify.results.results import Comparison, Diagnosis, FitResult
 from identify.selection.confounded import Change, MovedParameter, Refit
-from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Step, Verdict
 from identify.selection.findings import Finding
 from identify.selection.repeating_force import Repeat

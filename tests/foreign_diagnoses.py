@@ -25,11 +25,11 @@ from foreign_machine import (
     run,
     train,
 )  # fmt: skip
+from identify.selection.forward_selection import diagnose_axis
 from machines import one_axis
 
 from identify import workflow
 from identify.selection.findings import FindingKind
-from identify.selection.forward_selection import diagnose_axis
 from twin.effects import load_catalogue
 from twin.model.file import load_model
 

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 from effect_runs import CATALOGUE
+from identify.selection.scoring import Candidate
 
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.drive import is_noise, parts_of, reading_error
@@ -17,7 +18,6 @@ from identify.estimation.force_balance import residual
 from identify.estimation.intervals import Estimate, estimates
 from identify.experiment_design.planting import added_force, draw_effect
 from identify.selection.candidates import try_effect
-from identify.selection.scoring import Candidate
 from twin.effect import Effect, Kind
 from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel

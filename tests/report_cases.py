@@ -15,12 +15,12 @@ from unittest.mock import patch
 from matplotlib.figure import Figure
 
 from identify import workflow
-from identify.output.addition import Addition
 from identify.output.report import answer, sections, write_report
 from identify.output.report.blocks import Answer, Picture, Section
 from identify.output.report.drawing import drawing_style
 from identify.output.report.subject import Subject
-from identify.output.results import Diagnosis
+from identify.results.addition import Addition
+from identify.results.results import Diagnosis
 from identify.selection.diagnosis import AxisDiagnosis
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate

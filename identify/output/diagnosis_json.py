@@ -7,12 +7,12 @@ from dataclasses import asdict
 from typing import Any
 
 from identify.estimation.errors import Errors
-from identify.output.as_json import parameters_json, plan_json, refit_json
+from identify.output.as_json import estimate_json, parameters_json, plan_json, refit_json
 from identify.output.remarks import remarks_on
-from identify.output.results import Diagnosis
 from identify.output.words.findings import advice, together_in_words
 from identify.output.words.selection import verdict_in_words
 from identify.output.words.steps import change_in_words, not_named_in_words, why_not
+from identify.results.results import Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding
@@ -33,7 +33,7 @@ def diagnose_json(result: Diagnosis, data_faults: Sequence[str] = ()) -> dict[st
 
 
 def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
-    d = result.axes[axis]
+    d, told = result.axes[axis], result.told[axis]
     units = d.base.axis.units
     dependence = d.unexplained
     following = result.next_experiments.get(axis)
@@ -60,8 +60,11 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "findings": [_finding(f) for f in d.findings],
         "remainder": _remainder(d, result.left_over.get(axis)),
         "force_error": d.base.error,
-        "noise_floor": d.base.floor,
-        **_test_errors(d.tested),
+        "force_error_with_found": d.final.error,
+        "noise_floor": told.floor,
+        "noise_floors": {role.value: floor for role, floor in told.floors.items()},
+        **_test_errors(told.tested),
+        "parameters": {e.label: estimate_json(e) for e in told.after},
         "unit": units.force,
         "force_shift": d.dataset.channel_delay,
         "force_shift_unit": "s",

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from identify.estimation.intervals import Estimate, NoInterval, refusal
+from identify.estimation.intervals import Estimate, NoInterval
 from identify.experiment_design.plan import Plan
 from identify.output.remarks import remarks_on
+from identify.output.simulation_fit import simulation_fit_text
 from identify.output.words.estimation import (
+    common_reason,
     no_interval_in_words,
     outcome_in_words,
     prepared_in_words,
@@ -46,17 +46,18 @@ from identify.output.words.validation import (
     loop_in_words,
     region_in_words,
 )
+from identify.results.addition import Addition
+from identify.results.printed import text_of
+from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
+from identify.results.told import Told
 from identify.selection.candidates import Candidate
+from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.nonparametric import nonparametric_labels
+from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
 
-if TYPE_CHECKING:  # results print themselves by these functions
-    from identify.output.addition import Addition
-    from identify.output.results import Comparison, Diagnosis, FitResult
-    from identify.selection.diagnosis import AxisDiagnosis
-    from identify.validation.misfit_maps import AxisComparison
 
-
+@text_of.register
 def fit_text(result: FitResult) -> str:
     """The fit of each axis, one parameter a line."""
     lines = []
@@ -77,7 +78,7 @@ def fit_text(result: FitResult) -> str:
         if changed := refit_in_words(result.refits[axis]):
             lines.append(f"  {changed}")
         hidden = nonparametric_labels(fit.axis)
-        common = refusal(fit)
+        common = common_reason(result.estimates[axis])
         if common is not None:
             lines.append(f"  {no_interval_in_words(common)}")
         lines += [
@@ -110,6 +111,7 @@ def _position_error(c: AxisComparison, log: str) -> str:
     return f", {c.units.words('free-running position error')} {error}"
 
 
+@text_of.register
 def compare_text(result: Comparison) -> str:
     """Errors by log, and the three worst regions of each axis."""
     lines = []
@@ -128,17 +130,15 @@ def compare_text(result: Comparison) -> str:
     return "\n".join(lines)
 
 
+@text_of.register
 def diagnose_text(result: Diagnosis) -> str:
     """The answer for each axis, and its best candidates."""
     lines = []
     for axis, d in result.axes.items():
-        unit, words = d.base.axis.units.force, d.base.axis.units.words
+        words = d.base.axis.units.words
         named = f" Missing: {named_in_words(d)}." if d.named else ""
         lines.append(f"axis {axis}: {words(verdict_in_words(d))}{named}")
-        lines.append(
-            f"  {words('force error')} {d.base.error:.4g} {unit}, noise floor "
-            f"{d.base.floor:.4g} {unit} (ratio {d.base.ratio:.2f})"
-        )
+        lines.append(f"  {words('force error')} {_errors(d, result.told[axis])}")
         lines.append(f"  {named_errors_in_words(d)}")
         lines += [f"  {tie}" for tie in ties_in_words(d)]
         if axis in result.next_experiments:
@@ -161,6 +161,16 @@ def diagnose_text(result: Diagnosis) -> str:
         lines += [f"  {line}" for line in step_lines(d)]
         lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]
     return "\n".join(lines)
+
+
+def _errors(found: AxisDiagnosis, told: Told) -> str:
+    """Errors on the training logs without and with what was found, and the noise floor."""
+    unit, floor = found.base.axis.units.force, told.floor
+    base, final = found.base.error, found.final.error
+    error, ratio = f"{base:.4g} {unit}", f"{base / floor:.2f}"
+    if found.final is not found.base:
+        error, ratio = f"{base:.4g} -> {final:.4g} {unit}", f"{ratio} -> {final / floor:.2f}"
+    return f"on the training logs {error}, noise floor {floor:.4g} {unit} (ratio {ratio})"
 
 
 def _ranking_line(c: Candidate, found: AxisDiagnosis) -> str:
@@ -197,6 +207,7 @@ def plan_text(result: Plan) -> str:
     return "\n".join([*lines, *(f"  not run: {not_run_in_words(n)}" for n in result.not_run)])
 
 
+@text_of.register
 def add_text(result: Addition) -> str:
     """The errors before and after adding the effect."""
     s, words = result.step, result.units.words
@@ -227,3 +238,6 @@ def add_text(result: Addition) -> str:
             "it needs another beside it, add that to the new model and judge then"
         )
     return "\n".join(lines)
+
+
+text_of.register(SimulationFit, simulation_fit_text)

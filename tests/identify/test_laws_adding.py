@@ -12,8 +12,8 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, fitted
 from identify import workflow
 from identify.dataset.given_logs import Role
 from identify.output import addition as adding
-from identify.output.addition import addition
 from identify.output.words.selection import moved_in_words
+from identify.results.addition import addition
 from identify.validation import free_run as free_runs
 from identify.workflow import add
 from twin.errors import InputError

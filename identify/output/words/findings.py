@@ -96,11 +96,16 @@ def _sure(finding: Finding) -> str:
         return "No confidence is stated, as the test logs do not confirm it"
     sure = (
         f"{100.0 * finding.confidence:.0f} % of such answers were right in the self-test: "
-        f"{finding.left:.3g} times the noise floor is left on the {finding.chosen.on.value} logs"
+        f"{_over(finding.left)} times the noise floor is left on the {finding.chosen.on.value} logs"
     )
     if finding.chosen.on is not Role.TRAINING:
-        sure += f", {finding.left_fitted:.3g} times on the training logs"
+        sure += f", {_over(finding.left_fitted)} times on the training logs"
     return sure
+
+
+def _over(left: float) -> str:
+    """Error over noise floor: noise is part of what is left, and so never more."""
+    return f"{max(left, 1.0):.3g}"
 
 
 def shares_in_words(found: AxisDiagnosis) -> list[str]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from identify.dataset.given_logs import Role
 from identify.output.words.numbers import PLAIN, Numbers, capitalised
-from identify.selection.candidates import Candidate
+from identify.results.addition import Addition
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import FindingKind
@@ -83,7 +83,7 @@ def named_errors_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str
     """The force error on the test logs, or on those that also chose, without and with the named."""
     tested, units = found.tested, found.base.axis.units
     before, after = (numbers.amount(e, units.force) for e in (tested.before, tested.after))
-    named = "" if found.with_named is found.base else f", with what is named {after}"
+    named = "" if found.final is found.base else f", with what was found {after}"
     return f"{units.words('force error')} on the {tested.on.value} logs {before}{named}"
 
 
@@ -195,18 +195,10 @@ def step_in_words(step: HistoryStep) -> str:
     return f"added {step.effect} to axis {step.axis}"
 
 
-def addition_notes(
-    added: Candidate,
-    moved: Sequence[MovedParameter],
-    set_aside: Sequence[str],
-    reshaped: str | None = None,
-) -> tuple[str, ...]:
-    """What a reader should know of an added effect, one sentence each.
-
-    reshaped: the effect whose law it gives another shape. set_aside: nonparametric effects that
-    were removed so that the physical effect explains what they had taken over.
-    """
-    notes = [moved_in_words(m) for m in moved]
+def notes_in_words(made: Addition) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What a reader should know of an added effect, one sentence each: for the model, and all."""
+    added, reshaped, set_aside = made.candidate, made.reshaped, made.set_aside
+    notes = [moved_in_words(m) for m in made.moved]
     if added.effect.is_nonparametric:
         notes.insert(0, nonparametric_in_words(added.fit.axis[added.effect.name]))
     if reshaped:
@@ -217,4 +209,5 @@ def addition_notes(
             f"{', '.join(set_aside)} was removed before {added.effect.name} was added; add it "
             "again for the error that is left"
         )
-    return tuple(notes)
+    beside = also_chose_in_words(made.told_on)
+    return tuple(notes), tuple(notes) if beside is None else (*notes, beside)

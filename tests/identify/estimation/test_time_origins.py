@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from identify.selection.forward_selection import diagnose_axis
 from machines import one_axis
 
 from identify.dataset.dataset import Dataset, datasets
@@ -12,7 +13,6 @@ from identify.estimation.fit import fit_axis
 from identify.estimation.time_origin import time_origins, with_time_origins
 from identify.selection.candidates import try_effect
 from identify.selection.diagnosis import Verdict
-from identify.selection.forward_selection import diagnose_axis
 from identify.workflow import compare, fit
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate

@@ -17,11 +17,11 @@ from identify.estimation.simulated_motion import MotionFit
 from identify.output.agreement import agree_json, agree_text
 from identify.output.laws import laws_json, laws_text
 from identify.output.plain import plain
-from identify.output.results import SimulationFit
 from identify.output.signature import FORCE, MASS, exemplary_motion, signature
 from identify.output.simulation_fit import simulation_fit_json, simulation_fit_text
 from identify.output.words.estimation import HELD_OUT_GREW, MOTION_OUTCOMES, motion_fit_in_words
 from identify.output.words.selection import addition_notes, step_in_words
+from identify.results.results import SimulationFit
 from identify.selection.confounded import MovedParameter
 from identify.validation.agreement import Agreement, Cause
 from twin.effect import Kind

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import built_results as made
 import pytest
 from built_fits import NOISE, built, built_fit, dataset_stub
+from identify.selection.decoys import Proof
 
 from identify.dataset.given_logs import Role
 from identify.estimation.fit import Outcome
@@ -39,7 +40,6 @@ from identify.output.words.steps import (
 from identify.output.words.validation import region_in_words
 from identify.selection.confidence import LEVELS
 from identify.selection.confounded import Change, Refit
-from identify.selection.decoys import Proof
 from identify.selection.diagnosis import Step, Verdict
 from identify.selection.findings import FindingKind
 

@@ -25,9 +25,9 @@ from identify.output.report.drawing import binned_mean
 from identify.output.report.overlay import representative
 from identify.output.report.subject import LogForces, Subject
 from identify.output.report.units import Scale, number, quantity
-from identify.output.results import Diagnosis
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import verdict_in_words
+from identify.results.results import Diagnosis
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.residual_dependence import Dependence
 from twin.effects import Catalogue, load_catalogue

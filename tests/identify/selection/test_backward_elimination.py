@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import pytest
 from built_fits import built, built_fit, dataset_stub
+from identify.selection.forward_selection import _eliminated_backwards, _in_its_place
 from machines import one_axis
 
 from identify.dataset.dataset import datasets
 from identify.estimation.fit import Outcome, finished, fit_axis
-from identify.selection.forward_selection import _eliminated_backwards, _in_its_place
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.model.file import load_model

@@ -9,12 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, fitted
+from identify.selection.decoys import DECOYS, Proof, Trial, _left, _Part, _ridge, proof
 
 from identify.estimation.evidence import Gain
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import averaged_force
 from identify.selection import decoys
-from identify.selection.decoys import DECOYS, Proof, Trial, _left, _Part, _ridge, proof
 from twin.model.machine import AxisModel
 
 BESIDE_DECOYS = 0.8  # the rule as it was decided

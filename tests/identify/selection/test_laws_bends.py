@@ -17,12 +17,12 @@ from built_fits import (
     dataset_stub,
     fitted,
 )
+from identify.selection.forward_selection import diagnose_axis
 
 from identify.estimation.fit import fit_axis
 from identify.output.words.findings import advice, finding_in_words
 from identify.selection.bends import Bend, bend_of, held_bends, is_needed, straightened
 from identify.selection.findings import FindingKind, found_reshaped
-from identify.selection.forward_selection import diagnose_axis
 from identify.selection.found_shape import AHEAD
 from twin.curve import Coordinate
 from twin.effects import Catalogue

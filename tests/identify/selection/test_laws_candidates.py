@@ -19,12 +19,12 @@ from built_fits import (
     dataset_stub,
     fitted,
 )
+from identify.selection.scoring import RIDGE, _cross_validated, on_equal_samples, score
 
 from identify.estimation import errors
 from identify.estimation.evidence import Evidence, Gain, effective_samples, evidence
 from identify.selection import scoring
 from identify.selection.candidates import absent_effects
-from identify.selection.scoring import RIDGE, _cross_validated, on_equal_samples, score
 from twin.effect import Kind
 
 # The rules as they were decided.

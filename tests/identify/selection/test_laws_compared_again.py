@@ -6,7 +6,6 @@ import importlib
 from dataclasses import replace
 
 from built_fits import axis_of, built, built_fit, dataset_stub, fitted, stage, step
-
 from identify.selection.verdict import _compared_again
 
 module = importlib.import_module("identify.selection.verdict")

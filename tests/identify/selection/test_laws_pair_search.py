@@ -10,9 +10,9 @@ from built_fits import (
     dataset_stub,
     fitted,
 )
+from identify.selection.pair_search import held_at_floor, search_pairs
 
 from identify.selection import pair_search as lookahead
-from identify.selection.pair_search import held_at_floor, search_pairs
 
 # The rules as they were decided.
 AT_FLOOR, COLLAPSE, SETTLED, FIRSTS, LEAST_PART = 1.3, 0.3, 0.999, 3, 0.1

@@ -18,11 +18,11 @@ from built_fits import (
     dataset_stub,
     fitted,
 )
+from identify.selection.ranking import _ranked, less, rank, tie
 
 from identify.estimation.evidence import Evidence, effective_samples, held_out_gain
 from identify.selection import ranking
 from identify.selection.candidates import Look
-from identify.selection.ranking import _ranked, less, rank, tie
 from twin.effects import Catalogue
 from twin.parallel import parallel
 

@@ -10,11 +10,11 @@ import built_results as made
 import numpy as np
 import pytest
 from built_fits import axis_of, built, built_fit, dataset_stub, fitted
-
 from identify.selection.decoys import Proof
+from identify.selection.wrong_shape import Shape, WrongShape
+
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import FindingKind
-from identify.selection.wrong_shape import Shape, WrongShape
 from twin.curve import Coordinate, Curve
 
 module = importlib.import_module("identify.selection.reshaping")

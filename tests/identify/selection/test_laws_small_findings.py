@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import pytest
 from built_fits import axis_of, built_fit, dataset_stub, fitted, step
+from identify.selection.verdict import _without_small
 
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors
 from identify.selection.diagnosis import Step
-from identify.selection.verdict import _without_small
 
 module = importlib.import_module("identify.selection.verdict")
 LEAST = 0.01  # of the squared error above the floor, the rule as it was decided

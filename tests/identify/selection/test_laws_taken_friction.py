@@ -10,8 +10,8 @@ from built_fits import (
     axis_of,
     fitted,
 )
-
 from identify.selection.ranking import took_friction
+
 from twin.model.machine import Fitted
 
 COLLAPSE = 0.3  # of the dry part, as it was decided

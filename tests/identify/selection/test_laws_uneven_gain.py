@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from built_fits import built, built_dataset, built_fit, dataset_stub
+from identify.selection.decoys import Proof
+from identify.selection.scoring import _beats_decoys
 
 from identify.dataset.given_logs import Role
 from identify.estimation.evidence import Gain
-from identify.selection.decoys import Proof
 from identify.selection.findings import _linear_step
-from identify.selection.scoring import _beats_decoys
 
 module = importlib.import_module("identify.selection.scoring")
 LEAST_T, LEAST_BIC = 3.0, 10.0  # the rules as they were decided

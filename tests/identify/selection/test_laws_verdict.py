@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from built_fits import NOISE, PLAIN, built, built_fit, dataset_stub, stage, step
-
 from identify.selection.forward_selection import _friction_instead, _near
 from identify.selection.ranking import part_explained
 from identify.selection.verdict import _convincing, _gone

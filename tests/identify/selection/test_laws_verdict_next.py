@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from built_fits import built, built_fit, dataset_stub, step
-
-from identify.selection.diagnosis import SelectionState
 from identify.selection.forward_selection import _next, diagnose_axis
 from identify.selection.pair_search import Pair
+
+from identify.selection.diagnosis import SelectionState
 from twin.effects import Catalogue
 
 module = importlib.import_module("identify.selection.forward_selection")

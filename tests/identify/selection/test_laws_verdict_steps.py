@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from built_fits import axis_of, built, built_fit, dataset_stub, fitted, stage, step
+from identify.selection.decoys import Proof
+from identify.selection.forward_selection import _eliminated_backwards
+from identify.selection.verdict import _graded
+from identify.selection.verdict import decided as decide
 
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors
-from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, kept
-from identify.selection.forward_selection import _eliminated_backwards
 from identify.selection.residual_dependence import Dependence
-from identify.selection.verdict import _graded
-from identify.selection.verdict import decided as decide
 
 module = importlib.import_module("identify.selection.verdict")
 searched = importlib.import_module("identify.selection.forward_selection")

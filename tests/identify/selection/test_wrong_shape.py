@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from built_fits import PLAIN, axis_of, built, built_dataset, built_machine, fitted
+from identify.selection.decoys import Proof
+from identify.selection.reshaping import curve_in_place
+from identify.selection.wrong_shape import best_shape, gain_on_fit_logs, wrong_shape, wrong_shapes
 
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import error_in
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
 from identify.output.words.findings import advice, finding_in_words, shape_in_words
-from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Step, Verdict
 from identify.selection.findings import (
     FindingKind,
@@ -24,9 +26,7 @@ from identify.selection.findings import (
 )
 from identify.selection.found_shape import AHEAD, BEHIND, BOTH, Drawn, FoundShape, found_shape
 from identify.selection.nonparametric import fit_in_place
-from identify.selection.reshaping import curve_in_place
 from identify.selection.residual_dependence import Dependence
-from identify.selection.wrong_shape import best_shape, gain_on_fit_logs, wrong_shape, wrong_shapes
 from identify.workflow import add_shape
 from twin.curve import Coordinate
 from twin.effects import load_catalogue
