@@ -61,8 +61,7 @@ class DecisionRule:
     samples; less is no delay, more is a fault of the log that its check finds.
     """
 
-    hardly: float = 1.0
-    level_t: float = 2.0
+    sure: float = 2.0
     beside_controls: float = 0.8
     most_ways: int = 2
     not_above: float = 0.85

@@ -82,7 +82,7 @@ class Score:
         """Why the change is not accepted, in words; None where it is."""
         if self.part < RULE.least_part:
             return f"takes {100.0 * max(self.part, 0.0):.0f} % of what is left"
-        if self.t < RULE.hardly:
+        if self.t < RULE.sure:
             return f"gain uncertain (t = {self.t:.1f})"
         clearly = 1.0 - self.part < RULE.beside_controls * (1.0 - self.control)
         if not (clearly or (self.t > RULE.least_t and self.part > self.control)):

@@ -134,8 +134,8 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
     """
     dataset = before.dataset
     for fitted in (f for f in fit.axis.effects if f.effect.name == effect.name):
-        free = [p for p in effect.parameters if p.name in own and p.name not in fitted.fixed]
-        for p in free:
+        free = (p for p in effect.parameters if p.name in own and p.name not in fitted.fixed)
+        for p in (p for p in free if p.lower < p.upper):
             value = fitted.values[p.name]
             low = p.lower > 0.0 and value <= p.lower * (1.0 + EDGE)
             if low or (p.upper > 0.0 and value >= p.upper * (1.0 - EDGE)):

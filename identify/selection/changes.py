@@ -22,7 +22,7 @@ from identify.estimation.thorough_fit import fit_thoroughly
 from identify.estimation.variable_projection import starts
 from identify.selection.acceptance import Judged
 from identify.selection.bends import held_bends
-from identify.selection.controls import Columns, Trial, change_of, unit_penalty
+from identify.selection.controls import Columns, Trial, change_of, with_unit_penalty
 from identify.selection.curves import Shape, columns_of, shapes_of, sticking
 from identify.selection.nonparametric import fit_in_place
 from twin.effect import Effect, Kind
@@ -32,6 +32,7 @@ from twin.model.parameters import ParameterReference
 Array = NDArray[np.float64]
 
 HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
+OTHER_BENDS = (0.6, 1.5)  # times what a law holds by design, at which its exponent is tried
 HOPELESS = 2.0  # times the squared error of the present friction, after a rough fit of another
 
 
@@ -129,10 +130,18 @@ class Freed:
         return self.effect.name
 
     def look(self, judged: Judged, trial: Trial) -> Look:
-        axis = self._free(judged.fit.axis)
-        where = [ParameterReference(self.name, self.effect.parameter(self.parameter))]
-        columns = _scaled_columns(axis, where, judged.dataset.fit)
-        return Look(self, trial.part(columns, sticking=sticks(axis)), (axis,))
+        """By the change of the residual at two other values: the law bends between them."""
+        axis, law = judged.fit.axis, judged.fit.axis[self.name]
+        free = replace(law, fixed=law.fixed - {self.parameter})
+        others = [{**law.values, self.parameter: r * self.held} for r in OTHER_BENDS]
+        axes = [axis.with_effect(replace(free, values=v)) for v in (law.values, *others)]
+
+        def columns(logs: Sequence[PreparedLog]) -> list[Array]:
+            now, *then = (residual(a, logs) for a in axes)
+            return split_by_log(np.column_stack([t - now for t in then]), logs)
+
+        promise = trial.part(with_unit_penalty(columns, judged.fit.logs), sticking=sticks(axis))
+        return Look(self, promise, tuple(axes))
 
     def refit(self, judged: Judged, look: Look) -> Fit:
         return fit_axis(look.axes[0], judged.dataset.fit)
@@ -146,10 +155,6 @@ class Freed:
 
     def columns(self, without: Judged, fit: Judged) -> tuple[Columns, bool]:
         return change_of(without, fit), _resting(without, fit)
-
-    def _free(self, axis: AxisModel) -> AxisModel:
-        law = axis[self.name]
-        return axis.with_effect(replace(law, fixed=law.fixed - {self.parameter}))
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,9 +215,10 @@ def refit_thoroughly(judged: Judged, look: Look, first: Fit) -> Fit:
     The effect was missing when the base was fitted, which distorts its values, so one start has
     those that the base began with.
     """
-    if not look.axes or not isinstance(look.change, Added):
-        return first
     logs, name = judged.dataset.fit, look.change.name
+    if not isinstance(look.change, Added):
+        fits = [first, *(fit_axis(axis, logs) for axis in look.axes[1:])]
+        return min(fits, key=lambda f: f.error)
     begun = judged.fit.begun.with_effect(look.axes[0][name])
     fits = [first, *(fit_axis(axis, logs) for axis in (begun, *look.axes[1:]))]
     best = min(fits, key=lambda f: f.error)
@@ -245,21 +251,12 @@ def _strength_columns(axis: AxisModel, name: str, training: Sequence[PreparedLog
     """The forces of an effect's free strengths."""
     law = axis[name]
     free = [p for p in law.effect.strengths if p.name not in law.fixed]
-    return _scaled_columns(axis, [ParameterReference(name, p) for p in free], training)
-
-
-def _scaled_columns(
-    axis: AxisModel, where: Sequence[ParameterReference], training: Sequence[PreparedLog]
-) -> Columns:
-    """Derivatives of the residual by parameters, for a unit penalty on the training logs."""
-    own = jacobian(axis, training, where)
-    size = unit_penalty(own)
+    where = [ParameterReference(name, p) for p in free]
 
     def columns(logs: Sequence[PreparedLog]) -> list[Array]:
-        every = own if logs is training else jacobian(axis, logs, where)
-        return split_by_log(every / size, logs)
+        return split_by_log(jacobian(axis, logs, where), logs)
 
-    return columns
+    return with_unit_penalty(columns, training)
 
 
 def _resting(without: Judged, fit: Judged) -> bool:

@@ -87,16 +87,23 @@ class Trial:
 
 def change_of(before: Judged, after: Judged) -> Columns:
     """What a change does to the residual, as one column (m, 1) N of each log."""
-    size: list[float] = []
 
     def columns(logs: Sequence[PreparedLog]) -> list[Array]:
         both = [residual(j.fit.axis, logs) / j.fit.lessened for j in (before, after)]
-        column = (both[1] - both[0])[:, None]
-        if not size:  # the training logs come first
-            size.append(float(unit_penalty(column)[0]))
-        return split_by_log(column / size[0], logs)
+        return split_by_log((both[1] - both[0])[:, None], logs)
 
-    return columns
+    return with_unit_penalty(columns, before.dataset.fit)
+
+
+def with_unit_penalty(columns: Columns, training: Sequence[PreparedLog]) -> Columns:
+    """The same, N per unit -> N, such that a weak penalty on their strengths is one."""
+    own = columns(training)
+    size = unit_penalty(np.concatenate(own))
+
+    def scaled(logs: Sequence[PreparedLog]) -> list[Array]:
+        return [part / size for part in (own if logs is training else columns(logs))]
+
+    return scaled
 
 
 def change_control(before: Judged, after: Judged) -> float:

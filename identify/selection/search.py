@@ -176,7 +176,7 @@ def is_level(one: Tried, best: Tried) -> bool:
     if len(effects) == 2 and all(e.dead_time for e in effects):
         return True  # which of the two is late, no log of both can tell
     by = score(one.judged, best.judged)
-    return by.t < RULE.level_t or by.part < RULE.least_part
+    return by.t < RULE.sure or by.part < RULE.least_part
 
 
 def _refitted(judged: Judged, looks: Sequence[Look], known: Sequence[Tried] = ()) -> list[Tried]:
@@ -283,7 +283,7 @@ def _together(judged: Judged, tried: Sequence[Tried], catalogue: Catalogue) -> l
         found = t.candidate
         return bool(
             found.score and not found.doubt
-            and found.part > RULE.promise * RULE.least_part and found.score.t > RULE.hardly
+            and found.part > RULE.promise * RULE.least_part and found.score.t > 1.0
         )  # fmt: skip
 
     ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[: RULE.most_ways]
