@@ -143,7 +143,9 @@ def diagnose_text(result: Diagnosis) -> str:
         lines += [f"  {tie}" for tie in ties_in_words(d)]
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
-        lines += [f"  {words(finding_in_words(f))}" for f in d.findings]
+        for f in d.findings:
+            first, *others = finding_in_words(f)
+            lines += [f"  {words(first)}", *(f"    {words(other)}" for other in others)]
         lines += [f"  {shares}" for shares in shares_in_words(d)]
         lines += [f"  {told}" for told in (*together_in_words(d), *also_seen_in_words(d))]
         shapes = [shape_in_words(f.effect, f.shape) for f in d.findings if f.shape]

@@ -79,7 +79,7 @@ def _remarks(
     axis: AxisComparison, found: AxisDiagnosis, following: Plan | None, refit: Refit | None
 ) -> list[str]:
     """What each finding explains, what else was seen, and what to do next."""
-    findings = (spaced(finding_in_words(f, SCALED)) for f in found.findings)
+    findings = (spaced(". ".join(finding_in_words(f, SCALED))) for f in found.findings)
     said = [
         *(axis.units.words(text) for text in findings), *shares_in_words(found),
         *together_in_words(found), *also_seen_in_words(found), *_runner_up(found),

@@ -22,13 +22,10 @@ ERROR = {
 }
 
 
-def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
-    """E.g. "cogging explains 93 % of the squared error above the noise floor: ..."."""
-    told = [
-        _explained(finding, numbers), *_removed(finding), *_values(finding, numbers),
-        _sure(finding),
-    ]  # fmt: skip
-    return ". ".join(told)
+def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> tuple[str, ...]:
+    """Sentences, e.g. "cogging explains 93 % of the squared error above the noise floor: ..."."""
+    removed, values = _removed(finding), _values(finding, numbers)
+    return (_explained(finding, numbers), *removed, *values, _sure(finding))
 
 
 def _explained(finding: Finding, numbers: Numbers) -> str:
@@ -190,7 +187,10 @@ def advice(findings: Sequence[Finding] = ()) -> str:
 
 
 def next_command(found: AxisDiagnosis) -> list[str]:
-    """The command that adds what is named first; nothing where none is, or a pair is named."""
-    if not found.missing or found.missing[0].together:
+    """The command that adds what is named first, where that stands by itself and is confirmed."""
+    if not found.missing:
+        return []
+    first = found.missing[0]
+    if first.together or first.tied or first.contradicted:
         return []
     return [f"next: twin add {found.named[0]} MODEL LOG... -o better.toml"]
