@@ -94,7 +94,7 @@ FOUND = (
     Finding("lugre", (), 0.119, *errors(3.23, 2.19), "N", {"Fc": 0.31}, score_of(0.417, 4.3, 0.071),
             parameter_units={"Fc": "N"}),
 )  # fmt: skip
-BASE, FINAL = built_fit(8.37, 2.11, PLAIN), built_fit(3.19, 2.03, LATER.fit.axis)
+BASE, FINAL = built_fit(8.37, 2.11, PLAIN), built_fit(3.19, 2.03, BEST.fit.axis)
 
 
 def diagnosis_of(

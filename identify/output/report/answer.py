@@ -84,13 +84,12 @@ def _remarks(
         *(axis.units.words(text) for text in findings), *shares_in_words(found),
         *together_in_words(found), *also_seen_in_words(found), *_runner_up(found),
     ]  # fmt: skip
-    if found.unexplained is not None:
-        said.append(f"{advice(found.findings)}.")
     if following is not None:
         said.append(_next_step(following))
     if found.verdict is Verdict.NOTHING_MISSING and refit:
         said.append(refit_in_words(refit, SCALED) or "")
-    return [capitalised(text) for text in (*said, *next_command(found)) if text]
+    out = [capitalised(text) for text in (*said, *next_command(found)) if text]
+    return out if found.unexplained is None else [*out, f"{advice(found.findings)}."]
 
 
 def _headline(found: AxisDiagnosis) -> str:
