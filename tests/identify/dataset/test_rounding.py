@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from identify.selection.forward_selection import diagnose_axis
 from machines import one_axis
 
 from identify.dataset.dataset import Dataset, datasets
@@ -13,7 +12,7 @@ from identify.dataset.motion import Motion
 from identify.dataset.noise_floor import floor_of, noise_of, unrounded_floor_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import finished, fit_axis
-from identify.selection.diagnosis import Verdict
+from identify.selection.diagnosis import Verdict, diagnose_axis
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
 from twin.model.file import load_model

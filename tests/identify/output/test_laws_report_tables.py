@@ -182,7 +182,9 @@ def test_candidates_have_their_evidence_errors_and_values():
 
 def test_the_laws_of_all_that_is_named_and_what_ties_with_it():
     """Of the final model, with every named effect: not of the first step alone."""
-    both = replace(made.FINAL, axis=axis_of(fitted("lugre"), fitted("cogging", p=0.0273)))
+    both = replace(
+        made.FINAL, axis=axis_of(fitted("cogging", p=0.0273)).with_effect(fitted("lugre"))
+    )
     page = page_of(subject_of(made.diagnosed(made.diagnosis_of(final=both))), equations)
     text = page.texts["equations"]
     assert "p = 27.3 mm" in text.replace("\u00a0", " ")

@@ -17,7 +17,7 @@ from built_fits import (
     dataset_stub,
     fitted,
 )
-from identify.selection.forward_selection import diagnose_axis
+from identify.selection.diagnosis import diagnose_axis
 
 from identify.estimation.fit import fit_axis
 from identify.output.words.findings import advice, finding_in_words
@@ -188,7 +188,7 @@ def test_a_drag_with_the_cube_of_speed_is_told_by_its_exponent(cubic) -> None:
     """Named by the nearest law of the catalogue, with the exponent in place of the law's own."""
     there, base = cubic
     few = Catalogue([CATALOGUE[n] for n in ("quadratic_drag", "coulomb_viscous")])
-    found = diagnose_axis(base, there, few).with_findings()
+    found = diagnose_axis(base, there, few)
     (finding,) = found.findings
     assert (finding.effect, finding.kind) == ("quadratic_drag", FindingKind.RESEMBLES)
     assert finding.bend is not None

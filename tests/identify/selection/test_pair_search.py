@@ -7,7 +7,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from identify.selection.forward_selection import diagnose_axis
+from identify.selection.diagnosis import diagnose_axis
 
 from identify.dataset.dataset import datasets
 from identify.estimation.fit import fit_axis

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from identify.selection.scoring import Candidate
+from identify.selection.candidates import Candidate
 
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import Evidence, Gain
