@@ -10,8 +10,9 @@ import numpy as np
 from benchmarks.figures import Figure, Target
 from benchmarks.timing import interleaved
 from identify import workflow
+from identify.selection.acceptance import Judged
 from identify.selection.candidates import absent_effects
-from identify.selection.ranking import rank
+from identify.selection.search import tried_beside
 from twin.core.native import law_address
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
@@ -46,7 +47,7 @@ def measure() -> list[Figure]:
     def ranked(count: int) -> None:
         with parallel(count):
             for axis, base in fitted.fits.items():
-                rank(base, fitted.datasets[axis], catalogue)
+                tried_beside(Judged(base, fitted.datasets[axis]), catalogue)
 
     runs = interleaved([partial(ranked, 1), partial(ranked, 2)], 1)
     one, two = (float(t) for t in np.median(runs, axis=0))

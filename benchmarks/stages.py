@@ -20,8 +20,9 @@ from benchmarks.figures import Figure, Target
 from benchmarks.workload import AXIS, Workload, saved
 from identify import workflow
 from identify.output.report import write_report
-from identify.selection import forward_selection
-from identify.selection.candidates import absent_effects, try_effect
+from identify.selection import diagnosis
+from identify.selection.candidates import absent_effects
+from identify.selection.trying import try_effect
 from twin.core.calling import law_address
 from twin.effects import load_catalogue
 from twin.log import Log, read_log
@@ -32,7 +33,8 @@ STAGES: tuple[tuple[str, ModuleType, str], ...] = (
     ("prepare", workflow, "datasets"),
     ("fit", workflow, "fit_aligned"),
     ("intervals", workflow, "estimates"),
-    ("ranking", forward_selection, "rank"),
+    ("search", diagnosis, "search"),
+    ("what each finding explains", diagnosis, "findings_of"),
     ("next experiment", workflow, "next_experiments"),
     ("comparison and free run", workflow, "_compared"),
 )

@@ -12,9 +12,9 @@ from identify import workflow
 from identify.dataset.dataset import Dataset, datasets
 from identify.estimation.fit import Fit, fit_axis
 from identify.experiment_design.planting import draw_effect, hidden_part, other_machine
-from identify.output.addition import Addition
 from identify.output.report import write_report
-from identify.output.results import Diagnosis
+from identify.results.addition import Addition
+from identify.results.results import Diagnosis
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError

@@ -11,7 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from identify.output.agreement import agree_text
-from identify.output.results import FitResult
+from identify.results.results import FitResult
 from identify.workflow import agree
 from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model

@@ -21,17 +21,20 @@ from identify.estimation.replay import simulated_error
 from identify.estimation.simulated_motion import fit_simulated_motion
 from identify.experiment_design.plan import next_experiments, plan
 from identify.measure import cable_force, velocity_map
-from identify.output.addition import Addition, addition
-from identify.output.results import Comparison, Diagnosis, FitResult, SimulationFit
-from identify.output.words.selection import axis_in_words
-from identify.selection.candidates import try_effect, usable
+from identify.output.text import diagnose_text as diagnose_text  # with it results print themselves
+from identify.output.words.selection import axis_in_words, notes_in_words
+from identify.results.addition import Addition, addition
+from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
+from identify.results.told import Told, told_of
+from identify.selection.candidates import usable
 from identify.selection.confounded import refit
-from identify.selection.forward_selection import diagnose_axis
-from identify.selection.nonparametric import fit_nonparametric, physics_alone, reshaped
-from identify.selection.scoring import score
-from identify.selection.wrong_shape import having_shape
+from identify.selection.curves import having_shape
+from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
+from identify.selection.nonparametric import fit_nonparametric, physics_alone
+from identify.selection.trying import reshape, try_effect
 from identify.validation.agreement import Agreement, agreement
 from identify.validation.misfit_maps import compare_axis, position_errors, worst_region
+from identify.validation.side_by_side import SideBySide, side_by_side
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
@@ -86,11 +89,12 @@ def fit(
     )
     known = Catalogue([]) if catalogue is None else usable(catalogue, given)
     intervals = {a: estimates(f) for a, f in fits.items()}
+    refits = {a: refit(given.axes[a], f, known) for a, f in fits.items()}
     for axis, result in fits.items():
         model = model.with_axis(axis, result.axis)
         model = model.with_intervals(axis, intervals_to_keep(result, intervals[axis]))
     give_back()
-    return FitResult(model, found, fits, intervals, held, tested, given, known)
+    return FitResult(model, found, fits, intervals, held, tested, given, refits)
 
 
 @parallel()
@@ -125,14 +129,32 @@ def compare(
         require_residual(model.axes[axis], dataset)
     given = model.axes
     found = {axis: noise_known(given[axis], aligned(given[axis], d)) for axis, d in found.items()}
-    return _compared(model, found, progress)
+    return _compared(model, found, {}, progress)
 
 
-def _compared(model: MachineModel, found: Mapping[str, Dataset], progress: Progress) -> Comparison:
-    """The comparison on datasets that are prepared already."""
-    errors, floors = position_errors(model, found, partial(progress, "comparing"))
-    axes = {a: compare_axis(model, dataset, errors[a], floors[a]) for a, dataset in found.items()}
+def _compared(
+    model: MachineModel,
+    found: Mapping[str, Dataset],
+    floors: Mapping[str, float],
+    progress: Progress,
+) -> Comparison:
+    """The comparison on datasets that are prepared already; floors: N RMS, where known."""
+    errors, drifts = position_errors(model, found, partial(progress, "comparing"))
+    axes = {
+        a: compare_axis(model, dataset, errors[a], drifts[a], floors.get(a))
+        for a, dataset in found.items()
+    }
     return Comparison(model, axes)
+
+
+@parallel()
+def side_by_side_of(found: Comparison) -> SideBySide:
+    """Measured, model and what is left of the first log of a comparison; raises CannotRun."""
+    name = next(log.motion.name for a in found.axes.values() for log in a.logs)
+    parts = {
+        axis: log for axis, one in found.axes.items() for log in one.logs if log.motion.name == name
+    }
+    return side_by_side(found.model, parts)
 
 
 @parallel()
@@ -153,29 +175,43 @@ def diagnose(
     """
     known = usable(catalogue, model)
     result = fit(
-        physics_alone(model), logs, holdout, test, catalogue=catalogue, test_function=test_function,
-        progress=progress,
-    )  # fmt: skip
+        physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress
+    )
     axes = {
         axis: diagnose_axis(
             fitted,
             result.datasets[axis],
             known,
             partial(progress, f"trying effects on {axis}"),
-        ).with_findings()
+        )
         for axis, fitted in result.fits.items()
     }
-    plans, not_planned = next_experiments(axes, result.model, test_function)
-    regions = {
-        axis: worst_region(d.with_named, d.dataset) for axis, d in axes.items() if d.unexplained
-    }
-    # Of the fit that the answer starts from: a diagnosis may correct another channel delay.
-    refits = {axis: refit(result.given.axes[axis], d.base, known) for axis, d in axes.items()}
+    told = {axis: told_of(d) for axis, d in axes.items()}
+    model = _begun(result.model, axes, told)
+    plans, not_planned = next_experiments(axes, model, test_function)
+    regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
+    prepared = {axis: d.dataset for axis, d in axes.items()}
     return Diagnosis(
-        result.model, axes, _compared(result.model, result.datasets, progress), plans,
-        refits, tuple(name for name in catalogue if name not in known), not_planned,
-        {axis: region for axis, region in regions.items() if region},
-    )  # fmt: skip
+        model=model,
+        axes=axes,
+        comparison=_compared(model, prepared, {a: t.floor for a, t in told.items()}, progress),
+        told=told,
+        next_experiments=plans,
+        refits={axis: refit(result.given.axes[axis], d.base, known) for axis, d in axes.items()},
+        not_tried=tuple(name for name in catalogue if name not in known),
+        not_planned=not_planned,
+        left_over={axis: region for axis, region in regions.items() if region},
+    )
+
+
+def _begun(
+    model: MachineModel, axes: Mapping[str, AxisDiagnosis], told: Mapping[str, Told]
+) -> MachineModel:
+    """The fitted model that the answers start from: a diagnosis may find another channel delay."""
+    for axis, found in axes.items():
+        model = model.with_axis(axis, found.base.axis)
+        model = model.with_intervals(axis, intervals_to_keep(found.base, told[axis].before))
+    return model
 
 
 @parallel()
@@ -211,13 +247,17 @@ def add(
         )
     attempt = fit_nonparametric if effect.is_nonparametric else try_effect
     tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]
-    best = max(tried, key=lambda c: c.delta_bic)
+    best = max(tried, key=lambda c: (c.supported, c.part, c.delta_bic))
     progress("adding", 1, 1)
     having = [n for n in names if n not in open_axes]
-    return addition(
-        best, before.fits[best.axis], before.datasets, before.model, given,
-        why_axis=axis_in_words(effect.name, best.axis, names, having),
-    )  # fmt: skip
+    made = addition(best, before.fits[best.axis], before.datasets, before.model, given)
+    return _with_notes(made, axis_in_words(effect.name, best.axis, names, having))
+
+
+def _with_notes(made: Addition, why_axis: str | None = None) -> Addition:
+    """An addition with what a reader should know; why_axis: why it went to its axis."""
+    kept, notes = notes_in_words(made)
+    return made.with_notes(kept, notes if why_axis is None else (why_axis, *notes))
 
 
 @parallel()
@@ -242,9 +282,9 @@ def add_shape(
     names = having_shape(effect, model, axis)
     before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
     fits = {n: before.fits[n] for n in names if n in before.fits}
-    best, shape = reshaped(effect, fits, before.datasets)
+    best, shape = reshape(effect, fits, before.datasets)
     progress("adding", 1, 1)
-    return addition(best, fits[best.axis], before.datasets, before.model, model, shape)
+    return _with_notes(addition(best, fits[best.axis], before.datasets, before.model, model, shape))
 
 
 def add_named(found: Diagnosis) -> Addition | None:
@@ -253,10 +293,10 @@ def add_named(found: Diagnosis) -> Addition | None:
     None where it names none, or names it as one of a pair.
     """
     leading, best = found.leading, found.leading.best
-    if best is None or not any(c is best for c in leading.ranking):
+    if best is None or not best.supported or not any(c is best for c in leading.ranking):
         return None
     prepared = {axis: one.dataset for axis, one in found.axes.items()}
-    return addition(best, leading.base, prepared, found.model, found.model)
+    return _with_notes(addition(best, leading.base, prepared, found.model, found.model))
 
 
 @parallel()
@@ -307,6 +347,5 @@ __all__ = [
     "fit_simulation",
     "plan",
     "reproduce",
-    "score",
     "velocity_map",
 ]

@@ -16,8 +16,10 @@ from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import Evidence, Gain
 from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.scaling import Scaling
-from identify.selection.diagnosis import SelectionState, Step
-from identify.selection.scoring import Candidate
+from identify.selection.acceptance import Judged, Score, Taken
+from identify.selection.candidates import Candidate
+from identify.selection.changes import Added, Look
+from identify.selection.search import Step, Tried
 from twin.effect import Effect, Excitation
 from twin.effects import load_catalogue
 from twin.model.machine import AxisModel, Fitted, Hardware
@@ -80,31 +82,35 @@ def built(
     after: float = 2.0,
     *,
     fit: Fit | None = None,
-    gain: float | None = None,
     axis: str = "x",
-    typical: float | None = None,
+    control: float = 0.05,
 ) -> Candidate:
-    """A candidate with this difference of BIC; gain: of the log squared error, alone.
+    """A candidate that takes the error from before to after (N, RMS), at this t.
 
-    typical: part of the squared error of a typical block that is left; as of the whole where None.
+    bic: difference of BIC. control: part of the error that its controls take.
     """
     effect = CATALOGUE[effect] if isinstance(effect, str) else effect
-    proof = Evidence(bic / 100.0 if gain is None else gain, 0, 100.0)
     if fit is None:
         fit = built_fit(after, axis=axis_of().with_effect(Fitted.at_start(effect)))
-    held = Gain(before, after, t, (after / before) ** 2 if typical is None else typical)
-    return Candidate(effect, axis, fit, proof, held)
+    left = (after / before) ** 2
+    taken = Taken(t, 1.0 - left, 1.0 - left)
+    return Candidate(
+        effect, axis, fit, Evidence(bic / 100.0, 0, 100.0), Gain(before, after, t, left),
+        Score(taken, taken, control),
+    )  # fmt: skip
 
 
-def step(effect: str = "cogging", tied: tuple[str, ...] = (), **changes: object) -> Step:
-    """A step with a well supported candidate."""
-    keys = ("dropped", "beside", "rivals")
-    told = {k: changes.pop(k) for k in keys if k in changes}
-    return Step(built(effect, **changes), tied, **told)  # type: ignore[arg-type]
+def tried(candidate: Candidate, dataset: Dataset | None = None) -> Tried:
+    """An added effect as a search has tried it."""
+    change = Added(candidate.effect)
+    judged = Judged(candidate.fit, dataset or dataset_stub())  # type: ignore[arg-type]
+    return Tried(change, Look(change, candidate.part), judged, candidate)
 
 
-def stage(fit: Fit, *steps: Step) -> SelectionState:
-    return SelectionState(tuple(steps), fit)
+def step(candidate: Candidate | str = "cogging", *level: Candidate, **told: object) -> Step:
+    """A step that added an effect, and those that were level with it."""
+    candidate = built(candidate) if isinstance(candidate, str) else candidate
+    return Step(tried(candidate), tuple(map(tried, level)), **told)  # type: ignore[arg-type]
 
 
 def dataset_stub(holdout: Sequence[object] = (), fit: Sequence[object] = ()) -> SimpleNamespace:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
-from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted, step
 
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors
@@ -15,17 +15,17 @@ from identify.estimation.intervals import Estimate, NotExcited
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
-from identify.output.addition import Addition
-from identify.output.results import Comparison, Diagnosis, FitResult
+from identify.results.addition import Addition
+from identify.results.results import Comparison, Diagnosis, FitResult
+from identify.results.told import Told
+from identify.selection.acceptance import Score, Taken
 from identify.selection.confounded import Change, MovedParameter, Refit
-from identify.selection.decoys import Proof
-from identify.selection.diagnosis import AxisDiagnosis, Step, Verdict
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding
 from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
 from identify.validation.misfit_maps import AxisComparison, MisfitMap, Region
 from identify.validation.whiteness import Correlation, Loop, ResidualTests
-from twin.effects import Catalogue
 from twin.experiments.kinds import Passes, Tracking
 from twin.model.history import HistoryStep
 from twin.model.machine import MachineModel
@@ -77,30 +77,53 @@ def plan_of(*between: str, **changes: object) -> Plan:
     return replace(plan, **changes)
 
 
-def diagnosis_of(verdict: Verdict = Verdict.MISSING_EFFECTS, **changes: object) -> AxisDiagnosis:
-    steps = (
-        Step(BEST, ("quadratic_drag",)),
-        Step(LATER, (), dropped=("wear",), beside="cogging"),
-    )
-    base = built_fit(8.37, 2.11, PLAIN)
-    final = built_fit(3.19, 2.03, LATER.fit.axis)
-    found = AxisDiagnosis(DATASET, base, (BEST, RIVAL, WEAK), steps, final, verdict, None, **{})
-    found = replace(found, **changes)
-    found.__dict__["repeat"] = None
-    return found
-
-
 def errors(before: float, after: float, on: Role = Role.SELECTION) -> tuple[Errors, Errors]:
     """Test errors, and those on the logs that chose."""
     chosen = Errors(before, after, Role.SELECTION)
     return replace(chosen, on=on), chosen
 
 
+def score_of(part: float, t: float, control: float) -> Score:
+    return Score(Taken(t, part, part), Taken(t + 1.3, part + 0.01, part), control)
+
+
 FOUND = (
-    Finding("cogging", ("quadratic_drag",), 0.871, *errors(7.17, 2.19), "N", {"p": 0.0261},
-            Proof(0.813, 0.137), parameter_units={"p": "m"}),
-    Finding("lugre", (), 0.119, *errors(3.23, 2.19), "N", {"Fc": 0.31}, None),
+    Finding("cogging", ("quadratic_drag",), 0.871, *errors(7.17, 2.19), "N",
+            {"p": 0.0261, "a1": 0.127}, score_of(0.813, 7.7, 0.137),
+            parameter_units={"p": "m", "a1": "N"}),
+    Finding("lugre", (), 0.119, *errors(3.23, 2.19), "N", {"Fc": 0.31}, score_of(0.417, 4.3, 0.071),
+            parameter_units={"Fc": "N"}),
 )  # fmt: skip
+BASE, FINAL = built_fit(8.37, 2.11, PLAIN), built_fit(3.19, 2.03, BEST.fit.axis)
+
+
+def diagnosis_of(
+    verdict: Verdict = Verdict.MISSING_EFFECTS,
+    findings: tuple[Finding, ...] | None = None,
+    on: Role = Role.SELECTION,
+    **changes: object,
+) -> AxisDiagnosis:
+    """A diagnosis that names cogging and lugre; of another verdict nothing. on: logs told of."""
+    named = verdict is Verdict.MISSING_EFFECTS
+    told = findings if findings is not None else FOUND if named else ()
+    steps = (step(BEST, RIVAL), step(LATER, dropped=("wear",))) if named else ()
+    found = AxisDiagnosis(
+        DATASET, BASE, (BEST, RIVAL, WEAK), steps, FINAL if told else BASE, verdict, told
+    )
+    found = replace(found, **changes)
+    tested, chosen = errors(7.81, 2.39 if told else 7.81, on)
+    found.__dict__.update(tested=tested, chosen=chosen)
+    return found
+
+
+def told_of(found: AxisDiagnosis) -> Told:
+    """What is told of a built diagnosis."""
+    before = estimates(0.5)[::2]
+    after = before if found.final is found.base else estimates(0.0)
+    floors = {Role.TRAINING: 2.03, Role.SELECTION: 2.17} if found.dataset.holdout else {}
+    return Told(before, after, (), found.tested, found.chosen, {Role.TRAINING: 2.03, **floors}, 1.0)
+
+
 STRUCTURE = Dependence(
     0.631, "other_axis_position", 0.0273, "m", {"time": 0.117, "position": 0.231}
 )
@@ -158,6 +181,7 @@ def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:
             Region("direction", "1", -1.5, 0.0, 0.087 + o, 7.7 + o, 0.53 + o),
         ],
         tests=whiteness_of(o),
+        kept=np.ones(len(residual), dtype=bool),
     )  # fmt: skip
 
 
@@ -170,13 +194,16 @@ def compared() -> Comparison:
 
 def diagnosed(x: AxisDiagnosis | None = None) -> Diagnosis:
     """x as given, and y where nothing is missing."""
-    other = replace(DATASET, axis="y", channel_delay=0.0)
-    y = AxisDiagnosis(
-        other, built_fit(1.07, 0.97), (replace(WEAK, axis="y"),), (), built_fit(1.07, 0.97),
-        Verdict.NOTHING_MISSING, None,
+    other, quiet = replace(DATASET, axis="y", channel_delay=0.0), built_fit(1.07, 0.97)
+    y = diagnosis_of(
+        Verdict.NOTHING_MISSING, dataset=other, base=quiet, final=quiet,
+        ranking=(replace(WEAK, axis="y"),),
     )  # fmt: skip
+    axes = {"y": y, "x": x or diagnosis_of()}
+    told = {axis: told_of(d) for axis, d in axes.items()}
+    told["y"] = replace(told["y"], floors={Role.TRAINING: 0.97, Role.SELECTION: 0.99})
     return Diagnosis(
-        MODEL, {"y": y, "x": x or diagnosis_of()}, compared(),
+        MODEL, axes, compared(), told,
         {"x": plan_of("cogging", "quadratic_drag")}, {"x": refit_of(0.0), "y": refit_of(0.01)},
         left_over={"x": LEFT_OVER} if x and x.unexplained else {},
     )  # fmt: skip
@@ -188,9 +215,9 @@ def fit_result() -> FitResult:
     datasets = {"x": DATASET, "y": replace(DATASET, axis="y", channel_delay=0.0)}
     result = FitResult(
         MODEL, datasets, {"x": x, "y": y}, {"x": estimates(0.0), "y": estimates(0.02)},
-        {"x": 0.0611, "y": None}, {"x": None, "y": 0.0733}, MODEL, Catalogue([]),
+        {"x": 0.0611, "y": None}, {"x": None, "y": 0.0733}, MODEL,
+        {"x": refit_of(0.0), "y": Refit(0.0319, 0.0317, ())},
     )  # fmt: skip
-    result.__dict__["refits"] = {"x": refit_of(0.0), "y": Refit(0.0319, 0.0317, ())}
     return result
 
 
@@ -208,7 +235,15 @@ MOVED = MovedParameter("mass", 5.31, 5.47, "kg", False)
 
 def addition(kept: bool = True) -> Addition:
     return Addition(
-        MODEL, STEPS[0], BEST, kept, (3.71e-6, 1.93e-6), 1.97e-6, (MOVED,), position_log="run 1"
+        MODEL,
+        STEPS[0],
+        BEST if kept else WEAK,
+        kept,
+        (3.71e-6, 1.93e-6),
+        1.97e-6,
+        (MOVED,),
+        position_log="run 1",
+        notes=("mass moved", "the errors told flatter it"),
     )
 
 

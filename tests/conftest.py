@@ -87,9 +87,3 @@ def alone(lock: Path) -> Iterator[bool]:
         yield True
     finally:
         lock.unlink()
-
-
-@pytest.fixture
-def nothing_moved(monkeypatch):
-    """Parameters that moved are another test's."""
-    monkeypatch.setattr("identify.output.remarks.moved_parameters", lambda before, after: ())

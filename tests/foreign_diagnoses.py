@@ -28,8 +28,8 @@ from foreign_machine import (
 from machines import one_axis
 
 from identify import workflow
+from identify.selection.diagnosis import diagnose_axis
 from identify.selection.findings import FindingKind
-from identify.selection.forward_selection import diagnose_axis
 from twin.effects import load_catalogue
 from twin.model.file import load_model
 
@@ -117,7 +117,7 @@ def added_on_logs(base: Machine, found, seed: int) -> float:
 
 def describe(d, planted: Planted, forms=()) -> dict:
     """The answer in a line."""
-    d = d.with_findings()
+    d = d
     curves = [f.kind is FindingKind.WRONG_SHAPE for f in d.findings]
     missing = [(f.effect, *f.tied) for f, c in zip(d.findings, curves, strict=True) if not c]
     wrong = [f.effect for f, c in zip(d.findings, curves, strict=True) if c]

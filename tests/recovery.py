@@ -16,8 +16,8 @@ from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import Estimate, estimates
 from identify.experiment_design.planting import added_force, draw_effect
-from identify.selection.candidates import try_effect
-from identify.selection.scoring import Candidate
+from identify.selection.candidates import Candidate
+from identify.selection.trying import try_effect
 from twin.effect import Effect, Kind
 from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel

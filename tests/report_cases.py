@@ -6,7 +6,7 @@ import base64
 import re
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
@@ -15,13 +15,14 @@ from unittest.mock import patch
 from matplotlib.figure import Figure
 
 from identify import workflow
-from identify.output.addition import Addition
 from identify.output.report import answer, sections, write_report
 from identify.output.report.blocks import Answer, Picture, Section
 from identify.output.report.drawing import drawing_style
 from identify.output.report.subject import Subject
-from identify.output.results import Diagnosis
-from identify.selection.diagnosis import AxisDiagnosis
+from identify.results.addition import Addition
+from identify.results.results import Diagnosis
+from identify.results.told import told_of
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
 from twin.log import Log
@@ -54,7 +55,16 @@ class Case:
 
     def concluding(self, x: AxisDiagnosis) -> Diagnosis:
         """The same diagnosis with another conclusion."""
-        return Diagnosis(self.diagnosis.model, {"x": x}, self.diagnosis.comparison)
+        told = {"x": told_of(x)}
+        return Diagnosis(self.diagnosis.model, {"x": x}, self.diagnosis.comparison, told)
+
+    @property
+    def quiet(self) -> AxisDiagnosis:
+        """The axis, had nothing been found."""
+        x = self.x
+        return replace(
+            x, verdict=Verdict.NOTHING_MISSING, findings=(), steps=(), final=x.base,
+        )  # fmt: skip
 
     def write(self, path: Path, **changes: object) -> str:
         arguments = {

@@ -27,6 +27,7 @@ from types import FunctionType
 from typing import Any
 
 from twin.curve import Curve, FreeShape, Part
+from twin.excitation import Excitation as Excitation  # effects' files take it from here
 
 # Slots of ``io``. Compiled laws freeze these numbers.
 INDEX = 0  # sample index, 0 at the first sample
@@ -87,38 +88,6 @@ class Kind(Enum):
 
 
 RUBBING = (Kind.FRICTION, Kind.MODIFIER)  # what makes friction together
-
-
-@dataclass(frozen=True)
-class Excitation:
-    """What a log's motion covers; start rules and scans are computed from it.
-
-    position_low, position_high (m, of the axis' travel where the model gives it), speed_max (m/s),
-    dry_level (N, half the gap between the force in the two directions), duration (s), period (s,
-    sample period), force_max (N, largest command), lines (Hz, frequencies at which the force
-    repeats in time; strongest first), resolution (m, step of the readings; 0 where none shows),
-    ripples (m, periods at which the reading's error may repeat in position; strongest first),
-    pitches, thrust_pitches (m, periods at which what a model leaves of the force, or of the motor's
-    force in proportion to it, repeats along the track; strongest first; empty without a model).
-    """
-
-    position_low: float
-    position_high: float
-    speed_max: float
-    dry_level: float
-    duration: float
-    period: float
-    force_max: float = 1.0
-    lines: tuple[float, ...] = ()
-    ripples: tuple[float, ...] = ()
-    resolution: float = 0.0
-    pitches: tuple[float, ...] = ()
-    thrust_pitches: tuple[float, ...] = ()
-
-    @property
-    def travel(self) -> float:
-        """Distance covered, m."""
-        return self.position_high - self.position_low
 
 
 @dataclass(frozen=True)

@@ -118,7 +118,7 @@ def compare(
     if mcap:
         from identify.output.side_by_side import write_side_by_side
 
-        write_side_by_side(result, mcap)
+        write_side_by_side(workflow.side_by_side_of(result), mcap)
     told = {**as_json.compare_json(result), "left_out": silent}
     say(as_text.compare_text(result), told, as_json_, [*findings, *silent])
 

@@ -202,10 +202,11 @@ def effects(
     if name is not None:
         chosen = catalogue[name]
         if plot is not None:
+            from identify.experiment_design.signature import signature
             from identify.output.signature import draw
 
             require_folder(plot)
-            draw(chosen, catalogue, plot)
+            draw(chosen, *signature(chosen, catalogue), plot)
         say(machine_text.effect_text(chosen), machine_json.effect_json(chosen), as_json_)
         return
     if plot is not None:

@@ -26,10 +26,10 @@ from identify.experiment_design.rival_hypotheses import (
     require_different,
     simulated_dataset,
 )
-from identify.selection.candidates import usable
-from identify.selection.diagnosis import AxisDiagnosis
-from identify.selection.forward_selection import diagnose_axis
-from identify.selection.scoring import Candidate
+from identify.selection.candidates import Candidate, usable
+from identify.selection.changes import Added
+from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
+from identify.selection.trying import try_effect
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
@@ -130,8 +130,7 @@ def next_experiment(
     """
     if found.best is None:
         return None
-    names = (found.best.effect.name, *found.ambiguous_with)[:MOST_RIVALS]
-    rivals = [c for c in found.ranking if c.effect.name in names]
+    rivals = _rivals(found)
     if len(rivals) < 2:
         return None
     arena = replace(_between_candidates(model, found.dataset, rivals), test_function=test_function)
@@ -254,12 +253,29 @@ def _arena(
         found = diagnose_axis(base, dataset, catalogue)
         own = base.axis
         if found.best is not None and len(found.ranking) > 1:
-            names = (found.best.effect.name, *found.ambiguous_with)[:MOST_RIVALS]
-            rivals = [c for c in found.ranking if c.effect.name in names]
-            return _between_candidates(
-                model, dataset, rivals if len(rivals) > 1 else found.ranking[:2]
-            )
+            rivals = _rivals(found)
+            if len(rivals) < 2:
+                rivals = [_refitted(c, found) for c in found.ranking[:2]]
+            return _between_candidates(model, dataset, rivals)
     return Arena(model, dataset.axis, (Explanation(model.name, own),), logs)
+
+
+def _rivals(found: AxisDiagnosis) -> list[Candidate]:
+    """The effect that is named first and those that are level with it, as they were tried."""
+    step = next(
+        s for s in reversed(found.steps)
+        if isinstance(s.change, Added) and s.change.name == found.named[0]
+    )  # fmt: skip
+    level = {t.change.name: t.candidate for t in step.level}
+    others = [level[name] for name in found.ambiguous_with if name in level]
+    return [step.tried.candidate, *others][:MOST_RIVALS]
+
+
+def _refitted(candidate: Candidate, found: AxisDiagnosis) -> Candidate:
+    """A candidate with fitted values: of one that promised little only a look was taken."""
+    if candidate.score is not None:
+        return candidate
+    return try_effect(found.base, found.dataset, candidate.effect)
 
 
 def _between_candidates(

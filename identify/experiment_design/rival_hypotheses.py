@@ -16,7 +16,7 @@ from identify.estimation.thorough_fit import fit_thoroughly
 from identify.estimation.variable_projection import starts as start_values
 from identify.experiment_design.discrimination import Explanation
 from identify.experiment_design.planting import strength_for
-from identify.selection.candidates import try_effect
+from identify.selection.trying import try_effect
 from twin.effect import Effect, Kind
 from twin.errors import InputError
 from twin.experiments.kinds import Tracking

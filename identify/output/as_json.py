@@ -7,13 +7,13 @@ from typing import Any
 from identify.estimation.intervals import Estimate
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
-from identify.output.addition import Addition
-from identify.output.results import Comparison, FitResult
 from identify.output.words.estimation import no_interval_in_words, outcome_in_words
 from identify.output.words.experiment_design import gap_in_words, in_order, not_run_in_words
 from identify.output.words.validation import loop_in_words, region_in_words
+from identify.results.addition import Addition
+from identify.results.results import Comparison, FitResult
+from identify.selection.candidates import Candidate
 from identify.selection.confounded import Refit
-from identify.selection.scoring import Candidate
 from identify.validation.misfit_maps import AxisComparison
 from identify.validation.whiteness import ResidualTests
 from twin.experiments.file import parameters
@@ -41,7 +41,7 @@ def fit_json(result: FitResult) -> dict[str, Any]:
                 "force_noise": result.datasets[axis].force_noise,
                 "beginnings_left_out": dict(result.datasets[axis].begun),
                 "beginnings_left_out_unit": "s",
-                "parameters": {e.label: _estimate(e) for e in result.estimates[axis]},
+                "parameters": {e.label: estimate_json(e) for e in result.estimates[axis]},
                 "refit": refit_json(result.refits[axis]),
             }
             for axis, fit in result.fits.items()
@@ -50,7 +50,8 @@ def fit_json(result: FitResult) -> dict[str, Any]:
     }
 
 
-def _estimate(e: Estimate) -> dict[str, Any]:
+def estimate_json(e: Estimate) -> dict[str, Any]:
+    """A value with its unit and interval, or why it has none."""
     interval = None if e.low is None else [e.low, e.high]
     return {
         "value": e.value, "unit": e.unit, "interval_90": interval, "free": e.free,
@@ -185,6 +186,8 @@ def add_json(result: Addition) -> dict[str, Any]:
         "axis": step.axis,
         "is_nonparametric": result.candidate.effect.is_nonparametric,
         "kept": result.kept,
+        "part": result.candidate.part,
+        "why_not": result.candidate.refused,
         "fit_error_before": step.fit_error_before,
         "fit_error_after": step.fit_error_after,
         "holdout_error_before": step.holdout_error_before,

@@ -7,16 +7,17 @@ from dataclasses import asdict
 from typing import Any
 
 from identify.estimation.errors import Errors
-from identify.output.as_json import parameters_json, plan_json, refit_json
+from identify.output.as_json import estimate_json, parameters_json, plan_json, refit_json
 from identify.output.remarks import remarks_on
-from identify.output.results import Diagnosis
-from identify.output.words.findings import advice
+from identify.output.words.findings import advice, together_in_words
 from identify.output.words.selection import verdict_in_words
-from identify.output.words.steps import not_named_in_words, together_in_words
-from identify.selection.diagnosis import AxisDiagnosis, Step
+from identify.output.words.steps import change_in_words, not_named_in_words, why_not
+from identify.results.results import Diagnosis
+from identify.selection.candidates import Candidate
+from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding
 from identify.selection.found_shape import FoundShape
-from identify.selection.scoring import Candidate
+from identify.selection.search import Step
 from identify.validation.misfit_maps import Region
 
 
@@ -32,7 +33,7 @@ def diagnose_json(result: Diagnosis, data_faults: Sequence[str] = ()) -> dict[st
 
 
 def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
-    d = result.axes[axis]
+    d, told = result.axes[axis], result.told[axis]
     units = d.base.axis.units
     dependence = d.unexplained
     following = result.next_experiments.get(axis)
@@ -41,13 +42,14 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "explanation": units.words(verdict_in_words(d)),
         "axis": axis,
         "effect": d.best.effect.name if d.best else None,
-        "ranking": [_candidate(c) for c in d.ranking],
+        "ranking": [_candidate(c, d) for c in d.ranking],
         "ambiguous_with": list(d.ambiguous_with),
         "missing": list(d.named),
         "steps": [
-            {**_step(s), "not_named": not_named_in_words(d, i)} for i, s in enumerate(d.steps)
+            {**_step(s, d), "not_named": not_named_in_words(d, i)} for i, s in enumerate(d.steps)
         ],
         "needed_together": together_in_words(d),
+        "also_seen": list(d.small),
         "unexplained": dependence
         and {
             "share_of_error": dependence.share_of_error,
@@ -58,8 +60,11 @@ def _axis_diagnosis(result: Diagnosis, axis: str) -> dict[str, Any]:
         "findings": [_finding(f) for f in d.findings],
         "remainder": _remainder(d, result.left_over.get(axis)),
         "force_error": d.base.error,
-        "noise_floor": d.base.floor,
-        **_test_errors(d.tested),
+        "force_error_with_found": d.final.error,
+        "noise_floor": told.floor,
+        "noise_floors": {role.value: floor for role, floor in told.floors.items()},
+        **_test_errors(told.tested),
+        "parameters": {e.label: estimate_json(e) for e in told.after},
         "unit": units.force,
         "force_shift": d.dataset.channel_delay,
         "force_shift_unit": "s",
@@ -91,9 +96,11 @@ def _finding(f: Finding) -> dict[str, Any]:
         "unit": f.unit,
         "parameters": f.parameters,
         "parameter_units": f.parameter_units,
-        "gain": f.proof and f.proof.gain,
-        "decoy": f.proof and f.proof.decoy,
-        "of_typical_block": f.proof and f.proof.typical,
+        "part": f.score.part,
+        "t": f.score.t,
+        "control": f.score.control,
+        "together": list(f.together),
+        "contradicted_by_test_logs": f.contradicted,
         "shape": f.shape and _shape(f.shape),
         "bend": f.bend and asdict(f.bend),
     }
@@ -156,16 +163,17 @@ def _remainder(d: AxisDiagnosis, region: Region | None) -> dict[str, Any] | None
     }
 
 
-def _step(s: Step) -> dict[str, Any]:
+def _step(s: Step, d: AxisDiagnosis) -> dict[str, Any]:
     return {
-        **_candidate(s.candidate),
-        "ambiguous_with": list(s.tied),
+        **_candidate(s.tried.candidate, d),
+        "effect": s.change.name,
+        "change": change_in_words(s.change),
         "dropped": list(s.dropped),
-        "beside": s.beside,
+        "with_others": s.with_others,
     }
 
 
-def _candidate(c: Candidate) -> dict[str, Any]:
+def _candidate(c: Candidate, d: AxisDiagnosis) -> dict[str, Any]:
     return {
         "effect": c.effect.name,
         "delta_bic": c.delta_bic,
@@ -173,5 +181,7 @@ def _candidate(c: Candidate) -> dict[str, Any]:
         "holdout_error_after": c.gain.after,
         "unit": c.fit.axis.units.force,
         "supported": c.supported,
+        "part": c.part,
+        "why_not": why_not(d, c) or None,
         **parameters_json(c),
     }

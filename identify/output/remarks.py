@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
-from identify.dataset.noise_floor import floor_of
+from identify.estimation.decision import RULE
 from identify.estimation.fit import Outcome
 from identify.output.words.estimation import outcome_in_words, prepared_in_words
 from identify.output.words.numbers import PLAIN, Numbers
@@ -15,37 +12,15 @@ from identify.output.words.selection import (
     refit_in_words,
     repeat_in_words,
 )
-from identify.selection.confounded import Refit, moved_parameters
-from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.pair_search import held_at_floor
-
-if TYPE_CHECKING:  # results print themselves, with these sentences
-    from identify.output.results import Diagnosis
+from identify.results.results import Diagnosis
+from identify.results.told import Told
+from identify.selection.diagnosis import Verdict
 
 
 def remarks_on(result: Diagnosis, axis: str, numbers: Numbers = PLAIN) -> tuple[str, ...]:
-    """What a reader should know beside the answer for one axis."""
-    return remarks(
-        result.axes[axis],
-        result.refits.get(axis),
-        result.not_tried,
-        result.not_planned.get(axis),
-        numbers,
-    )
-
-
-def remarks(
-    found: AxisDiagnosis,
-    refit: Refit | None,
-    not_tried: Sequence[str] = (),
-    not_planned: str | None = None,
-    numbers: Numbers = PLAIN,
-) -> tuple[str, ...]:
-    """Channel delays, fits that did not converge, changed parameters, weak evidence.
-
-    not_tried: effects that depend on the other axis, on a machine with more than two axes.
-    not_planned: why no experiment is proposed for an ambiguous answer.
-    """
+    """Channel delays, fits that did not converge, changed parameters, weak evidence of one axis."""
+    found, told = result.axes[axis], result.told[axis]
+    refit, not_planned = result.refits.get(axis), result.not_planned.get(axis)
     words = found.base.axis.units.words
     out = []
     if refit and (changed := refit_in_words(refit, numbers)):
@@ -53,12 +28,11 @@ def remarks(
     out += prepared_in_words(found.dataset)
     if found.base.ended is not Outcome.CONVERGED:
         out.append(words(outcome_in_words(found.base.ended)))
-    if found.best is not None:
-        name = found.best.effect.name
-        if found.best.fit.ended is not Outcome.CONVERGED:
-            out.append(f"with {name}: {words(outcome_in_words(found.best.fit.ended))}")
-        moved = moved_parameters(found.base, found.best.fit)
-        out += [f"with {name}, {words(moved_in_words(m, numbers))}" for m in moved]
+    if found.final is not found.base:
+        with_it = f"with {' and '.join(f.effect for f in found.findings)}"
+        if found.final.ended is not Outcome.CONVERGED:
+            out.append(f"{with_it}: {words(outcome_in_words(found.final.ended))}")
+        out += [f"{with_it}, {words(moved_in_words(m, numbers))}" for m in told.moved]
     if found.repeat is not None:
         out.append(repeat_in_words(found.repeat))
     if not found.dataset.holdout:
@@ -66,28 +40,27 @@ def remarks(
             "no log was held out, so candidates were judged by cross-validation on blocks of the "
             "training logs, which is a weaker test. Give --holdout a log of another experiment."
         )
-    if found.verdict is Verdict.NOTHING_MISSING and (beyond := _beyond_in_words(found)):
+    if found.verdict is Verdict.NOTHING_MISSING and (beyond := _beyond_in_words(told)):
         out.append(words(beyond))
     if found.findings and (also := also_chose_in_words(found.dataset.tested_on)):
         out.append(also)
     if not_planned is not None:
         out.append(f"no experiment that would tell them apart is proposed: {not_planned}")
-    if not_tried:
+    if result.not_tried:
         out.append(
-            f"not tried: {', '.join(not_tried)}, because each depends on the other axis, and with "
-            "more than two axes it is not known which that is; diagnose a model of two axes alone"
+            f"not tried: {', '.join(result.not_tried)}, because each depends on the other axis, "
+            "and with more than two axes it is not known which that is; diagnose a model of two "
+            "axes alone"
         )
     return tuple(out)
 
 
-def _beyond_in_words(found: AxisDiagnosis) -> str | None:
-    """That the held-out logs show what the fit logs do not; None where they do not."""
-    held = found.dataset.holdout
-    if not held or held_at_floor(found.base, found.dataset):
+def _beyond_in_words(told: Told) -> str | None:
+    """That the selection logs show what the training logs do not; None where they do not."""
+    if told.selection_ratio is None or told.selection_ratio < RULE.at_floor:
         return None
-    ratio = found.chosen.before / floor_of(found.base.axis, held)
     return (
         "what was said holds for the training logs: on the selection logs the force error is "
-        f"{ratio:.1f} times its noise floor. Give such a log as a training log too, so that what "
-        "it shows is looked for"
+        f"{told.selection_ratio:.1f} times its noise floor. Give such a log as a training log too, "
+        "so that what it shows is looked for"
     )

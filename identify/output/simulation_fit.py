@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from identify.estimation.simulated_motion import MotionFit
 from identify.output.words.estimation import MOTION_OUTCOMES, motion_fit_in_words
 from identify.output.words.numbers import with_unit
+from identify.results.results import SimulationFit
 from twin.model.parameters import free_parameters, read
-
-if TYPE_CHECKING:  # results print themselves by these functions
-    from identify.output.results import SimulationFit
 
 OBJECTIVE = "simulation"
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from identify.estimation.intervals import Estimate, NoInterval, refusal
+from identify.estimation.intervals import Estimate, NoInterval
 from identify.experiment_design.plan import Plan
 from identify.output.remarks import remarks_on
+from identify.output.simulation_fit import simulation_fit_text
 from identify.output.words.estimation import (
+    common_reason,
     no_interval_in_words,
     outcome_in_words,
     prepared_in_words,
@@ -21,9 +21,12 @@ from identify.output.words.experiment_design import (
 )
 from identify.output.words.findings import (
     advice,
+    also_seen_in_words,
     finding_in_words,
+    next_command,
     shape_in_words,
     shares_in_words,
+    together_in_words,
 )
 from identify.output.words.selection import (
     dependence_in_words,
@@ -37,23 +40,24 @@ from identify.output.words.selection import (
     ties_in_words,
     verdict_in_words,
 )
-from identify.output.words.steps import step_lines, support_in_words, together_in_words
+from identify.output.words.steps import step_lines, why_not
 from identify.output.words.validation import (
     correlation_in_words,
     loop_in_words,
     region_in_words,
 )
+from identify.results.addition import Addition
+from identify.results.printed import text_of
+from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
+from identify.results.told import Told
+from identify.selection.candidates import Candidate
+from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.nonparametric import nonparametric_labels
-from identify.selection.scoring import Candidate
+from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
 
-if TYPE_CHECKING:  # results print themselves by these functions
-    from identify.output.addition import Addition
-    from identify.output.results import Comparison, Diagnosis, FitResult
-    from identify.selection.diagnosis import AxisDiagnosis
-    from identify.validation.misfit_maps import AxisComparison
 
-
+@text_of.register
 def fit_text(result: FitResult) -> str:
     """The fit of each axis, one parameter a line."""
     lines = []
@@ -74,7 +78,7 @@ def fit_text(result: FitResult) -> str:
         if changed := refit_in_words(result.refits[axis]):
             lines.append(f"  {changed}")
         hidden = nonparametric_labels(fit.axis)
-        common = refusal(fit)
+        common = common_reason(result.estimates[axis])
         if common is not None:
             lines.append(f"  {no_interval_in_words(common)}")
         lines += [
@@ -107,6 +111,7 @@ def _position_error(c: AxisComparison, log: str) -> str:
     return f", {c.units.words('free-running position error')} {error}"
 
 
+@text_of.register
 def compare_text(result: Comparison) -> str:
     """Errors by log, and the three worst regions of each axis."""
     lines = []
@@ -125,24 +130,24 @@ def compare_text(result: Comparison) -> str:
     return "\n".join(lines)
 
 
+@text_of.register
 def diagnose_text(result: Diagnosis) -> str:
     """The answer for each axis, and its best candidates."""
     lines = []
     for axis, d in result.axes.items():
-        unit, words = d.base.axis.units.force, d.base.axis.units.words
+        words = d.base.axis.units.words
         named = f" Missing: {named_in_words(d)}." if d.named else ""
         lines.append(f"axis {axis}: {words(verdict_in_words(d))}{named}")
-        lines.append(
-            f"  {words('force error')} {d.base.error:.4g} {unit}, noise floor "
-            f"{d.base.floor:.4g} {unit} (ratio {d.base.ratio:.2f})"
-        )
+        lines.append(f"  {words('force error')} {_errors(d, result.told[axis])}")
         lines.append(f"  {named_errors_in_words(d)}")
         lines += [f"  {tie}" for tie in ties_in_words(d)]
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
-        lines += [f"  {words(finding_in_words(f))}" for f in d.findings]
+        for f in d.findings:
+            first, *others = finding_in_words(f)
+            lines += [f"  {words(first)}", *(f"    {words(other)}" for other in others)]
         lines += [f"  {shares}" for shares in shares_in_words(d)]
-        lines += [f"  {together}" for together in together_in_words(d)]
+        lines += [f"  {told}" for told in (*together_in_words(d), *also_seen_in_words(d))]
         shapes = [shape_in_words(f.effect, f.shape) for f in d.findings if f.shape]
         lines += [f"  {words(text)}" for text in shapes]
         if remains := remainder_in_words(d):
@@ -153,15 +158,26 @@ def diagnose_text(result: Diagnosis) -> str:
                 lines.append(f"  it is largest at {words(region_in_words(result.left_over[axis]))}")
         if d.unexplained or any(f.shape for f in d.findings):
             lines.append(f"  {advice(d.findings)}")
+        lines += [f"  {command}" for command in next_command(d)]
         lines += [_ranking_line(c, d) for c in d.ranking[:4]]
         lines += [f"  {line}" for line in step_lines(d)]
         lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]
     return "\n".join(lines)
 
 
+def _errors(found: AxisDiagnosis, told: Told) -> str:
+    """Errors on the training logs without and with what was found, and the noise floor."""
+    unit, floor = found.base.axis.units.force, told.floor
+    base, final = found.base.error, found.final.error
+    error, ratio = f"{base:.4g} {unit}", f"{base / floor:.2f}"
+    if found.final is not found.base:
+        error, ratio = f"{base:.4g} -> {final:.4g} {unit}", f"{ratio} -> {final / floor:.2f}"
+    return f"on the training logs {error}, noise floor {floor:.4g} {unit} (ratio {ratio})"
+
+
 def _ranking_line(c: Candidate, found: AxisDiagnosis) -> str:
     unit = c.fit.axis.units.force
-    tail = "" if c.supported else f"   {support_in_words(found, c)}"
+    tail = f"   {why}" if (why := why_not(found, c)) else ""
     return (
         f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   {tested_on(found)} error "
         f"{c.gain.before:.4g} -> {c.gain.after:.4g} {unit}{tail}"
@@ -193,6 +209,7 @@ def plan_text(result: Plan) -> str:
     return "\n".join([*lines, *(f"  not run: {not_run_in_words(n)}" for n in result.not_run)])
 
 
+@text_of.register
 def add_text(result: Addition) -> str:
     """The errors before and after adding the effect."""
     s, words = result.step, result.units.words
@@ -218,9 +235,11 @@ def add_text(result: Addition) -> str:
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
         lines.append(
-            f"  the data do not support this effect: the evidence and {result.judged_by} do not "
-            "both favour it alone. The model has it nevertheless, as asked for; go on with the "
-            "model before, or, if a diagnosis says that it needs another beside it, add that to "
-            "the new model and judge then"
+            f"  the logs do not prove it: {result.candidate.refused}. The model has it "
+            "nevertheless, as asked for; go on with the model before, or, if a diagnosis says that "
+            "it needs another beside it, add that to the new model and judge then"
         )
     return "\n".join(lines)
+
+
+text_of.register(SimulationFit, simulation_fit_text)

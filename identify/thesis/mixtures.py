@@ -15,7 +15,7 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.intervals import half_widths
-from identify.selection.candidates import try_effect
+from identify.selection.trying import try_effect
 from identify.thesis.mixed_friction import EFFECT, PARTS, WEIGHT, mixed
 from identify.thesis.residuals import friction_of
 from twin.effect import Effect

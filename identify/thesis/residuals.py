@@ -17,8 +17,7 @@ from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.channel_delay import fit_aligned, realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on
-from identify.selection.diagnosis import Verdict
-from identify.selection.forward_selection import diagnose_axis
+from identify.selection.diagnosis import Verdict, diagnose_axis
 from identify.thesis.chapter import Chapter, Progress, Recovered
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
 from twin.effect import Kind

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.floor import noise_beside
-from identify.dataset.prepared_log import PreparedLog, at_rest, moving, split_by_log, sticks
+from identify.dataset.prepared_log import (
+    PreparedLog,
+    at_rest,
+    moving,
+    on_blocks,
+    split_by_log,
+    sticks,
+    total_force,
+)
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
@@ -18,7 +26,7 @@ from identify.selection.residual_dependence import UNITS, gathered, unit_of
 from identify.validation.error_spectrum import bands
 from identify.validation.free_run import FreeRun, drift_of_noise, free_run, rms_error
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
-from twin.model.machine import AxisModel, MachineModel
+from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.units import LINEAR, AxisUnits
 from twin.parallel import spread
 
@@ -78,7 +86,10 @@ class AxisComparison:
 
     force_error: N RMS of the force residual, by log. floor: N. position_error: m RMS of the free
     run, by log; position_floor: the same from measurement noise alone. residual (n,) N, coordinates
-    name -> (n,).
+    name -> (n,). kept: which test functions of the logs in a row (all,) tell something, n of them.
+    periods: lengths (m) at which effects of the model repeat along the track, by the coordinate
+    that is the phase. curves: force (m,) N of each nonparametric effect along the motion of the
+    logs in a row, by name.
     """
 
     axis: str
@@ -92,6 +103,9 @@ class AxisComparison:
     maps: Sequence[MisfitMap]
     worst: Sequence[Region]
     tests: ResidualTests
+    kept: NDArray[np.bool_]
+    periods: Mapping[str, float] = field(default_factory=dict)
+    curves: Mapping[str, Array] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"<AxisComparison of {self.axis}: {self.total_error:.4g} N>"
@@ -117,14 +131,19 @@ def compare_axis(
     dataset: Dataset,
     position_error: Mapping[str, float],
     position_floor: Mapping[str, float],
+    floor: float | None = None,
 ) -> AxisComparison:
-    """Force errors of one axis over the dataset's fit logs, with maps of where they are."""
+    """Force errors of one axis over the dataset's fit logs, with maps of where they are.
+
+    floor: noise floor, N RMS; as the model and what it leaves tell it where None.
+    """
     axis = model.axes[dataset.axis]
     kept = moving(dataset.fit, sticks(axis))
     every = residual(axis, dataset.fit)
     force = every[kept]
     left = split_by_log(np.where(kept, every, 0.0), dataset.fit)
-    floor = noise_beside(axis, dataset.fit, left).value
+    if floor is None:
+        floor = noise_beside(axis, dataset.fit, left).value
     where = {k: v[kept] for k, v in _coordinates(axis, dataset.fit).items()}
     maps = _maps(axis, dataset, floor, force, where)
     maps.append(misfit_by_frequency(axis, dataset.fit))
@@ -140,7 +159,18 @@ def compare_axis(
         maps=maps,
         worst=worst_regions(maps, effective_samples(force)),
         tests=residual_tests(dataset.fit, every, kept, floor, loop_of(dataset.fit)),
+        kept=kept,
+        periods={phase_name(name): period for name, period in periods(axis).items()},
+        curves={
+            f.effect.name: _along(f, dataset.fit) for f in axis.effects if f.effect.is_nonparametric
+        },
     )
+
+
+def _along(fitted: Fitted, logs: Sequence[PreparedLog]) -> Array:
+    """The force (m,) N of an effect along the motion of logs in a row."""
+    alone = AxisModel(1.0, effects=(fitted,), rotary=logs[0].motion.units.rotary)
+    return np.concatenate([total_force(on_blocks(alone), log.motion) for log in logs])
 
 
 def worst_region(fit: Fit, dataset: Dataset) -> Region | None:

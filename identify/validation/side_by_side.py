@@ -11,6 +11,7 @@ from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.force_balance import residual
 from identify.validation.free_run import free_run
 from twin.model.machine import MachineModel
+from twin.model.units import AxisUnits
 from twin.signals import Array
 
 
@@ -19,10 +20,12 @@ class SideBySide:
     """Of one log. sample_rate: Hz; topics: "/measured/x" -> column -> (n,) in units of the axis.
 
     The position of the model is that of the free run; its force is averaged by test functions.
+    units: by axis.
     """
 
     sample_rate: float
     topics: Mapping[str, Mapping[str, Array]]
+    units: Mapping[str, AxisUnits]
 
 
 def side_by_side(model: MachineModel, parts: Mapping[str, PreparedLog]) -> SideBySide:
@@ -45,4 +48,5 @@ def side_by_side(model: MachineModel, parts: Mapping[str, PreparedLog]) -> SideB
         }
         for kind, signals in columns.items():
             topics[f"/{kind}/{axis}"] = {n: c[first:] for n, c in signals.items()}
-    return SideBySide(1.0 / next(iter(parts.values())).motion.sample_period, topics)
+    units = {axis: log.motion.units for axis, log in parts.items()}
+    return SideBySide(1.0 / next(iter(parts.values())).motion.sample_period, topics, units)

@@ -11,9 +11,9 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, fitted
 
 from identify import workflow
 from identify.dataset.given_logs import Role
-from identify.output import addition as adding
-from identify.output.addition import addition
-from identify.output.words.selection import moved_in_words
+from identify.output.words.selection import moved_in_words, notes_in_words
+from identify.results import addition as adding
+from identify.results.addition import addition
 from identify.validation import free_run as free_runs
 from identify.workflow import add
 from twin.errors import InputError
@@ -29,15 +29,17 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
 
     def attempt(fit, dataset, effect):
         tried.append((fit, dataset, effect.name))
-        return built(effect, bic={"sx": 40.0, "sy": 70.0}[dataset], axis=dataset[1])
+        return built(effect, after={"sx": 4.0, "sy": 2.0}[dataset], axis=dataset[1])
 
     seen = []
     monkeypatch.setattr(workflow, "fit", lambda *a, **k: seen.append((a, k)) or both)
     monkeypatch.setattr(workflow, "try_effect", attempt)
-    monkeypatch.setattr(workflow, "addition", lambda best, base, *_, why_axis: (best, base))
+    monkeypatch.setattr(workflow, "addition", lambda best, base, *_: (best, base))
+    monkeypatch.setattr(workflow, "_with_notes", lambda made, why_axis: (*made, why_axis))
     wear = CATALOGUE["wear"]
-    best, base = add(wear, made.MODEL, "logs", "held", "test", test_function=0.07)
+    best, base, why = add(wear, made.MODEL, "logs", "held", "test", test_function=0.07)
     assert (best.axis, base) == ("y", both.fits["y"])
+    assert why == "of axes x, y, axis y has the most evidence for it"
     assert [t[1:] for t in tried] == [("sx", "wear"), ("sy", "wear")]
     assert [t[0] for t in tried] == list(both.fits.values())
     assert seen[0][0][1:] == ("logs", "held", "test")
@@ -57,7 +59,9 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
 @pytest.mark.parametrize("kept", [True, False])
 def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     base = built_fit(7.3)
-    best = built("cogging", fit=built_fit(2.9, axis=axis_of(fitted("cogging"))), t=9 if kept else 1)
+    best = built(
+        "cogging", fit=built_fit(2.9, axis=axis_of(fitted("cogging"))), t=9 if kept else 0.9
+    )
     dataset = replace(made.DATASET, holdout=("held",), test=("test",))
     model = MachineModel("m", {"x": PLAIN, "y": replace(PLAIN, mass=3.0)})
     runs = []
@@ -93,10 +97,15 @@ def test_an_addition_records_errors_before_and_after(monkeypatch, kept):
     assert [r[2] for r in runs].count("MujocoSimulator") == 1
     assert next(r[0] for r in runs if r[2] == "MujocoSimulator") == 2
     assert (found.moved[0].before, found.moved[0].after) == pytest.approx((7.3, 2.9))
-    assert found.notes[0] == moved_in_words(found.moved[0])
+    kept_notes, notes = notes_in_words(found)
+    assert kept_notes[0] == moved_in_words(found.moved[0])
+    assert notes == kept_notes, "test logs decided nothing, so nothing is said of them"
     assert found.set_aside == ("empirical_map",)
-    assert "empirical_map was removed" in found.notes[1]
+    assert "empirical_map was removed" in notes[1]
     assert found.model.axes["x"] is best.fit.axis
     assert found.model.history == (step,)
-    assert (found.position_log, found.why_axis) == (dataset.fit[0].motion.name, None)
+    assert found.position_log == dataset.fit[0].motion.name
+    told = found.with_notes(kept_notes, ("because", *notes))
+    assert told.step.notes == told.model.history[-1].notes == kept_notes
+    assert told.notes == ("because", *notes)
     assert found.kept is kept

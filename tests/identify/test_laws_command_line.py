@@ -11,6 +11,7 @@ import pytest
 from stubbed_cli import stub, stubbed
 
 import identify.demo
+import identify.experiment_design.signature
 import identify.output.report
 import identify.output.signature
 import identify.selftest
@@ -220,13 +221,14 @@ def test_effects(monkeypatch, cli):
     monkeypatch.setattr(machine_text, "effect_text", lambda effect: f"one {effect}")
     monkeypatch.setattr(machine_json, "effect_json", lambda effect: {"is": effect})
     draw = stub(monkeypatch, identify.output.signature, "draw")
+    own = identify.experiment_design.signature
+    monkeypatch.setattr(own, "signature", lambda effect, known: ("motion", f"force of {effect}"))
     assert cli("effects") == (0, "all 2\n", "")
     code, out, err = cli("effects", "--plot", "w.svg")
     assert (code, out, err) == (2, "", "twin: --plot w.svg: draws one effect; give its NAME\n")
     assert json.loads(cli("effects", "--json")[1]) == {"effects": [{"is": []}, {"is": "W"}]}
     assert cli("effects", "wear", "--plot", "w.svg") == (0, "one W\n", "")
-    (chosen, catalogue, path), _ = draw.only
-    assert (chosen, catalogue["wear"], path) == ("W", "W", Path("w.svg"))
+    assert draw.only[0] == ("W", "motion", "force of W", Path("w.svg"))
     assert json.loads(cli("effects", "wear", "--json")[1]) == {"is": "W"}
 
 

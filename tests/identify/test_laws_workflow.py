@@ -3,37 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import built_results as made
 import numpy as np
 import pytest
-from built_fits import axis_of, built, built_fit, fitted
+from built_fits import CATALOGUE, axis_of, built, built_fit, fitted
+from report_cases import Case, cogging_case
 
 from identify import workflow
 from identify.dataset.given_logs import Role
-from identify.estimation import errors
-from identify.output import results
+from identify.output.text import diagnose_text
 from identify.output.words.selection import moved_in_words
 from identify.selection import confounded
 from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import Verdict
 
-# The rules as they were decided.
-LEAST_FORCE, AT_FLOOR, MOST_TOLD = 0.1, 1.3, 3
-
-
 # --- the axis of the answer -----------------------------------------------------------------
 
 
 def axis_with(verdict: Verdict, bic: float = 1.0, ratio: float = 2.0):
-    steps = made.diagnosis_of().steps[:1] if verdict is Verdict.MISSING_EFFECTS else ()
     ranking = (built("wear", bic=bic),)
-    return made.diagnosis_of(verdict, steps=steps, ranking=ranking, base=built_fit(ratio, 1.0))
+    return made.diagnosis_of(verdict, ranking=ranking, base=built_fit(ratio, 1.0))
 
 
 def leading(**axes) -> str:
-    found = workflow.Diagnosis(made.MODEL, axes, made.Comparison(made.MODEL, {}))
+    found = workflow.Diagnosis(made.MODEL, axes, made.Comparison(made.MODEL, {}), {})
     return next(name for name, d in axes.items() if d is found.leading)
 
 
@@ -96,144 +90,41 @@ def test_a_strength_collapsed_where_less_than_a_third_is_left(monkeypatch, f0, s
     assert moved(monkeypatch, {"F0": 0.039}, {"F0": 0.0}) == ()
 
 
-# --- fit, compare, diagnose -----------------------------------------------------------------
+# --- what a diagnosis and an addition hand on ------------------------------------------------
 
 
-def handed(monkeypatch):
-    """The loop's parts stubbed: each says what it was given."""
-    datasets = {a: replace(made.DATASET, axis=a) for a in ("x", "y")}
-    seen = {}
-
-    def read(*asked):
-        seen["datasets"] = asked
-        return dict(datasets)
-
-    def aligned(axis, dataset):
-        aligned_dataset = replace(dataset, channel_delay=axis.mass / 1e4)
-        return aligned_dataset, built_fit(axis.mass, axis=replace(axis, mass=2 * axis.mass))
-
-    monkeypatch.setattr(workflow, "datasets", read)
-    monkeypatch.setattr(workflow, "fit_aligned", aligned)
-    monkeypatch.setattr(workflow, "with_own_noise", lambda fit, dataset: (dataset, fit))
-    monkeypatch.setattr(workflow, "estimates", lambda fit: ("estimates", fit))
-    monkeypatch.setattr(workflow, "intervals_to_keep", lambda fit, found: (fit.error, found))
-    monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
-    monkeypatch.setattr(errors, "error_on", lambda axis, logs: np.full(5, axis.mass * len(logs)))
-    monkeypatch.setattr(results, "refit", lambda *given: given)
-    monkeypatch.setattr(workflow, "telling", lambda dataset, sticks: dataset)
-    monkeypatch.setattr(workflow, "require_residual", lambda axis, dataset: None)
-    return seen
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return cogging_case()
 
 
-def test_a_fit_takes_over_the_values_and_the_shift_of_each_axis(monkeypatch):
-    seen, bars = handed(monkeypatch), []
-    found = workflow.fit(
-        made.MODEL, "logs", "held", "test", catalogue="known", test_function=0.07,
-        progress=lambda *done: bars.append(done),
-    )  # fmt: skip
-    assert seen["datasets"] == (made.MODEL, "logs", "held", 0.07, "test")
-    assert bars == [("fitting", 1, 2), ("fitting", 2, 2)]
-    assert {a: m.mass for a, m in found.model.axes.items()} == {"x": 10.6, "y": 15.8}
-    assert {a: s.channel_delay for a, s in found.datasets.items()} == {"x": 5.3e-4, "y": 7.9e-4}
-    assert found.holdout_error == pytest.approx({"x": 10.6, "y": 15.8})
-    assert found.model.intervals == {a: (f.error, ("estimates", f)) for a, f in found.fits.items()}
-    assert all(found.estimates[a] == ("estimates", found.fits[a]) for a in "xy")
-    assert found.refits == {a: (made.MODEL.axes[a], found.fits[a], "known") for a in "xy"}
-    assert found.test_error == {"x": None, "y": None}
-    bare = replace(made.DATASET, holdout=())
-    assert workflow.error_if_any(Role.SELECTION, found.fits["x"], bare) is None
-    assert len(workflow.fit(made.MODEL, "logs").catalogue) == 0
-    assert seen["datasets"][2] == {}
+def test_the_comparison_of_a_diagnosis_is_of_its_dataset_over_the_floor_of_its_final_model(case):
+    x, told, compared = case.x, case.diagnosis.told["x"], case.diagnosis.comparison.axes["x"]
+    assert compared.logs is x.dataset.fit
+    assert compared.total_error == pytest.approx(x.base.error)
+    assert compared.floor == told.floor
+    assert told.floor <= x.final.error, "noise is part of what is left"
+    assert set(told.floors) == {Role.TRAINING, Role.SELECTION}
+    assert told.floors[Role.SELECTION] <= told.chosen.after
+    assert case.diagnosis.model.axes["x"] is x.base.axis
+    labels = {e.label for e in told.after} - {e.label for e in told.before}
+    assert labels == {f"cogging.{p.name}" for p in CATALOGUE["cogging"].parameters}
+    assert {m.label for m in told.moved} >= {"coulomb_viscous.Fc"}
 
 
-def test_a_comparison_is_of_the_axes_that_move(monkeypatch):
-    moving = {"y": "dataset y"}
-    monkeypatch.setattr(workflow, "datasets", lambda *given: moving if given[1:] == (
-        "logs", {}, 0.07) else None)  # fmt: skip
-    monkeypatch.setattr(workflow, "telling", lambda dataset, sticks: dataset)
-    monkeypatch.setattr(workflow, "require_residual", lambda axis, dataset: None)
-    monkeypatch.setattr(workflow, "aligned", lambda axis, dataset: (axis.mass, dataset))
-    monkeypatch.setattr(workflow, "noise_known", lambda axis, dataset: (*dataset, axis.mass + 1))
-    asked = []
-
-    def errors(model, found, progress):
-        progress(3, 4)
-        asked.append((model, dict(found)))
-        return {"y": "errors of y"}, {"y": "floors of y"}
-
-    monkeypatch.setattr(workflow, "position_errors", errors)
-    monkeypatch.setattr(workflow, "compare_axis", lambda *given: given)
-    bars = []
-    found = workflow.compare(
-        made.MODEL, "logs", test_function=0.07, progress=lambda *done: bars.append(done)
-    )
-    prepared = (7.9, "dataset y", 8.9)
-    assert found.axes == {"y": (made.MODEL, prepared, "errors of y", "floors of y")}
-    assert (asked, bars) == ([(made.MODEL, {"y": prepared})], [("comparing", 3, 4)])
-    assert found.model is made.MODEL
+def test_what_a_diagnosis_names_is_added_as_it_was_fitted(case):
+    made_of_it = workflow.add_named(case.diagnosis)
+    assert made_of_it.candidate is case.x.best
+    assert made_of_it.kept
+    assert made_of_it.model.axes["x"] is case.x.best.fit.axis
+    assert made_of_it.model.history[-1] == made_of_it.step
+    assert set(made_of_it.step.notes) < set(made_of_it.notes)
+    assert workflow.add_named(case.diagnosis.__class__(
+        case.diagnosis.model, {"x": case.quiet}, case.diagnosis.comparison, {}
+    )) is None  # fmt: skip
 
 
-def test_a_diagnosis_hands_each_axis_its_own_fit_and_dataset(monkeypatch):
-    described = made.MODEL.with_axis("x", axis_of(fitted("empirical_map")))
-    result = made.fit_result()
-    asked = {}
-
-    def fit(*given, **named):
-        asked.update(given=given, named=named)
-        return result
-
-    def diagnose_axis(fit, dataset, catalogue, progress):
-        progress(1, 2)
-        told = SimpleNamespace(
-            axis=dataset.axis, fit=fit, catalogue=catalogue, dataset=dataset,
-            base=f"base of {dataset.axis}", with_named=f"fit of {dataset.axis}",
-            unexplained=dataset.axis == "y",
-        )  # fmt: skip
-        return SimpleNamespace(with_findings=lambda: told)
-
-    bars = []
-    monkeypatch.setattr(workflow, "fit", fit)
-    monkeypatch.setattr(workflow, "diagnose_axis", diagnose_axis)
-    monkeypatch.setattr(workflow, "usable", lambda catalogue, model: catalogue)
-    monkeypatch.setattr(workflow, "next_experiments", lambda *given: (given, "not planned"))
-    monkeypatch.setattr(workflow, "_compared", lambda *given: given)
-    monkeypatch.setattr(workflow, "worst_region", lambda *given: given)
-    monkeypatch.setattr(workflow, "refit", lambda *given: given)
-    progress = lambda *done: bars.append(done)  # noqa: E731
-    found = workflow.diagnose(
-        described,
-        "logs",
-        "held",
-        "test",
-        catalogue="known",
-        test_function=0.07,
-        progress=progress,
-    )
-    assert asked["given"] == (made.MODEL, "logs", "held", "test")
-    assert asked["named"] == {"catalogue": "known", "test_function": 0.07, "progress": progress}
-    for axis in "xy":
-        d = found.axes[axis]
-        assert (d.axis, d.fit, d.catalogue) == (axis, result.fits[axis], "known")
-    assert bars == [(f"trying effects on {a}", 1, 2) for a in "xy"]
-    assert found.next_experiments == (found.axes, result.model, 0.07)
-    assert found.not_planned == "not planned"
-    assert found.comparison == (result.model, result.datasets, progress)
-    assert found.refits == {a: (made.MODEL.axes[a], f"base of {a}", "known") for a in "xy"}, (
-        "of the fit that the answer starts from"
-    )
-    assert found.left_over == {"y": ("fit of y", result.datasets["y"])}
-
-
-def test_what_a_diagnosis_names_is_added_as_it_was_fitted(monkeypatch):
-    """One of a pair was fitted beside the other, so that it has to be fitted by itself."""
-    monkeypatch.setattr(workflow, "addition", lambda best, base, *_: (best, base))
-
-    def added(found):
-        return workflow.add_named(workflow.Diagnosis(made.MODEL, {"x": found}, made.compared()))
-
-    paired = axis_with(Verdict.MISSING_EFFECTS)
-    assert paired.best is not None
-    alone = replace(paired, ranking=(paired.best,))
-    assert added(alone) == (alone.best, alone.base)
-    assert added(paired) is None
-    assert added(axis_with(Verdict.UNEXPLAINED)) is None
+def test_a_result_prints_the_text_of_its_command(case):
+    assert str(case.diagnosis) == diagnose_text(case.diagnosis)
+    assert str(case.addition).startswith("added cogging to axis x\n")
+    assert str(case.diagnosis.comparison).startswith("axis x, run 1: force error")

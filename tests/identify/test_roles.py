@@ -14,7 +14,7 @@ from identify.dataset.dataset import datasets
 from identify.dataset.given_logs import Role
 from identify.estimation.channel_delay import realigned
 from identify.output.diagnosis_json import diagnose_json
-from identify.output.results import Diagnosis
+from identify.results.results import Diagnosis
 from identify.workflow import add_named, diagnose
 from twin.effects import Catalogue
 from twin.errors import InputError

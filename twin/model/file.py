@@ -15,7 +15,7 @@ from twin.effects import Catalogue
 from twin.entries import read_entries, read_toml
 from twin.errors import InputError, at
 from twin.files import write_atomically
-from twin.model.intervals import ENTRY, intervals_table, read_intervals
+from twin.model.intervals_file import ENTRY, intervals_table, read_intervals
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.schema import AxisEntry, EffectEntry, ModelFile
 from twin.model.units import LINEAR, ROTARY, AxisUnits

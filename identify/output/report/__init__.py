@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from identify.dataset.given_logs import Role
-from identify.output.addition import Addition
 from identify.output.report import (
     answer,
     equations,
@@ -27,7 +26,8 @@ from identify.output.report.drawing import drawing_style
 from identify.output.report.html import page
 from identify.output.report.subject import Subject
 from identify.output.report.units import quantity
-from identify.output.results import Comparison, Diagnosis
+from identify.results.addition import Addition
+from identify.results.results import Comparison, Diagnosis
 from twin.files import require_writable, write_atomically
 from twin.model.history import HistoryStep
 

@@ -5,25 +5,35 @@ from __future__ import annotations
 from identify.dataset.given_logs import Role
 from identify.estimation.decision import RULE
 from identify.experiment_design.plan import Plan
-from identify.output.addition import Addition
 from identify.output.report.blocks import Answer, Section, Tile, Tone
-from identify.output.report.subject import Subject
+from identify.output.report.subject import Subject, what_was_found
 from identify.output.report.units import SCALED, Scale, number, quantity, spaced
 from identify.output.words.experiment_design import gap_in_words
-from identify.output.words.findings import advice, finding_in_words, shares_in_words
+from identify.output.words.findings import (
+    advice,
+    also_seen_in_words,
+    finding_in_words,
+    next_command,
+    shares_in_words,
+    together_in_words,
+)
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import (
+    also_chose_in_words,
     dependence_in_words,
     named_in_words,
+    not_confirmed_in_words,
     refit_in_words,
     remainder_in_words,
     tested_on,
     verdict_in_words,
 )
-from identify.output.words.steps import support_in_words, together_in_words
+from identify.output.words.steps import why_not
 from identify.output.words.validation import region_in_words
+from identify.results.addition import Addition
+from identify.results.told import Told
+from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.scoring import Candidate
 from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
 from twin.model.units import AxisUnits
@@ -47,8 +57,8 @@ def section(subject: Subject) -> Section:
 def _diagnosed(
     axis: AxisComparison, found: AxisDiagnosis, following: Plan | None, subject: Subject
 ) -> Answer:
-    remarks: list[str] = []
-    refit = subject.refit(axis.axis)
+    told = subject.told(axis.axis)
+    assert told is not None  # of whatever was diagnosed
     sentence = axis.units.words(verdict_in_words(found))
     if remains := remainder_in_words(found, SCALED):
         sentence = f"{sentence} {capitalised(remains)}"
@@ -56,35 +66,38 @@ def _diagnosed(
         sentence = f"{sentence} {dependence_in_words(found.unexplained, SCALED)}"
     if region := subject.left_over(axis.axis):
         sentence = f"{sentence} It is largest at {region_in_words(region, SCALED)}."
-    remarks.extend(
-        axis.units.words(f"{capitalised(spaced(finding_in_words(f, SCALED)))}")
-        for f in found.findings
-    )
-    remarks.extend(capitalised(text) for text in shares_in_words(found))
-    if found.best is not None and not found.findings:
-        remarks.append(_left_over(found.best))
-    remarks.extend(capitalised(text) for text in together_in_words(found))
-    remarks.extend(_runner_up(found))
-    if found.unexplained is not None:
-        remarks.append(f"{advice(found.findings)}.")
-    if following is not None:
-        remarks.append(_next_step(following))
-    if (
-        found.verdict is Verdict.NOTHING_MISSING
-        and refit
-        and (changed := refit_in_words(refit, SCALED))
-    ):
-        remarks.append(capitalised(changed))
     return Answer(
         headline=f"Axis {axis.axis}: {_headline(found)}",
         sentence=sentence,
-        tiles=_tiles(axis, found),
-        remarks=remarks,
+        tiles=_tiles(axis, found, told),
+        remarks=_remarks(axis, found, following, subject.refit(axis.axis)),
         tone=Tone.PLAIN if found.verdict is Verdict.NOTHING_MISSING else Tone.STRONG,
     )
 
 
+def _remarks(
+    axis: AxisComparison, found: AxisDiagnosis, following: Plan | None, refit: Refit | None
+) -> list[str]:
+    """What each finding explains, what else was seen, and what to do next."""
+    findings = (spaced(". ".join(finding_in_words(f, SCALED))) for f in found.findings)
+    said = [
+        *(axis.units.words(text) for text in findings), *shares_in_words(found),
+        *together_in_words(found), *also_seen_in_words(found), *_runner_up(found),
+    ]  # fmt: skip
+    if following is not None:
+        said.append(_next_step(following))
+    if found.verdict is Verdict.NOTHING_MISSING and refit:
+        said.append(refit_in_words(refit, SCALED) or "")
+    out = [capitalised(text) for text in (*said, *next_command(found)) if text]
+    return out if found.unexplained is None else [*out, f"{advice(found.findings)}."]
+
+
 def _headline(found: AxisDiagnosis) -> str:
+    against = not_confirmed_in_words(found)
+    return _answer(found) + (f" ({spaced(against)})" if against else "")
+
+
+def _answer(found: AxisDiagnosis) -> str:
     match found.verdict:
         case Verdict.MISSING_EFFECTS:
             return f"{spaced(named_in_words(found))} {'are' if found.named[1:] else 'is'} missing"
@@ -96,25 +109,14 @@ def _headline(found: AxisDiagnosis) -> str:
             return "nothing is missing"
 
 
-def _left_over(best: Candidate) -> str:
-    name, fit = spaced(best.effect.name), best.fit
-    error = fit.axis.units.words("force error")
-    if fit.at_floor:
-        return f"With {name} the {error} is at its noise floor."
-    return (
-        f"With {name} the {error} is still {number(fit.ratio)} times its noise floor: add it, "
-        "then diagnose again."
-    )
-
-
 def _runner_up(found: AxisDiagnosis) -> list[str]:
-    others = found.ranking[1:] if found.best else found.ranking
+    others = [c for c in found.ranking if c.effect.name not in found.named]
     if not others:
         return []
     second = others[0]
     change = _change(found.dataset.units.force, second.gain.before, second.gain.after)
     role = "Runner-up" if found.best else "Nearest candidate"
-    verdict = support_in_words(found, second)
+    verdict = why_not(found, second) or "proved too"
     return [
         f"{role}: {spaced(second.effect.name)}, ΔBIC {number(second.delta_bic)}, "
         f"{tested_on(found)} error {change}, {verdict}."
@@ -138,36 +140,35 @@ def _change(unit: str, before: float, after: float) -> str:
     return f"{number(before / scale.size)} → {scale.text(after)}"
 
 
-def _tiles(axis: AxisComparison, found: AxisDiagnosis) -> list[Tile]:
-    base, best = found.base, found.best
+def _tiles(axis: AxisComparison, found: AxisDiagnosis, told: Told) -> list[Tile]:
+    base, final, floor = found.base, found.final, told.floor
     unit, words = axis.units.force, axis.units.words
-    if best is None:
-        errors = _error_tiles(base.error, base.floor, axis.units)
-        return [*errors, *_test_tile(found), *_position_tile(axis, "")]
-    final = found.with_named
-    named = spaced(best.effect.name) if len(found.named) == 1 else "all that is named"
+    if final is base:
+        errors = _error_tiles(base.error, floor, axis.units)
+        return [*errors, *_test_tile(found, told), *_position_tile(axis, "")]
+    named = what_was_found(found)
     return [
         Tile(
             words("Force error on the fit logs"),
             _change(unit, base.error, final.error),
             f"with {named}, RMS",
         ),
-        *_chosen_tile(found, named),
-        *_test_tile(found),
+        *_chosen_tile(found, told, named),
+        *_test_tile(found, told),
         Tile(
             "Error over noise floor",
-            f"{number(base.error / final.floor)} → {number(final.ratio)}",
-            f"fit logs; floor {quantity(final.floor, unit)} RMS",
+            f"{number(base.error / floor)} → {number(final.error / floor)}",
+            f"fit logs; floor {quantity(floor, unit)} RMS",
         ),
         *_position_tile(axis, f", without {named}"),
     ]
 
 
-def _chosen_tile(found: AxisDiagnosis, named: str) -> list[Tile]:
+def _chosen_tile(found: AxisDiagnosis, told: Told, named: str) -> list[Tile]:
     """The error on held-out logs; without them one effect has the error of cross-validation."""
     units = found.dataset.units
     if found.dataset.holdout:
-        chosen = found.chosen
+        chosen = told.chosen
         error = _change(units.force, chosen.before, chosen.after)
         return [Tile(units.words("Held-out force error"), error, f"with {named}, RMS")]
     if found.best is None or len(found.named) > 1:
@@ -177,15 +178,15 @@ def _chosen_tile(found: AxisDiagnosis, named: str) -> list[Tile]:
     return [Tile(units.words("Cross-validated force error"), error, t)]
 
 
-def _test_tile(found: AxisDiagnosis) -> list[Tile]:
+def _test_tile(found: AxisDiagnosis, told: Told) -> list[Tile]:
     """The error on test logs without and with what is named, where there are such logs."""
-    tested, units = found.tested, found.dataset.units
+    tested, units = told.tested, found.dataset.units
     if tested.on is not Role.TEST:
         return []
     error, what = quantity(tested.before, units.force), "RMS"
-    if found.with_named is not found.base:
+    if found.final is not found.base:
         error = _change(units.force, tested.before, tested.after)
-        what = "with what is named, RMS"
+        what = f"with {what_was_found(found)}, RMS"
     return [Tile(units.words("Test force error"), error, what)]
 
 
@@ -248,16 +249,16 @@ def _added(addition: Addition) -> Answer:
         replayed = f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo"
         tiles.append(Tile(words("Position, free run"), moved, replayed))
     outcome = "given the shape found" if step.action == "shape" else "added"
-    sentence = f"The evidence and {addition.judged_by} support the effect."
+    sentence = "The logs prove the effect."
     if not addition.kept:
         sentence = (
-            f"The evidence and {addition.judged_by} do not both support this effect; leave it out, "
+            f"The logs do not prove this effect: {addition.candidate.refused}; leave it out, "
             "unless a diagnosis says that it needs another beside it."
         )
     return Answer(
         headline=f"Axis {step.axis}: {spaced(step.effect)} {outcome}",
         sentence=sentence,
         tiles=tiles,
-        remarks=[] if addition.also_chose is None else [capitalised(addition.also_chose)],
+        remarks=[capitalised(also)] if (also := also_chose_in_words(addition.told_on)) else [],
         tone=Tone.STRONG if addition.kept else Tone.PLAIN,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,11 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
-from identify.output.addition import Addition
+from identify.dataset.given_logs import Role
 from identify.output.report.blocks import Block, Column, Heading, Picture, Row, Section, Table
-from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
+from identify.output.report.drawing import BLUE, GREY, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, number, spaced, title_case
+from identify.results.addition import Addition
 from twin.model.history import HistoryStep
 from twin.model.units import units_of
 
@@ -27,8 +28,7 @@ def section(subject: Subject) -> Section | None:
     for axis, steps in _by_axis(subject.steps).items():
         if len(_by_axis(subject.steps)) > 1 or subject.heading(axis):
             blocks.append(Heading(f"Axis {axis}"))
-        compared = subject.comparison.axes.get(axis)
-        blocks.append(_picture(steps, compared.floor if compared else None))
+        blocks.append(_picture(steps, subject.floors(axis)))
         blocks.append(_table(steps))
     if subject.additions:
         blocks.append(_positions(subject.additions))
@@ -42,15 +42,15 @@ def _by_axis(steps: Sequence[HistoryStep]) -> dict[str, list[HistoryStep]]:
     return out
 
 
-def _picture(steps: Sequence[HistoryStep], floor: float | None) -> Picture:
+def _picture(steps: Sequence[HistoryStep], floors: Mapping[Role, float]) -> Picture:
     caption = (
         "Force error after each effect was added and the model refitted. A real effect lowers the "
         "held-out error as much as the error on the fit logs."
     )
-    return Picture(_figure(steps, floor), units_of(steps[0].unit).words(caption))
+    return Picture(_figure(steps, floors), units_of(steps[0].unit).words(caption))
 
 
-def _figure(steps: Sequence[HistoryStep], floor: float | None) -> Figure:
+def _figure(steps: Sequence[HistoryStep], floors: Mapping[Role, float]) -> Figure:
     fit = [steps[0].fit_error_before, *(s.fit_error_after for s in steps)]
     held = _numbers([steps[0].holdout_error_before, *(s.holdout_error_after for s in steps)])
     figure = new_figure(3.2)
@@ -63,8 +63,7 @@ def _figure(steps: Sequence[HistoryStep], floor: float | None) -> Figure:
     if np.isfinite(tested).any():
         axes.plot(scale(tested), "^-.", color=GREY, label="test", linewidth=1.6)
     _number_points(axes, scale(fit), scale(held))
-    if floor is not None:
-        axes.axhline(float(scale(floor)), color=INK, linestyle=":", label="noise floor")
+    _draw_floors(axes, scale, floors, {Role.TRAINING: fit[-1], Role.SELECTION: float(held[-1])})
     names = ["at the start", *(_label(s) for s in steps)]
     axes.set_xticks(range(len(names)), names)
     axes.set_yscale("log")
@@ -76,6 +75,19 @@ def _figure(steps: Sequence[HistoryStep], floor: float | None) -> Figure:
     axes.set_ylabel(scale.label(units_of(steps[0].unit).words("Force error, RMS")))
     figure.legend(loc="outside upper right", ncols=3)
     return figure
+
+
+def _draw_floors(
+    axes: Axes, scale: Scale, floors: Mapping[Role, float], last: Mapping[Role, float]
+) -> None:
+    """The noise floor of the logs of each role whose error is drawn.
+
+    A history from a file may be of other logs; where it ends below the floor of these, it is.
+    """
+    for role, color in ((Role.TRAINING, BLUE), (Role.SELECTION, ORANGE)):
+        if role in floors and last[role] >= floors[role]:
+            label = f"noise floor, {role.value} logs"
+            axes.axhline(float(scale(floors[role])), color=color, linestyle=":", label=label)
 
 
 def _numbers(values: Sequence[float | None]) -> Array:

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from identify.estimation.evidence import rms
 from identify.output.report.blocks import Block, Heading, Picture, Section
 from identify.output.report.drawing import (
     BLUE,
@@ -21,8 +20,8 @@ from identify.output.report.drawing import (
     noise_band,
     symmetric_limit,
 )
-from identify.output.report.subject import LogForces, Subject, log_forces
-from identify.output.report.units import Scale, spaced
+from identify.output.report.subject import LogForces, Subject, forces_by_log
+from identify.output.report.units import Scale
 from identify.validation.misfit_maps import AxisComparison
 from twin.model.units import units_of
 
@@ -47,14 +46,10 @@ def _words(subject: Subject) -> str:
 
 
 def _picture(subject: Subject, axis: AxisComparison) -> Picture:
-    best = subject.named(axis.axis)
-    forces = [
-        log_forces(log, subject.model(axis.axis), best.fit.axis if best else None)
-        for log in axis.logs
-    ]
+    forces = forces_by_log(axis, subject.model(axis.axis).mass, subject.final(axis.axis))
     shown = min(forces, key=lambda f: abs(_error(f, slice(None)) - axis.total_error))
     span = representative(shown, STRETCH)
-    named = spaced(best.effect.name) if best else ""
+    named = subject.found_on(axis.axis)
     force = axis.units.words("force")
     caption = (
         f"Log {shown.name}: the {force} that the model must explain (command less inertia) and the "
@@ -66,7 +61,8 @@ def _picture(subject: Subject, axis: AxisComparison) -> Picture:
 
 def _error(forces: LogForces, part: slice) -> float:
     left = (forces.explain - forces.model)[part]
-    return rms(left[np.isfinite(left)])
+    seen = left[np.isfinite(left)]
+    return float(np.sqrt(np.mean(seen**2))) if len(seen) else np.nan
 
 
 def representative(forces: LogForces, length: float) -> slice:
@@ -122,8 +118,8 @@ def _lines(forces: LogForces, named: str) -> list[_Line]:
         _Line("measured (command less inertia)", forces.explain, MEASURED, 3.0),
         _Line("model", forces.model, BLUE, 1.2),
     ]
-    if forces.named is not None:
-        lines.append(_Line(f"model with {named}", forces.named, ORANGE, 1.2))
+    if forces.found is not None:
+        lines.append(_Line(f"model with {named}", forces.found, ORANGE, 1.2))
     return lines
 
 

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from identify.estimation.fit import Fit
-from identify.estimation.intervals import Estimate, estimates, refusal
+from identify.estimation.intervals import Estimate
 from identify.output.report.blocks import Block, Column, Heading, Row, Section, Table, Tone
-from identify.output.report.subject import Subject
-from identify.output.report.units import NOTHING, Scale, number, quantity, spaced
-from identify.output.words.estimation import no_interval_in_words
+from identify.output.report.subject import Subject, what_was_found
+from identify.output.report.units import NOTHING, Scale, number, quantity
+from identify.output.words.estimation import common_reason, no_interval_in_words
+from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.nonparametric import nonparametric_labels
 from twin.model.machine import AxisModel
@@ -23,7 +24,8 @@ def section(subject: Subject) -> Section:
         if heading := subject.heading(axis.axis):
             blocks.append(Heading(heading))
         found = subject.diagnosed(axis.axis)
-        blocks.append(_given(subject.model(axis.axis)) if found is None else _fitted(found))
+        told = subject.told(axis.axis)
+        blocks.append(_fitted(found, told) if found and told else _given(subject.model(axis.axis)))
     return Section("parameters", "Parameters", blocks)
 
 
@@ -44,18 +46,21 @@ def _given(axis: AxisModel) -> Table:
     return Table(columns, rows, "Values of the given model; twin fit adds intervals.")
 
 
-def _fitted(found: AxisDiagnosis) -> Table:
-    """Values of the fitted model, beside those of the model with the named effect."""
-    fits, richest = {"Value": found.base}, found.base
-    if found.best:
-        name, richest = spaced(found.best.effect.name), found.best.fit
-        fits = {f"Without {name}": found.base, f"With {name}": richest}
-    known = {heading: estimates(fit) for heading, fit in fits.items()}
-    base, rich = next(iter(known.values())), list(known.values())[-1]
+def _fitted(found: AxisDiagnosis, told: Told) -> Table:
+    """Values of the fitted model, beside those of the model with what was found."""
+    fits, richest, known = {"Value": found.base}, found.final, {"Value": told.before}
+    if found.final is not found.base:
+        what = what_was_found(found)
+        without, with_it = f"Without {what}", f"With {what}"
+        fits = {without: found.base, with_it: richest}
+        known = {without: told.before, with_it: told.after}
+    base, rich = told.before, told.after
     labels = list(dict.fromkeys(e.label for e in (*rich, *base)))
     meanings = _meanings(richest.axis)
     meanings |= {e.label: f"{meanings[e.label]}, held" for e in rich if not e.free}
-    parts = [_part(heading, fit, known[heading], labels) for heading, fit in fits.items()]
+    parts = [
+        _part(heading, fit, told.floor, known[heading], labels) for heading, fit in fits.items()
+    ]
     columns = [c for part in parts for c in part.columns]
     new = {c.label for c in richest.scaling.where} - {c.label for c in found.base.scaling.where}
     rows = [
@@ -78,17 +83,19 @@ class _Part:
     remark: str
 
 
-def _part(heading: str, fit: Fit, found: Sequence[Estimate], labels: Sequence[str]) -> _Part:
+def _part(
+    heading: str, fit: Fit, floor: float, found: Sequence[Estimate], labels: Sequence[str]
+) -> _Part:
     known = {e.label: e for e in found}
     cells = [_cells(known.get(label)) for label in labels]
     columns = (Column(heading, numeric=True), Column("90 % interval"))
-    if refusal(fit) is None:
+    if common_reason(found) is None:
         return _Part(columns, cells, "")
     # All values have the same reason, so it is in the caption instead of a column.
     error, words = quantity(fit.error, fit.axis.units.force), fit.axis.units.words
     remark = (
         f"{heading}: no intervals, because the {words('force error')} of {error} is "
-        f"{number(fit.ratio)} times the noise floor; the model is wrong by more than noise."
+        f"{number(fit.error / floor)} times the noise floor; the model is wrong by more than noise."
     )
     return _Part(columns[:1], [c[:1] for c in cells], remark)
 

@@ -9,9 +9,12 @@ from identify.output.report.drawing import BLUE, GREY, INK, ORANGE, new_figure
 from identify.output.report.subject import Subject
 from identify.output.report.units import Scale, number, quantity, spaced, title_case
 from identify.output.words.selection import tested_on
-from identify.output.words.steps import partner
+from identify.output.words.steps import why_not
+from identify.results.told import Told
+from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
-from identify.selection.scoring import Candidate
+from twin.effect import Effect
+from twin.model.machine import AxisModel
 
 WITH_VALUES = 3  # candidates whose parameter values are printed
 UNBROKEN = "\u00a0"  # space at which no line ends
@@ -22,24 +25,24 @@ def section(subject: Subject) -> Section | None:
     """A picture and a table for each axis that has candidates."""
     blocks: list[Block] = []
     for axis in subject.axes:
-        found = subject.diagnosed(axis.axis)
-        if found is None or not found.ranking:
+        found, told = subject.diagnosed(axis.axis), subject.told(axis.axis)
+        if found is None or told is None or not found.ranking:
             continue
         if heading := subject.heading(axis.axis):
             blocks.append(Heading(heading))
-        blocks.extend((_picture(found), _table(found)))
+        blocks.extend((_picture(found, told), _table(found)))
     return Section("ranking", "Candidates, ranked", blocks) if blocks else None
 
 
-def _picture(found: AxisDiagnosis) -> Picture:
+def _picture(found: AxisDiagnosis, told: Told) -> Picture:
     caption = (
         f"Force error on {tested_on(found)} data after each effect was added and everything "
         "refitted: a missing effect brings it from the dashed line towards the noise floor."
     )
-    return Picture(_figure(found), found.dataset.units.words(caption))
+    return Picture(_figure(found, told), found.dataset.units.words(caption))
 
 
-def _figure(found: AxisDiagnosis) -> Figure:
+def _figure(found: AxisDiagnosis, told: Told) -> Figure:
     figure = new_figure(0.9 + 0.27 * len(found.ranking))
     axes = figure.subplots()
     before, after = found.ranking[0].gain.before, [c.gain.after for c in found.ranking]
@@ -49,7 +52,8 @@ def _figure(found: AxisDiagnosis) -> Figure:
     colors = [ORANGE if c is found.best else BLUE if c.supported else GREY for c in found.ranking]
     axes.barh([_label(c) for c in found.ranking], lengths, color=colors, height=0.62)
     axes.axvline(float(scale(before)), color=INK, linestyle="--", label="before")
-    axes.axvline(float(scale(found.base.floor)), color=INK, linestyle=":", label="noise floor")
+    floor = told.floors[found.dataset.chosen_on]
+    axes.axvline(float(scale(floor)), color=INK, linestyle=":", label="noise floor")
     for row, error in enumerate(after):
         cut = "bar cut, " if scale(error) > end else ""
         axes.text(
@@ -81,8 +85,9 @@ def _table(found: AxisDiagnosis) -> Table:
                 number(c.delta_bic),
                 scale.text(c.gain.before),
                 scale.text(c.gain.after),
-                "yes" if c.supported else _unsupported(found, c),
-                values_of(c) if rank < WITH_VALUES else "",
+                f"{100.0 * max(c.part, 0.0):.0f} %" if c.score else "",
+                spaced(why_not(found, c)),
+                values_of(c.effect, c.fit.axis) if rank < WITH_VALUES else "",
             ),
             _tone(found, c),
         )
@@ -93,20 +98,15 @@ def _table(found: AxisDiagnosis) -> Table:
         Column("ΔBIC", numeric=True),
         Column("Error before", numeric=True),
         Column("Error after", numeric=True),
-        Column("Supported"),
+        Column("Part removed", numeric=True),
+        Column("Why not"),
         Column("Values"),
     )
     caption = (
-        f"Error: RMS force, {tested_on(found)}. Supported: the evidence (ΔBIC above 10) and the "
-        "data left out of the fit both favour the effect."
+        f"Error: RMS force, {tested_on(found)}. Part removed: of the squared error above the noise "
+        "floor, on the training logs or on data left out of the fit, whichever is less."
     )
     return Table(columns, rows, found.dataset.units.words(caption))
-
-
-def _unsupported(found: AxisDiagnosis, candidate: Candidate) -> str:
-    """No, unless it is one of two that are needed together."""
-    other = partner(found, candidate.effect.name)
-    return f"only together with {spaced(other)}" if other else "no"
 
 
 def _tone(found: AxisDiagnosis, candidate: Candidate) -> Tone:
@@ -115,9 +115,8 @@ def _tone(found: AxisDiagnosis, candidate: Candidate) -> Tone:
     return Tone.PLAIN if candidate.supported else Tone.MUTED
 
 
-def values_of(candidate: Candidate) -> str:
-    """The fitted values of a candidate's own parameters, with units."""
-    effect = candidate.effect
-    values, units = candidate.fit.axis[effect.name].values, candidate.fit.axis.units
+def values_of(effect: Effect, model: AxisModel) -> str:
+    """The values of an effect's parameters in a model, with units."""
+    values, units = model[effect.name].values, model.units
     texts = (f"{p.name} = {quantity(values[p.name], units(p.unit))}" for p in effect.parameters)
     return ", ".join(t.replace(" ", UNBROKEN) for t in texts)

@@ -12,8 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from identify.dataset.prepared_log import moving
-from identify.estimation.fit import sticks
 from identify.output.report.blocks import Block, Heading, Picture, Section
 from identify.output.report.drawing import (
     BLUE,
@@ -24,9 +22,9 @@ from identify.output.report.drawing import (
     noise_band,
     symmetric_limit,
 )
-from identify.output.report.subject import Subject, shown_residual
-from identify.output.report.units import Scale, quantity, spaced, title_case
-from identify.validation.misfit_maps import AxisComparison, periods, phase_name
+from identify.output.report.subject import Subject, by_log
+from identify.output.report.units import Scale, quantity, title_case
+from identify.validation.misfit_maps import AxisComparison
 from twin.model.units import LINEAR, AxisUnits
 
 Array = NDArray[np.float64]
@@ -49,7 +47,7 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class _Left:
-    """Residual (n,) of the model, and of the model with the named effect, and their floor.
+    """Residual (n,) of the model, and of the model with what was found, and their floor.
 
     In the unit of force of ``units``.
     """
@@ -72,45 +70,39 @@ def section(subject: Subject) -> Section:
 
 
 def _picture(subject: Subject, axis: AxisComparison) -> Picture:
-    best = subject.named(axis.axis)
-    named, label = None, ""
-    if best is not None:
-        rows = [shown_residual(best.fit.axis, log) for log in axis.logs]
-        named = np.concatenate(rows)[_kept(subject, axis)]
-        label = f"mean with {spaced(best.effect.name)}"
+    final, label = subject.final(axis.axis), f"mean with {subject.found_on(axis.axis)}"
+    named = None
+    if final is not None:
+        named = np.concatenate(by_log(axis, final.residual, final.kept))[axis.kept]
     left = _Left(axis.residual, named, label, axis.floor, axis.units)
     caption = (
         "Dots are single test functions, lines the means. A mean outside the noise band shows what "
         "the missing force depends on: a wave along the track, a step with direction, a drift."
     )
-    return Picture(_figure(_views(subject, axis), left), axis.units.words(caption))
+    return Picture(_figure(_views(axis), left), axis.units.words(caption))
 
 
-def _kept(subject: Subject, axis: AxisComparison) -> NDArray[np.bool_]:
-    return moving(axis.logs, sticks(subject.model(axis.axis)))
-
-
-def _views(subject: Subject, axis: AxisComparison) -> Sequence[View]:
+def _views(axis: AxisComparison) -> Sequence[View]:
     where, units = axis.coordinates, axis.units
     views = [
-        View(_running_time(subject, axis), "Time, logs in a row", "s"),
+        View(_running_time(axis), "Time, logs in a row", "s"),
         View(where["velocity"], "Speed", units.velocity),
         View(where["position"], units.words("Position"), units.position),
     ]
     position, travelled = units.words("position"), np.ptp(where["position"])
-    for effect, period in periods(subject.model(axis.axis)).items():
+    for phase, period in axis.periods.items():
         if len(views) < PANELS and travelled > period:
             cycle = quantity(period, units.position)
-            name = f"{title_case(effect)} phase, {position} modulo {cycle}"
-            views.append(View(where[phase_name(effect)], name, units.position))
+            name = f"{title_case(phase)}, {position} modulo {cycle}"
+            views.append(View(where[phase], name, units.position))
     return views
 
 
-def _running_time(subject: Subject, axis: AxisComparison) -> Array:
+def _running_time(axis: AxisComparison) -> Array:
     """Time (n,) s of each residual, as if every log began where the one before it ended."""
     ends = accumulate((float(log.motion.time[-1]) for log in axis.logs), initial=0.0)
     rows = [log.time + start for log, start in zip(axis.logs, ends, strict=False)]
-    return np.concatenate(rows)[_kept(subject, axis)]
+    return np.concatenate(rows)[axis.kept]
 
 
 def _figure(views: Sequence[View], left: _Left) -> Figure:

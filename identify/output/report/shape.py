@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from identify.dataset.prepared_log import on_blocks, total_force
 from identify.output.report.blocks import Block, Heading, Listing, Picture, Section
 from identify.output.report.drawing import BLUE, ORANGE, binned_mean, new_figure
 from identify.output.report.subject import Subject
@@ -13,7 +12,7 @@ from identify.output.report.units import Scale, spaced
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import nonparametric_in_words
 from identify.validation.misfit_maps import AxisComparison
-from twin.model.machine import AxisModel, Fitted
+from twin.model.machine import Fitted
 
 
 def section(subject: Subject) -> Section | None:
@@ -38,8 +37,7 @@ def _picture(axis: AxisComparison, fitted: Fitted) -> Picture:
 
 
 def _figure(axis: AxisComparison, fitted: Fitted) -> Figure:
-    alone = AxisModel(1.0, effects=(fitted,), rotary=axis.units.rotary)
-    force = np.concatenate([total_force(on_blocks(alone), log.motion) for log in axis.logs])
+    force = axis.curves[fitted.effect.name]
     position = np.concatenate([log.motion.position for log in axis.logs])
     velocity = np.concatenate([log.motion.velocity for log in axis.logs])
     figure = new_figure(3.0)

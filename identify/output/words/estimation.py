@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import (
     AlwaysAtRest,
+    Estimate,
     Inseparable,
     ModelWrong,
     NoInterval,
@@ -65,6 +68,12 @@ MOTION_OUTCOMES = {
     Outcome.CONVERGED: "The fit converged: no parameter change lowers the position error further.",
     Outcome.NOT_CONVERGED: OUTCOMES[Outcome.NOT_CONVERGED],
 }
+
+
+def common_reason(found: Sequence[Estimate]) -> NoInterval | None:
+    """Why a fit has no intervals at all; None where it has."""
+    reasons = (e.reason for e in found)
+    return next((r for r in reasons if isinstance(r, AlwaysAtRest | ModelWrong)), None)
 
 
 def no_interval_in_words(reason: NoInterval) -> str:

@@ -22,31 +22,32 @@ ERROR = {
 }
 
 
-def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> str:
-    """E.g. "cogging explains 93 % of the squared error above the noise floor: ..."."""
+def finding_in_words(finding: Finding, numbers: Numbers = PLAIN) -> tuple[str, ...]:
+    """Sentences, e.g. "cogging explains 93 % of the squared error above the noise floor: ..."."""
+    removed, values = _removed(finding), _values(finding, numbers)
+    return (_explained(finding, numbers), *removed, *values, _sure(finding))
+
+
+def _explained(finding: Finding, numbers: Numbers) -> str:
     unit = finding.unit
     error, tested = ERROR[finding.tested.on], finding.tested
     before, after = (numbers.amount(e, unit) for e in (tested.before, tested.after))
-    what, without, with_it = f"{finding.effect} explains", "without it", "with it"
+    what, without, with_it = finding.effect, "without it", "with it"
     if finding.kind is FindingKind.RESEMBLES:
-        what = f"what is missing resembles {finding.effect}, {_in_which_shape(finding)} explains"
+        what = f"what is missing resembles {finding.effect}, {_in_which_shape(finding)}"
     if finding.kind is FindingKind.WRONG_SHAPE:
-        what = f"{finding.effect} has another shape: a free curve beside its law explains"
+        what = f"{finding.effect} has another shape: a free curve beside its law"
         without, with_it = "with the law", "with the curve"
     if finding.bend and finding.kind is FindingKind.WRONG_SHAPE:
         with_it, without = (f"with {value}" for value in _bends_in_words(finding.bend))
-        what = f"{finding.effect} has another shape, which its law {with_it} has: that explains"
-    text = (
-        f"{what} {100.0 * finding.explains:.0f} % of the squared error above the noise floor: "
-        f"{without} the {error} is {before}, {with_it} {after}"
+        what = f"{finding.effect} has another shape, which its law {with_it} has: that"
+    errors = f"{without} the {error} is {before}, {with_it} {after}"
+    if finding.contradicted:
+        return f"{what} is not confirmed by the test logs: {errors}"
+    return (
+        f"{what} explains {100.0 * finding.explains:.0f} % of the squared error above the noise "
+        f"floor: {errors}"
     )
-    sure = (
-        f"confidence {100.0 * finding.confidence:.0f} %: {finding.left:.3g} times the "
-        f"noise floor is left on the {finding.chosen.on.value} logs"
-    )
-    if finding.chosen.on is not Role.TRAINING:
-        sure += f", {finding.left_fitted:.3g} times on the training logs"
-    return "; ".join((text, *_beside_decoys(finding), sure))
 
 
 def _in_which_shape(finding: Finding) -> str:
@@ -65,6 +66,45 @@ def _bends_in_words(bend: Bend) -> list[str]:
     ]
 
 
+def _removed(finding: Finding) -> list[str]:
+    """What it takes in the acceptance test, beside what its controls take."""
+    part, control = (100.0 * max(p, 0.0) for p in (finding.score.part, finding.score.control))
+    return [
+        f"On the logs that decided it removes {part:.0f} % of what is left above the noise floor",
+        "The same force shifted in time, which cannot be real, removes at most "
+        f"{control:.0f} % (19 of 20 times)",
+    ]
+
+
+def _values(finding: Finding, numbers: Numbers) -> list[str]:
+    """The values that a missing effect was found with."""
+    if finding.kind is FindingKind.WRONG_SHAPE or not finding.parameters:
+        return []
+    known = finding.parameters.items()
+    units = finding.parameter_units
+    return [
+        "Found: " + ", ".join(f"{n} = {numbers.amount(v, units.get(n, '1'))}" for n, v in known)
+    ]
+
+
+def _sure(finding: Finding) -> str:
+    """How often such an answer was right, and of what kind it is; none where tests contradict."""
+    if finding.confidence is None:
+        return "No confidence is stated, as the test logs do not confirm it"
+    sure = (
+        f"{100.0 * finding.confidence:.0f} % of such answers were right in the self-test: "
+        f"{_over(finding.left)} times the noise floor is left on the {finding.chosen.on.value} logs"
+    )
+    if finding.chosen.on is not Role.TRAINING:
+        sure += f", {_over(finding.left_fitted)} times on the training logs"
+    return sure
+
+
+def _over(left: float) -> str:
+    """Error over noise floor: noise is part of what is left, and so never more."""
+    return f"{max(left, 1.0):.3g}"
+
+
 def shares_in_words(found: AxisDiagnosis) -> list[str]:
     """That the shares of several findings are no parts of one whole; nothing of a single one."""
     if len(found.findings) < 2:
@@ -75,16 +115,34 @@ def shares_in_words(found: AxisDiagnosis) -> list[str]:
     ]
 
 
-def _beside_decoys(finding: Finding) -> list[str]:
-    """What an effect takes beside what chance would; nothing where it has no decoys."""
-    if finding.proof is None:
+def together_in_words(found: AxisDiagnosis) -> list[str]:
+    """Of named effects that need each other: that they do, and how both are added."""
+    said = []
+    for i, finding in enumerate(found.findings):
+        for other in finding.together:
+            if other in [f.effect for f in found.findings[i + 1 :]]:
+                said.append(_pair_in_words(found, finding.effect, other))
+    return said
+
+
+def _pair_in_words(found: AxisDiagnosis, first: str, second: str) -> str:
+    take = ""
+    above = found.tested.before**2 - found.base.floor**2
+    if len(found.findings) == 2 and above > 0.0:
+        taken = min((found.tested.before**2 - found.tested.after**2) / above, 1.0)
+        take = f"; together they take {100.0 * taken:.0f} % of the squared error above the floor"
+    return (
+        f"{first} and {second} are needed together, so the logs prove neither alone{take}: "
+        f"twin add {first} MODEL LOG... -o first.toml, then twin add {second} first.toml LOG... "
+        "-o both.toml; judge after the second (the first ends with exit code 1)"
+    )
+
+
+def also_seen_in_words(found: AxisDiagnosis) -> list[str]:
+    """Effects that are real and too small to matter, in one line; nothing where there are none."""
+    if not found.small:
         return []
-    gain, decoy = (100.0 * max(p, 0.0) for p in (finding.proof.gain, finding.proof.decoy))
-    where = " in a typical stretch of the log" if finding.proof.typical else ""
-    return [
-        f"tried beside decoys (its force shifted in time) it takes {gain:.0f} % of the squared "
-        f"error left without it{where}, 1 in 20 of them {decoy:.0f} % or more"
-    ]
+    return [f"also seen, too small to matter: {', '.join(found.small)}"]
 
 
 def shape_in_words(effect: str, shape: FoundShape, numbers: Numbers = PLAIN) -> str:
@@ -126,3 +184,13 @@ def advice(findings: Sequence[Finding] = ()) -> str:
     every = load_catalogue().values()
     known = [e.name for e in every if e.is_nonparametric and not e.free_shape]
     return f"twin add {' or '.join(known)} lowers the error by fitted curves, without explaining it"
+
+
+def next_command(found: AxisDiagnosis) -> list[str]:
+    """The command that adds what is named first, where that stands by itself and is confirmed."""
+    if not found.missing:
+        return []
+    first = found.missing[0]
+    if first.together or first.tied or first.contradicted:
+        return []
+    return [f"next: twin add {found.named[0]} MODEL LOG... -o better.toml"]

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.given_logs import Role
-from identify.output.words.numbers import PLAIN, Numbers
+from identify.output.words.numbers import PLAIN, Numbers, capitalised
+from identify.results.addition import Addition
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import FindingKind
 from identify.selection.nonparametric import followed
 from identify.selection.repeating_force import Repeat
 from identify.selection.residual_dependence import Dependence
-from identify.selection.scoring import Candidate
 from twin.model.history import HistoryStep
 from twin.model.machine import Fitted
 from twin.model.units import units_of
@@ -33,16 +33,23 @@ SEVERAL = "Several effects explain the error equally well; these data cannot sep
 
 def verdict_in_words(found: AxisDiagnosis) -> str:
     """The answer of a diagnosis."""
-    if found.ambiguous_with or any(f.tied for f in found.findings):
-        return SEVERAL
+    against = f" {capitalised(but)}." if (but := not_confirmed_in_words(found)) else ""
+    if any(f.tied for f in found.findings):
+        return f"{SEVERAL}{against}"
     if found.verdict is not Verdict.MISSING_EFFECTS:
-        return VERDICTS[found.verdict]
+        return f"{VERDICTS[found.verdict]}{against}"
     lacks, them = ("several effects", "them") if len(found.named) > 1 else ("an effect", "it")
     if found.dataset.holdout:
-        return f"The model lacks {lacks}: the fit logs and the held-out logs prove {them}."
-    return (
-        f"The model lacks {lacks}: the fit logs prove {them}, block by block; no log was held out."
-    )
+        proved = f"the training logs and the selection logs prove {them}"
+    else:
+        proved = f"the training logs prove {them}, block by block; no log was held out"
+    return f"The model lacks {lacks}: {proved}.{against}"
+
+
+def not_confirmed_in_words(found: AxisDiagnosis) -> str | None:
+    """Which findings the test logs contradict; None where they contradict none."""
+    against = [f.effect for f in found.findings if f.contradicted]
+    return f"not confirmed by the test logs: {', '.join(against)}" if against else None
 
 
 def tested_on(found: AxisDiagnosis) -> str:
@@ -64,7 +71,7 @@ def named_in_words(found: AxisDiagnosis) -> str:
 
 def ties_in_words(found: AxisDiagnosis) -> list[str]:
     """What these data cannot separate, one sentence a named effect, each pair once."""
-    ties = {f.effect: f.tied for f in found.findings} or {a[0]: a[1:] for a in found.answers}
+    ties = {f.effect: f.tied for f in found.findings}
     said: list[str] = []
     for name, alike in ties.items():
         if {*alike} - {other for other in said if name in ties[other]}:
@@ -76,7 +83,7 @@ def named_errors_in_words(found: AxisDiagnosis, numbers: Numbers = PLAIN) -> str
     """The force error on the test logs, or on those that also chose, without and with the named."""
     tested, units = found.tested, found.base.axis.units
     before, after = (numbers.amount(e, units.force) for e in (tested.before, tested.after))
-    named = "" if found.with_named is found.base else f", with what is named {after}"
+    named = "" if found.final is found.base else f", with what was found {after}"
     return f"{units.words('force error')} on the {tested.on.value} logs {before}{named}"
 
 
@@ -188,18 +195,10 @@ def step_in_words(step: HistoryStep) -> str:
     return f"added {step.effect} to axis {step.axis}"
 
 
-def addition_notes(
-    added: Candidate,
-    moved: Sequence[MovedParameter],
-    set_aside: Sequence[str],
-    reshaped: str | None = None,
-) -> tuple[str, ...]:
-    """What a reader should know of an added effect, one sentence each.
-
-    reshaped: the effect whose law it gives another shape. set_aside: nonparametric effects that
-    were removed so that the physical effect explains what they had taken over.
-    """
-    notes = [moved_in_words(m) for m in moved]
+def notes_in_words(made: Addition) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What a reader should know of an added effect, one sentence each: for the model, and all."""
+    added, reshaped, set_aside = made.candidate, made.reshaped, made.set_aside
+    notes = [moved_in_words(m) for m in made.moved]
     if added.effect.is_nonparametric:
         notes.insert(0, nonparametric_in_words(added.fit.axis[added.effect.name]))
     if reshaped:
@@ -210,4 +209,5 @@ def addition_notes(
             f"{', '.join(set_aside)} was removed before {added.effect.name} was added; add it "
             "again for the error that is left"
         )
-    return tuple(notes)
+    beside = also_chose_in_words(made.told_on)
+    return tuple(notes), tuple(notes) if beside is None else (*notes, beside)

@@ -12,8 +12,7 @@ from identify.dataset.motion import Motion
 from identify.dataset.noise_floor import floor_of, noise_of, unrounded_floor_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import finished, fit_axis
-from identify.selection.diagnosis import Verdict
-from identify.selection.forward_selection import diagnose_axis
+from identify.selection.diagnosis import Verdict, diagnose_axis
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
 from twin.model.file import load_model

@@ -13,7 +13,7 @@ from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import OpenSided, Side, estimates, refusal
 from identify.estimation.levenberg_marquardt import minimise
-from identify.selection.candidates import try_effect
+from identify.selection.trying import try_effect
 from identify.workflow import diagnose
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate

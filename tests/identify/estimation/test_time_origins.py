@@ -10,9 +10,8 @@ from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import fit_axis
 from identify.estimation.time_origin import time_origins, with_time_origins
-from identify.selection.candidates import try_effect
-from identify.selection.diagnosis import Verdict
-from identify.selection.forward_selection import diagnose_axis
+from identify.selection.diagnosis import Verdict, diagnose_axis
+from identify.selection.trying import try_effect
 from identify.workflow import compare, fit
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate

@@ -8,7 +8,7 @@ from dataclasses import replace
 import built_results as made
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_motion, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, built_motion, fitted, step
 
 from identify.dataset.prepared_log import PreparedLog
 from identify.experiment_design.candidate_experiments import NotRun
@@ -123,10 +123,11 @@ def test_an_ambiguous_diagnosis_asks_for_an_experiment_between_its_rivals(monkey
     assert plans.next_experiment(x, STAGE, 0.07) == "the plan"
     effects = {n: CATALOGUE[n] for n in ("cogging", "quadratic_drag")}
     assert asked == [(tuple(effects), x.dataset.fit, 0.07, (10.0, 3, False, effects))]
-    assert plans.next_experiment(replace(x, verdict=Verdict.UNEXPLAINED), STAGE) is None
-    assert plans.next_experiment(replace(x, ranking=(made.BEST, made.WEAK)), STAGE) is None
-    tied = replace(x.steps[0], tied=("quadratic_drag", "constant_force", "wear"))
-    many = replace(x, steps=(tied,), ranking=(*x.ranking, built("wear")))
+    assert plans.next_experiment(made.diagnosis_of(Verdict.UNEXPLAINED), STAGE) is None
+    assert plans.next_experiment(made.diagnosis_of(findings=ALONE), STAGE) is None
+    others = (made.RIVAL, made.WEAK, built("wear"))
+    tied = replace(ALONE[0], tied=tuple(c.effect.name for c in others))
+    many = made.diagnosis_of(findings=(tied,), steps=(step(made.BEST, *others),))
     plans.next_experiment(many, STAGE)
     assert asked[-1][0] == ("cogging", "quadratic_drag", "constant_force")
 
@@ -149,6 +150,9 @@ def test_an_axis_whose_experiment_cannot_run_says_why(monkeypatch):
     assert plans.next_experiments(axes, STAGE, None) == (
         {"y": "the plan"}, {"x": "axis x has no travel"},
     )  # fmt: skip
+
+
+ALONE = (replace(made.FOUND[0], tied=()),)
 
 
 def planned(monkeypatch):
@@ -194,9 +198,12 @@ def test_a_plan_between_rivals_hands_on_what_it_was_asked(monkeypatch, logs):
     ("changes", "between"),
     [
         ({}, ("cogging", "quadratic_drag")),
-        ({"ranking": (made.BEST, made.WEAK, made.LATER)}, ("cogging", "constant_force")),
+        (
+            {"ranking": (made.BEST, made.WEAK, made.LATER), "findings": ALONE},
+            ("cogging", "constant_force"),
+        ),
         ({"ranking": (made.BEST,)}, ("s",)),
-        ({"steps": (), "verdict": Verdict.NOTHING_MISSING}, ("s",)),
+        ({"verdict": Verdict.NOTHING_MISSING}, ("s",)),
     ],
 )
 def test_without_rivals_a_plan_asks_what_the_diagnosis_leaves_open(monkeypatch, changes, between):

@@ -23,8 +23,6 @@ from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.validation import loop_in_words, region_in_words
 from twin.log.check import CheckReport, Fault, Finding, Severity
 
-pytestmark = pytest.mark.usefixtures("nothing_moved")
-
 
 def test_what_is_not_finite_is_null_at_any_depth():
     values = [math.nan, math.inf, -math.inf, np.float64("nan"), np.float32("inf")]
@@ -150,19 +148,19 @@ def test_the_information_of_one_model_has_no_difference():
 @pytest.mark.parametrize("kept", [True, False])
 def test_an_addition(kept):
     a = made.addition(kept)
-    s = a.step
+    s, c = a.step, a.candidate
     assert strict(add_json(a)) == {
         "action": "add", "effect": "cogging", "axis": "x", "is_nonparametric": False,
-        "kept": kept,
+        "kept": kept, "part": c.part, "why_not": c.refused,
         "fit_error_before": s.fit_error_before, "fit_error_after": s.fit_error_after,
         "holdout_error_before": s.holdout_error_before,
-        "holdout_error_after": s.holdout_error_after, "noise_floor": made.BEST.fit.floor,
+        "holdout_error_after": s.holdout_error_after, "noise_floor": c.fit.floor,
         "test_error_before": s.test_error_before, "test_error_after": s.test_error_after,
         "unit": "N", "position_error_before": a.position_error[0],
         "position_error_after": a.position_error[1], "position_error_in_mujoco": a.replayed,
         "position_error_on": "run 1",
-        "position_unit": "m", "parameters": dict(made.BEST.fit.axis["cogging"].values),
-        "parameter_units": {p.name: p.unit for p in made.BEST.effect.parameters},
+        "position_unit": "m", "parameters": dict(c.fit.axis[c.effect.name].values),
+        "parameter_units": {p.name: p.unit for p in c.effect.parameters},
         "notes": list(a.notes),
     }  # fmt: skip
     unheld = replace(a, step=made.STEPS[2], candidate=made.candidate("wear", 0.5))

@@ -7,16 +7,15 @@ from dataclasses import replace
 import built_results as made
 import numpy as np
 import pytest
-from built_fits import built_fit
 from built_results import Page
 
-from identify.output import remarks as remarks_module
+from identify.dataset.given_logs import Role
+from identify.output.remarks import remarks_on
 from identify.output.report import (
     answer,
     growth,
     maps,
     notes,
-    parameters,
     ranking,
     regions,
     render,
@@ -25,9 +24,9 @@ from identify.output.report import (
 from identify.output.report.blocks import Answer, Heading, Picture, Section, Table, Tile, Tone
 from identify.output.report.html import page
 from identify.output.report.subject import Subject
-from identify.output.report.units import SCALED, number, quantity
+from identify.output.report.units import SCALED, number, quantity, spaced
 from identify.output.words.experiment_design import gap_in_words
-from identify.output.words.findings import advice
+from identify.output.words.findings import advice, finding_in_words, shares_in_words
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import SEVERAL, VERDICTS, refit_in_words
 from identify.output.words.validation import region_in_words
@@ -36,18 +35,13 @@ from identify.selection.findings import FindingKind
 
 
 @pytest.fixture(autouse=True)
-def given_estimates(monkeypatch):
-    """Estimates by the fit's error; pictures and parameters that moved are other tests'."""
+def no_pictures(monkeypatch):
+    """Pictures are other tests'."""
     blank = Picture(None, "")
     for module, name in (
         (growth, "_picture"), (ranking, "_picture"), (maps, "picture"), (regions, "_picture"),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, lambda *_: blank)
-    monkeypatch.setattr(remarks_module, "moved_parameters", lambda before, after: ())
-    known = {made.BEST.fit.error: made.estimates(0.0)}
-    monkeypatch.setattr(
-        parameters, "estimates", lambda fit: known.get(fit.error, made.estimates(0.5)[::2])
-    )
 
 
 def subject_of(diagnosis=None, *, history=made.STEPS, additions=(), **changes) -> Subject:
@@ -76,17 +70,17 @@ def test_the_answer_for_an_ambiguity():
     assert (first.sentence, first.tone) == (SEVERAL, Tone.STRONG)
     tiles = [(t.name, t.value, t.remark) for t in first.tiles]
     ratio = f"{number(8.37 / 2.03)} → {number(3.19 / 2.03)}"
-    chosen = made.diagnosed().axes["x"].chosen
-    held = answer._change("N", chosen.before, chosen.after)
     assert tiles == [
-        ("Force error on the fit logs", "8.37 → 3.19 N", "with all that is named, RMS"),
-        ("Held-out force error", held, "with all that is named, RMS"),
+        ("Force error on the fit logs", "8.37 → 3.19 N", "with all that was found, RMS"),
+        ("Held-out force error", "7.81 → 2.39 N", "with all that was found, RMS"),
         ("Error over noise floor", ratio, "fit logs; floor 2.03 N RMS"),
-        ("Position, free run", "4.29 µm", "RMS of the worst log, without all that is named"),
+        ("Position, free run", "4.29 µm", "RMS of the worst log, without all that was found"),
     ]  # fmt: skip
+    findings = [spaced(". ".join(finding_in_words(f, SCALED))) for f in made.FOUND]
     assert first.remarks == [
-        "With cogging the force error is at its noise floor.",
-        "Runner-up: quadratic drag, ΔBIC 423, held-out error 7.34 → 2.38 N, supported.",
+        *map(capitalised, findings),
+        capitalised(shares_in_words(made.diagnosis_of())[0]),
+        "Runner-up: quadratic drag, ΔBIC 423, held-out error 7.34 → 2.38 N, proved too.",
         "The experiment that decides (8.30 s; twin plan writes it): passes: axis x, span 0.0831 m, "
         "speed 0.0127 m/s, repeats 7. The rival leaves 41.2 mN RMS unexplained, where noise is "
         "11.3 mN; "
@@ -97,7 +91,7 @@ def test_the_answer_for_an_ambiguity():
     words = refit_in_words(made.refit_of(0.01), SCALED)
     assert second.remarks[-1] == f"{words[0].upper()}{words[1:]}."
     assert second.remarks[0].startswith("Nearest candidate: constant force, ΔBIC 66.0")
-    assert second.remarks[0].endswith("not supported.")
+    assert second.remarks[0].endswith("gain uncertain (t = 1.3).")
     assert [(t.name, t.value) for t in second.tiles] == [
         ("Force error", "1.07 N"), ("Error over noise floor", number(1.07 / 0.97)),
         ("Position, free run", "1.90 mm"),
@@ -105,7 +99,7 @@ def test_the_answer_for_an_ambiguity():
 
 
 def test_the_answer_where_error_remains_beside_what_is_named():
-    left = made.diagnosis_of(unexplained=made.STRUCTURE, findings=made.FOUND)
+    left = made.diagnosis_of(unexplained=made.STRUCTURE)
     card, _ = cards(made.diagnosed(left))
     assert card.sentence.startswith(
         f"{SEVERAL} What remains beside the named effects is 3.19 N on the fit logs, "
@@ -114,10 +108,9 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     where = region_in_words(made.LEFT_OVER, SCALED)
     assert card.sentence.endswith(f"It is largest at {where}.")
     assert [r.split(" explains ")[0] for r in card.remarks[:2]] == ["Cogging", "Lugre"]
-    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N; tried beside"
+    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N. On the logs that"
     assert told in card.remarks[0]
     assert "need not sum to 100 %" in card.remarks[2]
-    assert not any("is at its noise floor" in r for r in card.remarks)
 
 
 def test_an_effect_that_a_missing_one_resembles():
@@ -143,19 +136,33 @@ def test_the_answer_for_what_nothing_explains():
     assert "period" not in cards(made.diagnosed(aperiodic))[0].sentence
 
 
-def test_the_answer_for_one_effect_that_leaves_more():
-    best = replace(made.BEST, fit=built_fit(3.1, 1.0, made.BEST.fit.axis))
-    steps = (replace(made.diagnosis_of().steps[0], candidate=best, tied=()),)
+def test_the_answer_for_one_effect_without_held_out_logs():
+    only = (replace(made.FOUND[0], tied=()),)
     one = made.diagnosis_of(
-        Verdict.MISSING_EFFECTS, steps=steps, dataset=replace(made.DATASET, holdout=())
+        findings=only, dataset=replace(made.DATASET, holdout=()), on=Role.TRAINING
     )
     found = made.diagnosed(one)
     card, _ = cards(replace(found, next_experiments={"x": made.plan_of("a", "b", ranking=(
         replace(made.TRIALS[0], gain=1.0),))}))  # fmt: skip
     assert card.headline == "Axis x: cogging is missing"
-    assert "is still 3.10 times its noise floor" in card.remarks[0]
     assert "cross-validated error" in card.remarks[1]
     assert "comes nearest to deciding, but is too short" in card.remarks[2]
+    assert card.remarks[3] == "Next: twin add cogging MODEL LOG... -o better.toml."
+
+
+def test_what_the_test_logs_contradict_stands_in_the_headline():
+    against = replace(made.FOUND[0], tied=(), tested=made.errors(2.17, 2.29, Role.TEST)[0])
+    card, _ = cards(made.diagnosed(made.diagnosis_of(findings=(against,))))
+    assert card.headline == ("Axis x: cogging is missing (not confirmed by the test logs: cogging)")
+    assert not any("% of such answers" in r for r in card.remarks)
+    assert not any(r.startswith("Next: twin add") for r in card.remarks)
+
+
+def test_cross_validated_errors_have_a_tile_of_their_own():
+    one = made.diagnosis_of(
+        findings=made.FOUND[:1], dataset=replace(made.DATASET, holdout=()), on=Role.TRAINING
+    )
+    card, _ = cards(made.diagnosed(one))
     assert [t.name for t in card.tiles][1] == "Cross-validated force error"
 
 
@@ -183,7 +190,8 @@ def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
     ]  # fmt: skip
     assert "1.97 µm replayed by MuJoCo" in first.tiles[2].remark
     assert (first.tone is Tone.STRONG) is kept
-    assert ("held-out logs support" in first.sentence) is kept
+    assert (first.sentence == "The logs prove the effect.") is kept
+    assert ("gain uncertain (t = 1.3)" in first.sentence) is not kept
     assert len(cards(made.diagnosed(), additions=(made.addition(),))) == 2
 
 
@@ -236,7 +244,7 @@ def test_notes_are_said_once():
     (listing,) = notes.section(subject).blocks
     assert listing.items.count("Axis x, cogging added: mass moved.") == 1
     told = [i for i in listing.items if i.startswith("Axis x: ")]
-    expected = remarks_module.remarks(made.diagnosis_of(), made.refit_of(0.0), numbers=SCALED)
+    expected = remarks_on(made.diagnosed(), "x", SCALED)
     assert "after the fit 127 mN" in expected[0]
     assert told == [f"Axis x: {r.removesuffix('.')}." for r in expected]
     assert notes.section(subject_of(history=())) is None

@@ -7,10 +7,8 @@ from dataclasses import replace
 import built_results as made
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built_fit
 
-from identify.estimation.evidence import rms
-from identify.estimation.force_balance import residual
 from identify.output.report import overlay, residuals, shape, whiteness
 from identify.output.report.drawing import (
     BLUE,
@@ -19,7 +17,7 @@ from identify.output.report.drawing import (
     noise_band,
     symmetric_limit,
 )
-from identify.output.report.subject import LogForces, Subject, log_forces, shown_residual
+from identify.output.report.subject import LogForces, Subject, forces_by_log
 from identify.output.report.units import Scale
 from identify.output.words.validation import correlation_in_words, loop_in_words
 from twin.model.machine import Fitted
@@ -41,30 +39,25 @@ def subject_of(diagnosis=None, **changes) -> Subject:
 
 
 def test_forces_add_up_to_the_command_less_inertia():
-    log = made.DATASET.fit[0]
-    sliding = axis_of(mass=4.9).with_effect(fitted("lugre"))
-    richer = sliding.with_effect(fitted("constant_force", F0=0.7))
-    found = log_forces(log, sliding, richer)
-    np.testing.assert_allclose(found.explain, log.command - 4.9 * log.acceleration)
-    np.testing.assert_allclose(found.explain - found.model, residual(sliding, [log]))
-    np.testing.assert_allclose(found.model - found.named, 0.7, atol=1e-9)
-    assert (found.name, log_forces(log, sliding, None).named) == ("run 1", None)
-    np.testing.assert_array_equal(found.time, log.time)
+    final = made.diagnosis_of(final=built_fit(0.5, kept=KEPT, residual=SMALL)).final
+    c = replace(made.comparison_of(), residual=LARGE, kept=KEPT)
+    for i, found in enumerate(forces_by_log(c, 4.9, final)):
+        log = c.logs[i]
+        span = slice(0, len(log)) if i == 0 else slice(len(c.logs[0]), None)
+        np.testing.assert_allclose(found.explain, log.command - 4.9 * log.acceleration)
+        for force, left in ((found.model, LARGE), (found.found, SMALL)):
+            every = np.full(len(KEPT), np.nan)
+            every[KEPT] = left
+            np.testing.assert_allclose(found.explain - force, every[span])
+        assert found.name == log.motion.name
+        np.testing.assert_array_equal(found.time, log.time)
+    assert np.isnan(forces_by_log(c, 4.9, None)[0].model[:10]).all()  # at rest, it tells nothing
+    assert forces_by_log(c, 4.9, None)[0].found is None
 
 
-def test_a_friction_at_rest_is_not_shown():
-    log = made.DATASET.fit[0]
-    still = np.where(np.arange(len(log.motion.velocity)) < 600, 0.0, log.motion.velocity)
-    rest = replace(
-        log, motion=replace(log.motion, signals=np.stack([log.motion.position, still,
-                                                          log.motion.command])),
-    )  # fmt: skip
-    gone = np.isnan(shown_residual(PLAIN, rest))
-    assert gone[:10].all()
-    assert 0 < gone.sum() < len(gone)
-    assert not np.isnan(shown_residual(axis_of().with_effect(fitted("lugre")), rest)).any()
-
-
+SAMPLES = sum(len(log) for log in made.DATASET.fit)
+KEPT = np.arange(SAMPLES) >= 10
+LARGE, SMALL = RNG.standard_normal((2, SAMPLES - 10))
 TIME = np.arange(0.0, 20.0, 0.01)
 
 
@@ -84,7 +77,7 @@ def test_measured_and_modelled_force_are_drawn_whole_and_in_part():
             lines["measured (command less inertia)"].get_ydata(), forces.explain[part]
         )
         np.testing.assert_allclose(lines["model"].get_ydata(), forces.model[part])
-        np.testing.assert_allclose(lines["model with the effect"].get_ydata(), forces.named[part])
+        np.testing.assert_allclose(lines["model with the effect"].get_ydata(), forces.found[part])
         np.testing.assert_allclose(lines["model"].get_xdata(), TIME[part])
         wide = lines["measured (command less inertia)"].get_linewidth()
         assert wide > lines["model"].get_linewidth()  # a model that hides it is seen to fit
@@ -106,31 +99,24 @@ def test_measured_and_modelled_force_are_drawn_whole_and_in_part():
 def test_the_log_shown_is_the_one_nearest_to_the_whole_error(monkeypatch):
     drawn = []
     monkeypatch.setattr(overlay, "_figure", lambda *given: drawn.append(given))
-    made_of = {"run 1": 3.0, "run 2": 1.2}
-    monkeypatch.setattr(
-        overlay, "log_forces",
-        lambda log, model, named: replace(
-            forces_of(made_of[log.motion.name], named is not None), name=log.motion.name
-        ),
-    )  # fmt: skip
     c = made.comparison_of()
-    c = replace(c, residual=0.11 * c.residual / rms(c.residual))
+    sizes = np.repeat([3.0, 1.2], [len(log) for log in c.logs])
+    c = replace(c, residual=sizes * np.where(np.arange(SAMPLES) % 2, 1.0, -1.0))
+    c = replace(c, logs=c.logs, force_error={"run 1": 3.0, "run 2": 1.2})
     picture = overlay._picture(subject_of(), c)
-    assert "Log run 2:" in picture.caption
-    assert drawn[0][0].named is None
+    shown = min((3.0, "run 1"), (1.2, "run 2"), key=lambda one: abs(one[0] - c.total_error))
+    assert f"Log {shown[1]}:" in picture.caption
+    assert drawn[0][0].found is None
     assert drawn[0][2:] == (c.floor, "")
-    overlay._picture(subject_of(made.diagnosed()), c)
-    assert drawn[1][0].named is not None
-    assert drawn[1][3] == "cogging"
+    final = built_fit(0.5, residual=np.full(SAMPLES, 0.5), kept=np.ones(SAMPLES, dtype=bool))
+    overlay._picture(subject_of(made.diagnosed(made.diagnosis_of(final=final))), c)
+    assert drawn[1][0].found is not None
+    assert drawn[1][3] == "all that was found"
 
 
 def test_the_residual_is_seen_against_time_speed_position_and_phase():
-    rolling = made.MODEL.with_axis("x", axis_of(fitted("roller_spikes")))
-    subject = subject_of(comparison=replace(made.compared(), model=rolling))
-    c = subject.axes[0]
-    kept = residuals._kept(subject, c)
-    c = replace(c, residual=c.residual[: kept.sum()])
-    views = residuals._views(subject, c)
+    c = replace(made.comparison_of(), kept=KEPT, periods={"roller_spikes_phase": 0.034})
+    views = residuals._views(c)
     assert [(v.quantity.split(",")[0], v.unit) for v in views] == [
         ("Time", "s"), ("Speed", "m/s"), ("Position", "m"), ("Roller spikes phase", "m"),
     ]  # fmt: skip
@@ -139,9 +125,9 @@ def test_the_residual_is_seen_against_time_speed_position_and_phase():
     assert views[3].values is c.coordinates["roller_spikes_phase"]
     first, second = c.logs
     both = np.concatenate([first.time, second.time + first.motion.time[-1]])
-    np.testing.assert_allclose(views[0].values, both[kept])
+    np.testing.assert_allclose(views[0].values, both[KEPT])
     short = replace(c, coordinates={**c.coordinates, "position": np.linspace(0.0, 0.0339, 9)})
-    assert len(residuals._views(subject, short)) == 3
+    assert len(residuals._views(short)) == 3
 
 
 def test_dots_and_means_of_the_residual():
@@ -166,17 +152,17 @@ def test_dots_and_means_of_the_residual():
     assert len(dots.get_xdata()) == -(-25_000 // 3)
 
 
-def test_the_residual_with_the_named_effect_is_on_the_same_windows(monkeypatch):
+def test_the_residual_of_the_final_model_is_on_the_same_test_functions(monkeypatch):
     drawn = []
     monkeypatch.setattr(residuals, "_figure", lambda views, left: drawn.append(left))
-    subject = subject_of(made.diagnosed())
-    c = subject.axes[0]
+    all_kept = np.ones(SAMPLES, dtype=bool)
+    final = built_fit(0.5, residual=RNG.standard_normal(SAMPLES), kept=all_kept)
+    subject = subject_of(made.diagnosed(made.diagnosis_of(final=final)))
+    c = replace(subject.axes[0], residual=LARGE, kept=KEPT)
     residuals._picture(subject, c)
     (left,) = drawn
-    kept = residuals._kept(subject, c)
-    every = np.concatenate([shown_residual(made.BEST.fit.axis, log) for log in c.logs])
-    np.testing.assert_array_equal(left.named, every[kept])
-    assert (left.label, left.floor) == ("mean with cogging", c.floor)
+    np.testing.assert_array_equal(left.named, final.residual[KEPT])
+    assert (left.label, left.floor) == ("mean with all that was found", c.floor)
     assert left.model is c.residual
 
 
@@ -233,7 +219,10 @@ def test_a_description_is_drawn_forwards_and_backwards():
     names = [p.name for part in effect.parts for p in effect.strengths if p.name in part.strengths]
     values = dict(zip(names, RNG.uniform(0.05, 0.2, len(names)), strict=True))
     description = Fitted.at_start(effect, values)
-    figure = shape._figure(made.comparison_of(), description)
+    c = made.comparison_of()
+    along = RNG.uniform(0.1, 0.3, sum(len(log.motion.position) for log in c.logs))
+    c = replace(c, curves={effect.name: along})
+    figure = shape._figure(c, description)
     left, right = figure.axes
     assert (left.get_xlabel(), right.get_xlabel()) == ("Position (mm)", "Speed (m/s)") or (
         right.get_xlabel() == "Speed (mm/s)"
@@ -241,7 +230,8 @@ def test_a_description_is_drawn_forwards_and_backwards():
     forwards, backwards = (lines_of(right)[n].get_xdata() for n in ("forwards", "backwards"))
     assert backwards.max() <= 0.0 <= forwards.min()
     model = replace(made.MODEL, axes={"x": axis_of(description), "y": PLAIN})
-    subject = subject_of(comparison=replace(made.compared(), model=model))
+    axes = {"x": c, "y": made.comparison_of("y")}
+    subject = subject_of(comparison=replace(made.compared(), model=model, axes=axes))
     blocks = shape.section(subject).blocks
     assert len(blocks) == 3
     assert blocks[0].text == "Empirical map on x"

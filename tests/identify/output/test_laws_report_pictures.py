@@ -8,6 +8,7 @@ import built_results as made
 import numpy as np
 import pytest
 
+from identify.dataset.given_logs import Role
 from identify.output.report import growth, maps, ranking, regions
 from identify.output.report.drawing import (
     BLUE,
@@ -33,12 +34,13 @@ def subject_of(diagnosis=None, **changes) -> Subject:
 
 
 def test_the_growth_runs_from_the_first_error_to_the_last():
-    figure = growth._figure(made.STEPS[:2], 1.17)
+    figure = growth._figure(made.STEPS[:2], {Role.TRAINING: 1.17, Role.SELECTION: 1.31})
     (axes,) = figure.axes
     lines = lines_of(axes)
     np.testing.assert_allclose(lines["fit logs"].get_ydata(), [7.31, 4.57, 2.29])
     np.testing.assert_allclose(lines["held out"].get_ydata(), [7.83, 4.91, 2.71])
-    np.testing.assert_allclose(lines["noise floor"].get_ydata(), 1.17)
+    np.testing.assert_allclose(lines["noise floor, training logs"].get_ydata(), 1.17)
+    np.testing.assert_allclose(lines["noise floor, selection logs"].get_ydata(), 1.31)
     assert [t.get_text() for t in axes.get_xticklabels()] == [
         "at the start", "+ cogging", "+ lugre",
     ]  # fmt: skip
@@ -55,14 +57,14 @@ def test_the_growth_runs_from_the_first_error_to_the_last():
 
 def test_of_two_equal_errors_one_number_is_above_and_one_below():
     alike = replace(made.STEPS[0], fit_error_before=3.0, holdout_error_before=3.0)
-    (axes,) = growth._figure([alike], None).axes
+    (axes,) = growth._figure([alike], {}).axes
     sides = [t.xyann[1] > 0 for t in axes.texts if t.get_text() == "3.00"]
     assert sorted(sides) == [False, True]
 
 
 def test_without_held_out_errors_there_is_one_line():
     small = replace(made.STEPS[2], fit_error_before=0.0341, fit_error_after=0.0313)
-    (axes,) = growth._figure([small], None).axes
+    (axes,) = growth._figure([small], {}).axes
     lines = lines_of(axes)
     assert list(lines) == ["fit logs"]
     np.testing.assert_allclose(lines["fit logs"].get_ydata(), [34.1, 31.3])
@@ -71,17 +73,22 @@ def test_without_held_out_errors_there_is_one_line():
     assert all(t.xyann[1] > 0 for t in axes.texts)
 
 
-def test_each_axis_has_the_floor_of_its_own_comparison(monkeypatch):
-    seen = []
-    monkeypatch.setattr(growth, "_figure", lambda steps, floor: seen.append((len(steps), floor)))
-    monkeypatch.setattr(growth, "Picture", lambda figure, caption: growth.Heading(""))
-    growth.section(subject_of())
+def test_no_error_ends_below_the_floor_that_is_drawn():
+    """The history of a file may be of other logs, over another noise."""
+    (axes,) = growth._figure(made.STEPS[:2], {Role.TRAINING: 2.30, Role.SELECTION: 2.30}).axes
+    assert [n for n in lines_of(axes) if "floor" in n] == ["noise floor, selection logs"]
+
+
+def test_each_axis_has_floors_of_its_own_those_of_the_final_model_where_it_was_diagnosed():
     axes = made.compared().axes
-    assert seen == [(2, axes["x"].floor), (1, axes["y"].floor)]
+    for name in "xy":
+        assert subject_of().floors(name) == {Role.TRAINING: axes[name].floor}
+        found = made.diagnosed()
+        assert subject_of(found).floors(name) == found.told[name].floors
 
 
 def test_a_picture_is_laid_out_on_a_grid_once():
-    figure = ranking._figure(made.diagnosis_of())
+    figure = ranking._figure(made.diagnosis_of(), made.told_of(made.diagnosis_of()))
     settle(figure)
     assert figure.get_layout_engine() is None
     places = [axes.get_position().bounds for axes in figure.axes]
@@ -91,7 +98,7 @@ def test_a_picture_is_laid_out_on_a_grid_once():
 def test_a_bar_for_each_candidate_ends_at_its_error():
     worse = replace(made.WEAK, gain=replace(made.WEAK.gain, after=20.0))
     x = made.diagnosis_of(ranking=(made.BEST, made.RIVAL, worse))
-    (axes,) = ranking._figure(x).axes
+    (axes,) = ranking._figure(x, made.told_of(x)).axes
     bars = axes.patches
     end = 1.6 * 7.13
     assert [b.get_width() for b in bars] == pytest.approx([2.17, 2.38, end])
@@ -105,7 +112,7 @@ def test_a_bar_for_each_candidate_ends_at_its_error():
     assert [b.get_facecolor() for b in bars] == [to_rgba(c) for c in (ORANGE, BLUE, GREY)]
     lines = lines_of(axes)
     assert lines["before"].get_xdata() == pytest.approx([7.13, 7.13])
-    assert lines["noise floor"].get_xdata() == pytest.approx([2.11, 2.11])
+    assert lines["noise floor"].get_xdata() == pytest.approx([2.17, 2.17])
     assert axes.get_xlabel() == "Held-out force error, RMS (N)"
     assert axes.get_xlim() == pytest.approx((0.0, 1.15 * end))
     assert axes.yaxis_inverted()

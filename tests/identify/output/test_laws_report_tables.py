@@ -9,8 +9,7 @@ import pytest
 from built_fits import CATALOGUE, axis_of, fitted
 from built_results import Page
 
-from identify.estimation.intervals import NotExcited
-from identify.output import remarks as remarks_module
+from identify.estimation.intervals import NotExcited, refusal
 from identify.output.report import (
     answer,
     equations,
@@ -33,18 +32,13 @@ from identify.validation.misfit_maps import Region
 
 
 @pytest.fixture(autouse=True)
-def given_estimates(monkeypatch):
-    """Estimates by the fit's error; pictures and parameters that moved are other tests'."""
+def no_pictures(monkeypatch):
+    """Pictures are other tests'."""
     blank = Picture(None, "")
     for module, name in (
         (growth, "_picture"), (ranking, "_picture"), (maps, "picture"), (regions, "_picture"),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, lambda *_: blank)
-    monkeypatch.setattr(remarks_module, "moved_parameters", lambda before, after: ())
-    known = {made.BEST.fit.error: made.estimates(0.0)}
-    monkeypatch.setattr(
-        parameters, "estimates", lambda fit: known.get(fit.error, made.estimates(0.5)[::2])
-    )
 
 
 def subject_of(diagnosis=None, *, history=made.STEPS, additions=(), **changes) -> Subject:
@@ -108,7 +102,7 @@ def test_each_section_has_its_anchor_and_title():
     ]
     assert {s.anchor: s.title for s in shown} == {
         "answer": "Answer", "regions": "Where the error is", "ranking": "Candidates, ranked",
-        "growth": "The error, effect by effect", "equations": "The law of the named effect",
+        "growth": "The error, effect by effect", "equations": "The laws of the named effects",
         "parameters": "Parameters", "logs": "Errors log by log", "notes": "Notes",
     }  # fmt: skip
 
@@ -168,11 +162,13 @@ def test_candidates_have_their_evidence_errors_and_values():
     page = page_of(subject_of(made.diagnosed()), ranking)
     rows = page.table("ranking", 0)
     assert list(rows) == ["Cogging", "Quadratic drag", "Constant force"]
-    cells = [list(r.values())[:4] for r in rows.values()]
-    assert list(rows["Cogging"])[:4] == ["ΔBIC", "Error before", "Error after", "Supported"]
+    cells = [list(r.values())[:5] for r in rows.values()]
+    assert list(rows["Cogging"])[:5] == [
+        "ΔBIC", "Error before", "Error after", "Part removed", "Why not",
+    ]  # fmt: skip
     assert cells == [
-        ["510", "7.13 N", "2.17 N", "yes"], ["423", "7.34 N", "2.38 N", "yes"],
-        ["66.0", "7.46 N", "2.50 N", "no"],
+        ["510", "7.13 N", "2.17 N", "91 %", ""], ["423", "7.34 N", "2.38 N", "89 %", ""],
+        ["66.0", "7.46 N", "2.50 N", "89 %", "gain uncertain (t = 1.3)"],
     ]  # fmt: skip
     values = rows["Cogging"]["Values"].replace("\u00a0", " ")
     assert values.startswith("p = 26.1 mm, a1 = 127 mN, b1 = 35.3 mN, a2 = 0 N")
@@ -184,19 +180,24 @@ def test_candidates_have_their_evidence_errors_and_values():
     assert [bool(r["Values"]) for r in rows.values()] == [True, True, True, False]
 
 
-def test_the_law_of_what_is_named_and_what_ties_with_it():
-    page = page_of(subject_of(made.diagnosed()), equations)
+def test_the_laws_of_all_that_is_named_and_what_ties_with_it():
+    """Of the final model, with every named effect: not of the first step alone."""
+    both = replace(
+        made.FINAL, axis=axis_of(fitted("cogging", p=0.0273)).with_effect(fitted("lugre"))
+    )
+    page = page_of(subject_of(made.diagnosed(made.diagnosis_of(final=both))), equations)
     text = page.texts["equations"]
-    for name in ("cogging", "quadratic_drag"):
+    assert "p = 27.3 mm" in text.replace("\u00a0", " ")
+    for name in ("cogging", "quadratic_drag", "lugre"):
         assert CATALOGUE[name].equation in text
         assert f"{title_case(name)} on x" in text
     assert CATALOGUE["constant_force"].equation not in text
-    last = CATALOGUE["quadratic_drag"]
+    last = CATALOGUE["lugre"]
     facts = page.facts
     assert facts["What it is"] == last.summary
     assert (facts["Fingerprint"], facts["Excited by"]) == (last.fingerprint, last.excited_by)
     assert facts["Source"] == last.source
-    assert facts["Fitted"] == ranking.values_of(made.RIVAL)
+    assert facts["Fitted"] == ranking.values_of(last, both.axis)
 
 
 # --- parameters -----------------------------------------------------------------------------
@@ -205,25 +206,36 @@ def test_the_law_of_what_is_named_and_what_ties_with_it():
 def test_fitted_values_stand_beside_those_without_the_effect():
     x = made.diagnosis_of()
     table = page_of(subject_of(made.diagnosed(x)), parameters).table("parameters", 0)
-    # 8.37 N over a floor of 2.11 N is too wrong for intervals: the column is left out.
     assert table["mass"] == {
-        "Without cogging": "5.81 kg", "With cogging": "5.31 kg", "90 % interval": "5.23 … 5.47",
+        "Without all that was found": "5.81 kg", "With all that was found": "5.31 kg",
+        "90 % interval": "5.23 … 5.47",
         "Meaning": "moved mass",
     }  # fmt: skip
     assert table["cogging.p"] == {
-        "Without cogging": "–", "With cogging": "24.1 mm",
+        "Without all that was found": "–", "With all that was found": "24.1 mm",
         "90 % interval": no_interval_in_words(NotExcited()), "Meaning": "magnet pitch",
     }  # fmt: skip
     assert table["coulomb_viscous.Fs"] == {
-        "Without cogging": "0.837 N", "With cogging": "337 mN", "90 % interval": "",
+        "Without all that was found": "0.837 N", "With all that was found": "337 mN",
+        "90 % interval": "",
         "Meaning": "static friction, held",
     }  # fmt: skip
     page = page_of(subject_of(made.diagnosed(x)), parameters)
-    assert (
-        "Without cogging: no intervals, because the force error of 8.37 N is 3.97 times"
-        in (page.texts["parameters"])
-    )
     assert page.tones["parameters"][:4] == ["head", "plain", "strong", "plain"]
+
+
+def test_a_model_that_is_wrong_has_no_intervals_and_one_reason():
+    found = made.diagnosed()
+    wrong = tuple(replace(e, low=None, high=None, reason=refusal(made.BASE) if e.free else None)
+                  for e in found.told["x"].before)  # fmt: skip
+    told = {**found.told, "x": replace(found.told["x"], before=wrong)}
+    page = page_of(subject_of(replace(found, told=told)), parameters)
+    titles = page.sections["parameters"][0][0]
+    assert titles.count("90 % interval") == 1
+    assert (
+        "Without all that was found: no intervals, because the force error of 8.37 N is "
+        f"{number(8.37 / 2.03)} times" in page.texts["parameters"]
+    )
 
 
 def test_values_as_given():

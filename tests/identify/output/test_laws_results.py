@@ -14,14 +14,15 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fi
 from identify.estimation.fit import Outcome
 from identify.estimation.replay import Beginning
 from identify.estimation.simulated_motion import MotionFit
+from identify.experiment_design.signature import FORCE, MASS, exemplary_motion, signature
 from identify.output.agreement import agree_json, agree_text
 from identify.output.laws import laws_json, laws_text
 from identify.output.plain import plain
-from identify.output.results import SimulationFit
-from identify.output.signature import FORCE, MASS, exemplary_motion, signature
 from identify.output.simulation_fit import simulation_fit_json, simulation_fit_text
 from identify.output.words.estimation import HELD_OUT_GREW, MOTION_OUTCOMES, motion_fit_in_words
-from identify.output.words.selection import addition_notes, step_in_words
+from identify.output.words.selection import notes_in_words, step_in_words
+from identify.results.addition import Addition
+from identify.results.results import SimulationFit
 from identify.selection.confounded import MovedParameter
 from identify.validation.agreement import Agreement, Cause
 from twin.effect import Kind
@@ -104,7 +105,13 @@ def test_an_added_effect_is_noted_by_what_it_moved_removed_and_replaced() -> Non
     moved = MovedParameter("mass", 5.0, 5.5, "kg", False)
     gone = MovedParameter("constant_force.F0", 0.3, 0.01, "N", True)
     added = built("cogging", fit=built_fit(0.1, axis=axis_of(fitted("cogging"))))
-    plain = addition_notes(added, [moved, gone], ["empirical_map"])
+    step = HistoryStep("add", "cogging", "x", 3.0, 2.0, 3.1, 2.1)
+    reshaped = replace(step, action="shape", effect="coulomb_viscous")  # which the axis still has
+
+    def notes(candidate, moved=(), gone=(), step=step):
+        return notes_in_words(Addition(None, step, candidate, True, None, None, moved, gone))[0]
+
+    plain = notes(added, (moved, gone), ("empirical_map",))
     assert plain == (
         "mass moved from 5 to 5.5 kg: more than it scatters between blocks of the logs",
         "constant_force.F0 collapsed from 0.3 to 0.01 N: it had taken over the missing effect's "
@@ -112,14 +119,16 @@ def test_an_added_effect_is_noted_by_what_it_moved_removed_and_replaced() -> Non
         "empirical_map was removed before cogging was added; add it again for the error that is "
         "left",
     )
-    assert addition_notes(added, [], []) == ()
-    (beside,) = addition_notes(added, [], [], "coulomb_viscous")  # which the axis still has
+    assert notes(added) == ()
+    (beside,) = notes(added, step=reshaped)
     assert beside == "cogging is beside the law of coulomb_viscous"
-    instead, note = addition_notes(added, [moved], ["empirical_map"], "roller_spikes")
+    instead, note = notes(
+        added, (moved,), ("empirical_map",), replace(reshaped, effect="roller_spikes")
+    )
     assert instead == "cogging is in the place of the law of roller_spikes"
     assert note.startswith("mass moved")
     curve = built("empirical_map", fit=built_fit(0.1, axis=axis_of(fitted("empirical_map"))))
-    told, note = addition_notes(curve, [moved], [])
+    told, note = notes(curve, (moved,))
     assert told.startswith("empirical_map is a fitted curve, not a physical law")
     assert note.startswith("mass moved")
 

@@ -101,8 +101,8 @@ def test_page_says_the_verdict(case: Case, page: str) -> None:
     scale = Scale.of("N", [case.x.base.error])
     before = number(case.x.base.error / scale.size)
     assert f"{before} → {scale.text(best.fit.error)}" in text
-    final = case.x.final
-    assert f"{number(case.x.base.error / final.floor)} → {number(final.ratio)}" in text
+    final, floor = case.x.final, case.diagnosis.told["x"].floor
+    assert f"{number(case.x.base.error / floor)} → {number(final.error / floor)}" in text
     assert best.effect.equation in text
     assert best.effect.fingerprint in text
     pitch = best.fit.axis["cogging"].values["p"]
@@ -142,7 +142,7 @@ def unlabelled(figure: Figure) -> list[str]:
 
 def test_every_axis_has_quantity_and_unit_and_can_be_read(case: Case) -> None:
     unexplained = Dependence(0.7, "position", 0.025, "m", {"position": 0.7, "time": 0.1})
-    other = replace(case.x, verdict=Verdict.UNEXPLAINED, unexplained=unexplained)
+    other = replace(case.quiet, verdict=Verdict.UNEXPLAINED, unexplained=unexplained)
     for diagnosis in (case.diagnosis, case.concluding(other)):
         drawn = list(figures(case.subject(diagnosis)))
         assert len(drawn) >= 4

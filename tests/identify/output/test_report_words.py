@@ -25,9 +25,10 @@ from identify.output.report.drawing import binned_mean
 from identify.output.report.overlay import representative
 from identify.output.report.subject import LogForces, Subject
 from identify.output.report.units import Scale, number, quantity
-from identify.output.results import Diagnosis
 from identify.output.words.numbers import capitalised
 from identify.output.words.selection import verdict_in_words
+from identify.results.results import Diagnosis
+from identify.results.told import told_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.residual_dependence import Dependence
 from twin.effects import Catalogue, load_catalogue
@@ -60,15 +61,15 @@ def test_an_addition_is_the_answer_where_nothing_was_diagnosed(case: Case) -> No
 
 def ambiguous(case: Case) -> AxisDiagnosis:
     """The diagnosis of the case, had drag explained as much."""
-    first = replace(case.x.steps[0], tied=("quadratic_drag",))
-    return replace(case.x, verdict=Verdict.MISSING_EFFECTS, steps=(first,))
+    (found,) = case.x.findings
+    return replace(case.x, findings=(replace(found, tied=("quadratic_drag",)),))
 
 
 def test_every_verdict_has_its_words(case: Case) -> None:
     structure = Dependence(0.63, "position", 0.027, "m", {"position": 0.63})
     tied = ambiguous(case)
-    lost = replace(case.x, verdict=Verdict.UNEXPLAINED, unexplained=structure)
-    done = replace(case.x, verdict=Verdict.NOTHING_MISSING)
+    lost = replace(case.quiet, verdict=Verdict.UNEXPLAINED, unexplained=structure)
+    done = case.quiet
     expected = {
         "Axis x: cogging or quadratic drag is missing": tied,
         "Axis x: something outside the catalogue is missing": lost,
@@ -89,19 +90,19 @@ def test_only_named_effects_have_their_law_printed(case: Case) -> None:
     assert [b.text for b in section.blocks if isinstance(b, Heading)] == [
         "Cogging on x", "Quadratic drag on x",
     ]  # fmt: skip
-    done = replace(case.x, verdict=Verdict.NOTHING_MISSING)
-    assert equations.section(case.subject(case.concluding(done))) is None
+    assert equations.section(case.subject(case.concluding(case.quiet))) is None
 
 
 def test_the_axis_of_the_answer_comes_first(case: Case) -> None:
     compared = case.diagnosis.comparison
-    quiet = replace(case.x, verdict=Verdict.NOTHING_MISSING)
     both = replace(
         compared,
         model=replace(compared.model, axes=dict.fromkeys("ax", compared.model.axes["x"])),
         axes={"a": replace(compared.axes["x"], axis="a"), "x": compared.axes["x"]},
     )
-    diagnosis = Diagnosis(both.model, {"a": quiet, "x": case.x}, both)
+    axes = {"a": case.quiet, "x": case.x}
+    told = {axis: told_of(d) for axis, d in axes.items()}
+    diagnosis = Diagnosis(both.model, axes, both, told)
     cards = answers(Subject("Report", diagnosis, both, (), ()))
     assert [card.headline[:7] for card in cards] == ["Axis x:", "Axis a:"]
 

@@ -8,8 +8,8 @@ from functools import cache
 import pytest
 
 from identify import workflow
-from identify.output.results import FitResult
 from identify.output.words.selection import refit_in_words
+from identify.results.results import FitResult
 from identify.selection.confounded import Refit
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate

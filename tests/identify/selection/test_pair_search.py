@@ -10,8 +10,7 @@ import pytest
 
 from identify.dataset.dataset import datasets
 from identify.estimation.fit import fit_axis
-from identify.selection.diagnosis import Verdict
-from identify.selection.forward_selection import diagnose_axis
+from identify.selection.diagnosis import Verdict, diagnose_axis
 from identify.selftest.cases import AXIS, machine
 from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model

@@ -8,7 +8,7 @@ import pytest
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import Evidence, Gain
 from identify.selection import ranking
-from identify.selection.scoring import Candidate
+from identify.selection.candidates import Candidate
 from twin.effects import load_catalogue
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, built, built_dataset, built_fit, fitted
 from built_results import errors
+from identify.selection.decoys import Proof
 
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import half_widths
-from identify.selection.decoys import Proof
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
 from identify.selection.found_shape import FoundShape

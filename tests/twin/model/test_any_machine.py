@@ -27,10 +27,10 @@ from matplotlib.text import Text
 from identify import workflow
 from identify.dataset.dataset import datasets
 from identify.output import as_json, diagnosis_json, text
-from identify.output.addition import Addition
 from identify.output.plain import plain
 from identify.output.report import write_report
-from identify.output.results import Comparison, Diagnosis, FitResult
+from identify.results.addition import Addition
+from identify.results.results import Comparison, Diagnosis, FitResult
 from identify.selection.residual_dependence import coordinates_of, unit_of
 from twin.effects import Catalogue
 from twin.errors import InputError

@@ -1,33 +1,30 @@
-"""The results of fit, compare, diagnose and add; ``print`` shows the text of the command."""
+"""The results of fit, compare and diagnose; ``print`` shows the text of the command."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit
 from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
-from identify.output.simulation_fit import simulation_fit_text
-from identify.output.text import compare_text, diagnose_text, fit_text
-from identify.selection.confounded import Refit, refit
+from identify.results.printed import Printed
+from identify.results.told import Told
+from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.misfit_maps import AxisComparison, Region
 from twin.effect import Effect
-from twin.effects import Catalogue
 from twin.model.machine import MachineModel
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FitResult:
+class FitResult(Printed):
     """A fitted machine: by axis the fit, the estimates, and the RMS force errors on other logs.
 
     holdout_error, test_error: on the selection and on the test logs; None where there are none.
-    given: the model before the fit. catalogue: absent effects that a parameter may be confounded
-    with.
+    given: the model before the fit. refits: what the fit changed of it, by axis.
     """
 
     model: MachineModel
@@ -37,7 +34,7 @@ class FitResult:
     holdout_error: Mapping[str, float | None]
     test_error: Mapping[str, float | None]
     given: MachineModel
-    catalogue: Catalogue
+    refits: Mapping[str, Refit]
 
     @property
     def left_out(self) -> Mapping[str, tuple[str, ...]]:
@@ -49,20 +46,12 @@ class FitResult:
         """Axes of the model that move in no log."""
         return tuple(axis for axis in self.model.axes if axis not in self.fits)
 
-    @cached_property
-    def refits(self) -> Mapping[str, Refit]:
-        """What the fit changed of the given model, by axis."""
-        return {a: refit(self.given.axes[a], f, self.catalogue) for a, f in self.fits.items()}
-
-    def __str__(self) -> str:
-        return fit_text(self)
-
     def __repr__(self) -> str:
         return f"<FitResult of {self.model.name}; print it to read it>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SimulationFit:
+class SimulationFit(Printed):
     """A machine fitted to the motion of whole logs, by axis, from a fit of the force residual.
 
     holdout_error: by axis, RMS position error over the test logs, else the held-out logs, before
@@ -74,31 +63,26 @@ class SimulationFit:
     axes: Mapping[str, MotionFit]
     holdout_error: Mapping[str, tuple[float, float] | None]
 
-    def __str__(self) -> str:
-        return simulation_fit_text(self)
-
     def __repr__(self) -> str:
         return f"<SimulationFit of {self.model.name}; print it to read it>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison:
+class Comparison(Printed):
     """The errors of a model on logs, by axis."""
 
     model: MachineModel
     axes: Mapping[str, AxisComparison]
-
-    def __str__(self) -> str:
-        return compare_text(self)
 
     def __repr__(self) -> str:
         return f"<Comparison of {self.model.name}; print it to read it>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis:
+class Diagnosis(Printed):
     """Diagnoses by axis; the answer is that of the axis with the strongest evidence.
 
+    model: with the values of the fit before anything was found. told: what is told of each axis.
     next_experiments: for an axis whose diagnosis is ambiguous, the experiment that decides.
     refits: what fitting changed of the given model, by axis. not_tried: effects of the catalogue
     that depend on the other axis, on a machine with more than two axes. not_planned: for an
@@ -109,6 +93,7 @@ class Diagnosis:
     model: MachineModel
     axes: Mapping[str, AxisDiagnosis]
     comparison: Comparison
+    told: Mapping[str, Told]
     next_experiments: Mapping[str, Plan] = field(default_factory=dict)
     refits: Mapping[str, Refit] = field(default_factory=dict)
     not_tried: tuple[str, ...] = ()
@@ -132,9 +117,6 @@ class Diagnosis:
         """The effect that is named, if any."""
         best = self.leading.best
         return best.effect if best else None
-
-    def __str__(self) -> str:
-        return diagnose_text(self)
 
     def __repr__(self) -> str:
         return f"<Diagnosis of {self.model.name}; print it to read it>"

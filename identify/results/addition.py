@@ -1,20 +1,19 @@
-"""A model with one effect more, and what that did to the errors; ``print`` shows the text."""
+"""A model with one effect more, and what that did to the errors."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import error_if_any
 from identify.estimation.fit import Fit
 from identify.estimation.intervals import estimates, intervals_to_keep
-from identify.output.text import add_text
-from identify.output.words.selection import addition_notes, also_chose_in_words
+from identify.results.printed import Printed
+from identify.selection.candidates import Candidate
+from identify.selection.changes import Reshaped
 from identify.selection.confounded import MovedParameter, moved_parameters
-from identify.selection.scoring import Candidate
-from identify.selection.wrong_shape import WrongShape
 from identify.validation.free_run import errors_of_both
 from twin.model.history import HistoryStep
 from twin.model.machine import MachineModel
@@ -22,15 +21,15 @@ from twin.model.units import AxisUnits
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Addition:
+class Addition(Printed):
     """A model with one added effect.
 
-    step: errors before and after. kept: whether evidence and held-out logs support the effect.
+    step: errors before and after. kept: whether training and selection logs prove the effect.
     position_error: free-running RMS error before and after; replayed: the same after, stepped by
     MuJoCo. Both in the units of the axis, None where the motion is imposed. position_log: the log
     that they are of. moved: parameters that the effect changed. set_aside: nonparametric effects
-    that were removed from the model before. why_axis: why it went to this axis, where none was
-    asked for.
+    that were removed from the model before. notes: what a reader should know beside the errors, one
+    sentence each.
     """
 
     model: MachineModel
@@ -42,36 +41,31 @@ class Addition:
     moved: tuple[MovedParameter, ...] = ()
     set_aside: tuple[str, ...] = ()
     position_log: str | None = None
-    why_axis: str | None = None
+    notes: tuple[str, ...] = ()
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """What a reader should know beside the errors, one sentence each."""
-        reshaped = self.step.effect if self.step.action == "shape" else None
-        notes = addition_notes(self.candidate, self.moved, self.set_aside, reshaped)
-        return tuple(n for n in (self.why_axis, *notes, self.also_chose) if n is not None)
+    def reshaped(self) -> str | None:
+        """The effect whose law was given another shape; None where an effect was added."""
+        return self.step.effect if self.step.action == "shape" else None
 
     @property
-    def also_chose(self) -> str | None:
-        """That the errors are of logs that took part in the choice; None where a log tests."""
+    def told_on(self) -> Role:
+        """The logs that tell most of it: those of the errors that were decided on least."""
         if self.step.test_error_after is not None:
-            return None
+            return Role.TEST
         held = self.step.holdout_error_after is not None
-        return also_chose_in_words(Role.SELECTION if held else Role.TRAINING)
+        return Role.SELECTION if held else Role.TRAINING
 
-    @property
-    def judged_by(self) -> str:
-        """What judged the effect beside the evidence of the fit logs."""
-        held = self.step.holdout_error_after is not None
-        return "the held-out logs" if held else "the cross-validation on blocks of the fit logs"
+    def with_notes(self, kept: tuple[str, ...], notes: tuple[str, ...]) -> Addition:
+        """The same with its notes; kept: those that go into the history of the model."""
+        step = replace(self.step, notes=kept)
+        model = replace(self.model, history=(*self.model.history[:-1], step))
+        return replace(self, step=step, model=model, notes=notes)
 
     @property
     def units(self) -> AxisUnits:
         """Of the axis that the effect was added to."""
         return self.candidate.fit.axis.units
-
-    def __str__(self) -> str:
-        return add_text(self)
 
     def __repr__(self) -> str:
         return f"<Addition of {self.model.name}; print it to read it>"
@@ -83,21 +77,17 @@ def addition(
     prepared: Mapping[str, Dataset],
     model: MachineModel,
     given: MachineModel,
-    shape: WrongShape | None = None,
-    why_axis: str | None = None,
+    shape: Reshaped | None = None,
 ) -> Addition:
     """The candidate added to a fitted model; ``given``: the model before that was fitted.
 
-    shape: that of a law of the model which the candidate is; None where it is a missing effect. It
-    is kept if it is proved and lowers the test error: one that differs at a few places lowers the
-    error of a few blocks alone. why_axis: why it went to its axis, where none was asked for.
+    shape: that of a law of the model which the candidate is; None where it is a missing effect.
     """
     name = best.axis
     moved = moved_parameters(base, best.fit)
     left = model.axes[name].names
     set_aside = tuple(n for n in given.axes[name].names if n not in left)
-    notes = addition_notes(best, moved, set_aside, shape.effect if shape else None)
-    step = _step(best, base, prepared[name], shape, notes)
+    step = _step(best, base, prepared[name], shape)
     new = model.with_axis(name, best.fit.axis).with_history(step)
     new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
     moving, replayed = errors_of_both(model, new, name, prepared)
@@ -105,19 +95,16 @@ def addition(
         model=new,
         step=step,
         candidate=best,
-        kept=best.supported if shape is None else shape.proof.holds and best.gain.falls,
+        kept=best.supported,
         position_error=moving,
         replayed=replayed,
         moved=moved,
         set_aside=set_aside,
-        why_axis=why_axis,
         position_log=None if moving is None else next(iter(by_log(prepared))),
     )
 
 
-def _step(
-    best: Candidate, base: Fit, dataset: Dataset, shape: WrongShape | None, notes: tuple[str, ...]
-) -> HistoryStep:
+def _step(best: Candidate, base: Fit, dataset: Dataset, shape: Reshaped | None) -> HistoryStep:
     """What an addition did to the errors on the logs of each role."""
     (held, held_after), (tested, tested_after) = (
         [error_if_any(role, f, dataset) for f in (base, best.fit)]
@@ -125,7 +112,7 @@ def _step(
     )
     return HistoryStep(
         action="shape" if shape else "add",
-        effect=shape.effect if shape else best.effect.name,
+        effect=shape.name if shape else best.effect.name,
         axis=best.axis,
         fit_error_before=base.error,
         fit_error_after=best.fit.error,
@@ -134,5 +121,4 @@ def _step(
         test_error_before=tested,
         test_error_after=tested_after,
         unit=best.fit.axis.units.force,
-        notes=notes,
     )
