@@ -107,7 +107,7 @@ def candidate_of(
     """
     base, fit, dataset = before.fit, after.fit, before.dataset
     shared = base.kept & fit.kept
-    pair = [f.residual[shared[f.kept]] / f.lessened for f in (base, fit)]
+    left, less = (f.residual[shared[f.kept]] / f.lessened for f in (base, fit))
     added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
     added += phases_found(fit.axis, effect.name, dataset) if effect.name in fit.axis.names else 0
     both = np.isfinite(before.other) & np.isfinite(after.other)
@@ -115,7 +115,7 @@ def candidate_of(
         effect=effect,
         axis=dataset.axis,
         fit=fit,
-        evidence=evidence(*pair, added),
+        evidence=evidence(left, less, added),
         gain=held_out_gain(before.other[both], after.other[both], base.floor),
         score=score(before, after, control),
         doubt=doubt(before, fit, effect, own),

@@ -105,8 +105,11 @@ def _without(steps: Sequence[Step], found: Found) -> Judged:
 def _finding(steps: Sequence[Step], found: Found) -> Finding:
     """The finding of the steps that are about one law."""
     dataset, final, less = found.dataset, found.final, _without(steps, found)
-    beside = score(less, final)
-    beside = replace(beside, control=control(steps[0].change, less, final))
+    own = steps[0].tried.candidate
+    if own.is_noise and own.score:  # it lowers no error
+        beside = own.score
+    else:
+        beside = replace(score(less, final), control=control(steps[0].change, less, final))
     chosen, tested = _errors(less.fit, final.fit, dataset)
     name = steps[0].change.name
     axis = final.fit.axis if name in final.fit.axis.names else less.fit.axis

@@ -191,7 +191,7 @@ def tried_beside(
         tried += _refitted(judged, best, tried)
     judged, tried = _at_its_best(judged, tried)
     give_back()
-    noise = [_as_noise(judged, e) for e in effects if is_noise(e)]
+    noise = [as_noise(judged, e) for e in effects if is_noise(e)]
     ranked = {t.candidate.effect.name: t.candidate for t in tried if isinstance(t.change, Added)}
     looked = [_as_looked(judged, k) for k in looks if isinstance(k.change, Added)]
     candidates = [ranked.get(c.effect.name, c) for c in looked] + [n.candidate for n in noise]
@@ -219,7 +219,7 @@ def _refitted(judged: Judged, looks: Sequence[Look], known: Sequence[Tried] = ()
     if not any(f.at_floor for _, f in fits):
         fits.sort(key=lambda pair: -_roughly(judged, pair[1]))
         fits[:LEADERS] = spread(lambda p: (p[0], from_all_starts(judged, *p)), fits[:LEADERS])
-    return spread(lambda pair: _tried(judged, *pair), fits)
+    return spread(lambda pair: judged_change(judged, *pair), fits)
 
 
 def _fit_of(judged: Judged, look: Look) -> Fit:
@@ -232,11 +232,11 @@ def _roughly(judged: Judged, fit: Fit) -> float:
     return (judged.fit.error**2 - fit.error**2) / above
 
 
-def _tried(judged: Judged, look: Look, fit: Fit) -> Tried:
+def judged_change(judged: Judged, look: Look, fit: Fit) -> Tried:
     """A refitted change with its score; its controls are asked only where they could decide."""
     change, after = look.change, Judged(fit, judged.dataset)
     found = candidate_of(judged, after, _effect(change), 0.0, parameters(change))
-    if found.supported:
+    if found.supported and found.score:
         taken = control(change, judged, after)
         found = replace(found, score=replace(found.score, control=taken))
     return Tried(change, look, after, found)
@@ -260,7 +260,7 @@ def _as_looked(judged: Judged, look: Look) -> Candidate:
     return Candidate.looked(judged, fit, look.change.effect, look.promise)  # type: ignore[attr-defined]
 
 
-def _as_noise(judged: Judged, effect: Effect) -> Tried:
+def as_noise(judged: Judged, effect: Effect) -> Tried:
     """An effect that only raises the noise floor."""
     fit, dataset = judged.fit, judged.dataset
     axis = fit.axis.with_effect(starts(fit, dataset, effect)[0].fitted)
@@ -282,7 +282,7 @@ def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried
     if again.error > RULE.settled * judged.fit.error:
         return judged, tried
     judged = Judged(again, judged.dataset)
-    return judged, [_tried(judged, t.look, t.judged.fit) for t in tried]
+    return judged, [judged_change(judged, t.look, t.judged.fit) for t in tried]
 
 
 def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
