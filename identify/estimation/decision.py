@@ -61,8 +61,7 @@ class DecisionRule:
     samples; less is no delay, more is a fault of the log that its check finds.
     """
 
-    sure: float = 2.0
-    beside_controls: float = 0.8
+    chance: float = 0.05
     most_ways: int = 2
     not_above: float = 0.85
     at_floor: float = 1.3

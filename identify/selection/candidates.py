@@ -99,11 +99,11 @@ class Candidate:
 
 
 def candidate_of(
-    before: Judged, after: Judged, effect: Effect, control: float, own: Sequence[str]
+    before: Judged, after: Judged, effect: Effect, own: Sequence[str], among: int = 1
 ) -> Candidate:
-    """What speaks for a fitted larger model.
+    """What speaks for a fitted larger model, before its controls are asked.
 
-    control: what its controls take. own: names of the parameters whose values must be its own.
+    own: names of the parameters whose values must be its own. among: of how many it was chosen.
     """
     base, fit, dataset = before.fit, after.fit, before.dataset
     shared = base.kept & fit.kept
@@ -117,7 +117,7 @@ def candidate_of(
         fit=fit,
         evidence=evidence(left, less, added),
         gain=held_out_gain(before.other[both], after.other[both], base.floor),
-        score=score(before, after, control),
+        score=score(before, after, among=among),
         doubt=doubt(before, fit, effect, own),
     )
 

@@ -109,7 +109,9 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
     if own.is_noise and own.score:  # it lowers no error
         beside = own.score
     else:
-        beside = replace(score(less, final), control=control(steps[0].change, less, final))
+        among = own.score.among if own.score else 1
+        taken = control(steps[0].change, less, final)
+        beside = score(less, final, taken, among)
     chosen, tested = _errors(less.fit, final.fit, dataset)
     name = steps[0].change.name
     axis = final.fit.axis if name in final.fit.axis.names else less.fit.axis

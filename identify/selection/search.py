@@ -20,7 +20,7 @@ from identify.estimation.scaling import Scaling
 from identify.estimation.thorough_fit import fit_thoroughly
 from identify.estimation.time_origin import synchronised, time_origins, with_given_origins
 from identify.estimation.variable_projection import starts
-from identify.selection.acceptance import Judged, score
+from identify.selection.acceptance import Judged, least_t, score
 from identify.selection.candidates import (
     Candidate,
     absent_effects,
@@ -183,12 +183,12 @@ def tried_beside(
         return found
 
     looks = spread(look, changes)
-    tried = _refitted(judged, looks)
+    tried = _refitted(judged, looks, len(looks))
     enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
     if not enough:
         curves = [c.look(judged, trial) for c in reshaped_of(judged.fit, judged.dataset)]
         best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
-        tried += _refitted(judged, best, tried)
+        tried += _refitted(judged, best, len(curves), tried)
     judged, tried = _at_its_best(judged, tried)
     give_back()
     noise = [as_noise(judged, e) for e in effects if is_noise(e)]
@@ -204,11 +204,16 @@ def is_level(one: Tried, best: Tried) -> bool:
     if len(effects) == 2 and all(e.dead_time for e in effects):
         return True  # which of the two is late, no log of both can tell
     by = score(one.judged, best.judged)
-    return by.t < RULE.sure or by.part < RULE.least_part
+    return by.t < least_t(1) or by.part < RULE.least_part
 
 
-def _refitted(judged: Judged, looks: Sequence[Look], known: Sequence[Tried] = ()) -> list[Tried]:
-    """The changes that promise enough, refitted; the better ones thoroughly if none is enough."""
+def _refitted(
+    judged: Judged, looks: Sequence[Look], among: int, known: Sequence[Tried] = ()
+) -> list[Tried]:
+    """The changes that promise enough, refitted; the better ones from all starts if none is enough.
+
+    among: of how many they are. known: what was refitted before.
+    """
     asked = RULE.promise * RULE.least_part
     waiting = sorted((k for k in looks if k.promise >= asked), key=lambda k: -k.promise)
     first = spread(lambda k: (k, _fit_of(judged, k)), waiting[:LEADERS])
@@ -219,7 +224,7 @@ def _refitted(judged: Judged, looks: Sequence[Look], known: Sequence[Tried] = ()
     if not any(f.at_floor for _, f in fits):
         fits.sort(key=lambda pair: -_roughly(judged, pair[1]))
         fits[:LEADERS] = spread(lambda p: (p[0], from_all_starts(judged, *p)), fits[:LEADERS])
-    return spread(lambda pair: judged_change(judged, *pair), fits)
+    return spread(lambda pair: judged_change(judged, *pair, among), fits)
 
 
 def _fit_of(judged: Judged, look: Look) -> Fit:
@@ -232,10 +237,13 @@ def _roughly(judged: Judged, fit: Fit) -> float:
     return (judged.fit.error**2 - fit.error**2) / above
 
 
-def judged_change(judged: Judged, look: Look, fit: Fit) -> Tried:
-    """A refitted change with its score; its controls are asked only where they could decide."""
+def judged_change(judged: Judged, look: Look, fit: Fit, among: int = 1) -> Tried:
+    """A refitted change with its score; its controls are asked only where they could decide.
+
+    among: of how many changes it is chosen.
+    """
     change, after = look.change, Judged(fit, judged.dataset)
-    found = candidate_of(judged, after, _effect(change), 0.0, parameters(change))
+    found = candidate_of(judged, after, _effect(change), parameters(change), among)
     if found.supported and found.score:
         taken = control(change, judged, after)
         found = replace(found, score=replace(found.score, control=taken))
@@ -278,11 +286,17 @@ def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried
     axis = best.change.undone(best.judged.fit.axis, judged.fit.axis)
     if axis is None or best.candidate.part > RULE.nearly_all:
         return judged, tried
-    again = replace(fit_axis(axis, judged.dataset.fit), begun=judged.fit.begun)
-    if again.error > RULE.settled * judged.fit.error:
+    refitted = replace(fit_axis(axis, judged.dataset.fit), begun=judged.fit.begun)
+    if refitted.error > RULE.settled * judged.fit.error:
         return judged, tried
-    judged = Judged(again, judged.dataset)
-    return judged, [judged_change(judged, t.look, t.judged.fit) for t in tried]
+    judged = Judged(refitted, judged.dataset)
+    again = [_scored_again(judged, t) for t in tried]
+    return judged, again
+
+
+def _scored_again(judged: Judged, tried: Tried) -> Tried:
+    among = tried.candidate.score.among if tried.candidate.score else 1
+    return judged_change(judged, tried.look, tried.judged.fit, among)
 
 
 def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
@@ -339,6 +353,8 @@ def _needed(
 ) -> tuple[Judged, tuple[Step, ...]]:
     """The fit and the steps without earlier ones that are not accepted beside the later ones."""
     for step in steps[:-1]:
+        if any(_replaces(s.change, step.change) for s in steps):
+            continue
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
         if axis is not None:
             without = Judged(_refit(axis, judged), judged.dataset)
@@ -353,6 +369,11 @@ def _needed(
         dropped = (*kept[-1].dropped, step.change.name)
         steps = (*kept[:-1], replace(kept[-1], dropped=dropped))
     return judged, steps
+
+
+def _replaces(change: Change, other: Change) -> bool:
+    """Whether a change is a free curve in the place of the law that another one added."""
+    return isinstance(change, Reshaped) and not change.shape.beside and change.name == other.name
 
 
 def _refit(axis: AxisModel, judged: Judged) -> Fit:
