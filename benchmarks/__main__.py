@@ -16,6 +16,7 @@ from benchmarks import (
     emps,
     fuzz,
     import_time,
+    kinds,
     mcap_logs,
     passes,
     peer_fits,
@@ -29,7 +30,7 @@ from benchmarks.figures import Figure, write_results
 from benchmarks.mutation import noticed
 
 ALL = (
-    simulation, second_start, peer_fits, diagnosis, passes, stages, mcap_logs, effect_cost,
+    simulation, second_start, peer_fits, diagnosis, passes, kinds, stages, mcap_logs, effect_cost,
     import_time, emps, thesis, selftest, fuzz, noticed,
 )  # fmt: skip
 
