@@ -12,17 +12,18 @@ from identify.dataset.given_logs import require_samples
 from identify.dataset.motion import Motion, motion_of
 from identify.dataset.reading_ripple import ripples_of_widest
 from identify.dataset.test_function import TestFunction
-from identify.dataset.time_scale import inertia
 from identify.estimation.cable_force import CableForce
 from identify.estimation.cable_force import cable_force as of_cable
+from identify.estimation.first_values import FirstValues, first_values
 from identify.estimation.velocity_map import VelocityMap
 from identify.estimation.velocity_map import velocity_map as of_velocity
-from twin.effect import Effect, Kind
+from twin.effect import Effect, Excitation, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.log import Log
 from twin.log.check import moves
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.model.units import AxisUnits
 
 TEST_FUNCTION = 0.02  # s, short enough for spikes of a few millimetres at 0.1 m/s
 MARGIN = 0.05  # of the way that was covered, beyond its ends
@@ -57,11 +58,13 @@ def cable_force(
 
 
 def first_model(logs: Mapping[str, Log], name: str, catalogue: Catalogue) -> MachineModel:
-    """A model to begin with: of each axis that moves its rough mass and the simplest friction.
+    """A model to begin with: of each axis that moves its mass and the simplest friction.
 
-    Hardware is what the logs show: travel, speed, acceleration and force that were reached, the
-    step and the noise of the encoder. Raises InputError where no axis moves, and where the logs
-    differ in sample rate.
+    And a constant force where the logs ask for it. Static friction is that of Coulomb where the
+    axis does not break away from rest (``not_determined``). Hardware is what the logs show: travel,
+    speed, acceleration and force that were reached, the step and the noise of the encoder. Raises
+    InputError where no axis moves, where the logs differ in sample rate, and where they do not tell
+    the mass.
     """
     require_samples(logs)
     rates = sorted({log.sample_rate for log in logs.values()})
@@ -77,16 +80,32 @@ def first_model(logs: Mapping[str, Log], name: str, catalogue: Catalogue) -> Mac
             ripples = ripples_of_widest(going.values(), axis)
             motions = [motion_of(log, axis, n, ripples=ripples) for n, log in going.items()]
             constant = next(iter(going.values())).axes[axis].force_constant
-            axes[axis] = _first_axis(motions, constant, _simplest_friction(catalogue))
+            axes[axis] = _first_axis(axis, motions, constant, catalogue)
     if not axes:
         raise InputError(f"no axis moves in {', '.join(logs)}; give a log in which one does")
     return MachineModel(name, axes, rates[0])
 
 
+def not_determined(axis: AxisModel) -> list[str]:
+    """Labels of what the logs did not tell of a first model: it has the value of something else."""
+    return [
+        f"{f.effect.name}.{p.name}"
+        for f in axis.effects
+        for p in f.effect.parameters
+        if p.at_least is not None and f.values[p.name] == f.values[p.at_least]
+    ]
+
+
 def _first_axis(
-    motions: Sequence[Motion], force_constant: float | None, friction: Effect
+    axis: str, motions: Sequence[Motion], force_constant: float | None, catalogue: Catalogue
 ) -> AxisModel:
-    mass, covered, units = inertia(motions), excitation(motions, None), motions[0].units
+    found, covered, units = first_values(motions), excitation(motions, None), motions[0].units
+    if found.mass is None:
+        names = ", ".join(m.name for m in motions)
+        raise InputError(
+            f"axis {axis}: {names} cannot tell the {units.mass_name}, as acceleration makes too "
+            "little of the force; give a log with faster changes of speed"
+        )
     window = [TestFunction.at_least(TEST_FUNCTION, m.period) for m in motions]
     reached = max(
         float(np.abs(w.acceleration(m.velocity)).max())
@@ -104,8 +123,29 @@ def _first_axis(
         acceleration=_shown(reached),
         jerk=_shown(reached / TEST_FUNCTION),
     )
-    start = Fitted.at_start(friction, friction.starts(covered), units)
-    return AxisModel(_shown(mass), hardware, (start,), rotary=units.rotary)
+    effects = _first_effects(found, catalogue, covered, units)
+    return AxisModel(_shown(found.mass), hardware, effects, rotary=units.rotary)
+
+
+def _first_effects(
+    found: FirstValues, catalogue: Catalogue, covered: Excitation, units: AxisUnits
+) -> tuple[Fitted, ...]:
+    """The simplest friction, and a constant force where there is one, with what was found."""
+    friction = _simplest_friction(catalogue)
+    static = found.coulomb if found.static is None else found.static
+    values = {"Fc": found.coulomb, "Fs": static, "sigma2": found.viscous}
+    own = {n: _shown(v) for n, v in values.items() if n in friction.starts(covered)}
+    effects = [Fitted.at_start(friction, {**friction.starts(covered), **own}, units)]
+    for force in filter(_is_constant, catalogue.values() if found.constant else ()):
+        (own_force,) = force.parameters
+        effects.append(Fitted.at_start(force, {own_force.name: _shown(-found.constant)}, units))
+    return tuple(effects)
+
+
+def _is_constant(effect: Effect) -> bool:
+    """Whether an effect is one force, N, and nothing else."""
+    force = effect.kind is Kind.FORCE and not effect.states and not effect.is_nonparametric
+    return force and [p.unit for p in effect.parameters] == ["N"]
 
 
 def _shown(value: float) -> float:

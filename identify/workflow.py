@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.given_logs import Role
+from identify.dataset.prepared_log import sticks
+from identify.dataset.silent_logs import telling
 from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.errors import error_if_any
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import require_finite, require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
+from identify.estimation.remainder import noise_known, with_own_noise
 from identify.estimation.replay import simulated_error
 from identify.estimation.simulated_motion import fit_simulated_motion
 from identify.experiment_design.plan import next_experiments, plan
@@ -29,7 +32,6 @@ from identify.selection.curves import having_shape
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
 from identify.selection.trying import reshape, try_effect
-from identify.selection.unpredictable import noise_known, with_own_noise
 from identify.validation.agreement import Agreement, agreement
 from identify.validation.misfit_maps import compare_axis, position_errors, worst_region
 from identify.validation.side_by_side import SideBySide, side_by_side
@@ -75,6 +77,7 @@ def fit(
     fits: dict[str, Fit] = {}
     for i, (axis, dataset) in enumerate(list(found.items())):
         fits = {a: replace(f) for a, f in fits.items()}  # less the matrices that they computed
+        dataset = telling(dataset, sticks(model.axes[axis]))
         require_residual(model.axes[axis], dataset)
         dataset, fitted = fit_aligned(model.axes[axis], dataset)
         found[axis], fits[axis] = with_own_noise(fitted, dataset)
@@ -118,7 +121,10 @@ def compare(
     progress: Progress = silent,
 ) -> Comparison:  # fmt: skip
     """The errors of a model with its present values, and where it fails. Raises InputError."""
-    found = datasets(model, logs, {}, test_function)
+    found = {
+        axis: telling(dataset, sticks(model.axes[axis]))
+        for axis, dataset in datasets(model, logs, {}, test_function).items()
+    }
     for axis, dataset in found.items():
         require_residual(model.axes[axis], dataset)
     given = model.axes

@@ -23,6 +23,7 @@ from identify.cli.shared import (
     app,
     bars_on_stderr,
     catalogue_with,
+    left_out,
     machine_model,
     read_checked,
     require_folder,
@@ -67,7 +68,7 @@ def fit(
     if out:
         require_folder(out)
     catalogue = catalogue_with(effects)
-    result, findings = with_roles(
+    result, findings, silent = with_roles(
         partial(workflow.fit, catalogue=catalogue, test_function=test_function),
         machine_model(model, catalogue), logs, holdout, test,
     )  # fmt: skip
@@ -78,7 +79,7 @@ def fit(
         fitted, text, found = refined.model, str(refined), simulation_fit_json(refined)
     if out:
         save_model(fitted, out)
-    say(text, found, as_json_, findings)
+    say(text, {**found, "left_out": silent}, as_json_, [*findings, *silent])
 
 
 @app.command()
@@ -105,7 +106,7 @@ def compare(
         require_folder(mcap)
     machine = machine_model(model, catalogue_with(effects))
     recorded, findings = read_checked(logs)
-    with bars_on_stderr() as bars:
+    with bars_on_stderr() as bars, left_out() as silent:
         result = workflow.compare(machine, recorded, test_function=test_function, progress=bars)
     if out:
         from identify.output.report import write_report
@@ -118,7 +119,8 @@ def compare(
         from identify.output.side_by_side import write_side_by_side
 
         write_side_by_side(workflow.side_by_side_of(result), mcap)
-    say(as_text.compare_text(result), as_json.compare_json(result), as_json_, findings)
+    told = {**as_json.compare_json(result), "left_out": silent}
+    say(as_text.compare_text(result), told, as_json_, [*findings, *silent])
 
 
 @app.command()
@@ -141,7 +143,7 @@ def diagnose(
         require_report(out)
     catalogue = catalogue_with(effects)
     machine = machine_model(model, catalogue)
-    result, findings = with_roles(
+    result, findings, silent = with_roles(
         partial(workflow.diagnose, catalogue=catalogue, test_function=test_function),
         machine,
         logs,
@@ -155,12 +157,8 @@ def diagnose(
             out, title=f"{machine.name}: what the model lacks", diagnosis=result,
             comparison=result.comparison, history=result.model.history,
         )  # fmt: skip
-    say(
-        as_text.diagnose_text(result),
-        diagnosis_json.diagnose_json(result, findings),
-        as_json_,
-        findings,
-    )
+    told = {**diagnosis_json.diagnose_json(result, findings), "left_out": silent}
+    say(as_text.diagnose_text(result), told, as_json_, [*findings, *silent])
 
 
 @app.command()
@@ -191,12 +189,13 @@ def add(
     require_folder(out)
     catalogue = catalogue_with(effects)
     chosen, made = catalogue[effect], workflow.add_shape if shape else workflow.add
-    result, findings = with_roles(
+    result, findings, silent = with_roles(
         partial(made, chosen, axis=axis, test_function=test_function),
         machine_model(model, catalogue), logs, holdout, test,
     )  # fmt: skip
     save_model(result.model, out)
-    say(as_text.add_text(result), as_json.add_json(result), as_json_, findings)
+    told = {**as_json.add_json(result), "left_out": silent}
+    say(as_text.add_text(result), told, as_json_, [*findings, *silent])
     if not result.kept:
         raise typer.Exit(1)
 

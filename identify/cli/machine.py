@@ -121,8 +121,8 @@ def new(
     out: Annotated[Path, typer.Option("--out", "-o", help="Machine model (.toml) to write.")],
     as_json_: Json = False,
 ) -> None:
-    """Propose a first model from logs: mass, friction and what they show of the hardware."""
-    from identify.measure import first_model
+    """Propose a first model from logs: mass, friction, constant force, and their hardware."""
+    from identify.measure import first_model, not_determined
     from twin.effects import load_catalogue
     from twin.model.file import save_model
 
@@ -130,8 +130,16 @@ def new(
     recorded, findings = read_checked(logs)
     model = first_model(dict(recorded), out.stem, load_catalogue())
     save_model(model, out)
+    unknown = {axis: not_determined(found) for axis, found in model.axes.items()}
+    notes = [
+        f"axis {axis}: {label} is not determined, as the axis does not break away from rest by "
+        "more than its Coulomb friction; it is set to that"
+        for axis, labels in unknown.items()
+        for label in labels
+    ]
     text = f"{out}: axes {', '.join(model.axes)}; now `twin fit {out} {logs[0]} -o fitted.toml`"
-    say(text, {"model": str(out), "axes": list(model.axes)}, as_json_, findings)
+    result = {"model": str(out), "axes": list(model.axes), "not_determined": unknown}
+    say("\n".join([text, *notes]), result, as_json_, findings)
 
 
 @app.command()

@@ -126,6 +126,22 @@ def say(text: str, result: dict[str, Any], as_json: bool, warnings: Sequence[str
     print(json.dumps(plain(result)) if as_json else text)
 
 
+@contextmanager
+def left_out() -> Iterator[list[str]]:
+    """The lines that are said meanwhile of logs that say nothing, instead of on standard error."""
+    import logging
+
+    lines: list[str] = []
+    handler = logging.Handler()
+    handler.emit = lambda record: lines.append(record.getMessage())  # type: ignore[method-assign]
+    logger = logging.getLogger("identify")
+    logger.addHandler(handler)
+    try:
+        yield lines
+    finally:
+        logger.removeHandler(handler)
+
+
 def catalogue_with(files: list[Path] | None) -> Catalogue:
     from twin.effects import load_catalogue
 
@@ -144,16 +160,20 @@ def with_roles(
     logs: list[Path],
     holdout: list[Path] | None,
     test: list[Path] | None,
-) -> tuple[Result, list[str]]:
-    """The result of a job on a model and the logs of each role; and the findings on the first."""
+) -> tuple[Result, list[str], list[str]]:
+    """The result of a job on a model and the logs of each role; the findings on the first.
+
+    And which logs of any role were left out, and why.
+    """
     from twin.memory import share
 
     share()
     held, tests = holdout or [], test or []
     recorded, findings = read_checked(logs, beside=[*held, *tests])
     others = read_measured(held, beside=[*logs, *tests]), read_measured(tests, [*logs, *held])
-    with bars_on_stderr() as bars:
-        return job(model, recorded, *others, progress=bars), findings
+    with bars_on_stderr() as bars, left_out() as silent:
+        result = job(model, recorded, *others, progress=bars)
+    return result, findings, silent
 
 
 class Recordings(Mapping[str, "Log"]):

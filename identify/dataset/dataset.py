@@ -48,8 +48,8 @@ class Dataset:
     fit: the training logs. holdout: the selection logs (may be none), which take part in the choice
     of effects; no parameter is fitted on them. test: the test logs (may be none), on which nothing
     is decided. covered: gives what the fit logs cover, which takes a while. channel_delay: s, by
-    which the force of the logs was shifted to earlier samples. still: names of logs that were left
-    out because the axis stands still in them. begun: s that were left out at the beginning of logs,
+    which the force of the logs was shifted to earlier samples. left_out: the logs that say nothing,
+    by name, with the reason of each. begun: s that were left out at the beginning of logs,
     by name, as the axis did not yet move freely.
     """
 
@@ -58,9 +58,14 @@ class Dataset:
     holdout: tuple[PreparedLog, ...]
     covered: Callable[[], Excitation]
     channel_delay: float = 0.0
-    still: tuple[str, ...] = ()
+    left_out: Mapping[str, str] = field(default_factory=dict)
     begun: Mapping[str, float] = field(default_factory=dict)
     test: tuple[PreparedLog, ...] = ()
+
+    @property
+    def still(self) -> tuple[str, ...]:
+        """Names of the logs that were left out."""
+        return tuple(self.left_out)
 
     @property
     def beyond(self) -> dict[str, float]:
@@ -108,6 +113,23 @@ class Dataset:
         """The beginnings of the fit logs, long enough together to scan nonlinear parameters on."""
         each = max(TRIED / len(self.fit), SHORTEST_HEAD)
         return tuple(PreparedLog.of(w.motion.head(each), w.test_function.length) for w in self.fit)
+
+    def shortened(self, seconds: float) -> Dataset:
+        """The same with the beginnings of its training and selection logs, each role that long."""
+        if all(sum(map(_length, logs)) <= seconds for logs in (self.fit, self.holdout)):
+            return self
+
+        def cut(logs: tuple[PreparedLog, ...]) -> tuple[PreparedLog, ...]:
+            each = seconds / max(len(logs), 1)
+            return tuple(
+                replace(
+                    PreparedLog.of(w.motion.head(each), w.test_function.length, w.reach),
+                    force_noise=w.force_noise,
+                )
+                for w in logs
+            )
+
+        return replace(self, fit=cut(self.fit), holdout=cut(self.holdout))
 
     @cached_property
     def in_heads(self) -> NDArray[np.bool_]:
@@ -169,8 +191,9 @@ def _prepared(model: MachineModel, given: Given, test_function: float | None) ->
         found = {role: moving_in(logs, name, tuple(model.axes)) for role, logs in given.items()}
         going = {role: moving for role, (moving, _) in found.items()}
         if going[Role.TRAINING]:
-            still = tuple(n for _, names in found.values() for n in names)
-            out[name] = replace(_of_axis(model, name, going, test_function), still=still)
+            why = f"axis {name} stands still in it; give one in which it moves"
+            still = {log: why for _, names in found.values() for log in names}
+            out[name] = replace(_of_axis(model, name, going, test_function), left_out=still)
     if not out:
         raise nothing_moves(model.axes, given[Role.TRAINING].values())
     return out
@@ -231,6 +254,11 @@ def _within_reach(
     if sum(np.count_nonzero(w.reached) for w in within) < LEAST_SHARED * sum(map(len, within)):
         return tuple(PreparedLog.of(m, length) for m in motions)
     return tuple(within)
+
+
+def _length(log: PreparedLog) -> float:
+    """Of its motion, s."""
+    return float(log.motion.signals.shape[1] * log.motion.period)
 
 
 def by_log(found: Mapping[str, Dataset]) -> dict[str, dict[str, PreparedLog]]:

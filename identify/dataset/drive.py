@@ -7,7 +7,8 @@ so these effects are stepped sample by sample, not over blocks.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from twin.signals import between, local_parabola
 Array = NDArray[np.float64]
 
 LESSENED = 0.5  # of the commanded force; below it errors are divided by actual over commanded
+KEPT = 8  # true motions of logs
 PASSES = 3  # iterations from a reading to the true position
 
 
@@ -69,6 +71,14 @@ def _added(actuation: AxisModel, motion: Motion, signals: Array, period: float) 
     return np.asarray(rows.sum(axis=0))
 
 
+@dataclass(frozen=True)
+class _Sensing:
+    """Sensing effects of an axis, the same where their names and values are."""
+
+    values: tuple[tuple[str, tuple[float, ...]], ...]
+    axis: AxisModel = field(compare=False)
+
+
 def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
     """The true motion behind the readings, and the rate of their error, (n,) m/s.
 
@@ -77,7 +87,13 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
     sensing = [f for f in axis.effects if f.effect.kind is Kind.SENSING and not is_noise(f.effect)]
     if not sensing:
         return motion, np.broadcast_to(0.0, motion.raw.shape[1])
-    error, rate = reading_error(replace(axis, effects=tuple(sensing)), motion)
+    values = tuple((f.effect.name, tuple(f.vector())) for f in sensing)
+    return _behind(_Sensing(values, replace(axis, effects=tuple(sensing))), motion)
+
+
+@lru_cache(maxsize=KEPT)  # while a fit moves other parameters, the true motion stays
+def _behind(sensing: _Sensing, motion: Motion) -> tuple[Motion, Array]:
+    error, rate = reading_error(sensing.axis, motion)
     blocks = motion.signals.copy()
     for block, at_samples in zip(blocks, (error, rate), strict=False):
         block -= at_samples.reshape(blocks.shape[1], -1).mean(axis=1)

@@ -56,7 +56,8 @@ class Motion:
     axis and of the other one, by which m, N and so on are to be read. beside: on a machine with
     more than two axes the others, by name. velocity_weight: 1, of a measured velocity beside the
     readings (identify.dataset.velocity); 0 where there is none. ripples: m, periods at which the
-    readings err along the track (identify.dataset.reading_ripple).
+    readings err along the track (identify.dataset.reading_ripple). ahead: s, by which the command
+    was moved ahead of how it was logged.
     """
 
     name: str
@@ -75,6 +76,7 @@ class Motion:
     beside: Mapping[str, OtherAxis] = field(default_factory=dict)
     velocity_weight: float = 0.0
     ripples: tuple[float, ...] = ()
+    ahead: float = 0.0
 
     def __repr__(self) -> str:
         return (
@@ -110,7 +112,8 @@ class Motion:
     def with_force_ahead(self, shift: float) -> Motion:
         """The same with its command moved ahead by ``shift`` seconds."""
         at = np.arange(self.raw.shape[1], dtype=float)
-        return self.with_force(np.interp(at + shift / self.sample_period, at, self.raw[1]))
+        moved = self.with_force(np.interp(at + shift / self.sample_period, at, self.raw[1]))
+        return replace(moved, ahead=self.ahead + shift)
 
     def with_force(self, force: Array) -> Motion:
         """The same under another force (n * samples a block,) N, at the log's own rate."""

@@ -18,6 +18,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.aliasing import folded
 from identify.dataset.drive import actual_force, is_noise
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, at_rest, on_blocks, sticks, total_force
@@ -36,9 +37,6 @@ MOST_SEGMENTS = 64  # whose median is sure enough: with as many frequencies, to 
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 BAND_OF_BOTH = 0.25  # its end beside a measured velocity, whose noise vanishes towards 0.5
 LOUDER = 2.0  # times the power of the quietest log, beyond which it is no noise: estimates scatter
-PASSED = 0.25  # of the power at rest
-PIECE = 64  # test functions of a piece, whose spectrum tells what the residual leaves room for
-REFUTED = 0.7  # of the floor, below which an error refutes it: estimates scatter by a tenth
 PLAIN = 3.0  # times the reading's noise where the band begins; above it the force's noise shows
 
 
@@ -48,7 +46,8 @@ class Noise:
 
     frequency (k,): Hz. force: N^2/Hz, one-sided and white. most: the same, that the log leaves room
     for where the reading's noise hides it. reading: m^2/Hz, one-sided and white. bend (k,): power
-    gain from a reading to the apparent force, N^2/m^2. segment: samples of the transform.
+    gain from a reading to the apparent force, N^2/m^2. segment: samples of the transform. folded:
+    N^2/Hz, one-sided, of the command that a thinned log folds; scatter: its relative error.
     """
 
     frequency: Array
@@ -57,11 +56,13 @@ class Noise:
     reading: float
     bend: Array
     segment: int
+    folded: float = 0.0
+    scatter: float = 0.0
 
     @property
     def power(self) -> Array:
         """Power of the noise in the force residual, (k,) N^2/Hz."""
-        return np.asarray(self.force + self.reading * self.bend)
+        return np.asarray(self.force + self.folded + self.reading * self.bend)
 
 
 def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
@@ -70,61 +71,14 @@ def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     return _with_own(sensors, logs)
 
 
-def floor_beside(
-    axis: AxisModel, logs: Sequence[PreparedLog], known: float, left: Sequence[Array]
-) -> float:
-    """The noise floor ``known`` (N RMS) of these logs, or less where what is left refutes it.
-
-    left: of each log (n,) N, what the axis leaves, zero where it tells nothing. A noise of the
-    force that alone would leave clearly more is refuted: it was the controller's answer to readings
-    that the log does not hold, or a load that strikes within its play. Its level is then what the
-    residual leaves room for.
-    """
-    if _rms_of(left) > REFUTED * known:
-        return known
-    given = [(log.motion, log.test_function) for log in logs]
-    noises = [
-        replace(n, force=_room_in(r, n, log))
-        for r, n, log in zip(left, noises_of(axis, [m for m, _ in given]), logs, strict=True)
-    ]
-    return min(_with_own(_passed_together(axis, noises, given), logs), known)
-
-
-def _rms_of(left: Sequence[Array]) -> float:
-    """RMS of what is left of all logs where it tells something."""
-    told = np.concatenate([r[r != 0.0] for r in left])
-    return float(np.sqrt(np.mean(told**2))) if len(told) else np.inf
-
-
-def _room_in(left: Array, noise: Noise, log: PreparedLog) -> float:
-    """White noise of the force, N^2/Hz, that what is left (n,) N of a log leaves room for.
-
-    In the octave below where test functions pass a quarter of the power: what a model lacks is
-    slower.
-    """
-    test = log.test_function
-    step = test.stride * test.period
-    told = np.count_nonzero(left) / max(len(left), 1)
-    if told * len(left) < PIECE:
-        return noise.force
-    frequency, power = _median_spectrum(left, PIECE, step, left == 0.0)
-    passed = np.interp(
-        frequency, noise.frequency, test.response(log.motion.sample_period, noise.segment)
-    )
-    own = np.interp(frequency, noise.frequency, noise.reading * noise.bend)
-    room = np.maximum(power / (told * passed) - own, 0.0)
-    top = float(frequency[np.flatnonzero(passed < PASSED * passed[0])[0]])
-    return float(room[(frequency > 0.5 * top) & (frequency <= top)].mean())
-
-
 def unrounded_floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     """The floor (N RMS) that these logs would have, had their readings not been rounded."""
     parts = []
     motions = [log.motion for log in logs]
     for noise, log in zip(noises_of(axis, motions), logs, strict=True):
         own = max(noise.reading - _white_rounding(log.motion), 0.0)
-        parts.append(_passed(replace(noise, reading=own), log.motion, log.test_function))
-    return _with_own(_together(parts, motions), logs)
+        parts.append(passed(replace(noise, reading=own), log.motion, log.test_function))
+    return _with_own(together(parts, motions), logs)
 
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
@@ -137,7 +91,7 @@ def _passed_together(
 ) -> float:
     """RMS in N of what the test functions of these logs pass of their noise."""
     each = [_variance(axis, n, *log) for n, log in zip(noises, logs, strict=True)]
-    return _together(each, [motion for motion, _ in logs])
+    return together(each, [motion for motion, _ in logs])
 
 
 def noises_of(axis: AxisModel, motions: Sequence[Motion]) -> tuple[Noise, ...]:
@@ -153,10 +107,12 @@ def _noises_of(axis: AxisModel, motions: tuple[Motion, ...]) -> tuple[Noise, ...
         dt = motion.sample_period
         quietest[dt] = min(noise.most, quietest.get(dt, np.inf))
     least = [quietest[motion.sample_period] for motion in motions]
-    return tuple(
+    noises = [
         replace(noise, force=low) if noise.force > LOUDER * low else noise
         for noise, low in zip(noises, least, strict=True)
-    )
+    ]
+    thinned = np.mean([noise.folded > 0.0 for noise in noises]) >= 0.5  # logs of one recorder
+    return tuple(noises if thinned else [replace(noise, folded=0.0) for noise in noises])
 
 
 def _with_own(sensors: float, logs: Sequence[PreparedLog]) -> float:
@@ -164,18 +120,18 @@ def _with_own(sensors: float, logs: Sequence[PreparedLog]) -> float:
     return float(np.hypot(sensors, np.sqrt(np.mean([log.force_noise**2 for log in logs]))))
 
 
-def _together(variances: Sequence[float], motions: Sequence[Motion]) -> float:
+def together(variances: Sequence[float], motions: Sequence[Motion]) -> float:
     seconds = [m.signals.shape[1] * m.period for m in motions]  # as many test functions has each
     return float(np.sqrt(np.average(variances, weights=seconds)))
 
 
 def _variance(axis: AxisModel, noise: Noise, motion: Motion, test_function: TestFunction) -> float:
     if not any(is_noise(f.effect) for f in axis.effects):
-        return _passed(noise, motion, test_function)
-    return _passed(noise, motion, test_function, _slow_rounding(motion, noise.segment))
+        return passed(noise, motion, test_function)
+    return passed(noise, motion, test_function, slow_rounding(motion, noise.segment))
 
 
-def _passed(
+def passed(
     noise: Noise, motion: Motion, test_function: TestFunction, beside: Array | float = 0.0
 ) -> float:
     """Variance, N^2, of the noise that a test function passes.
@@ -187,7 +143,7 @@ def _passed(
     return float(np.trapezoid(power * response, noise.frequency))
 
 
-def _slow_rounding(motion: Motion, segment: int) -> Array:
+def slow_rounding(motion: Motion, segment: int) -> Array:
     """One-sided power (segment // 2 + 1,) m^2/Hz of the slow steps of the readings' rounding.
 
     At speed rounding is white and already in the median spectrum; its slow steps are not.
@@ -229,7 +185,7 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
         raw += _between_samples(total_force(table, motion), motion)
     # The median over segments ignores those with spikes and reversals.
     segment = min(max(round(SEGMENT / dt), 256), len(raw))
-    frequency, power = _median_spectrum(raw, segment, dt, _at_rest(axis, motion))
+    frequency, power = median_spectrum(raw, segment, dt, _at_rest(axis, motion))
     half = np.cos(np.pi * frequency * dt) ** 2
     bend = _bend(axis, motion, frequency)
     band = _band(motion, frequency)
@@ -237,7 +193,8 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     most = max(force, PLAIN * reading * float(bend[band][0]))
     if force < most:
         force = motion.command_noise
-    return Noise(frequency, force, most, reading, bend, segment)
+    more, scatter = folded(motion, frequency[band], power[band], half[band], bend[band])
+    return Noise(frequency, force, most, reading, bend, segment, max(more - force, 0.0), scatter)
 
 
 def _between_samples(force: Array, motion: Motion) -> Array:
@@ -256,7 +213,7 @@ def _at_rest(axis: AxisModel, motion: Motion) -> NDArray[np.bool_]:
     return np.asarray(np.repeat(still & sticks(axis), samples)[1:])
 
 
-def _median_spectrum(
+def median_spectrum(
     signal: Array, segment: int, dt: float, left_out: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
     """Welch's one-sided density with medians: frequency Hz, power unit^2/Hz, (segment // 2 + 1,).

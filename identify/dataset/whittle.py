@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 ROUNDS = 12
 TOLERATED = 0.5  # log of power over fit at which a frequency has half its weight
 SMOOTHED = 9  # frequencies
+DEEPEST = 1e-6  # of the least power, that a fit may be
 
 
 def fitted_levels(shapes: Array, power: Array) -> Array:
@@ -30,6 +31,27 @@ def fitted_levels(shapes: Array, power: Array) -> Array:
         levels = _not_negative(shapes * (weight / model)[:, None], power / model * weight)
         model = np.maximum(shapes @ levels, 1e-12 * power.max())
     return levels
+
+
+def levels_with_dip(white: Array, bend: Array, power: Array) -> tuple[float, float]:
+    """Level of ``white`` in a power (m,), and its coherence, 0..1, with ``bend`` of opposite sign.
+
+    Two noises of one origin: to the shapes (m,) of each alone comes that of their product, which
+    may take from the power; 0 where it does not, or where one of the levels is not positive.
+    """
+    shapes = np.stack([white, bend, -np.sqrt(white * bend)], axis=1)
+    least = _underneath(power)
+    model, levels = least, np.zeros(3)
+    for _ in range(ROUNDS):
+        above = np.maximum(np.log(power / model), 0.0) / TOLERATED
+        weight = 1.0 / (1.0 + above**2)
+        weighed = shapes * (weight / model)[:, None]
+        size = np.maximum(np.linalg.norm(weighed, axis=0), np.finfo(float).tiny)
+        levels = np.linalg.lstsq(weighed / size, power / model * weight, rcond=1e-12)[0] / size
+        model = np.maximum(shapes @ levels, DEEPEST * least)
+    if levels.min() <= 0.0:
+        return 0.0, 0.0
+    return float(levels[0]), float(min(0.5 * levels[2] / np.sqrt(levels[0] * levels[1]), 1.0))
 
 
 def _underneath(power: Array) -> Array:

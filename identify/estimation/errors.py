@@ -34,8 +34,9 @@ def error_in(role: Role, fit: Fit, dataset: Dataset) -> float:
 
 
 def error_if_any(role: Role, fit: Fit, dataset: Dataset) -> float | None:
-    """The same, or None where there are none."""
-    return error_in(role, fit, dataset) if dataset.having(role) else None
+    """The same, or None where there are none, or none that say anything of this model."""
+    logs = dataset.having(role)
+    return error_in(role, fit, dataset) if logs and moving(logs, sticks(fit.axis)).any() else None
 
 
 def holdout_error(fit: Fit, dataset: Dataset) -> float | None:
@@ -44,7 +45,7 @@ def holdout_error(fit: Fit, dataset: Dataset) -> float | None:
 
 
 def gain_held_out(before: Fit, after: Fit, dataset: Dataset) -> Gain | None:
-    """What a fit takes of another's error on the held-out logs; None where there are none.
+    """What a fit takes of another's error on the held-out logs; None where none can say it.
 
     On the test functions that both can use. An effect that makes the motor's force small makes
     every force and error small with it.
@@ -52,6 +53,8 @@ def gain_held_out(before: Fit, after: Fit, dataset: Dataset) -> Gain | None:
     if not dataset.holdout:
         return None
     held = moving(dataset.holdout, sticks(before.axis) or sticks(after.axis))
+    if not held.any():
+        return None
     motions = [log.motion for log in dataset.holdout]  # it may differ from the fit logs
     pair = [
         residual(f.axis, dataset.holdout)[held] / forces_lessened(f.axis, motions)

@@ -141,25 +141,33 @@ def _undetermined(fit: Fit, half: Array) -> dict[str, NoInterval]:
 
 
 def intervals_to_keep(fit: Fit, found: Sequence[Estimate]) -> AxisIntervals:
-    """The intervals of a fit's estimates, for its model's file.
+    """The intervals of a fit's estimates, for its model's file: those that are told, and no other.
 
-    Where all of them are refused because the model is wrong, the scatter of the blocks is kept with
-    the ratio that tells so: whether two machines are alike can be asked of wrong models too.
+    What is refused where the fit is told is refused in the file: of a wrong model the intervals
+    of one actuator from two logs need not overlap.
     """
     ends = {
         e.label: (float(e.low), float(e.high))
         for e in found
         if e.low is not None and e.high is not None
     }
-    if isinstance(refusal(fit), ModelWrong):
-        where, half = fit.scaling.where, half_widths(fit)
-        without = _undetermined(fit, half)
-        ends = {
-            c.label: (float(value - h), float(value + h))
-            for c, value, h in zip(where, read(fit.axis, where), half, strict=True)
-            if c.label not in without
-        }
     return AxisIntervals(ends, float(fit.ratio) if len(fit.residual) else 1.0)
+
+
+def scatter(fit: Fit) -> AxisIntervals:
+    """How far the values scatter between parts of the log, however wrong the model is.
+
+    To compare a machine with its twin on the same motion, which a wrong model fits alike. No
+    interval of a true value, and never written.
+    """
+    where, half = fit.scaling.where, half_widths(fit)
+    without = _undetermined(fit, half)
+    ends = {
+        c.label: (float(value - h), float(value + h))
+        for c, value, h in zip(where, read(fit.axis, where), half, strict=True)
+        if c.label not in without
+    }
+    return AxisIntervals(ends, float(fit.ratio))
 
 
 def open_sides(fit: Fit, where: Sequence[ParameterReference], half: Array) -> dict[str, Side]:

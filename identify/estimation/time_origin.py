@@ -70,6 +70,12 @@ def time_origins(dataset: Dataset) -> Array:
     return np.array([log.motion.time_origin for log in dataset.logs])
 
 
+def with_given_origins(dataset: Dataset, begun: Array) -> Dataset:
+    """The dataset with its logs begun at these times (n,) s, in the order of ``time_origins``."""
+    pairs = zip(dataset.logs, begun, strict=True)
+    return dataset.with_logs(_set(log, float(at)) for log, at in pairs)
+
+
 def depends_on_time_origin(axis: AxisModel, dataset: Dataset) -> bool:
     """Whether a force of the axis depends on when a log began."""
     return len(without_timed_forces(axis, dataset.fit[0]).effects) < len(axis.effects)

@@ -184,9 +184,15 @@ def parts(before: Array, after: Array, count: Array, quiet: float) -> tuple[floa
 
     Of the whole and of a typical block. quiet: squared noise floor, N^2.
     """
-    whole = [float(np.average(s, weights=count)) for s in (before, after)]
-    typical = [float(np.exp(np.log(s + quiet).mean())) - quiet for s in (before, after)]
-    return _part(*whole, quiet), _part(*typical, quiet)
+
+    def whole(squares: Array) -> float:
+        return float(np.average(squares, weights=count))
+
+    def typical(squares: Array) -> float:
+        return float(np.exp(np.log(squares + quiet).mean())) - quiet
+
+    first, second = ((of(before), of(after)) for of in (whole, typical))
+    return _part(*first, quiet), _part(*second, quiet)
 
 
 def _part(before: float, after: float, quiet: float) -> float:

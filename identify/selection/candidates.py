@@ -12,7 +12,7 @@ from identify.dataset.drive import is_noise
 from identify.dataset.noise_floor import floor_of, unrounded_floor_of
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import Evidence, Gain, evidence, held_out_gain, rms
-from identify.estimation.fit import Fit, error_on
+from identify.estimation.fit import Fit, at_bounds, error_on
 from identify.estimation.time_origin import phases_found
 from identify.selection.acceptance import Judged, Score, Taken, score
 from twin.effect import Effect, Kind
@@ -22,7 +22,6 @@ from twin.model.machine import AxisModel, MachineModel
 Array = NDArray[np.float64]
 
 MOST_INERTIA = 3.0  # times the moved mass of the base or its start, that an effect may leave
-EDGE = 1e-3  # relative distance from a bound at which a value ended there
 NO_SCORE = "a linear step takes too little for a refit"
 
 
@@ -108,7 +107,7 @@ def candidate_of(
     """
     base, fit, dataset = before.fit, after.fit, before.dataset
     shared = base.kept & fit.kept
-    pair = [f.residual[shared[f.kept]] / f.lessened for f in (base, fit)]
+    left, less = (f.residual[shared[f.kept]] / f.lessened for f in (base, fit))
     added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
     added += phases_found(fit.axis, effect.name, dataset) if effect.name in fit.axis.names else 0
     both = np.isfinite(before.other) & np.isfinite(after.other)
@@ -116,7 +115,7 @@ def candidate_of(
         effect=effect,
         axis=dataset.axis,
         fit=fit,
-        evidence=evidence(*pair, added),
+        evidence=evidence(left, less, added),
         gain=held_out_gain(before.other[both], after.other[both], base.floor),
         score=score(before, after, control),
         doubt=doubt(before, fit, effect, own),
@@ -134,12 +133,9 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
     """
     dataset = before.dataset
     for fitted in (f for f in fit.axis.effects if f.effect.name == effect.name):
-        free = (p for p in effect.parameters if p.name in own and p.name not in fitted.fixed)
-        for p in (p for p in free if p.lower < p.upper):
-            value = fitted.values[p.name]
-            low = p.lower > 0.0 and value <= p.lower * (1.0 + EDGE)
-            if low or (p.upper > 0.0 and value >= p.upper * (1.0 - EDGE)):
-                return f"{p.name} ends at its bound of {value:.3g} {fit.axis.units(p.unit)}"
+        ended = [label for label in at_bounds(fit, effect.name) if label.split(".")[-1] in own]
+        if ended:
+            return f"{' and '.join(ended)} {'end' if ended[1:] else 'ends'} at a bound"
         if effect.is_itself and not effect.is_itself(fitted.values, dataset.excitation):
             return "its values make another force of it"
         periods = [fitted.values[p.name] for p in effect.parameters if p.period]

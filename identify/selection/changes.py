@@ -18,7 +18,6 @@ from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sti
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, fit_axis, fit_roughly
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.thorough_fit import fit_thoroughly
 from identify.estimation.variable_projection import starts
 from identify.selection.acceptance import Judged
 from identify.selection.bends import held_bends
@@ -209,22 +208,18 @@ def control(change: Change, without: Judged, fit: Judged) -> float:
     return Trial.beside(without).control(columns, sticking=resting)
 
 
-def refit_thoroughly(judged: Judged, look: Look, first: Fit) -> Fit:
-    """The best of a first fit and of those from all other starts, with shapes scanned again.
+def from_all_starts(judged: Judged, look: Look, first: Fit) -> Fit:
+    """The best of a first fit and of those from all other starts.
 
     The effect was missing when the base was fitted, which distorts its values, so one start has
     those that the base began with.
     """
-    logs, name = judged.dataset.fit, look.change.name
-    if not isinstance(look.change, Added):
-        fits = [first, *(fit_axis(axis, logs) for axis in look.axes[1:])]
-        return min(fits, key=lambda f: f.error)
-    begun = judged.fit.begun.with_effect(look.axes[0][name])
-    fits = [first, *(fit_axis(axis, logs) for axis in (begun, *look.axes[1:]))]
-    best = min(fits, key=lambda f: f.error)
-    if not best.at_floor:
-        best = fit_thoroughly(best.axis, judged.dataset)
-    return simplified(best, judged.dataset, look.change.effect)
+    change, logs, axes = look.change, judged.dataset.fit, look.axes[1:]
+    if not isinstance(change, Added):
+        return min([first, *(fit_axis(axis, logs) for axis in axes)], key=lambda f: f.error)
+    begun = judged.fit.begun.with_effect(first.axis[change.name])
+    fits = [first, *(fit_axis(axis, logs) for axis in (begun, *axes))]
+    return simplified(min(fits, key=lambda f: f.error), judged.dataset, change.effect)
 
 
 def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:

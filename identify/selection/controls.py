@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,13 +56,18 @@ class Trial:
     other_quiet: float
 
     @classmethod
+    @lru_cache(maxsize=8)  # every change is tried beside the same fit, and its controls again
     def beside(cls, judged: Judged) -> Trial:
         """The trial beside a fit."""
         fit, holdout = judged.fit, judged.dataset.holdout
         size = unit_penalty(fit.jacobian)
-        own = _Part.of(judged, fit.logs, size)
-        other = _Part.of(judged, holdout, size) if holdout else None
-        return cls(own, other, fit.floor**2, judged.other_floor**2)
+        own = _Part(fit.logs, fit.residual, fit.jacobian / size, fit.kept)
+        if not holdout:
+            return cls(own, None, fit.floor**2, judged.other_floor**2)
+        kept = np.isfinite(judged.other)
+        columns = jacobian(fit.axis, holdout, fit.scaling.where)[kept] / size
+        force = judged.other[kept] * fit.lessened
+        return cls(own, _Part(holdout, force, columns, kept), fit.floor**2, judged.other_floor**2)
 
     def part(self, columns: Columns, *, sticking: bool) -> float:
         """Part of the error above the floor that a linear step with columns takes (``acceptance``).
@@ -142,7 +147,7 @@ def _survives_shifts(columns: Sequence[Array]) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Some logs: residual (n,) N and the base's columns (n, k), of the test functions kept.
+    """Some logs: residual (n,) N and the base's columns (n, k), of the test functions kept (m,).
 
     columns: those that are tried, (m, j) for each log. All are for strengths with a unit penalty.
     """
@@ -153,18 +158,11 @@ class _Part:
     kept: NDArray[np.bool_]
     columns: Sequence[Array] = ()
 
-    @classmethod
-    def of(cls, judged: Judged, logs: Sequence[PreparedLog], size: Array) -> _Part:
-        axis = judged.fit.axis
-        force = residual(axis, logs)
-        own = jacobian(axis, logs, judged.fit.scaling.where)
-        own /= size
-        return cls(logs, force, own, np.ones(len(force), dtype=bool))
-
     def with_columns(self, columns: Columns, sticking: bool) -> _Part:
         """The same with columns to try; sticking: without test functions with standstill."""
-        kept = moving(self.logs, sticking)
-        return _Part(self.logs, self.force[kept], self.base[kept], kept, columns(self.logs))
+        kept = moving(self.logs, sticking) & self.kept
+        among = kept[self.kept]
+        return _Part(self.logs, self.force[among], self.base[among], kept, columns(self.logs))
 
     @cached_property
     def spans(self) -> list[slice]:

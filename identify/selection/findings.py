@@ -13,7 +13,7 @@ from identify.estimation.fit import Fit, fit_axis
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.bends import Bend
 from identify.selection.bent_curve import bent_curve
-from identify.selection.changes import Added, Freed, Reshaped, control
+from identify.selection.changes import Added, Change, Freed, Reshaped, control
 from identify.selection.confidence import confidence
 from identify.selection.found_shape import FoundShape, found_shape
 from identify.selection.search import Found, Step
@@ -78,44 +78,47 @@ class Finding:
 
 
 def findings_of(found: Found) -> tuple[Finding, ...]:
-    """What each step of a search explains; it takes a refit for each.
+    """What each law that a search added or changed explains; it takes a refit for each.
 
-    A change of a law that another step added is told with that effect, as what it resembles.
+    All changes of one law are told together: another shape of an effect that was added is what the
+    missing one resembles.
     """
-    added = {s.change.name: s for s in found.steps if isinstance(s.change, Added)}
-    out: list[Finding] = []
-    for step in found.steps:
-        changed = not isinstance(step.change, Added)
-        if changed and step.change.name in added:
-            continue
-        own = [s for s in found.steps if s.change.name == step.change.name and s is not step]
-        finding = _finding(step, own if not changed else (), found)
-        out.append(finding)
+    names = dict.fromkeys(s.change.name for s in found.steps)
+    by_law = [[s for s in found.steps if s.change.name == name] for name in names]
+    out = [_finding(steps, found) for steps in by_law]
     dataset, final = found.dataset, found.final
     least = error_in(dataset.chosen_on, final.fit, dataset)
     left = least / (final.other_floor if dataset.holdout else final.fit.floor)
     return tuple(replace(f, left=left, left_fitted=final.fit.ratio) for f in out)
 
 
-def without(step: Step, found: Found) -> Judged:
-    """The final fit without one step, refitted."""
-    if len(found.steps) == 1 and step.change.undone(found.final.fit.axis, found.base.fit.axis):
+def _without(steps: Sequence[Step], found: Found) -> Judged:
+    """The final fit without some steps, refitted."""
+    axis = found.final.fit.axis
+    for step in reversed(steps):
+        axis = step.change.undone(axis, found.base.fit.axis) or axis
+    if len(steps) == len(found.steps):
         return found.base
-    axis = step.change.undone(found.final.fit.axis, found.base.fit.axis)
-    return found.base if axis is None else Judged(fit_axis(axis, found.dataset.fit), found.dataset)
+    return Judged(fit_axis(axis, found.dataset.fit), found.dataset)
 
 
-def _finding(step: Step, shaped: Sequence[Step], found: Found) -> Finding:
-    """The finding of a step. shaped: steps that changed the law of the effect that it added."""
-    dataset, final, less = found.dataset, found.final, without(step, found)
-    beside = score(less, final)
-    beside = replace(beside, control=control(step.change, less, final))
+def _finding(steps: Sequence[Step], found: Found) -> Finding:
+    """The finding of the steps that are about one law."""
+    dataset, final, less = found.dataset, found.final, _without(steps, found)
+    own = steps[0].tried.candidate
+    if own.is_noise and own.score:  # it lowers no error
+        beside = own.score
+    else:
+        beside = replace(score(less, final), control=control(steps[0].change, less, final))
     chosen, tested = _errors(less.fit, final.fit, dataset)
-    name = step.change.name
+    name = steps[0].change.name
     axis = final.fit.axis if name in final.fit.axis.names else less.fit.axis
+    added = any(isinstance(s.change, Added) for s in steps)
+    others = [s.change.name for s in found.steps if s.with_others and s not in steps]
+    tied = (t.change.name for s in steps for t in s.level)
     finding = Finding(
         effect=name,
-        tied=tuple(dict.fromkeys(t.change.name for t in step.level if t.change.name != name)),
+        tied=tuple(dict.fromkeys(other for other in tied if other != name)),
         explains=share_explained(tested, found.base.fit, dataset),
         tested=tested,
         chosen=chosen,
@@ -123,51 +126,33 @@ def _finding(step: Step, shaped: Sequence[Step], found: Found) -> Finding:
         parameters=dict(axis[name].values),
         parameter_units=axis.parameter_units(name),
         score=beside,
-        kind=FindingKind.MISSING if isinstance(step.change, Added) else FindingKind.WRONG_SHAPE,
-        together=tuple(
-            s.change.name
-            for s in found.steps
-            if s.with_others and step.with_others and s is not step
-        ),
+        kind=FindingKind.MISSING if added else FindingKind.WRONG_SHAPE,
+        together=tuple(others) if any(s.with_others for s in steps) else (),
     )
-    for change in (step.change, *(s.change for s in shaped)):
-        finding = _shaped(finding, change, less, found)
+    for step in steps:
+        finding = _shaped(finding, step.change, less.fit, found)
     return finding
 
 
-def _needed_with(step: Step, found: Found) -> tuple[str, ...]:
-    others = [s for s in found.steps if s.with_others and step.with_others and s is not step]
-    return tuple(s.change.name for s in others)
-
-
-def _shaped(
-    finding: Finding, change: Added | Freed | Reshaped, less: Judged, found: Found
-) -> Finding:
-    """The finding with the curve that a change gives a law."""
-    final, dataset = found.final.fit, found.dataset
-    kind = finding.kind
-    if isinstance(change, Freed) and change.name in final.axis.names:
-        law = final.axis[change.name]
+def _shaped(finding: Finding, change: Change, less: Fit, found: Found) -> Finding:
+    """The finding with the curve that a change gives a law; that of a missing effect resembles."""
+    final, dataset, name = found.final.fit, found.dataset, change.name
+    without = change.undone(final.axis, final.axis)
+    if without is None or isinstance(change, Added):
+        return finding
+    kind = FindingKind.RESEMBLES if finding.kind is FindingKind.MISSING else finding.kind
+    if isinstance(change, Freed):
         bend = Bend(
-            change.parameter, change.held, law.values[change.parameter],
+            change.parameter, change.held, final.axis[name].values[change.parameter],
             change.effect.parameter(change.parameter).unit,
         )  # fmt: skip
-        if kind is FindingKind.MISSING and not bend.differs:
+        if finding.kind is FindingKind.MISSING and not bend.differs:
             return finding
-        axis = change.undone(final.axis, final.axis)
-        assert axis is not None
-        drawn = bent_curve(axis[change.name], final, dataset)
-        kind = FindingKind.RESEMBLES if kind is FindingKind.MISSING else kind
+        drawn = bent_curve(without[name], final, dataset)
         return replace(finding, kind=kind, bend=bend, shape=drawn)
-    if isinstance(change, Reshaped):
-        axis = change.undone(final.axis, final.axis)
-        at = final if axis is None else replace(less.fit, axis=less.fit.axis)
-        if change.name not in at.axis.names:
-            return finding
-        drawn = found_shape(change.shape, at, dataset)
-        kind = FindingKind.RESEMBLES if kind is FindingKind.MISSING else kind
-        return replace(finding, kind=kind, shape=drawn)
-    return finding
+    assert isinstance(change, Reshaped)
+    before = less if name in less.axis.names else fit_axis(without, dataset.fit)
+    return replace(finding, kind=kind, shape=found_shape(change.shape, before, dataset))
 
 
 def _errors(before: Fit, after: Fit, dataset: Dataset) -> tuple[Errors, Errors]:

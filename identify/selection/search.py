@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
-from identify.estimation.channel_delay import moved_by
+from identify.estimation.channel_delay import moved_by, realigned
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.scaling import Scaling
 from identify.estimation.thorough_fit import fit_thoroughly
-from identify.estimation.time_origin import synchronised
+from identify.estimation.time_origin import synchronised, time_origins, with_given_origins
 from identify.estimation.variable_projection import starts
 from identify.selection.acceptance import Judged, score
 from identify.selection.candidates import (
@@ -36,7 +36,7 @@ from identify.selection.changes import (
     Reshaped,
     control,
     freed_of,
-    refit_thoroughly,
+    from_all_starts,
     reshaped_of,
 )
 from identify.selection.controls import Trial
@@ -44,10 +44,10 @@ from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.memory import give_back
 from twin.model.machine import AxisModel
-from twin.model.parameters import free_parameters
 from twin.parallel import counting, spread
 
 Progress = Callable[[int, int], None]
+SEARCHED = 30.0  # s of motion in each role, in which what a model lacks shows many times
 LEADERS = 2  # looks that are refitted first, and tell what others must promise
 
 
@@ -99,39 +99,65 @@ class Found:
 
 
 def search(
-    base: Fit,
-    dataset: Dataset,
-    catalogue: Catalogue,
-    progress: Progress | None = None,
-    shifts: int = RULE.most_shifts,
+    base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress | None = None
 ) -> Found:
     """Change one fitted axis while changes are accepted.
 
-    shifts: how often the search may still begin again as a change alters the channel delay.
+    Long logs are searched by their beginnings, with one fit of the answer to all of them; where
+    this leaves clearly more, it goes on from there on all of them.
     """
-    first = judged = Judged(base, dataset)
-    steps: tuple[Step, ...] = ()
-    passed: list[Step] = []
-    ranking: tuple[Candidate, ...] = ()
-    last: list[Tried] = []
+    part = dataset.shortened(SEARCHED)
+    if part is dataset:
+        return _search(_begun(base, dataset), catalogue, progress)
+    found = _search(_begun(fit_axis(base.axis, part.fit), part), catalogue, progress)
+    whole = _on_whole(found, base, dataset)
+    if found.final.fit.ratio * RULE.at_floor > whole.final.fit.ratio or whole.final.at_floor:
+        return whole
+    return _search(whole, catalogue, progress)
+
+
+def _begun(base: Fit, dataset: Dataset) -> Found:
+    """What is found before a search."""
+    return Found(dataset, Judged(base, dataset), Judged(base, dataset), (), (), (), ())
+
+
+def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
+    """What was found on the beginnings of logs, fitted to the whole of them."""
+    part = found.dataset
+    if part.channel_delay != dataset.channel_delay:
+        dataset = realigned(dataset, part.channel_delay)
+    dataset = with_given_origins(dataset, time_origins(part))
+    fits = [
+        replace(fit_axis(axis, dataset.fit), begun=base.begun)
+        for axis in (found.base.fit.axis, found.final.fit.axis)
+    ]
+    first, final = (Judged(fit, dataset) for fit in fits)
+    return replace(found, dataset=dataset, base=first, final=final if found.steps else first)
+
+
+def _search(
+    found: Found, catalogue: Catalogue, progress: Progress | None, shifts: int = RULE.most_shifts
+) -> Found:
+    """Go on from what was found; shifts: how often a change may still alter the channel delay."""
+    dataset, first, judged, steps = found.dataset, found.base, found.final, found.steps
+    passed, ranking, last = [*found.passed], found.ranking, list(found.last)
     while len(steps) < RULE.most_steps:
         judged, last, candidates = tried_beside(judged, catalogue, progress)
-        if not ranking:
+        if not steps:
             first, ranking = judged, ordered(candidates)
         new = _accepted(judged, last) or _together(judged, last, catalogue)
         if not new:
             break
         passed += new
-        judged = new[-1].tried.judged
-        judged, steps = _needed(judged, (*steps, *new), first)
+        judged, steps = _needed(new[-1].tried.judged, (*steps, *new), first)
         if judged.at_floor:
             break
         if shifts and (moved := moved_by(judged.fit, dataset)):
-            return search(
-                fit_axis(first.fit.axis, moved.fit), moved, catalogue, progress, shifts - 1
-            )
-        dataset, fit = synchronised(judged.fit, dataset)
-        judged = judged if dataset is judged.dataset else Judged(fit, dataset)
+            again = _begun(fit_axis(first.fit.axis, moved.fit), moved)
+            return _search(again, catalogue, progress, shifts - 1)
+        fit = fit_thoroughly(judged.fit.axis, dataset, judged.fit.begun)
+        dataset, fit = synchronised(fit, dataset)
+        judged = Judged(fit, dataset)
     return Found(dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
 
 
@@ -147,7 +173,8 @@ def tried_beside(
     plain = [Added(e) for e in effects if not is_noise(e)]
     changes: list[Change] = [*plain, *freed_of(judged.fit.axis)]
     one_more = counting(len(changes), progress)
-    done = judged.at_floor
+    if judged.at_floor:
+        changes = []
     trial = Trial.beside(judged)
 
     def look(change: Change) -> Look:
@@ -156,14 +183,15 @@ def tried_beside(
         return found
 
     looks = spread(look, changes)
-    tried = [] if done else _refitted(judged, looks)
-    if not done and not any(t.judged.at_floor and t.candidate.supported for t in tried):
+    tried = _refitted(judged, looks)
+    enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
+    if not enough:
         curves = [c.look(judged, trial) for c in reshaped_of(judged.fit, judged.dataset)]
         best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
         tried += _refitted(judged, best, tried)
     judged, tried = _at_its_best(judged, tried)
     give_back()
-    noise = [_as_noise(judged, e) for e in effects if is_noise(e)]
+    noise = [as_noise(judged, e) for e in effects if is_noise(e)]
     ranked = {t.candidate.effect.name: t.candidate for t in tried if isinstance(t.change, Added)}
     looked = [_as_looked(judged, k) for k in looks if isinstance(k.change, Added)]
     candidates = [ranked.get(c.effect.name, c) for c in looked] + [n.candidate for n in noise]
@@ -190,9 +218,8 @@ def _refitted(judged: Judged, looks: Sequence[Look], known: Sequence[Tried] = ()
     fits = [*first, *spread(lambda k: (k, _fit_of(judged, k)), rest)]
     if not any(f.at_floor for _, f in fits):
         fits.sort(key=lambda pair: -_roughly(judged, pair[1]))
-        better = spread(lambda p: (p[0], refit_thoroughly(judged, *p)), fits[:LEADERS])
-        fits[:LEADERS] = better
-    return spread(lambda pair: _tried(judged, *pair), fits)
+        fits[:LEADERS] = spread(lambda p: (p[0], from_all_starts(judged, *p)), fits[:LEADERS])
+    return spread(lambda pair: judged_change(judged, *pair), fits)
 
 
 def _fit_of(judged: Judged, look: Look) -> Fit:
@@ -205,11 +232,11 @@ def _roughly(judged: Judged, fit: Fit) -> float:
     return (judged.fit.error**2 - fit.error**2) / above
 
 
-def _tried(judged: Judged, look: Look, fit: Fit) -> Tried:
+def judged_change(judged: Judged, look: Look, fit: Fit) -> Tried:
     """A refitted change with its score; its controls are asked only where they could decide."""
     change, after = look.change, Judged(fit, judged.dataset)
     found = candidate_of(judged, after, _effect(change), 0.0, parameters(change))
-    if found.supported:
+    if found.supported and found.score:
         taken = control(change, judged, after)
         found = replace(found, score=replace(found.score, control=taken))
     return Tried(change, look, after, found)
@@ -229,11 +256,11 @@ def parameters(change: Change) -> tuple[str, ...]:
 def _as_looked(judged: Judged, look: Look) -> Candidate:
     """An absent effect that was not refitted, as its linear step predicts it."""
     axis = look.axes[0]
-    fit = replace(judged.fit, axis=axis, scaling=Scaling(free_parameters(axis)))
+    fit = replace(judged.fit, axis=axis, scaling=Scaling.of(axis, judged.fit.logs))
     return Candidate.looked(judged, fit, look.change.effect, look.promise)  # type: ignore[attr-defined]
 
 
-def _as_noise(judged: Judged, effect: Effect) -> Tried:
+def as_noise(judged: Judged, effect: Effect) -> Tried:
     """An effect that only raises the noise floor."""
     fit, dataset = judged.fit, judged.dataset
     axis = fit.axis.with_effect(starts(fit, dataset, effect)[0].fitted)
@@ -255,7 +282,7 @@ def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried
     if again.error > RULE.settled * judged.fit.error:
         return judged, tried
     judged = Judged(again, judged.dataset)
-    return judged, [_tried(judged, t.look, t.judged.fit) for t in tried]
+    return judged, [judged_change(judged, t.look, t.judged.fit) for t in tried]
 
 
 def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
-from identify.estimation.fit import Fit, finished
-from identify.estimation.variable_projection import starts
+from identify.estimation.fit import Fit
+from identify.estimation.thorough_fit import fit_thoroughly
 from identify.selection.acceptance import Judged
-from identify.selection.candidates import Candidate, candidate_of, noise_candidate
-from identify.selection.changes import Added, Change, Reshaped, control, refit_thoroughly
+from identify.selection.candidates import Candidate
+from identify.selection.changes import Added, Reshaped, from_all_starts
 from identify.selection.controls import Trial
 from identify.selection.curves import shapes_of
+from identify.selection.search import as_noise, judged_change
 from twin.effect import Effect
 from twin.errors import InputError
 
@@ -25,14 +25,12 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     """
     before, change = Judged(base, dataset), Added(effect)
     if is_noise(effect):
-        axis = base.axis.with_effect(starts(base, dataset, effect)[0].fitted)
-        after = Judged(finished(axis, base.begun, dataset.fit, base.outcome), dataset)
-        return noise_candidate(before, after, effect)
+        return as_noise(before, effect).candidate
     look = change.look(before, Trial.beside(before))
     fit = change.refit(before, look)
     if not fit.at_floor:
-        fit = refit_thoroughly(before, look, fit)
-    return _judged(change, before, fit, effect, [p.name for p in effect.parameters])
+        fit = fit_thoroughly(from_all_starts(before, look, fit).axis, dataset, base.begun)
+    return judged_change(before, look, fit).candidate
 
 
 def reshape(
@@ -48,23 +46,12 @@ def reshape(
         trial = Trial.beside(before)
         for shape in shapes_of(fit, before.dataset, effect.name):
             change = Reshaped(shape, fit.axis[effect.name])
-            after = change.refit(before, change.look(before, trial))
-            tried.append((_judged(change, before, after, shape.empty.effect, ()), change))
+            look = change.look(before, trial)
+            fit = change.refit(before, look)
+            tried.append((judged_change(before, look, fit).candidate, change))
     if not tried:
         raise InputError(
             f"the logs show no other shape of {effect.name}: no curve in its place lowers their "
             "error; `twin diagnose` says what the model lacks"
         )
     return max(tried, key=lambda one: (one[0].supported, one[0].part))
-
-
-def _judged(
-    change: Change, before: Judged, fit: Fit, effect: Effect, own: Sequence[str]
-) -> Candidate:
-    """What speaks for a refitted change; its controls are asked only where they could decide."""
-    after = Judged(fit, before.dataset)
-    found = candidate_of(before, after, effect, 0.0, own)
-    if found.score is None or not found.supported:
-        return found
-    taken = control(change, before, after)
-    return replace(found, score=replace(found.score, control=taken))

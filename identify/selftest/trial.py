@@ -181,7 +181,8 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
             right = any(e in OUTSIDE for e in case.effects)
             right |= any(f.effect.name in names and _is_another(f) for f in built.planted)
     over = OVER[finding.shape.over] if finding.shape else None
-    return Answer(names, finding.kind, right, finding.least_left, finding.confidence, over)
+    sure = np.nan if finding.confidence is None else finding.confidence
+    return Answer(names, finding.kind, right, finding.least_left, sure, over)
 
 
 def _is_another(planted: Fitted) -> bool:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
 from identify.estimation.channel_delay import fit_aligned
-from identify.estimation.intervals import estimates, intervals_to_keep
+from identify.estimation.intervals import scatter
 from identify.measure import only_axis
 from identify.thesis.chapter import Chapter, Progress
 from identify.validation.agreement import Agreement, agreement
@@ -134,11 +134,11 @@ def _drawn(model: MachineModel, name: str, rng: np.random.Generator) -> MachineM
 
 
 def identified(model: MachineModel, log: Log, test_function: float | None = None) -> MachineModel:
-    """The model fitted to one log, with its intervals."""
+    """The model fitted to one log, with the scatter of its values, to be compared."""
     for axis, dataset in datasets(model, {"log": log}, {}, test_function).items():
         _, fit = fit_aligned(model.axes[axis], dataset)
         model = model.with_axis(axis, fit.axis)
-        model = model.with_intervals(axis, intervals_to_keep(fit, estimates(fit)))
+        model = model.with_intervals(axis, scatter(fit))
     return model
 
 

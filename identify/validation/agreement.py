@@ -135,9 +135,20 @@ def agreement(a: MachineModel, b: MachineModel, catalogue: Catalogue) -> Agreeme
     if not axes:
         raise InputError(
             f"{a.name} and {b.name}: no parameter has an interval in both, so nothing can be "
-            "compared; fit each with `twin fit MODEL LOG... -o FILE`, which writes its intervals"
+            f"compared; {_what_to_do(a, b)}"
         )
     return Agreement(axes, tuple(axis for axis in shared if axis not in axes))
+
+
+def _what_to_do(a: MachineModel, b: MachineModel) -> str:
+    """How the machines would come to intervals, as the end of a sentence."""
+    above = max((i.above_floor for m in (a, b) for i in m.intervals.values()), default=1.0)
+    if above > LARGEST_RATIO:
+        return (
+            f"a fit that leaves {above:.3g} times its noise floor has none, as its model is wrong: "
+            "find what it lacks with `twin diagnose MODEL LOG...`"
+        )
+    return "fit each with `twin fit MODEL LOG... -o FILE`, which writes its intervals"
 
 
 def _compared(a: MachineModel, b: MachineModel, axis: str) -> AxisAgreement:

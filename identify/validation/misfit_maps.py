@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset, by_log
-from identify.dataset.noise_floor import floor_beside, floor_of
+from identify.dataset.floor import noise_beside
 from identify.dataset.prepared_log import (
     PreparedLog,
     at_rest,
@@ -143,7 +143,7 @@ def compare_axis(
     force = every[kept]
     left = split_by_log(np.where(kept, every, 0.0), dataset.fit)
     if floor is None:
-        floor = floor_beside(axis, dataset.fit, floor_of(axis, dataset.fit), left)
+        floor = noise_beside(axis, dataset.fit, left).value
     where = {k: v[kept] for k, v in _coordinates(axis, dataset.fit).items()}
     maps = _maps(axis, dataset, floor, force, where)
     maps.append(misfit_by_frequency(axis, dataset.fit))

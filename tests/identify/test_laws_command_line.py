@@ -92,7 +92,8 @@ def test_the_loop_is_called_with_what_was_given(monkeypatch, cli, name):
         assert told["history"] == (("a step",) if name == "diagnose" else ())
         assert told["title"].startswith(NAME)
     code, text, _ = cli(name, "m.toml", "a.mcap", "--json")
-    assert (code, json.loads(text, parse_constant=refuse)) == (0, {"json of": name, "bad": None})
+    told = {"json of": name, "bad": None, "left_out": []}
+    assert (code, json.loads(text, parse_constant=refuse)) == (0, told)
     assert text.count("\n") == 1
     assert len(save.calls) + len(write.calls) == 1
     given, named = call.calls[-1]
@@ -116,7 +117,7 @@ def test_add(monkeypatch, cli, kept, code):
     assert named == {"axis": "y", "test_function": 0.07}
     assert save.only == (("the new model", Path("n.toml")), {})
     found, text, _ = cli(*command, "--json")
-    assert (found, json.loads(text)) == (code, {"json of": "add", "bad": None})
+    assert (found, json.loads(text)) == (code, {"json of": "add", "bad": None, "left_out": []})
 
 
 @pytest.mark.parametrize(("decides", "code"), [(True, 0), (False, 1)])

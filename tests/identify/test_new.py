@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from cli_runs import twin
 
-from identify.measure import first_model
+from identify.measure import first_model, not_determined
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.log import ROTARY_UNITS, AxisLog, Log
+from twin.log.importers import import_log, load_mapping
 from twin.model.file import load_model
 
 CATALOGUE = load_catalogue()
@@ -43,6 +46,101 @@ def test_it_has_the_mass_and_what_was_reached(units):
     assert [f.effect.kind.name for f in axis.effects] == ["FRICTION"]
 
 
+def hopping(static: float, offset: float, seed: int = 4) -> Log:
+    """Moves of 0.4 s each way and rests of 0.2 s, from which the force builds up to break away."""
+    rng, rate = np.random.default_rng(seed), 1000.0
+    hop, rest = np.arange(400) / 400.0, np.zeros(200)
+    position, force, at = [], [], 0.0
+    for k in range(24):
+        way = rng.uniform(0.01, 0.04) * (-1.0) ** k
+        v = way * 2.5 * (1.0 - np.cos(2.0 * np.pi * hop))
+        a = way * 2.5 * 2.5 * 2.0 * np.pi * np.sin(2.0 * np.pi * hop)
+        position += [at + rest, at + (np.cumsum(v) - v) / rate]
+        built_up = np.linspace(0.0, static, 200) * np.sign(way)
+        force += [built_up, MASS * a + COULOMB * np.sign(v) + VISCOUS * v]
+        at += float(v.sum()) / rate
+    columns = {"position": np.concatenate(position), "force": np.concatenate(force) + offset}
+    columns["position"] += 1e-9 * rng.standard_normal(len(columns["position"]))
+    columns["force"] += 1e-3 * rng.standard_normal(len(columns["force"]))
+    return Log(rate, {"a": AxisLog(columns)})
+
+
+def values_of(log: Log) -> dict[str, float]:
+    """Every value of the first model of a log."""
+    axis = first_model({"l": log}, "m", CATALOGUE).axes["a"]
+    own = {k: v for f in axis.effects for k, v in f.values.items()}
+    return {"mass": axis.mass, **own}
+
+
+@pytest.mark.parametrize("static", [COULOMB, 1.6 * COULOMB])
+@pytest.mark.parametrize("offset", [0.0, -0.7])
+def test_the_values_are_those_that_the_log_tells(static, offset):
+    """The offset is one of the command, which the constant force makes necessary."""
+    found = values_of(hopping(static, offset))
+    truth = {"mass": MASS, "Fc": COULOMB, "Fs": static, "sigma2": VISCOUS}
+    if offset:
+        truth["F0"] = -offset
+    assert found == pytest.approx(truth, rel=0.06)
+
+
+def test_a_static_friction_that_no_log_tells_is_that_of_coulomb():
+    axis = first_model({"l": drive()}, "m", CATALOGUE).axes["a"]
+    (friction,) = axis.effects
+    assert friction.values["Fs"] == friction.values["Fc"] == pytest.approx(COULOMB, rel=0.05)
+    assert friction.values["sigma2"] == pytest.approx(VISCOUS, rel=0.05)
+    assert not_determined(axis) == [f"{friction.effect.name}.Fs"]
+    told = first_model({"l": hopping(1.6 * COULOMB, 0.0)}, "m", CATALOGUE).axes["a"]
+    assert not_determined(told) == []
+
+
+def test_a_spring_does_not_hide_the_mass_and_a_turning_axis_has_gravity():
+    """Forces of the place of many times the inertia's, which neither model has."""
+    log = drive()
+    x = log.axes["a"].columns["position"]
+    log.axes["a"].columns["force"] += 900.0 * x
+    assert values_of(log)["mass"] == pytest.approx(MASS, rel=0.05)
+    turning = drive(ROTARY_UNITS)
+    q = 20.0 * turning.axes["a"].columns["position"]  # rad, of 20 times the inertia
+    columns = {"position": q, "force": 20.0 * turning.axes["a"].columns["force"]}
+    columns["force"] = columns["force"] + 300.0 * np.sin(q)
+    model = first_model({"l": Log(1000.0, {"a": AxisLog(columns, ROTARY_UNITS)})}, "m", CATALOGUE)
+    assert model.axes["a"].mass == pytest.approx(MASS, rel=0.05)
+
+
+def test_a_force_that_one_way_alone_shows_is_friction_and_no_constant():
+    log = drive()
+    middle = T + 0.5e-3
+    velocity = 0.25 * np.cos(5.0 * middle) + 0.26 * np.cos(13.0 * middle + 1.0)
+    columns = log.axes["a"].columns
+    columns["position"] += 0.6 * T
+    columns["force"] += COULOMB * (1.0 - np.sign(velocity)) + VISCOUS * 0.6
+    found = values_of(log)
+    assert "F0" not in found
+    assert found["Fc"] == pytest.approx(COULOMB, rel=0.05)
+
+
+def test_a_log_that_cannot_tell_the_mass_is_refused():
+    t = np.arange(30_000) / 1000.0
+    v = 0.025 * np.cos(0.5 * t) + 0.007 * np.cos(0.35 * t + 1.0)
+    x = np.cumsum(v) / 1000.0 + 1e-8 * np.random.default_rng(1).standard_normal(len(t))
+    slow = Log(1000.0, {"a": AxisLog({"position": x, "force": 1.5 * np.sign(v) + 40.0 * v})})
+    with pytest.raises(InputError, match=r"axis a: l cannot tell the mass.*faster changes") as why:
+        first_model({"l": slow}, "m", CATALOGUE)
+    assert "\n" not in str(why.value)
+
+
+@pytest.mark.parametrize("name", ["DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"])
+def test_the_emps_drive_has_the_published_values(shared_data, name):
+    """A. Janot et al. 2019: 95.1 kg, 20.4 N, 203.5 N s/m, offset -3.16 N of the command."""
+    examples = Path(__file__).parents[2] / "examples"
+    log = import_log(shared_data / "emps" / name, load_mapping(examples / "import_emps.toml"))
+    found = {k: v for f in first_model({"l": log}, "m", CATALOGUE).axes["x"].effects
+             for k, v in f.values.items()}  # fmt: skip
+    assert found["Fc"] == pytest.approx(20.4, rel=0.06)
+    assert found["sigma2"] == pytest.approx(203.5, rel=0.06)
+    assert found["F0"] == pytest.approx(3.16, rel=0.1)
+
+
 def test_logs_that_give_none_are_refused():
     still = Log(1000.0, {"a": AxisLog({"position": 0.0 * T, "force": 0.0 * T})})
     with pytest.raises(InputError, match="no axis moves in l"):
@@ -66,6 +164,7 @@ def test_the_commands_of_a_new_machine(tmp_path):
     ):
         done = twin(*command, folder=tmp_path)
         assert done.returncode == 0, done.stderr
+    assert "axis x: coulomb_viscous.Fs is not determined, as the axis does not" in done.stdout
     axis = load_model(str(tmp_path / "model.toml"), CATALOGUE).axes["x"]
     assert axis.mass == pytest.approx(MASS, rel=0.05)
     for wrong in (("import", "run.csv"), ("import", "--guess", "run.csv", "run.csv")):

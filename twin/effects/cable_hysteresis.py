@@ -9,19 +9,12 @@ its velocity dependence. Rate-independent, keeps the memory of inner loops, line
 and exact for motion in one direction within a sample.
 """
 
-from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V
+from twin.effect import Effect, Kind
+from twin.one_law import LAYERS, on_a_cable, slipping_layers
 
 
 def law(p, s, io):
-    step = io[V] * io[DT]
-    limit = p[0]
-    force = 0.0
-    for i in range(4):  # from the layer that slips last to the one that slips first
-        now = min(max(s[i] + io[WHEN] * step, -limit), limit)
-        s[i] = min(max(s[i] + step, -limit), limit)
-        force -= p[1 + i] * now / limit
-        limit *= 0.5
-    io[OUT] = force
+    slipping_layers(p, s, io)
 
 
 EFFECT = Effect(
@@ -29,21 +22,10 @@ EFFECT = Effect(
     summary="rate-independent hysteresis of the cable slab over millimetres of travel",
     equation="F = -sum_i f_i e_i/d_i;  e_i follows x within +-d_i;  d_i = reach (1, 1/2, 1/4, 1/8)",
     source="Iwan 1966, distributed elements; Al-Bender, Lampaert, Swevers 2005, Maxwell-slip",
-    parameters=(
-        Parameter(
-            "reach", "m", 5e-3, 1e-6, 1.0, "travel from no force until every layer slips",
-            scan=lambda e: tuple(min(r, e.travel) for r in (1e-3, 3e-3, 1e-2, 3e-2)),
-        ),
-        *(
-            Parameter(
-                f"f{i}", "N", 0.0, 0.0, 1e7, f"force of the layer that slips at reach/{2 ** i}",
-                strength=True,
-            )
-            for i in range(4)
-        ),
-    ),
+    parameters=LAYERS,
     states=("e0", "e1", "e2", "e3"),
     law=law,
     fingerprint="residual bends over millimetres after each reversal, at every speed alike",
     excited_by="slow passes with reversals at many places, and inner loops of millimetres",
-)  # fmt: skip
+    suits=on_a_cable,
+)

@@ -6,7 +6,8 @@ choice: the thesis prints a measured curve, no formula.
 """
 
 from twin.curve import Coordinate, Curve
-from twin.effect import OUT, Effect, Kind, Parameter, X
+from twin.effect import MOST, OUT, Effect, Kind, Parameter, X
+from twin.one_law import on_a_cable
 
 
 def law(p, s, io):
@@ -20,13 +21,14 @@ EFFECT = Effect(
     equation="F = -(offset + k1 x + k2 x^2 + k3 x^3)",
     source="L. Jia 2023, cable pass; the polynomial form is an assumption",
     parameters=(
-        Parameter("offset", "N", 0.0, -1e7, 1e7, "force at x = 0", strength=True),
-        Parameter("k1", "N/m", 0.0, -1e5, 1e5, "stiffness", strength=True),
-        Parameter("k2", "N/m^2", 0.0, -1e6, 1e6, "quadratic term", strength=True),
-        Parameter("k3", "N/m^3", 0.0, -1e7, 1e7, "cubic term", strength=True),
+        Parameter("offset", "N", 0.0, -MOST, MOST, "force at x = 0", strength=True),
+        Parameter("k1", "N/m", 0.0, -MOST, MOST, "stiffness", strength=True),
+        Parameter("k2", "N/m^2", 0.0, -MOST, MOST, "quadratic term", strength=True),
+        Parameter("k3", "N/m^3", 0.0, -MOST, MOST, "cubic term", strength=True),
     ),
     law=law,
     curves=(Curve(Coordinate.POSITION),),
     fingerprint="residual is one smooth curve of position, the same in both directions",
     excited_by="slow passes over the whole travel in both directions",
+    suits=on_a_cable,
 )

@@ -13,8 +13,7 @@ class AxisIntervals:
     """Low and high ends (90 %) by parameter label, in the parameters' units.
 
     above_floor: force error of the fit over its noise floor. Where it is more than noise the model
-    is wrong, and the ends tell how far the values scatter from one part of the logs to another, no
-    more.
+    is wrong, and a fit's file has no ends.
     """
 
     ends: Mapping[str, Interval]

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, ConfigDict, Field
 
-from twin.effect import Effect
+from twin.effect import LEAST, MOST, Effect
 from twin.entries import Entries
 from twin.model.history import HistoryStep
 from twin.model.units import ROTARY
@@ -62,15 +62,15 @@ class EffectEntry(Entries):
 class AxisEntry(Entries):
     """One axis, with ``mass`` or with ``inertia``; what is left out has the default of Hardware."""
 
-    mass: Annotated[float, _none_or_from(1e-6)] | None = Field(
-        None, ge=0.0, le=1e6,
-        description="a number from 1e-06 to 1e+06, in kg: the moved mass; or 0, where the motion "
-        "is imposed and the force that it takes was measured",
+    mass: Annotated[float, _none_or_from(LEAST)] | None = Field(
+        None, ge=0.0, le=MOST,
+        description=f"a number from {LEAST:g} to {MOST:g}, in kg: the moved mass; or 0, "
+        "where the motion is imposed and the force that it takes was measured",
     )  # fmt: skip
-    inertia: Annotated[float, _none_or_from(1e-12)] | None = Field(
-        None, ge=0.0, le=1e6,
-        description="a number from 1e-12 to 1e+06, in kg m^2: the moment of inertia; or 0, where "
-        "the motion is imposed and the torque that it takes was measured",
+    inertia: Annotated[float, _none_or_from(LEAST)] | None = Field(
+        None, ge=0.0, le=MOST,
+        description=f"a number from {LEAST:g} to {MOST:g}, in kg m^2: the moment of "
+        "inertia; or 0, where the motion is imposed and the torque that it takes was measured",
     )  # fmt: skip
     fixed: list[Name] | None = Field(
         None, description='["mass"] (["inertia"] on a rotary axis), where a fit holds it'

@@ -12,25 +12,25 @@ from constructed import STICKY, effect, log_of, moved, windowed
 from noisy_motion import MASS, PLACE, PUSH, RATE, noisy
 from scipy.signal import welch
 
-import identify.dataset.noise_floor as noise_floor_module
 from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.floor import noise_beside
 from identify.dataset.motion import motion_of
 from identify.dataset.noise_floor import (
     _at_rest,
     _between_samples,
-    _median_spectrum,
-    _together,
-    floor_beside,
     floor_of,
+    median_spectrum,
     noise_floor,
     noise_of,
     noises_of,
+    together,
 )
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, on_blocks, total_force
 from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
 from identify.dataset.whittle import _underneath, fitted_levels
 from identify.estimation.force_balance import residual
+from twin.effect import LEAST
 from twin.errors import InputError
 from twin.log.check import moves
 from twin.model.machine import AxisModel, MachineModel
@@ -71,30 +71,30 @@ def test_the_floor_is_in_proportion_to_the_noise_and_falls_with_the_window():
     assert floor_of(axis, [short]) / floor_of(axis, [long]) == pytest.approx(2.0**2.5, rel=0.05)
 
 
-def test_a_floor_that_what_is_left_refutes_is_that_of_the_residual(monkeypatch):
+def test_a_floor_that_what_is_left_refutes_is_that_of_the_residual():
     """As where readings that the log does not hold made the command."""
     axis, log = AxisModel(MASS), noisy(6, 0.02, duration=20.0)
     left = residual(axis, [log])
-    true = floor_of(axis, [log])
-    assert floor_beside(axis, [log], true, [left]) == true
-    found = noise_floor_module.noises_of
-
-    def much(axis, motions):
-        return tuple(replace(n, force=30.0 * n.force) for n in found(axis, motions))
-
-    monkeypatch.setattr(noise_floor_module, "noises_of", much)
-    known = floor_of(axis, [log])
-    assert known == pytest.approx(np.sqrt(30.0) * true, rel=0.01)
-    assert floor_beside(axis, [log], known, [left]) == pytest.approx(true, rel=0.15)
+    floor = noise_beside(axis, [log], [left])
+    assert floor.value == pytest.approx(floor_of(axis, [log]), rel=0.1)
+    assert floor.value <= np.sqrt(np.mean(left**2)) * (1.0 + 1e-9)
+    assert floor.low < floor.value < floor.high < 1.3 * floor.value
+    # A log that seems five times as noisy as what is left of it.
+    loud = noisy(6, 0.1, duration=20.0)
+    known = noise_beside(axis, [loud])
+    assert known.value == pytest.approx(5.0 * floor.value, rel=0.05)
+    less = noise_beside(axis, [loud], [left])
+    assert less.value == pytest.approx(floor.value, rel=0.15)
+    assert less.high == known.high
     # What a model lacks is slower than the noise, and stays above the floor.
-    slow = 3.0 * true * np.sin(2.0 * np.pi * np.arange(len(left)) / 64.0)
-    assert floor_beside(axis, [log], known, [left + slow]) == pytest.approx(true, rel=0.15)
+    slow = 2.0 * floor.value * np.sin(2.0 * np.pi * np.arange(len(left)) / 64.0)
+    assert noise_beside(axis, [loud], [left + slow]).value == pytest.approx(floor.value, rel=0.15)
 
 
 def test_logs_weigh_by_how_long_they_last_not_by_their_blocks():
     short, long = noisy(7, 0.02, duration=3.0), noisy(8, 0.04, duration=9.0)
     coarse = replace(long.motion, period=10.0 * long.motion.period)
-    assert _together([1.0, 4.0], [short.motion, coarse]) ** 2 == pytest.approx(
+    assert together([1.0, 4.0], [short.motion, coarse]) ** 2 == pytest.approx(
         (1.0 * 3.0 + 4.0 * 90.0) / 93.0, rel=1e-2
     )
 
@@ -183,9 +183,9 @@ def test_rounding_of_the_readings_adds_what_it_pretends():
 
 
 @pytest.mark.parametrize(("segment", "n"), [(256, 5000), (255, 3000), (256, 900)])
-def test_the_median_spectrum_is_that_of_welch(segment, n):
+def test_themedian_spectrum_is_that_of_welch(segment, n):
     signal = np.random.default_rng(8).normal(1.0, 2.0, n) + np.linspace(0.0, 30.0, n)
-    found = _median_spectrum(signal, segment, 2e-3, np.zeros(n, bool))
+    found = median_spectrum(signal, segment, 2e-3, np.zeros(n, bool))
     wanted = welch(signal, 500.0, nperseg=segment, average="median", detrend="linear")
     np.testing.assert_allclose(found[0], wanted[0])
     np.testing.assert_allclose(found[1], wanted[1], rtol=1e-9)
@@ -196,9 +196,9 @@ def test_segments_of_rest_are_left_out_but_a_quarter_is_kept():
     signal = rng.normal(0.0, 1.0, 8192)
     loud = np.arange(8192) >= 2600
     signal[loud] *= 30.0
-    _, power = _median_spectrum(signal, 256, 1e-3, loud)
+    _, power = median_spectrum(signal, 256, 1e-3, loud)
     assert np.mean(power) == pytest.approx(2e-3, rel=0.2)
-    _, blind = _median_spectrum(signal, 256, 1e-3, ~loud)
+    _, blind = median_spectrum(signal, 256, 1e-3, ~loud)
     assert np.mean(blind) == pytest.approx(900.0 * 2e-3, rel=0.2)
 
 
@@ -242,7 +242,7 @@ def test_the_rough_mass_is_exact_beside_dry_and_viscous_friction():
     pushed = replace(m, signals=np.stack([m.position, m.velocity, u]))
     assert inertia([pushed, pushed]) == pytest.approx(2.3, rel=2e-3)
     pulled = replace(m, signals=np.stack([m.position, m.velocity, -u]))
-    assert inertia([pulled]) == pytest.approx(1e-6)  # the least mass that a model may have
+    assert inertia([pulled]) == pytest.approx(LEAST)  # the least mass that a model may have
 
 
 def test_the_shortest_window_that_is_quiet_is_chosen():

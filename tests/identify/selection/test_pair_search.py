@@ -7,11 +7,10 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from identify.selection.diagnosis import diagnose_axis
 
 from identify.dataset.dataset import datasets
 from identify.estimation.fit import fit_axis
-from identify.selection.diagnosis import Verdict
+from identify.selection.diagnosis import Verdict, diagnose_axis
 from identify.selftest.cases import AXIS, machine
 from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model

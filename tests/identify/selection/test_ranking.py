@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from identify.selection.candidates import Candidate
 
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import Evidence, Gain
 from identify.selection import ranking
+from identify.selection.candidates import Candidate
 from twin.effects import load_catalogue
 
 

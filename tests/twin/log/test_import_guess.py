@@ -55,6 +55,50 @@ def test_names_and_numbers_tell_the_signals(tmp_path, columns, expected, rate):
     np.testing.assert_allclose(log.axes["x"].position, Q, atol=1e-9)
 
 
+def trailing(column, samples=25):
+    """A loop that is so many samples behind its setpoint, a little smaller, read with noise."""
+    late = np.r_[np.full(samples, column[0]), column[:-samples]]
+    return 0.97 * late + 1e-5 * np.std(column) * NOISE
+
+
+GOAL, RATE_OF_GOAL, REACHED, SPEED = Q, V, trailing(Q), trailing(V)
+PUSH = -3.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED) + 5.0 * SPEED
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected", "told"),
+    [
+        ({"a": T, "b": REACHED, "c": SPEED, "d": GOAL, "e": PUSH},
+         {"position": "b", "velocity": "c", "setpoint_position": "d", "force": "e"},
+         "goes as the position, 30 ms ahead of it"),
+        ({"a": T, "b": GOAL, "c": RATE_OF_GOAL, "d": REACHED, "e": SPEED, "f": PUSH},
+         {"position": "d", "velocity": "e", "setpoint_position": "b", "setpoint_velocity": "c",
+          "force": "f"}, "setpoint_velocity"),
+        ({"t": T, "angle": REACHED, "u": 180.0 / np.pi * GOAL, "w": PUSH},
+         {"position": "angle", "setpoint_position": "u", "force": "w"}, 'unit = "deg"'),
+        ({"t": T, "position": REACHED, "goal_position": GOAL, "load": PUSH},
+         {"position": "position", "setpoint_position": "goal_position", "force": "load"}, ""),
+        ({"t": T, "present_position": REACHED, "goal": GOAL, "load": PUSH},
+         {"position": "present_position", "setpoint_position": "goal", "force": "load"}, ""),
+        ({"t": T, "pos": REACHED, "push": 40.0 * REACHED + 0.1 * PUSH},
+         {"position": "pos", "force": "push"}, ""),  # a spring's, of another size
+    ],
+)  # fmt: skip
+def test_what_follows_the_position_is_its_setpoint_and_no_force(tmp_path, columns, expected, told):
+    write_csv(tmp_path / "a.csv", columns)
+    found = guess_map(tmp_path / "a.csv")
+    assert not found.missing
+    assert columns_of(tmp_path, found.text) == {"x": expected}
+    assert told in found.text
+
+
+def test_a_setpoint_alone_is_no_force(tmp_path):
+    write_csv(tmp_path / "a.csv", {"t": T, "pos": REACHED, "u": GOAL})
+    assert guess_map(tmp_path / "a.csv").missing == (
+        "axis x: no column of pos, u looks like a force",
+    )
+
+
 def test_what_is_assumed_and_what_is_missing_is_said(tmp_path):
     savemat(tmp_path / "a.mat", {"t": T, "angle": 100.0 * Q, "speed": 200.0 * V, "label": "abc"})
     found = guess_map(tmp_path / "a.mat")

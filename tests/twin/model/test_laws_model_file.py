@@ -194,7 +194,7 @@ def test_a_sample_rate_is_a_positive_number(rate):
             {"axes": {"x": {"mass": 1.0, "jerks": 2.0}}},
             "axes.x: unknown entry 'jerks'; did you mean 'jerk'",
         ),
-        ({"axes": {"x": {"mass": 1e-7}}}, "mass = 1e-07: give a number from 1e-06"),
+        ({"axes": {"x": {"mass": 1e-16}}}, "mass = 1e-16: give a number from 1e-15"),
         ({"axes": {"x": {"mass": 1.0, "effects": {"none": {}}}}}, "none"),
     ],
 )

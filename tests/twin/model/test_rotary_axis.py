@@ -69,7 +69,7 @@ def test_a_log_of_the_other_kind_is_refused(log_of: str, model_of: str, message:
     [
         (ROTARY_AXIS.replace("inertia", "mass = 1.0\ninertia"), "both mass and inertia"),
         (ROTARY_AXIS.replace("inertia = 0.02", ""), "no mass; .* kg m.2 for a rotary axis"),
-        (ROTARY_AXIS.replace("0.02", "-1.0"), "inertia = -1.0: give a number from 1e-12 .* kg m.2"),
+        (ROTARY_AXIS.replace("0.02", "-1.0"), "inertia = -1.0: give a number from 1e-15 .* kg m.2"),
         (ROTARY_AXIS.replace("0.02", "'big'"), "inertia = 'big': give a number .* kg m.2"),
         (
             ROTARY_AXIS.replace("5.0", "'big'"),

@@ -23,6 +23,14 @@ _MOVING = 5.0  # speed, in units of its noise
 _MOST_HELD = 20  # samples
 _PHASE = 0.95  # of the changes fall on one of every m samples where a signal is held
 _FEWEST_CHANGES = 50
+_PASSED_IN, _FEWEST_COUNTS = 4, 5  # samples in which a count is passed; counts that tell it
+_ONE_COUNT = (0.5, 0.25, 0.1)  # parts of the ways that may be less, as text far from 0 is coarser
+_WHOLE, _OF_WHOLE = 0.05, 0.9  # how far a way is off a whole one; least part of them in whole ones
+_SAME_LAG = 0.3  # largest difference of a lag with and without a memory, as a part of it
+_PRESLIDING = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the way covered, over which friction may build up
+_SHORT = 0.8  # of the setpoint's spread, up to which a position falls short of it
+_SPRING = 0.3  # largest part of a command that a spring to the setpoint leaves
+_AS_GOOD, _WELL = 1.5, 0.03  # times what is left with two gains; or that part of the command
 _LEAST_MOTION = 0.3  # s; a loop that is closed at rest settles within half of that
 
 
@@ -46,9 +54,10 @@ class Axis:
 
     @cached_property
     def position_step(self) -> float:
-        """Smallest change of the position in m; for a coarse encoder its resolution."""
+        """Smallest change of the position in m; for a coarse encoder its count."""
         steps = np.abs(np.diff(self.log.position))
-        return float(steps[steps > 0.0].min(initial=np.inf)) if steps.any() else 0.0
+        least = float(steps[steps > 0.0].min(initial=np.inf)) if steps.any() else 0.0
+        return least if self.position_held else max(count_of(self.log.position), least)
 
     @cached_property
     def position_noise(self) -> float:
@@ -148,13 +157,27 @@ class Axis:
 
     @cached_property
     def lag(self) -> Lag:
-        """Lag of the command behind the motion that it causes."""
-        return find_lag(self.force, self.regressors, self.kept, self.smoother.block)
+        """Lag of the command behind the motion that it causes.
+
+        Not clear where friction with a memory explains it: what lags by a distance and not by a
+        time is none.
+        """
+        found = find_lag(self.force, self.regressors, self.kept, self.smoother.block)
+        if not found.clear:
+            return found
+        beside = find_lag(self.force, self.remembering, self.kept, self.smoother.block)
+        same = abs(beside.seconds - found.seconds) < _SAME_LAG * abs(found.seconds)
+        return found if beside.clear and same else Lag(0.0, False)
 
     @cached_property
     def trend(self) -> Trend | None:
         """The same in each part of the log."""
         return find_trend(self.force, self.regressors, self.kept, self.smoother.block)
+
+    @cached_property
+    def trend_beside_memory(self) -> Trend | None:
+        """The same beside friction with a memory."""
+        return find_trend(self.force, self.remembering, self.kept, self.smoother.block)
 
     @cached_property
     def dynamics(self) -> Dynamics:
@@ -178,6 +201,72 @@ class Axis:
                 position - position.mean(),
             ]
         )
+
+    @cached_property
+    def remembering(self) -> Array:
+        """(m, 5 + k) regressors of a command, with friction that builds up over k distances."""
+        position = self.smoother.position(self.log.position)
+        widths = np.ptp(position) * np.array(_PRESLIDING)
+        return np.column_stack([self.regressors, *(_built_up(position, w) for w in widths)])
+
+    @cached_property
+    def soft_loop(self) -> bool:
+        """Whether the command is that of a spring and damper between setpoint and position.
+
+        Then the position falls short of its setpoint under a load, and no scale is wrong. With a
+        wrong one the loop, which knows better, weighs setpoint and position differently.
+        """
+        setpoint = self.log.columns.get("setpoint_position")
+        if setpoint is None:
+            return False
+        goal, position = self.smoother.position(setpoint), self.smoother.position(self.log.position)
+        if np.std(position) > _SHORT * np.std(goal):
+            return False
+        rates = np.column_stack(
+            [np.ones_like(goal), self.velocity, self.smoother.velocity(setpoint)]
+        )
+        spring, left = _fitted(self.force, np.column_stack([goal - position, rates]))
+        apart = _fitted(self.force, np.column_stack([goal, position, rates]))[1]
+        size = float(np.std(self.force))
+        return spring > 0.0 and left < _SPRING * size and left < max(_AS_GOOD * apart, _WELL * size)
+
+
+def _fitted(signal: Array, columns: Array) -> tuple[float, float]:
+    """The gain of the first of some columns (m, k) in a signal (m,), and the RMS that is left."""
+    size = np.abs(columns).max(axis=0)
+    scaled = columns / np.where(size > 0.0, size, 1.0)
+    gains = np.linalg.lstsq(scaled, signal, rcond=1e-12)[0]
+    return float(gains[0]), float(np.std(signal - scaled @ gains))
+
+
+def _built_up(position: Array, width: float) -> Array:
+    """(m,) in -1..1: what has built up since the last reversals, full after a distance (m).
+
+    The stop operator: M. A. Krasnosel'skii, A. V. Pokrovskii, Systems with Hysteresis, 1989.
+    """
+    held, out, way = 0.0, [], position / width
+    for step in np.diff(way, prepend=way[0]).tolist():
+        held = min(max(held + step, -1.0), 1.0)
+        out.append(held)
+    return np.array(out)
+
+
+def count_of(signal: Array) -> float:
+    """One count of a signal that stays at some value, and goes by whole counts to the next.
+
+    It passes a few samples between, where it was resampled. 0 where no count shows.
+    """
+    edges = np.flatnonzero(np.diff(np.diff(signal) != 0.0, prepend=False, append=False))
+    first, last = edges[::2], edges[1::2]
+    ways = np.abs(signal[last] - signal[first])[last - first <= _PASSED_IN]
+    ways = ways[ways > 0.0]
+    if len(ways) < _FEWEST_COUNTS:
+        return 0.0
+    for count in np.quantile(ways, _ONE_COUNT):
+        off = np.abs(ways / count - np.round(ways / count))
+        if ways[(off < _WHOLE) & (ways > 0.5 * count)].sum() > _OF_WHOLE * ways.sum():
+            return float(count)
+    return 0.0
 
 
 def held_samples(signal: Array) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from twin.log.check.axis import Axis
-from twin.log.check.lag import find_lag
+from twin.log.check.lag import Trend, find_lag
 from twin.log.check.report import Fault, Finding, Severity
 from twin.signals import Array
 
@@ -50,7 +50,8 @@ def check(axis: Axis) -> Iterator[Finding]:
     if "setpoint_position" in columns:
         setpoint = axis.smoother.velocity(columns["setpoint_position"])
         lag = _lag(axis, axis.velocity, setpoint)
-        if lag < -allowed or lag > max(allowed, FOLLOWING):
+        slow = lag > max(allowed, FOLLOWING) and not axis.soft_loop
+        if lag < -allowed or slow:
             yield _disagree(axis, "position", "its setpoint", _late(axis, lag, allowed), lag)
 
 
@@ -80,8 +81,7 @@ def _steady(axis: Axis) -> Iterator[Finding]:
             "whole log", "record both with one clock, or import each with time stamps",
         )  # fmt: skip
         return
-    least = max(STEADY_SAMPLES / axis.sample_rate, STEADY, SURE * trend.error)
-    if least < abs(trend.seconds) < PHYSICAL:
+    if _is_steady(axis, trend) and _is_steady(axis, axis.trend_beside_memory):
         late = "force" if trend.seconds > 0.0 else "position"
         yield Finding(
             Severity.WARNING, Fault.LAG, axis.name,
@@ -90,6 +90,14 @@ def _steady(axis: Axis) -> Iterator[Finding]:
             "whole log",
             f"{_remedy(axis, late, trend.seconds)}, unless the drive has that dead time",
         )  # fmt: skip
+
+
+def _is_steady(axis: Axis, trend: Trend | None) -> bool:
+    """Whether a lag is more than its error and than what is usual, and may be a drive's."""
+    if trend is None:
+        return False
+    least = max(STEADY_SAMPLES / axis.sample_rate, STEADY, SURE * trend.error)
+    return least < abs(trend.seconds) < PHYSICAL
 
 
 def _lag(axis: Axis, signal: Array, other: Array) -> float:

@@ -18,11 +18,15 @@ _SLIPS: Mapping[float, str] = {
     1e6: "a unit a million times smaller, as um for m",
     180.0 / np.pi: "degrees for radians",
 }
+UNKNOWN_SLIP = "a scale or the sample rate is wrong"
 
 
 @dataclass(frozen=True)
 class _Pair:
-    """A signal and the one that states the same; low, high: their allowed ratio."""
+    """A signal and the one that states the same; low, high: their allowed ratio.
+
+    follows: whether the one states where the other should be, and not where it is.
+    """
 
     name: str
     signal: Array
@@ -30,6 +34,7 @@ class _Pair:
     other: Array
     low: float
     high: float
+    follows: bool = False
     zero: bool = False  # whether 0 is the same on both sides, as of speeds and not of positions
 
 
@@ -62,15 +67,15 @@ def _pairs(axis: Axis) -> Iterator[_Pair]:
     acceleration = columns.get("setpoint_acceleration")
     if setpoint is not None:
         # a controller may follow badly; one that is off by more than 2 does not follow at all
-        yield _Pair("position", smoother.position(columns["position"]),
-                    "setpoint_position", smoother.position(setpoint), 0.5, 2.0)  # fmt: skip
+        yield _Pair("position", smoother.position(columns["position"]), "setpoint_position",
+                    smoother.position(setpoint), 0.5, 2.0, follows=True)  # fmt: skip
     if "velocity" in columns:
         yield _Pair("velocity", smoother.rate(columns["velocity"]),
-                    "the rate of position", axis.velocity, 0.95, 1.05, True)  # fmt: skip
+                    "the rate of position", axis.velocity, 0.95, 1.05, zero=True)  # fmt: skip
     if setpoint is not None and velocity is not None:
         yield _Pair("setpoint_velocity", smoother.rate(velocity),
                     "the rate of setpoint_position", smoother.velocity(setpoint),
-                    0.95, 1.05, True)  # fmt: skip
+                    0.95, 1.05, zero=True)  # fmt: skip
     if setpoint is not None and acceleration is not None:
         yield _Pair("setpoint_acceleration", smoother.rate(acceleration),
                     "the second rate of setpoint_position", smoother.acceleration(setpoint),
@@ -97,6 +102,8 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
         fault, looks = Fault.SIGN, "one of them is reversed"
     else:
         fault, looks = Fault.UNIT, _looks_like(ratio)
+        if looks == UNKNOWN_SLIP and pair.follows and axis.soft_loop:
+            return
     yield Finding(
         Severity.ERROR,
         fault,
@@ -111,7 +118,7 @@ def _looks_like(ratio: float) -> str:
     for size, text in _SLIPS.items():
         if abs(np.log(ratio * size)) < 0.3 or abs(np.log(ratio / size)) < 0.3:
             return f"it looks like {text}"
-    return "a scale or the sample rate is wrong"
+    return UNKNOWN_SLIP
 
 
 def _reversed_force(axis: Axis) -> Iterator[Finding]:

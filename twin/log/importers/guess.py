@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,29 +14,29 @@ from twin.errors import InputError
 from twin.log.container import reading
 from twin.log.importers.importer import table_of
 from twin.log.importers.mapping import ImportMap
-from twin.log.importers.relations import moved_by, rate_of_another, ratio_of_rates
+from twin.log.importers.relations import ratio_of_rates
+from twin.log.importers.signals import (
+    ASKED,
+    OTHER,
+    WORDS,
+    Signal,
+    assumed,
+    bare,
+    is_unit,
+    named,
+    signals_of,
+    turns,
+    unit_in,
+    words_of,
+)
 from twin.log.importers.table import numbers
 from twin.log.importers.units import find_unit
 from twin.log.log import LINEAR_UNITS, ROTARY_UNITS, Array
 from twin.log.topics import IDENTIFIER
 
-# Words that name a signal, the surest first.
-_WORDS: Mapping[str, tuple[str, ...]] = {
-    "position": ("position", "pos", "displacement", "encoder", "enc", "angle", "theta", "qm", "q",
-                 "x", "y"),
-    "velocity": ("velocity", "velo", "vel", "speed", "qd", "dq"),
-    "force": ("force", "torque", "effort", "tau", "moment", "f"),
-    "current": ("current", "iq", "cur", "amps", "i"),
-}  # fmt: skip
-_ASKED = ("setpoint", "reference", "target", "desired", "demand", "command", "ref", "set", "cmd",
-          "qg", "sp", "soll")  # fmt: skip
-_OTHER = ("act", "actual", "measured", "main", "axis", "data", "joint", "states", "state")
-_TURNING = ("torque", "effort", "tau", "moment", "angle", "theta")
 _TIME_WORDS = ("time", "timestamp", "stamp", "t", "zeit", "clock")
-_UNIT_IN_NAME = re.compile(r"[\[(]\s*([^\])]*[^\])\s\d][^\])]*?)\s*[\])]\s*$|[_ ]([A-Za-z/0-9^]+)$")
 _TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 _SLOWEST, _FASTEST = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
-_FAR = {"m": (5.0, "mm"), "rad": (40.0, "deg")}  # what goes farther is taken for the other unit
 _EVEN = 0.01  # of a step; what is less even needs resample
 _ALIKE = 0.1  # how far a velocity may be off the rate of its position to be in the same unit
 
@@ -47,15 +47,6 @@ class Guess:
 
     text: str
     missing: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Signal:
-    """A column that was taken for a signal, and why; unit: None where its name states none."""
-
-    name: str
-    unit: str | None
-    reason: str
 
 
 def guess_map(path: Path) -> Guess:
@@ -74,8 +65,8 @@ def guess_map(path: Path) -> Guess:
     ]
     missing: list[str] = []
     for axis, names in _axes(moving).items():
-        found = _signals(names, moving, step)
-        rotary = _turns(found)
+        found = signals_of(names, moving, step)
+        rotary = turns(found)
         lines += ["", f"[axes.{axis}]"]
         position = found.get("position")
         for field, signal in found.items():
@@ -109,15 +100,10 @@ def _distinct(raw: Mapping[str, np.ndarray]) -> dict[str, Array]:
     return {name: column for name, column in out.items() if len(column) == longest}
 
 
-def _words(name: str) -> list[str]:
-    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name)
-    return re.findall(r"[a-z]+", spaced.lower())
-
-
 def _time(columns: Mapping[str, Array]) -> str | None:
     """The column of time stamps: it rises, and is called so or rises evenly."""
     rising = {n: c for n, c in columns.items() if np.mean(np.diff(c) > 0.0) > 0.9}
-    called = [n for n in rising if set(_words(n)) & set(_TIME_WORDS)]
+    called = [n for n in rising if set(words_of(n)) & set(_TIME_WORDS)]
     even = [n for n, c in rising.items() if np.ptp(np.diff(c)) < 0.5 * np.median(np.diff(c))]
     return next(iter([*called, *even]), None)
 
@@ -132,8 +118,8 @@ def _clock(
         return ["sample_rate = 1000.0 # Hz, ASSUMED: no column rises as times do"], 1e-3
     steps = np.diff(columns[time])
     step = float(np.median(steps[steps > 0.0]))
-    unit, reason = _unit_in(time), "its name states the unit"
-    if unit is None or not _is(unit, "s"):
+    unit, reason = unit_in(time), "its name states the unit"
+    if unit is None or not is_unit(unit, "s"):
         fits = [u for u, size in _TIME_SIZES.items() if _SLOWEST <= size / step <= _FASTEST]
         unit = fits[0] if fits else "s"
         reason = f"that is {_TIME_SIZES[unit] / step:.6g} Hz"
@@ -148,10 +134,10 @@ def _clock(
 
 def _axes(columns: Mapping[str, Array]) -> dict[str, list[str]]:
     """Columns by axis: what a name has beside the words of signals and units tells the axis."""
-    every = {w for words in (*_WORDS.values(), _ASKED, _OTHER) for w in words if len(w) > 1}
+    every = {w for words in (*WORDS.values(), ASKED, OTHER) for w in words if len(w) > 1}
     out: dict[str, list[str]] = {}
     for name in columns:
-        rest = [w for w in _words(_UNIT_IN_NAME.sub("", name)) if w not in every]
+        rest = [w for w in words_of(bare(name)) if w not in every]
         letters = [w for w in rest if w in ("x", "y", "z")]
         digits = re.findall(r"\d+", name.rpartition("/")[2])
         axis = letters[0] if letters else f"axis{digits[-1]}" if digits else (rest or ["x"])[-1]
@@ -159,77 +145,10 @@ def _axes(columns: Mapping[str, Array]) -> dict[str, list[str]]:
     whole = {
         axis: names
         for axis, names in out.items()
-        if IDENTIFIER.fullmatch(axis) and {"force", "current"} & _named(names).keys()
-        and "position" in _named(names)
+        if IDENTIFIER.fullmatch(axis) and {"force", "current"} & named(names).keys()
+        and "position" in named(names)
     }  # fmt: skip
     return whole or {"x": list(columns)}
-
-
-def _named(names: Sequence[str]) -> dict[str, Signal]:
-    """The signals that names tell, the surest name first."""
-    found: dict[str, Signal] = {}
-    for field, words in _WORDS.items():
-        for asked in (False, True):
-            if asked and field not in ("position", "velocity"):
-                continue
-            taken = {signal.name for signal in found.values()}
-            fitting = []
-            for name in names:
-                own = _words(_UNIT_IN_NAME.sub("", name) or name)
-                places = [words.index(w) for w in own if w in words]
-                if asked and field == "position" and "qg" in own:
-                    places.append(0)
-                if name not in taken and places and bool(set(own) & set(_ASKED)) is asked:
-                    fitting.append((min(places), name))
-            if fitting:
-                name = min(fitting)[1]
-                key = f"setpoint_{field}" if asked else field
-                found[key] = Signal(name, _unit_in(name), "so called")
-    return found
-
-
-def _signals(names: Sequence[str], columns: Mapping[str, Array], step: float) -> dict[str, Signal]:
-    """The signals that names tell, and those that the numbers tell."""
-    found = _named(names)
-    left = [n for n in names if n not in {signal.name for signal in found.values()}]
-    if "position" not in found and (pair := rate_of_another(columns, left, step)):
-        position, velocity, how = pair
-        found["position"] = Signal(
-            position, _unit_in(position), f"{velocity} is its rate ({how:.2f})"
-        )
-        found.setdefault(
-            "velocity", Signal(velocity, _unit_in(velocity), f"the rate of {position}")
-        )
-        left = [n for n in left if n not in pair]
-    if "position" in found and not {"force", "current"} & found.keys():
-        moved = moved_by(columns, left, columns[found["position"].name], step)
-        if moved is not None:
-            why = f"the motion explains {100.0 * moved[1]:.0f} % of it"
-            found["force"] = Signal(moved[0], _unit_in(moved[0]), why)
-    return found
-
-
-def _turns(found: Mapping[str, Signal]) -> bool:
-    """Whether the axis is rotary: by a unit, or by words where no unit is stated."""
-    for field, signal in found.items():
-        if LINEAR_UNITS[field] != ROTARY_UNITS[field]:
-            if _is(signal.unit, ROTARY_UNITS[field]):
-                return True
-            if _is(signal.unit, LINEAR_UNITS[field]):
-                return False
-    return any(set(_words(signal.name)) & set(_TURNING) for signal in found.values())
-
-
-def _unit_in(name: str) -> str | None:
-    found = _UNIT_IN_NAME.search(name)
-    return next((g for g in found.groups() if g), None) if found else None
-
-
-def _is(unit: str | None, *kinds: str) -> bool:
-    try:
-        return unit is not None and find_unit(unit, *kinds).si is not None
-    except InputError:
-        return False
 
 
 def _entry(
@@ -240,21 +159,16 @@ def _entry(
     column = columns[signal.name]
     span = f"{signal.reason}; {column.min():.4g} to {column.max():.4g}"
     units = ROTARY_UNITS if rotary else LINEAR_UNITS
-    if _is(signal.unit, units[field]):
+    if is_unit(signal.unit, units[field]):
         return f"{field} = {_table(signal.name, signal.unit)} # {span}"
-    unit, why = _assumed(units[field], column), ""
+    unit, why = assumed(units[field], column), ""
     if field.endswith("velocity") and position is not None:
-        base = position.unit or _assumed(units["position"], columns[position.name])
+        base = position.unit or assumed(units["position"], columns[position.name])
         unit = f"{base}/s"
         ratio = ratio_of_rates(columns[position.name], column, step)
         if field == "velocity" and abs(ratio - 1.0) > _ALIKE:
             why = f", but one of it is {ratio:.3g} {unit} by the position: correct one of the units"
     return f"{field} = {_table(signal.name, unit)} # {span}; unit ASSUMED{why}"
-
-
-def _assumed(si: str, column: Array) -> str:
-    far, other = _FAR.get(si, (np.inf, si))
-    return other if np.ptp(column) > far else si
 
 
 def _table(name: str, unit: str | None) -> str:

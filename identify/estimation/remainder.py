@@ -1,0 +1,214 @@
+"""Whether what a fit leaves is noise: nothing that was measured foretells it.
+
+Slow force noise, such as of a cooling hose or of an amplifier, stands above the noise floor that
+sensors tell, and no spectrum of a sensor shows it. It is told from the residual itself, by one
+test: curves over each coordinate of the motion, and what moved before, are learned on most blocks
+of the logs and foretell the block that is left out. The controls are the residual itself, shifted
+in time within each log: as large, as slow, and owed to nothing. All are tried with the same shifts,
+so that the best of them is set against the best of its controls (P. H. Westfall, S. S. Young,
+Resampling-Based Multiple Testing, 1993). The same is asked of its size: a force whose size the
+motion foretells is one that a law of the motion makes. What curves cannot tell is asked of its
+spectrum and of its distribution: noise has no line, and no amplitude that it keeps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.coordinates import gathered
+from identify.dataset.dataset import Dataset
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.dataset.spectral_lines import find_lines
+from identify.dataset.spectrum import Record
+from identify.estimation.evidence import blocks_of, by_blocks, effective_samples, rms
+from identify.estimation.fit import Fit, Outcome, error_on, finished
+from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.subspace import orthonormal, unabsorbed
+from twin.model.machine import AxisModel
+from twin.signals import Array
+
+HATS = 16  # knots of a curve over a coordinate; finer ones would learn the noise
+LAGS = (1, 2, 4, 8, 16, 32, 64)  # test functions, by which what moved before may act
+MOVED = ("velocity", "acceleration", "direction")
+RIDGES = (0.01, 1.0)  # of a column's square: for many samples, and for few that slow noise leaves
+CONTROLS = 40  # of which none may do as well: 1 noise in 41 is refused
+SHIFTS = (0.1, 0.9)  # of a log, by which its residual is shifted
+SEED = 0  # of the shifts
+LEAST_LOGS = 2  # one does not tell: where an axis comes by once nothing is foretold
+MOST = 0.5  # of the force, RMS: a larger rest is of another machine
+ALL = 1.1  # of the floor: it is known to a tenth, and nothing more is left
+ALIKE = 1.5  # times the error of the fit logs that noise may have on others
+FORETOLD = 0.1  # of its square, below which what is foretold is too little to matter
+FORETOLD_SIZE = 0.05  # the same of the variance of its size, most of which is chance
+LINE = (1e-3, 0.2)  # chance and share of a spectral line that is no noise
+LINES = 6  # least likely by chance, of which none may be strong
+CYCLES = (
+    0.5 * HATS
+)  # of a line over the span at least: of fewer curves tell, and slow noise has some
+SAMPLES = 4.0  # test functions a period at least
+GAUSSIAN, LAPLACE = 3.0, 6.0  # kurtosis of these noises
+SURE = 3.0  # standard errors by which a tone's kurtosis is below that of noise
+QUIET = 0.1  # of the mean square, below which the size of a force does not matter
+
+
+@dataclass(frozen=True, eq=False)
+class Remainder:
+    """What a fit leaves of some logs, beside where the motion was.
+
+    force (n,): N, less what the fit's own parameters can add, basis (n, k). where: coordinates
+    (n,) by name. past (n, p): what moved before. logs (n,): the number of the log of each.
+    """
+
+    force: Array
+    basis: Array
+    where: dict[str, Array]
+    past: Array
+    logs: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, fit: Fit, logs: Sequence[PreparedLog]) -> Remainder:
+        kept = moving(logs, sticks(fit.axis))
+        force = residual(fit.axis, logs)[kept]
+        basis = orthonormal(jacobian(fit.axis, logs, fit.scaling.where)[kept])
+        log = np.repeat(np.arange(len(logs)), [len(each) for each in logs])
+        every = gathered(logs)
+        where = {name: values[kept] for name, values in every.items()}
+        return cls(unabsorbed(force, basis), basis, where, _past(every, log)[kept], log[kept])
+
+    def is_foretold(self) -> bool:
+        """Whether something foretells a part of the force that matters."""
+        return self._foretold(self.force, self.basis, FORETOLD)
+
+    def size_is_foretold(self) -> bool:
+        """The same of its size, the logarithm of its square; a few large values do not decide."""
+        squares = self.force**2
+        size = np.log(squares + QUIET * squares.mean())
+        return self._foretold(size - size.mean(), np.zeros((len(size), 0)), FORETOLD_SIZE)
+
+    def _foretold(self, values: Array, basis: Array, least: float) -> bool:
+        """Whether a part of values (n,), and more than of any control, is foretold by something.
+
+        basis (n, k): of what was fitted already. least: part of the square, 0..1.
+        """
+        tried = np.column_stack([values, self._controls(values)])
+        tried = unabsorbed(tried, basis)
+        columns = (unabsorbed(c, basis) for c in self._predictors())
+        best = np.max([self._parts(c, tried) for c in columns], axis=0)
+        return bool(best[0] > least and best[0] > best[1:].max())
+
+    def _controls(self, force: Array) -> Array:
+        """The force shifted within each log, (n, CONTROLS)."""
+        spans = np.split(np.arange(len(force)), np.flatnonzero(np.diff(self.logs)) + 1)
+        shifts = np.random.default_rng(SEED).uniform(*SHIFTS, (CONTROLS, len(spans)))
+        rolled = [
+            [np.roll(force[at], round(s * len(at))) for s, at in zip(row, spans, strict=True)]
+            for row in shifts
+        ]
+        return np.stack([np.concatenate(parts) for parts in rolled], axis=1)
+
+    def _parts(self, columns: Array, tried: Array) -> Array:
+        """Part of the square of each force (n, m) that columns (n, k) foretell, (m,).
+
+        Each block by what the others teach; ridge regression, by inner products of blocks.
+        """
+        spans = blocks_of(len(tried))
+        squares, products = by_blocks(columns, columns, spans), by_blocks(columns, tried, spans)
+        own = squares.sum(axis=0).diagonal().mean() * np.eye(columns.shape[1])
+        others = squares.sum(axis=0) - squares, products.sum(axis=0) - products
+        whole = np.maximum(np.sum(tried**2, axis=0), np.finfo(float).tiny)
+        parts = []
+        for ridge in RIDGES:
+            learned = np.linalg.solve(others[0] + ridge * own, others[1])
+            told = 2.0 * products - squares @ learned
+            parts.append(np.sum(learned * told, axis=(0, 1)) / whole)
+        return np.asarray(np.max(parts, axis=0))
+
+    def _predictors(self) -> Iterator[Array]:
+        """Columns (n, k) over each coordinate, alike both ways and not, and of the past."""
+        for name in self.where.keys() - {"time", "direction"}:
+            at = self.where[name]
+            knots = np.unique(np.quantile(at, np.linspace(0.0, 1.0, HATS)))
+            hats = np.stack([np.interp(at, knots, unit) for unit in np.eye(len(knots))], axis=1)
+            yield np.hstack([hats, hats * self.where["direction"][:, None]])
+        yield self.past
+
+    def has_line(self) -> bool:
+        """Whether it repeats, in time or along the track."""
+        runs = np.flatnonzero(np.diff(self.logs)) + 1
+        in_time = _repeats(self.force, self.where["time"], runs)
+        return in_time or _repeats(self.force, self.where["position"], ())
+
+
+def is_noise(fit: Fit, dataset: Dataset) -> bool:
+    """Whether what a fit leaves is noise, so that its size is a part of the noise floor."""
+    logs = (*dataset.fit, *dataset.holdout)
+    command = np.concatenate([log.command for log in fit.logs])[fit.kept]
+    if len(logs) < LEAST_LOGS or fit.error > MOST * rms(command):
+        return False
+    rest = Remainder.of(fit, logs)
+    kurtosis = _kurtosis(rest.force)
+    least = GAUSSIAN - SURE * np.sqrt(24.0 / effective_samples(rest.force))
+    if kurtosis < least or rest.is_foretold() or rest.has_line():
+        return False
+    if fit.noise.follows_motion:
+        return True
+    if kurtosis > LAPLACE:
+        return False
+    larger = dataset.holdout and rms(error_on(fit.axis, dataset.holdout)) > ALIKE * fit.error
+    return not larger and not rest.size_is_foretold()
+
+
+def with_own_noise(fit: Fit, dataset: Dataset) -> tuple[Dataset, Fit]:
+    """Dataset and fit with what is left as part of the noise floor, where it is noise."""
+    if fit.ratio < ALL or not is_noise(fit, dataset):
+        return dataset, fit
+    own = np.sqrt(fit.error**2 - fit.floor**2 + dataset.force_noise**2)
+    dataset = dataset.with_force_noise(float(own))
+    return dataset, finished(fit.axis, fit.begun, dataset.fit, fit.outcome)
+
+
+def noise_known(axis: AxisModel, dataset: Dataset) -> Dataset:
+    """The dataset with what an axis, as it is given, leaves as part of the noise, if it is."""
+    return with_own_noise(finished(axis, axis, dataset.fit, Outcome.CONVERGED), dataset)[0]
+
+
+def _kurtosis(force: Array) -> float:
+    """Kurtosis of a force (n,): 3 of Gaussian noise, 1.5 of a tone, also of moving frequency.
+
+    That of n samples scatters by sqrt(24 / n) (R. A. Fisher, Statistical Methods for Research
+    Workers, section 14). What test functions average is nearer to Gaussian than Laplace's noise,
+    whose kurtosis is 6; more have forces that come in bursts.
+    """
+    squares = force**2
+    return float(np.mean(squares**2) / np.mean(squares) ** 2)
+
+
+def _repeats(force: Array, at: Array, runs: Sequence[int] | NDArray[np.int64]) -> bool:
+    """Whether a force (n,) has a line over a coordinate; runs: where another record begins."""
+    span = float(np.ptp(at))
+    if span == 0.0:
+        return False
+    chance, share = LINE
+    parts = zip(np.split(at, runs), np.split(force, runs), strict=True)
+    highest = len(force) / (SAMPLES * span)
+    found = find_lines(
+        [Record(*part) for part in parts], CYCLES / span, highest, most=LINES, chance=chance
+    )
+    return any(line.share > share for line in found)
+
+
+def _past(where: dict[str, Array], logs: NDArray[np.int64]) -> Array:
+    """What moved some test functions ago, (n, p) of unit size; nothing before a log began."""
+    moved = np.stack([where[name] for name in MOVED], axis=1)
+    moved /= np.maximum(np.sqrt(np.mean(moved**2, axis=0)), np.finfo(float).tiny)
+    parts = []
+    for lag in LAGS:
+        late = np.roll(moved, lag, axis=0)
+        late[np.roll(logs, lag) != logs] = 0.0
+        late[:lag] = 0.0
+        parts.append(late)
+    return np.hstack(parts)
