@@ -178,6 +178,8 @@ def _errors(found: AxisDiagnosis, told: Told) -> str:
 def _ranking_line(c: Candidate, found: AxisDiagnosis) -> str:
     unit = c.fit.axis.units.force
     tail = f"   {why}" if (why := why_not(found, c)) else ""
+    if c.score is None:
+        return f"  {c.effect.name:28s} not refitted: {why}"
     return (
         f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   {tested_on(found)} error "
         f"{c.gain.before:.4g} -> {c.gain.after:.4g} {unit}{tail}"
