@@ -12,6 +12,8 @@ from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import Estimate, NotExcited
+from identify.estimation.repeating_force import Repeat
+from identify.estimation.residual_dependence import Dependence
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
@@ -22,8 +24,6 @@ from identify.selection.acceptance import Score, Taken
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding
-from identify.selection.repeating_force import Repeat
-from identify.selection.residual_dependence import Dependence
 from identify.validation.misfit_maps import AxisComparison, MisfitMap, Region
 from identify.validation.whiteness import Correlation, Loop, ResidualTests
 from twin.experiments.kinds import Passes, Tracking

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.coordinates import since_reversal
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, at_rest
-from identify.selection.residual_dependence import since_reversal
 from twin.model.units import LINEAR
 
 Array = NDArray[np.float64]

@@ -28,8 +28,8 @@ from identify.estimation.decision import RULE
 from identify.estimation.evidence import blocks_of, effective_samples, left_out, rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
+from identify.estimation.smoothed import solve
 from identify.estimation.smoothing import has_nonparametric, smoothing
-from identify.selection.smoothed import solve
 
 Array = NDArray[np.float64]
 

@@ -18,8 +18,8 @@ from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sti
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian
+from identify.estimation.smoothed import STIFFNESS, Linearised, choose_stiffness
 from identify.selection.controls import Columns
-from identify.selection.smoothed import STIFFNESS, Linearised, choose_stiffness
 from twin.curve import Curve
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue

@@ -10,12 +10,12 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.errors import Errors
 from identify.estimation.fit import Fit, finished
 from identify.estimation.remainder import with_own_noise
+from identify.estimation.repeating_force import Repeat, not_general
+from identify.estimation.residual_dependence import Dependence, find_dependence
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added
 from identify.selection.findings import Finding, FindingKind, findings_of
-from identify.selection.repeating_force import Repeat, not_general
-from identify.selection.residual_dependence import Dependence, find_dependence
 from identify.selection.search import Found, Progress, Step, Tried, is_level, search
 from twin.effects import Catalogue
 

@@ -12,8 +12,8 @@ from identify.dataset.prepared_log import moving
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import averaged_force
+from identify.estimation.smoothed import Linearised, solve
 from identify.selection.curves import Shape, sticking
-from identify.selection.smoothed import Linearised, solve
 from twin.curve import Coordinate
 from twin.model.units import LINEAR
 from twin.signals import Array

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.excitation import excitation
 from identify.estimation.fit import Fit, finished, fit_axis
+from identify.estimation.smoothed import Linearised, choose_stiffness
 from identify.estimation.thorough_fit import fit_without
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate, candidate_of
 from identify.selection.controls import change_control
 from identify.selection.curves import Shape
-from identify.selection.smoothed import Linearised, choose_stiffness
 from twin.effect import Effect
 from twin.model.machine import AxisModel, Fitted, MachineModel
 

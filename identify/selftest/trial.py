@@ -16,10 +16,10 @@ from identify.estimation.errors import error_in
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates, half_widths
+from identify.estimation.residual_dependence import dependences
 from identify.estimation.subspace import unabsorbed
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.findings import Finding, FindingKind
-from identify.selection.residual_dependence import dependences
 from identify.selftest.case import Case
 from identify.selftest.cases import AXIS, Machine, NotShown, machine, own_error, prepared
 from identify.selftest.laws import OUTSIDE

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.floor import noise_beside
 from identify.dataset.prepared_log import (
@@ -22,7 +23,7 @@ from identify.dataset.prepared_log import (
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
-from identify.selection.residual_dependence import UNITS, gathered, unit_of
+from identify.estimation.residual_dependence import UNITS, unit_of
 from identify.validation.error_spectrum import bands
 from identify.validation.free_run import FreeRun, drift_of_noise, free_run, rms_error
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests

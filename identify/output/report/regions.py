@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from matplotlib.figure import Figure
 
 from identify.estimation.decision import RULE
+from identify.estimation.residual_dependence import Dependence
 from identify.output.report import maps
 from identify.output.report.blocks import Block, Heading, Listing, Picture, Section
 from identify.output.report.drawing import BLUE, GREY, new_figure
@@ -15,7 +16,6 @@ from identify.output.report.units import SCALED, spaced
 from identify.output.words.numbers import capitalised
 from identify.output.words.validation import region_in_words
 from identify.selection.diagnosis import AxisDiagnosis
-from identify.selection.residual_dependence import Dependence
 from identify.validation.misfit_maps import AxisComparison
 from twin.model.units import units_of
 

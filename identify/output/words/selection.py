@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.given_logs import Role
+from identify.estimation.repeating_force import Repeat
+from identify.estimation.residual_dependence import Dependence
 from identify.output.words.numbers import PLAIN, Numbers, capitalised
 from identify.results.addition import Addition
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import FindingKind
 from identify.selection.nonparametric import followed
-from identify.selection.repeating_force import Repeat
-from identify.selection.residual_dependence import Dependence
 from twin.model.history import HistoryStep
 from twin.model.machine import Fitted
 from twin.model.units import units_of

@@ -22,12 +22,12 @@ from report_cases import (
 )
 
 import identify.output.report
+from identify.estimation.residual_dependence import Dependence
 from identify.output.report import residuals
 from identify.output.report.drawing import data_uri, drawing_style
 from identify.output.report.units import Scale, number, quantity
 from identify.output.words.selection import verdict_in_words
 from identify.selection.diagnosis import Verdict
-from identify.selection.residual_dependence import Dependence
 from twin.errors import InputError
 
 MOST_BYTES = 3_000_000

@@ -19,6 +19,7 @@ from report_cases import (
 )
 
 from identify import workflow
+from identify.estimation.residual_dependence import Dependence
 from identify.output.report import equations
 from identify.output.report.blocks import Heading
 from identify.output.report.drawing import binned_mean
@@ -30,7 +31,6 @@ from identify.output.words.selection import verdict_in_words
 from identify.results.results import Diagnosis
 from identify.results.told import told_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.residual_dependence import Dependence
 from twin.effects import Catalogue, load_catalogue
 
 

@@ -12,6 +12,14 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fi
 from identify.estimation.evidence import BLOCKS, effective_samples
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.smoothed import (
+    RIDGE,
+    ROUNDING,
+    STIFFNESS,
+    Linearised,
+    choose_stiffness,
+    solve,
+)
 from identify.output.words.selection import nonparametric_in_words
 from identify.selection import nonparametric as module
 from identify.selection.nonparametric import (
@@ -19,14 +27,6 @@ from identify.selection.nonparametric import (
     _filled,
     nonparametric_labels,
     physics_alone,
-)
-from identify.selection.smoothed import (
-    RIDGE,
-    ROUNDING,
-    STIFFNESS,
-    Linearised,
-    choose_stiffness,
-    solve,
 )
 from twin.model.machine import Fitted, MachineModel
 from twin.model.parameters import ParameterReference

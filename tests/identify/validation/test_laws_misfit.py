@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 from constructed import SHORT, dataset_of, effect, moved, windowed
 
+from identify.dataset.coordinates import coordinates_of, gathered, since_reversal
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.force_balance import residual
+from identify.estimation.residual_dependence import UNITS
 from identify.output.words.validation import region_in_words
-from identify.selection.residual_dependence import (
-    UNITS,
-    coordinates_of,
-    gathered,
-    since_reversal,
-)
 from identify.validation.error_spectrum import bands
 from identify.validation.misfit_maps import (
     ABOVE_FLOOR,

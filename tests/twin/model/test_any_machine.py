@@ -25,13 +25,14 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from identify import workflow
+from identify.dataset.coordinates import coordinates_of
 from identify.dataset.dataset import datasets
+from identify.estimation.residual_dependence import unit_of
 from identify.output import as_json, diagnosis_json, text
 from identify.output.plain import plain
 from identify.output.report import write_report
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis, FitResult
-from identify.selection.residual_dependence import coordinates_of, unit_of
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.experiments.kinds import Passes

@@ -20,8 +20,8 @@ from axis_kinds import (
 
 from identify import workflow
 from identify.dataset.dataset import datasets
+from identify.estimation.residual_dependence import unit_of
 from identify.output import as_json, text
-from identify.selection.residual_dependence import unit_of
 from twin.errors import InputError
 from twin.experiments.experiment import driven_units
 from twin.experiments.file import format_experiment

@@ -8,22 +8,21 @@ import pytest
 from constructed import SHORT, dataset_of, log_of, moved, windowed
 from scipy.stats import norm
 
+from identify.dataset.coordinates import coordinates_of
 from identify.dataset.motion import _follows, motion_of
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
-from identify.output.words.validation import correlation_in_words
-from identify.selection.residual_dependence import (
+from identify.estimation.residual_dependence import (
     BINS,
     _foremost,
     _share,
     _shares,
-    coordinates_of,
     dependences,
-    explains,
     find_dependence,
     line,
     share,
 )
+from identify.output.words.validation import correlation_in_words
 from identify.validation.whiteness import Correlation, Loop, correlation, loop_of, residual_tests
 
 LOG = windowed(SHORT)
@@ -152,21 +151,6 @@ def test_logs_are_told_apart_even_where_one_begins_later_than_the_other_ends():
         residual=pump[second], kept=kept & (np.arange(len(kept)) >= len(LONG[0]))
     )
     assert find_dependence(still, DATASET).shares["time"] > 0.9
-
-
-def test_an_explanation_takes_away_what_the_residual_depended_on_most():
-    noise = np.random.default_rng(5).normal(0.0, 0.1, len(KEPT))
-    cable = np.tanh(2.0 * WHERE["position"] / np.std(WHERE["position"]))
-    pump = np.sin(2.0 * np.pi * WHERE["time"] / 0.113)
-    before = fit_leaving(cable + 0.3 * pump + noise)
-    assert explains(before, fit_leaving(0.3 * pump + noise), DATASET)
-    assert not explains(before, fit_leaving(cable + noise), DATASET)
-    smaller, larger = (fit_leaving(f * RULE.left_over * cable + pump + noise) for f in (0.6, 1.3))
-    assert explains(before, smaller, DATASET)
-    assert not explains(before, larger, DATASET)
-    weak = fit_leaving(0.02 * cable + noise)
-    assert max(dependences(weak.residual, weak, DATASET).values()) < RULE.least_share
-    assert not explains(weak, fit_leaving(noise), DATASET)
 
 
 # --- whiteness ----------------------------------------------------------------------------------

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.coordinates import OTHER, QUANTITIES, beside, gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import Motion
-from identify.dataset.prepared_log import PreparedLog, last_direction
 from identify.dataset.spectral_lines import find_lines
 from identify.dataset.spectrum import Record
 from identify.estimation.decision import RULE
@@ -54,14 +54,6 @@ UNITS = {
 }
 
 
-OTHER = "other_axis_"
-
-
-def beside(axis: str, quantity: str) -> str:
-    """Name of a coordinate of one of several other axes."""
-    return f"axis_{axis}_{quantity}"
-
-
 def unit_of(coordinate: str, motion: Motion, linear: Mapping[str, str] = UNITS) -> str:
     """Unit of a coordinate along a motion; linear: declared units, a length where not among them.
 
@@ -73,50 +65,6 @@ def unit_of(coordinate: str, motion: Motion, linear: Mapping[str, str] = UNITS) 
                 return other.units(UNITS[quantity])
     units = motion.other_units if coordinate.startswith(OTHER) else motion.units
     return units(linear.get(coordinate, LINEAR.position))
-
-
-QUANTITIES = ("position", "velocity", "acceleration")
-
-
-def coordinates_of(log: PreparedLog) -> dict[str, Array]:
-    """Coordinates of each test function (n,) in SI units, by the names of UNITS.
-
-    On a machine with more than two axes each other axis has coordinates of its own name.
-    """
-    m = log.motion
-    velocity = log.test_function.mean(m.velocity)
-    out = {
-        "position": log.test_function.mean(m.position),
-        "velocity": velocity,
-        "direction": np.sign(velocity),
-        "acceleration": log.acceleration,
-        "time": log.time,
-        "distance_since_reversal": log.test_function.mean(since_reversal(m.velocity, m.period)),
-    }
-    if m.others.any():
-        for name, row in zip(QUANTITIES, m.others, strict=True):
-            out[f"{OTHER}{name}"] = log.test_function.mean(row)
-    for axis, other in m.beside.items():
-        for name, row in zip(QUANTITIES, other.signals, strict=True):
-            out[beside(axis, name)] = log.test_function.mean(row)
-    return out
-
-
-def since_reversal(velocity: Array, period: float) -> Array:
-    """Distance (n,) m travelled since the last change of direction."""
-    direction = last_direction(velocity)
-    travelled = np.cumsum(np.abs(velocity)) * period
-    turned = np.flatnonzero(np.diff(direction) != 0) + 1
-    start = np.zeros(len(velocity))
-    start[turned] = travelled[turned]
-    return travelled - np.maximum.accumulate(start)
-
-
-def gathered(logs: Sequence[PreparedLog]) -> dict[str, Array]:
-    """Coordinates of all windows of several logs in a row."""
-    parts = [coordinates_of(log) for log in logs]
-    common = [k for k in parts[0] if all(k in p for p in parts)]
-    return {k: np.concatenate([p[k] for p in parts]) for k in common}
 
 
 def share(residual: Array, coordinate: Array) -> float:
@@ -159,19 +107,6 @@ def find_dependence(base: Fit, dataset: Dataset) -> Dependence:
     name = _foremost(shares)
     unit = unit_of(name, dataset.fit[0].motion)
     return Dependence(shares[name], name, lines.get(name), unit, shares)
-
-
-def explains(before: Fit, after: Fit, dataset: Dataset) -> bool:
-    """Whether a larger model took away what the residual of the smaller depended on most.
-
-    What is left must be smaller along that coordinate, and depend on another more.
-    """
-    shares, _ = _shares(before.residual, *_where(before, dataset))
-    left, _ = _shares(after.residual, *_where(after, dataset))
-    name = _foremost(shares)
-    was = before.error * np.sqrt(shares[name])
-    smaller = after.error * np.sqrt(left[name]) < RULE.left_over * was
-    return bool(shares[name] > RULE.least_share and smaller and _foremost(left) != name)
 
 
 def dependences(force: Array, fit: Fit, dataset: Dataset) -> dict[str, float]:
