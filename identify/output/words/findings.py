@@ -102,7 +102,7 @@ def _sure(finding: Finding) -> str:
 
 def _over(left: float) -> str:
     """Error over noise floor: noise is part of what is left, and so never more."""
-    return f"{max(left, 1.0):.3g}"
+    return f"{max(left, 1.0):.2f}"
 
 
 def shares_in_words(found: AxisDiagnosis) -> list[str]:
