@@ -169,7 +169,7 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
 
 
 def ordered(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Proved ones first, then by the part that they take, then by evidence."""
+    """Proved ones first, then those that were refitted, then by what they leave."""
     return tuple(
-        sorted(candidates, key=lambda c: (not c.supported, -round(c.part, 2), -c.delta_bic))
+        sorted(candidates, key=lambda c: (not c.supported, c.score is None, c.gain.after))
     )

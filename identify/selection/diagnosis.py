@@ -8,7 +8,7 @@ from functools import cached_property
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.errors import Errors
-from identify.estimation.fit import Fit, finished
+from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.remainder import with_own_noise
 from identify.estimation.repeating_force import Repeat, not_general
 from identify.estimation.residual_dependence import Dependence, find_dependence
@@ -88,8 +88,8 @@ class AxisDiagnosis:
     @property
     def best(self) -> Candidate | None:
         """The candidate that is named first, where one is."""
-        by_name = {s.change.name: s.tried.candidate for s in self.steps}
-        return by_name[self.named[0]] if self.named else None
+        added = (s.tried.candidate for s in self.steps if isinstance(s.change, Added))
+        return next((c for c in added if c.effect.name in self.named[:1]), None)
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
@@ -152,8 +152,6 @@ def _with_ties(found: Found) -> Found:
 
 
 def _compared_again(step: Step, found: Found) -> Step:
-    from identify.estimation.fit import fit_axis
-
     final = found.final
     names = {s.change.name for s in found.steps}
     axis = step.change.undone(final.fit.axis, found.base.fit.axis)
@@ -162,7 +160,9 @@ def _compared_again(step: Step, found: Found) -> Step:
     own = replace(step.tried, judged=final)
 
     def beside(rival: Tried) -> bool:
-        if not isinstance(rival.change, Added) or rival.change.name in names:
+        if not isinstance(rival.change, Added):
+            return rival.change.name not in names
+        if rival.change.name in names:
             return False
         law = rival.judged.fit.axis[rival.change.name]
         fit = fit_axis(axis.with_effect(law), found.dataset.fit)
