@@ -106,9 +106,41 @@ def cable_hysteresis(p: Values, q: Columns) -> Results:
     return {OUT: seen}
 
 
+@written_from(
+    "F = -sum_i f_i e_i/d_i;  e_i follows x within +-d_i;  d_i = reach (1, 1/2, 1/4, 1/8)"
+)
+def presliding_hysteresis(p: Values, q: Columns) -> Results:
+    """Play operators: what each element has slipped is where x pushed it last."""
+    path = np.cumsum(np.repeat(q.v * q.dt / 64, 64))
+    force = np.zeros(len(path))
+    for i in range(4):
+        reach, slipped = p["reach"] / 2**i, 0.0
+        for k, x in enumerate(path):
+            slipped = min(max(slipped, x - reach), x + reach)
+            force[k] -= p[f"f{i}"] * (x - slipped) / reach
+    return {OUT: force[np.arange(len(q)) * 64 + round(64 * q.when) - 1]}
+
+
 @written_from("F = -(offset + k1 x + k2 x^2 + k3 x^3)")
 def cable_slab(p: Values, q: Columns) -> Results:
     return {OUT: -Polynomial([p["offset"], p["k1"], p["k2"], p["k3"]])(q.x)}
+
+
+@written_from("F = -(offset + k1 d + k2 d^2 + k3 d^3);  d = x - middle")
+def spring(p: Values, q: Columns) -> Results:
+    about = Polynomial([-p["middle"], 1.0])
+    return {OUT: -Polynomial([p["offset"], p["k1"], p["k2"], p["k3"]])(about)(q.x)}
+
+
+@written_from("F = -c v")
+def viscous_friction(p: Values, q: Columns) -> Results:
+    return {OUT: -p["c"] * q.v}
+
+
+@written_from("F = -(sine sin q + cosine cos q) = -m g l sin(q - q0)")
+def gravity(p: Values, q: Columns) -> Results:
+    """The imaginary part of a pointer that hangs at q0."""
+    return {OUT: -np.imag((p["sine"] + 1j * p["cosine"]) * np.exp(1j * q.x))}
 
 
 @written_from("F = sum_{k=1..3} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)")
@@ -183,12 +215,12 @@ def quadratic_drag(p: Values, q: Columns) -> Results:
     "r = 2 (x - phase - k pitch)/width"
 )
 def roller_spikes(p: Values, q: Columns) -> Results:
-    """d follows the direction within 20 um of travel; the sum runs over every roller."""
+    """d follows the direction within a 200th of the width; the sum runs over every roller."""
     bump = np.zeros(len(q))
     for k in range(-60, 61):
         r = 2.0 * (q.x - p["phase"] - k * p["pitch"]) / p["width"]
         bump += np.where(np.abs(r) < 1.0, (1.0 - r**2) ** 2, 0.0)
-    d = followed(q, 2e-5)
+    d = followed(q, p["width"] / 200.0)
     return {OUT: -(p["ahead"] * (1.0 + d) / 2.0 - p["behind"] * (1.0 - d) / 2.0) * bump}
 
 

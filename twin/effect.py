@@ -18,7 +18,7 @@ It is plain Python and also compiles, once, to native code (see twin.core.native
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
@@ -54,6 +54,9 @@ IO_SIZE = 21
 COLUMNS = IO_SIZE  # how many strengths act at a sample; then the number and the weight of each
 
 Law = Callable[[Any, Any, Any], None]
+
+# Bounds of what has a force or a length in its unit where physics gives none: beyond any machine.
+LEAST, MOST = 1e-15, 1e15
 
 ELEMENTS = "elements"  # the parameter that counts the elements of an effect with ``of_size``
 
@@ -177,7 +180,9 @@ class Effect:
     more than once, as cogging of poles and of slots; number: which of these it is. is_itself:
     (values by name, the motion covered) -> whether the law with these values is the effect, and not
     some other force that it imitates. dead_time: whether it does nothing but delay the force
-    against the reading; which of the two is late, no log of both can tell.
+    against the reading; which of the two is late, no log of both can tell. suits: (effects that an
+    axis has, whether it turns) -> whether a diagnosis offers this one beside them, and not the same
+    law by another name; None: beside all.
     """
 
     kind: Kind
@@ -202,6 +207,7 @@ class Effect:
     number: int = 1
     is_itself: Callable[[Mapping[str, float], Excitation], bool] | None = None
     dead_time: bool = False
+    suits: Callable[[Collection[Effect], bool], bool] | None = None
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]

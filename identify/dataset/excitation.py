@@ -14,6 +14,7 @@ from twin.signals import Array
 
 FEWEST_CYCLES = 20  # over the travel, of an error of the reading
 MOST_RIPPLES = 8
+LEAST_DRY = 1e-9  # of the largest command, that a dry level is at least
 LISTENED = 40.0  # s of all logs together, that lines are sought in before there is a model
 
 
@@ -30,15 +31,15 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
         gap = np.median(ahead) - np.median(behind)
     else:
         gap = 2.0 * np.median(np.abs(command))
-    heard = _heads(motions)
+    heard, force = _heads(motions), float(np.abs(command).max())
     return Excitation(
         position_low=float(position.min()),
         position_high=float(position.max()),
         speed_max=float(np.abs(velocity).max()),
-        dry_level=float(max(abs(gap) / 2.0, 1e-9)),
+        dry_level=float(max(abs(gap) / 2.0, LEAST_DRY * force)),
         duration=float(sum(len(m.time) * m.period for m in motions)),
         period=motions[0].period,
-        force_max=float(np.abs(command).max()),
+        force_max=force,
         lines=lines(heard),
         ripples=(*motions[0].ripples, *ripples(heard)),  # the readings of all logs tell the same
         resolution=max(m.resolution for m in motions),

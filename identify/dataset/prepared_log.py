@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from identify.dataset.motion import Motion
 from identify.dataset.test_function import TestFunction
 from twin.core.native import Table
 from twin.core.walks import walk_sets
+from twin.dimension import Scale
 from twin.effect import Kind
 from twin.model.machine import AxisModel, axis_table
 
@@ -65,6 +67,13 @@ class PreparedLog:
         position = self.test_function.mean(self.motion.position)
         return np.asarray((position >= low) & (position <= high))
 
+    @cached_property
+    def extent(self) -> tuple[float, Reach, float]:
+        """Largest command (N), lowest and highest position (m), highest speed (m/s)."""
+        position, velocity, command = self.motion.signals[:3]
+        reach = float(position.min()), float(position.max())
+        return float(np.abs(command).max()), reach, float(np.abs(velocity).max())
+
     @property
     def time(self) -> Array:
         """(n,) s, middle of each test function."""
@@ -101,6 +110,13 @@ def on_blocks(axis: AxisModel) -> Table:
 def sticks(axis: AxisModel) -> bool:
     """Whether the axis has static friction, whose force at rest the motion does not determine."""
     return any(f.effect.sticks for f in axis.effects)
+
+
+def scale_of(logs: Sequence[PreparedLog]) -> Scale:
+    """The size of the machine as some logs show it; one of each unit that they do not show."""
+    forces, reaches, speeds = zip(*(log.extent for log in logs), strict=True)
+    travel = (max(high for _, high in reaches) - min(low for low, _ in reaches)) or 1.0
+    return Scale(max(forces) or 1.0, travel, travel / (max(speeds) or 1.0))
 
 
 def split_by_log(values: NDArray[Any], logs: Sequence[PreparedLog]) -> list[NDArray[Any]]:

@@ -22,10 +22,10 @@ from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit_problem import FitProblem
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.pitches import pitches
-from identify.estimation.scaling import Scaling
+from identify.estimation.scaling import AT_EDGE, Scaling
 from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.model.machine import AxisModel
-from twin.model.parameters import free_parameters, read
+from twin.model.parameters import read
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,6 @@ WEIGHED = 0.9  # of the error by which the priors were weighed; above it they ar
 NEGLIGIBLE = 1e-3  # twice a gain in log likelihood, below which a fit has converged
 PUSHED = 3.0  # standard errors by which the gradient must point beyond a bound
 RESIDUAL_LINES = 6  # spectral lines of the residual that are told
-AT_EDGE = 1e-6  # of a bound, within which a value is at it
 
 
 class Outcome(Enum):
@@ -147,12 +146,12 @@ class Fit:
         noise = self.error * np.sqrt(len(self.residual) / self.samples)
         values = read(self.axis, self.scaling.where)
         out = []
-        for c, value, column in zip(self.scaling.where, values, self.jacobian.T, strict=True):
+        each = zip(self.scaling.where, self.scaling.limits, values, self.jacobian.T, strict=True)
+        for c, (low, high), value, column in each:
             pushed = -float(column @ self.residual)  # > 0: a larger value would be better
-            p = c.parameter
-            edge = p.upper if pushed > 0.0 else p.lower
+            edge = high if pushed > 0.0 else low
             sure = abs(pushed) > PUSHED * noise * float(np.linalg.norm(column))
-            if sure and abs(value - edge) <= AT_EDGE * max(abs(edge), abs(p.start)):
+            if sure and abs(value - edge) <= AT_EDGE * abs(edge):
                 out.append(c.label)
         return tuple(out)
 
@@ -228,8 +227,18 @@ def finished(
     axis: AxisModel, begun: AxisModel, logs: Sequence[PreparedLog], outcome: Outcome
 ) -> Fit:
     """The fit object of an axis with its present values, without fitting."""
-    kept, scaling = moving(logs, sticks(axis)), Scaling(free_parameters(axis))
+    kept, scaling = moving(logs, sticks(axis)), Scaling.of(axis, logs)
     return Fit(axis, logs, scaling, outcome, residual(axis, logs)[kept], kept, begun)
+
+
+def at_bounds(fit: Fit, effect: str) -> tuple[str, ...]:
+    """Labels of the free parameters of an effect that ended at a bound: values that are none.
+
+    Zero is no bound: there the effect, or a part of it, is absent.
+    """
+    edges = fit.scaling.at_limit(read(fit.axis, fit.scaling.where))
+    each = zip(fit.scaling.where, edges, strict=True)
+    return tuple(c.label for c, at_limit in each if at_limit and c.effect == effect)
 
 
 def error_on(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:

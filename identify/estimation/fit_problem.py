@@ -15,7 +15,7 @@ from identify.estimation.scaling import Scaling
 from identify.estimation.smoothing import has_nonparametric, smoothing
 from twin.effect import Kind
 from twin.model.machine import AxisModel
-from twin.model.parameters import ParameterReference, free_parameters
+from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ class FitProblem:
         self.axis = axis
         self.most_evaluations = most_evaluations
         self.logs = logs
-        self.scaling = Scaling(free_parameters(axis))
+        self.scaling = Scaling.of(axis, logs)
         self.kept = moving(logs, sticks(axis))
         self.bounds = self.scaling.bounds()
         self.start = np.clip(self.scaling.inside(axis), *self.bounds)

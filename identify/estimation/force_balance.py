@@ -14,10 +14,18 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import actual_force, parts_of, reading_error, true_motion
 from identify.dataset.motion import Motion
-from identify.dataset.prepared_log import PreparedLog, moving, sticks, total_force, total_forces
+from identify.dataset.prepared_log import (
+    PreparedLog,
+    moving,
+    scale_of,
+    sticks,
+    total_force,
+    total_forces,
+)
 from twin.core.calling import P_AT
 from twin.core.columns import averaged_columns, reading_columns
 from twin.core.native import Table
+from twin.dimension import Scale, has_size
 from twin.effect import RUBBING, Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
@@ -29,6 +37,8 @@ Array = NDArray[np.float64]
 _Along: TypeAlias = Callable[[PreparedLog], Array]
 _Walk: TypeAlias = tuple[list[int], _Along]
 
+STEP = 1e-5  # of a value, of a difference quotient
+LEAST_PART = 1e-3  # of what is usual, by which a smaller value is stepped as if it were that large
 AT_ONCE = 500_000  # forces of several sets of parameters that are held until they are averaged
 
 
@@ -128,7 +138,8 @@ def jacobian(
 ) -> Array:
     """Derivative of the residual by these parameters, (n, n_parameters), N per unit."""
     values = read(axis, where)
-    steps = np.array([difference_step(c, v) for c, v in zip(where, values, strict=True)])
+    scale = scale_of(logs)
+    steps = np.array([difference_step(c, v, scale) for c, v in zip(where, values, strict=True)])
     changed = changes(axis, logs, where, steps)
     changed /= steps[:, None]
     return changed.T
@@ -254,8 +265,12 @@ def _by_mass(axis: AxisModel, steps: Array, log: PreparedLog) -> Array:
     return np.asarray(steps * (averaged_force(attached, [log]) / axis.mass - log.acceleration))
 
 
-def difference_step(c: ParameterReference, value: float) -> float:
-    """A step within the bounds, small relative to the value or to the parameter's range."""
+def difference_step(c: ParameterReference, value: float, scale: Scale) -> float:
+    """A step within the bounds, small relative to the value or to what is usual on this machine.
+
+    A positive scale counts by itself; a strength or a place may be zero.
+    """
     p = c.parameter
-    size = 1e-5 * max(abs(value), abs(p.start), 1e-3 * min(p.upper - p.lower, 1.0))
+    usual = scale.size(p.unit) if has_size(p.unit) else min(p.upper - p.lower, 1.0)
+    size = STEP * (abs(value) if p.lower > 0.0 else max(abs(value), LEAST_PART * usual))
     return size if value + size <= p.upper else -size

@@ -33,7 +33,7 @@ from identify.estimation.rough_search import rough_minimum
 from identify.estimation.scaling import Scaling
 from twin.errors import InputError
 from twin.model.machine import AxisModel
-from twin.model.parameters import ParameterReference, free_parameters
+from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
 
@@ -131,7 +131,7 @@ class _Problem:
     def __init__(self, axis: AxisModel, logs: Sequence[PreparedLog]) -> None:
         _require_alone(axis, logs)
         self.axis, self.logs = axis, logs
-        self.scaling = Scaling(free_parameters(axis))
+        self.scaling = Scaling.of(axis, logs)
         self.runs = [Replay(axis, log) for log in logs]
         self.measured, self.surely = zip(
             *(measured_beginning(axis, log) for log in logs), strict=True

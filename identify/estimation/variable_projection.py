@@ -24,7 +24,7 @@ from identify.estimation.scaling import Scaling
 from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.effect import Effect, Excitation, Kind, Parameter
 from twin.model.machine import AxisModel, Fitted
-from twin.model.parameters import ParameterReference, free_parameters, read, write
+from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]
 
@@ -153,14 +153,13 @@ def one_linear_step(base: Fit, start: Start) -> Fit:
     columns = base.jacobian / norms
     followed = columns.T @ (left - start.force)
     step = np.linalg.lstsq(columns.T @ columns, followed, rcond=1e-12)[0] / norms
-    lower = [c.parameter.lower for c in where]
-    upper = [c.parameter.upper for c in where]
+    lower, upper = np.array(base.scaling.limits).reshape(-1, 2).T
     moved = write(base.axis, where, np.clip(read(base.axis, where) + step, lower, upper))
     axis = moved.with_effect(start.fitted)
     return replace(
         base,
         axis=axis,
-        scaling=Scaling(free_parameters(axis)),
+        scaling=Scaling.of(axis, base.logs),
         outcome=Outcome.NOT_CONVERGED,
         residual=left,
     )

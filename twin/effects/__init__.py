@@ -1,4 +1,4 @@
-"""The catalogue: every file in this folder is one effect, and no other file names it.
+"""The catalogue: every file in this folder is one effect, named by no other but its like.
 
 A file defines ``EFFECT``, a twin.effect.Effect, and takes its name from the file.
 """
@@ -19,7 +19,7 @@ from twin.effect import Effect
 from twin.entries import near
 from twin.errors import InputError
 
-MOST_OF_ONE = 6  # of one effect on an axis
+MOST_OF_ONE = 12  # of one effect on an axis: a motor has more than five unrelated periods
 LONGEST_TRIAL = 30.0  # s for loading, trying and compiling a user's file
 LARGEST_TRIAL = 4 << 30  # bytes for the same
 
@@ -49,9 +49,12 @@ class Catalogue(Mapping[str, Effect]):
         """The effect of that name, or the one of several, such as ``cogging_2``."""
         if name in self._effects:
             return self._effects[str(name)]
-        several = re.fullmatch(r"(\w+)_([2-9])", str(name))
+        several = re.fullmatch(r"(\w+)_([1-9]\d?)", str(name))
         first = self._effects.get(several[1]) if several else None
-        return first.numbered(int(several[2])) if several and first and first.several else None
+        if several is None or first is None or not first.several:
+            return None
+        number = int(several[2])
+        return first.numbered(number) if 2 <= number <= MOST_OF_ONE else None
 
     def after(self, taken: Collection[str]) -> Iterator[Effect]:
         """The effects that can be added to those taken: absent ones, and the next of several."""

@@ -5,7 +5,7 @@ G. Tao, P. V. Kokotovic, "Adaptive control of plants with unknown dead-zones", I
 with slope 1 and equal breakpoints.
 """
 
-from twin.effect import Effect, Kind, Parameter, U
+from twin.effect import MOST, Effect, Kind, Parameter, U
 
 
 def law(p, s, io):
@@ -17,7 +17,7 @@ EFFECT = Effect(
     summary="no force below a threshold of the command",
     equation="u_actual = 0 for |u| <= width, else u - width sgn u",
     source="Tao, Kokotovic 1994, dead-zone of slope 1",
-    parameters=(Parameter("width", "N", 0.0, 0.0, 1e7, "threshold", strength=True),),
+    parameters=(Parameter("width", "N", 0.0, 0.0, MOST, "threshold", strength=True),),
     law=law,
     fingerprint="residual opposes the command with one size, whichever way the axis moves",
     excited_by="commands of both signs in each direction of motion: acceleration and braking",

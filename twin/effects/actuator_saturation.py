@@ -5,7 +5,7 @@ of the force of a motor whose iron saturates. Saturation nonlinearity, H. K. Kha
 Systems, 3rd ed., section 1.2.7; the partial loss is this project's choice.
 """
 
-from twin.effect import Effect, Kind, Parameter, U
+from twin.effect import LEAST, MOST, Effect, Kind, Parameter, U
 
 
 def law(p, s, io):
@@ -19,7 +19,7 @@ EFFECT = Effect(
     source="Khalil, Nonlinear Systems, section 1.2.7 (loss = 1); partial loss is an assumption",
     parameters=(
         Parameter(
-            "limit", "N", 1.0, 1e-6, 1e6, "force where the loss begins",
+            "limit", "N", 1.0, LEAST, MOST, "force where the loss begins",
             start_rule=lambda e: 0.8 * e.force_max,
             scan=lambda e: tuple(e.force_max * part for part in (0.5, 0.65, 0.8, 0.9, 0.97)),
         ),

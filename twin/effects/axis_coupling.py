@@ -5,7 +5,7 @@ the drive, couple the equations of motion through off-diagonal terms of the mass
 matrices: M q'' + D q' = F, e.g. A. Preumont, Vibration Control of Active Structures, section 2.2.
 """
 
-from twin.effect import A_OTHER, OUT, V_OTHER, Effect, Kind, Parameter
+from twin.effect import A_OTHER, MOST, OUT, V_OTHER, Effect, Kind, Parameter
 
 
 def law(p, s, io):
@@ -19,8 +19,8 @@ EFFECT = Effect(
     source="off-diagonal terms of M q'' + D q' = F; Preumont, Vibration Control of Active "
     "Structures, section 2.2",
     parameters=(
-        Parameter("mass", "kg", 0.0, -1e3, 1e3, "coupling mass", strength=True),
-        Parameter("damping", "N s/m", 0.0, -1e4, 1e4, "coupling damping", strength=True),
+        Parameter("mass", "kg", 0.0, -MOST, MOST, "coupling mass", strength=True),
+        Parameter("damping", "N s/m", 0.0, -MOST, MOST, "coupling damping", strength=True),
     ),
     law=law,
     fingerprint="residual follows the acceleration or speed of the other axis, also at rest",

@@ -11,7 +11,7 @@ the dead zone. The step is that of a load on a spring (flexible mode) but for th
 
 from math import expm1, pi, sin, sqrt
 
-from twin.effect import ACC, DT, MOVED, OUT, WHEN, Effect, Kind, Parameter
+from twin.effect import ACC, DT, LEAST, MOST, MOVED, OUT, WHEN, Effect, Kind, Parameter
 
 
 def law(p, s, io):
@@ -42,8 +42,8 @@ EFFECT = Effect(
     parameters=(
         Parameter("load", "1", 0.0, 0.0, 0.9, "part of the mass behind the play", strength=True),
         Parameter(
-            "play", "m", 2e-5, 1e-9, 0.1, "full width of the play",
-            scan=lambda e: tuple(2e-6 * 1.5**k for k in range(16)),
+            "play", "m", 2e-5, LEAST, MOST, "full width of the play",
+            scan=lambda e: tuple(6e-6 * e.travel * 1.5**k for k in range(16)),
         ),
         Parameter(
             "frequency", "Hz", 100.0, 1.0, 2000.0, "of the load on the contact, drive held",

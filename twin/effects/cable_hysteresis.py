@@ -9,7 +9,8 @@ its velocity dependence. Rate-independent, keeps the memory of inner loops, line
 and exact for motion in one direction within a sample.
 """
 
-from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V
+from twin.effect import DT, LEAST, MOST, OUT, WHEN, Effect, Kind, Parameter, V
+from twin.effects.cable_slab import on_a_cable
 
 
 def law(p, s, io):
@@ -31,12 +32,12 @@ EFFECT = Effect(
     source="Iwan 1966, distributed elements; Al-Bender, Lampaert, Swevers 2005, Maxwell-slip",
     parameters=(
         Parameter(
-            "reach", "m", 5e-3, 1e-6, 1.0, "travel from no force until every layer slips",
-            scan=lambda e: tuple(min(r, e.travel) for r in (1e-3, 3e-3, 1e-2, 3e-2)),
+            "reach", "m", 5e-3, LEAST, MOST, "travel from no force until every layer slips",
+            scan=lambda e: tuple(part * e.travel for part in (3e-3, 9e-3, 0.03, 0.09)),
         ),
         *(
             Parameter(
-                f"f{i}", "N", 0.0, 0.0, 1e7, f"force of the layer that slips at reach/{2 ** i}",
+                f"f{i}", "N", 0.0, 0.0, MOST, f"force of the layer that slips at reach/{2 ** i}",
                 strength=True,
             )
             for i in range(4)
@@ -46,4 +47,5 @@ EFFECT = Effect(
     law=law,
     fingerprint="residual bends over millimetres after each reversal, at every speed alike",
     excited_by="slow passes with reversals at many places, and inner loops of millimetres",
+    suits=on_a_cable,
 )  # fmt: skip

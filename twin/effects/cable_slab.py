@@ -5,8 +5,18 @@ F(x) = -(offset + k1 x + k2 x^2 + k3 x^3); it falls with x because the fold of t
 choice: the thesis prints a measured curve, no formula.
 """
 
+from collections.abc import Collection
+
 from twin.curve import Coordinate, Curve
-from twin.effect import OUT, Effect, Kind, Parameter, X
+from twin.effect import MOST, OUT, Effect, Kind, Parameter, X
+
+
+def on_a_cable(present: Collection[Effect], turns: bool) -> bool:
+    """Whether an axis with these effects has a cable; without one the same laws have other names.
+
+    spring and presliding_hysteresis.
+    """
+    return any(effect.name in ("cable_slab", "cable_hysteresis") for effect in present)
 
 
 def law(p, s, io):
@@ -20,13 +30,14 @@ EFFECT = Effect(
     equation="F = -(offset + k1 x + k2 x^2 + k3 x^3)",
     source="L. Jia 2023, cable pass; the polynomial form is an assumption",
     parameters=(
-        Parameter("offset", "N", 0.0, -1e7, 1e7, "force at x = 0", strength=True),
-        Parameter("k1", "N/m", 0.0, -1e5, 1e5, "stiffness", strength=True),
-        Parameter("k2", "N/m^2", 0.0, -1e6, 1e6, "quadratic term", strength=True),
-        Parameter("k3", "N/m^3", 0.0, -1e7, 1e7, "cubic term", strength=True),
+        Parameter("offset", "N", 0.0, -MOST, MOST, "force at x = 0", strength=True),
+        Parameter("k1", "N/m", 0.0, -MOST, MOST, "stiffness", strength=True),
+        Parameter("k2", "N/m^2", 0.0, -MOST, MOST, "quadratic term", strength=True),
+        Parameter("k3", "N/m^3", 0.0, -MOST, MOST, "cubic term", strength=True),
     ),
     law=law,
     curves=(Curve(Coordinate.POSITION),),
     fingerprint="residual is one smooth curve of position, the same in both directions",
     excited_by="slow passes over the whole travel in both directions",
+    suits=on_a_cable,
 )

@@ -9,7 +9,9 @@ from collections.abc import Mapping
 from math import cos, hypot, pi, sin
 
 from twin.curve import Coordinate, Curve
-from twin.effect import COLUMNS, OUT, Effect, Excitation, Kind, Parameter, X
+from twin.effect import COLUMNS, LEAST, MOST, OUT, Effect, Excitation, Kind, Parameter, X
+
+CYCLES = 120  # most over the travel that are tried before a model tells them
 
 
 def waves(p, io):
@@ -40,8 +42,7 @@ def pitches(e: Excitation) -> tuple[float, ...]:
     """
     if e.pitches:
         return tuple(k * pitch for pitch in e.pitches for k in (1, 2, 3))
-    cycles = int(min(e.travel / 2e-3, 120.0))
-    return tuple(2.0 * e.travel / k for k in range(6, 2 * cycles + 1))
+    return tuple(2.0 * e.travel / k for k in range(6, 2 * CYCLES + 1))
 
 
 def simplest(values: Mapping[str, float]) -> dict[str, float]:
@@ -61,10 +62,10 @@ EFFECT = Effect(
     equation="F = sum_{k=1..3} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)",
     source="Gieras, Piech, Tomczuk, Linear Synchronous Motors, 2011 (cogging as a Fourier series)",
     parameters=(
-        Parameter("p", "m", 0.024, 1e-4, 10.0, "magnet pitch", scan=pitches, period=True),
+        Parameter("p", "m", 0.024, LEAST, MOST, "magnet pitch", scan=pitches, period=True),
         *(
             Parameter(
-                f"{c}{k}", "N", 0.0, -1e7, 1e7, f"{f} term of harmonic {k}", strength=True,
+                f"{c}{k}", "N", 0.0, -MOST, MOST, f"{f} term of harmonic {k}", strength=True,
                 screened=k == 1,
             )
             for k in (1, 2, 3)

@@ -3,7 +3,7 @@
 F = F0; for a tilt by angle alpha, F0 = -m g sin(alpha).
 """
 
-from twin.effect import OUT, Effect, Kind, Parameter
+from twin.effect import MOST, OUT, Effect, Kind, Parameter
 
 
 def law(p, s, io):
@@ -15,7 +15,7 @@ EFFECT = Effect(
     summary="constant force: tilt, preload or amplifier offset",
     equation="F = F0",
     source="statics; in EMPS (Janot et al. 2019) the 'offset' of the drive force",
-    parameters=(Parameter("F0", "N", 0.0, -1e7, 1e7, "the force", strength=True),),
+    parameters=(Parameter("F0", "N", 0.0, -MOST, MOST, "the force", strength=True),),
     law=law,
     fingerprint="residual has the same mean everywhere, in both directions",
     excited_by="any motion in both directions",

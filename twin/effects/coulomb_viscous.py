@@ -9,7 +9,7 @@ level allows it, exactly that force acts and the axis is at rest to rounding, so
 from math import copysign
 
 from twin.curve import FRICTION_CURVES
-from twin.effect import DRY, HOLD, INDEX, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
+from twin.effect import DRY, HOLD, INDEX, MOST, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -34,14 +34,14 @@ EFFECT = Effect(
     source="L. Jia 2023, eq. 2.1-2.2, section 2.1.3",
     parameters=(
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.3, 0.0, 1e7, "static friction", strength=True, dry=True, fixed=True,
+            "Fs", "N", 0.3, 0.0, MOST, "static friction", strength=True, dry=True, fixed=True,
             at_least="Fc", start_rule=lambda e: e.dry_level,
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
     ),
     states=("at_rest",),
     sticks=True,

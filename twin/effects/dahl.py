@@ -11,7 +11,7 @@ r falls along the path as dr/d|x| = -sigma0/Fc r^n, which is integrated exactly 
 from math import copysign, exp, expm1, log, log1p
 
 from twin.curve import FRICTION_CURVES
-from twin.effect import DRY, DT, OUT, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, LEAST, MOST, OUT, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -42,14 +42,14 @@ EFFECT = Effect(
     source="Dahl 1968; Dahl 1976; with the viscous part added",
     parameters=(
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
         Parameter(
-            "sigma0", "N/m", 300.0, 1.0, 1e9, "stiffness at F = 0",
-            start_rule=lambda e: 1e3 * e.dry_level,
-            scan=lambda e: tuple(e.dry_level / z for z in (1e-2, 1e-3, 1e-4, 1e-5)),
+            "sigma0", "N/m", 300.0, LEAST, MOST, "stiffness at F = 0",
+            start_rule=lambda e: 300.0 * e.dry_level / e.travel,
+            scan=lambda e: tuple(e.dry_level / (z * e.travel) for z in (0.03, 3e-3, 3e-4, 3e-5)),
         ),
         Parameter("n", "1", 1.0, 0.0, 4.0, "shape of the yield", fixed=True),
     ),

@@ -11,7 +11,7 @@ threshold of speed is needed. The age is exact over a sample of constant speed.
 
 from math import exp, expm1
 
-from twin.effect import DT, STATIC, Effect, Kind, Parameter, V
+from twin.effect import DT, LEAST, MOST, STATIC, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -34,8 +34,8 @@ EFFECT = Effect(
             scan=lambda e: (0.1, 1.0, 10.0),
         ),
         Parameter(
-            "slip", "m", 1e-3, 1e-8, 0.1, "sliding that renews the contacts",
-            scan=lambda e: (1e-5, 1e-4, 1e-3),
+            "slip", "m", 1e-3, LEAST, MOST, "sliding that renews the contacts",
+            scan=lambda e: tuple(part * e.travel for part in (3e-5, 3e-4, 3e-3)),
         ),
     ),
     states=("age",),

@@ -20,7 +20,7 @@ from math import copysign, expm1, sqrt
 from typing import Any
 
 from twin.curve import Part
-from twin.effect import DT, OUT, TIME, WHEN, Effect, Kind, Parameter, V, X
+from twin.effect import DT, LEAST, MOST, OUT, TIME, WHEN, Effect, Kind, Parameter, V, X
 
 KNOTS = 11  # where the knots' parameters begin
 SPEEDS = 17
@@ -123,34 +123,36 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
     return (
         Parameter("elements", "1", elements, elements, elements, "number of intervals in x"),
         Parameter(
-            "start", "m", -0.15, -1e3, 1e3, "where the covered travel begins", fixed=True,
+            "start", "m", -0.15, -MOST, MOST, "where the covered travel begins", fixed=True,
             start_rule=lambda e: e.position_low,
         ),
         Parameter(
-            "length", "m", 0.3, 1e-6, 1e3, "length of the covered travel", fixed=True,
+            "length", "m", 0.3, LEAST, MOST, "length of the covered travel", fixed=True,
             start_rule=lambda e: e.travel,
         ),
         Parameter(
-            "speed", "m/s", 0.2, 1e-6, 1e3, "highest speed covered", fixed=True,
+            "speed", "m/s", 0.2, LEAST, MOST, "highest speed covered", fixed=True,
             start_rule=lambda e: e.speed_max,
         ),
         Parameter(
-            "turn", "m", 3e-4, 1e-9, 1.0, "travel after which a reversal is forgotten", fixed=True,
-            start_rule=lambda e: 1e-3 * e.travel,
+            "turn", "m", 3e-4, LEAST, MOST, "travel after which a reversal is forgotten",
+            fixed=True, start_rule=lambda e: 1e-3 * e.travel,
         ),
         Parameter(
             "T", "s", 1.0, 1e-4, 1e4, "period of what repeats in time", fixed=True,
             start_rule=lambda e: 1.0 / e.lines[0] if e.lines else 1.0,
         ),
         *(
-            Parameter(f"stiff_{key}", "N", 1e-3, 1e-12, 1e6, f"bend expected of {what}", fixed=True)
+            Parameter(
+                f"stiff_{key}", "N", 1e-3, LEAST, MOST, f"bend expected of {what}", fixed=True,
+            )
             for key, what in (("x", "A"), ("d", "D"), ("e", "E"), ("v", "B"), ("t", "C"))
         ),
     )  # fmt: skip
 
 
 def _knots(names: tuple[str, ...], meaning: str) -> tuple[Parameter, ...]:
-    return tuple(Parameter(n, "N", 0.0, -1e7, 1e7, meaning, strength=True) for n in names)
+    return tuple(Parameter(n, "N", 0.0, -MOST, MOST, meaning, strength=True) for n in names)
 
 
 EFFECT = of_size(40)

@@ -8,7 +8,7 @@ is determined from the readings and not fitted.
 
 from math import floor
 
-from twin.effect import READING, Effect, Kind, Parameter
+from twin.effect import MOST, READING, Effect, Kind, Parameter
 
 EXACT = 2.0**52  # steps above which a double has no digits left to round
 
@@ -25,7 +25,7 @@ EFFECT = Effect(
     source="Widrow, Kollar, Quantization Noise, section 1.1",
     parameters=(
         Parameter(
-            "step", "m", 0.0, 0.0, 1e-2, "resolution", strength=True, fixed=True,
+            "step", "m", 0.0, 0.0, MOST, "resolution", strength=True, fixed=True,
             start_rule=lambda e: e.resolution,
         ),
     ),

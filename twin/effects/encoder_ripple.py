@@ -9,7 +9,7 @@ of a phase error is left out, a shift of zero.
 
 from math import cos, pi, sin
 
-from twin.effect import COLUMNS, READING, Effect, Excitation, Kind, Parameter
+from twin.effect import COLUMNS, LEAST, MOST, READING, Effect, Excitation, Kind, Parameter
 
 SCALES = (2e-6, 4e-6, 8e-6, 1e-5, 1.6e-5, 2e-5, 4e-5, 1e-4)  # m; longer ones show as ripples
 
@@ -45,11 +45,12 @@ EFFECT = Effect(
     source="Heydemann 1981, quadrature errors to first order",
     parameters=(
         Parameter(
-            "period", "m", 2e-5, 1e-8, 10.0, "signal period of the scale", scan=periods, period=True
+            "period", "m", 2e-5, LEAST, MOST, "signal period of the scale", scan=periods,
+            period=True,
         ),
         *(
             Parameter(
-                f"{c}{k}", "m", 0.0, -1e-4, 1e-4, f"{f} term of harmonic {k}", strength=True,
+                f"{c}{k}", "m", 0.0, -MOST, MOST, f"{f} term of harmonic {k}", strength=True,
                 screened=k == 1,
             )
             for k in (1, 2)

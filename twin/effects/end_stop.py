@@ -9,7 +9,7 @@ which no force changes, the law is as printed.
 
 from collections.abc import Mapping
 
-from twin.effect import DT, MASS, OUT, Effect, Excitation, Kind, Parameter, V, X
+from twin.effect import DT, MASS, MOST, OUT, Effect, Excitation, Kind, Parameter, V, X
 
 # Places tried, parts of the travel from its ends; soft stops a tenth off pass for a cable.
 STOPS = (0.005, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4)
@@ -46,16 +46,16 @@ EFFECT = Effect(
     source="Kelvin-Voigt contact that does not pull; Modelica Standard Library, ElastoBacklash2",
     parameters=(
         Parameter(
-            "low", "m", 0.0, -1e3, 1e3, "lower stop",
+            "low", "m", 0.0, -MOST, MOST, "lower stop",
             start_rule=lambda e: e.position_low,
             scan=lambda e: tuple(e.position_low + k * e.travel for k in STOPS),
         ),
         Parameter(
-            "high", "m", 0.0, -1e3, 1e3, "upper stop",
+            "high", "m", 0.0, -MOST, MOST, "upper stop",
             start_rule=lambda e: e.position_high,
             scan=lambda e: tuple(e.position_high - k * e.travel for k in STOPS),
         ),
-        Parameter("stiffness", "N/m", 0.0, 0.0, 1e9, "stiffness of a stop", strength=True),
+        Parameter("stiffness", "N/m", 0.0, 0.0, MOST, "stiffness of a stop", strength=True),
         Parameter(
             "relaxation", "s", 2e-3, 0.0, 0.1, "damping of a stop over its stiffness", fixed=True
         ),

@@ -8,7 +8,9 @@ magnet motors", Proc. American Control Conference 2001.
 
 from math import cos, pi, sin
 
-from twin.effect import Effect, Excitation, Kind, Parameter, U, X
+from twin.effect import LEAST, MOST, Effect, Excitation, Kind, Parameter, U, X
+
+CYCLES = 70  # most over the travel that are tried before a model tells them
 
 
 def law(p, s, io):
@@ -27,8 +29,7 @@ def pitches(e: Excitation) -> tuple[float, ...]:
     """
     if e.thrust_pitches:
         return tuple(k * pitch for pitch in e.thrust_pitches for k in (1, 2))
-    cycles = int(min(e.travel / 2e-3, 70.0))
-    return tuple(2.0 * e.travel / k for k in range(6, 2 * cycles + 1))
+    return tuple(2.0 * e.travel / k for k in range(6, 2 * CYCLES + 1))
 
 
 EFFECT = Effect(
@@ -37,7 +38,7 @@ EFFECT = Effect(
     equation="u_actual = u (1 + sum_{k=1,2} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p))",
     source="Rohrig, Jochheim 2001, force ripple in proportion to current",
     parameters=(
-        Parameter("p", "m", 0.024, 1e-4, 10.0, "magnet pitch", scan=pitches, period=True),
+        Parameter("p", "m", 0.024, LEAST, MOST, "magnet pitch", scan=pitches, period=True),
         *(
             Parameter(f"{c}{k}", "1", 0.0, -0.5, 0.5, f"{f} term of harmonic {k}", strength=True)
             for k in (1, 2)

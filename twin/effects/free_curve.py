@@ -21,7 +21,20 @@ from math import copysign, expm1, floor, sqrt
 from typing import Any
 
 from twin.curve import Coordinate, Curve, FreeShape, Part
-from twin.effect import COLUMNS, DT, OUT, WHEN, Effect, Excitation, Kind, Parameter, V, X
+from twin.effect import (
+    COLUMNS,
+    DT,
+    LEAST,
+    MOST,
+    OUT,
+    WHEN,
+    Effect,
+    Excitation,
+    Kind,
+    Parameter,
+    V,
+    X,
+)
 
 KNOTS = 9  # where the knots' parameters begin
 TURNED = 1e-12  # less of a turn than this is left when it is over
@@ -117,30 +130,30 @@ def of_size(elements: int) -> Effect:
         parameters=(
             Parameter("elements", "1", elements, elements, elements, "number of intervals"),
             Parameter(
-                "per_metre", "1/m", 3.0, 0.0, 1e6, "coordinate by position", fixed=True,
-                start_rule=lambda e: 1.0 / max(e.travel, 1e-6),
+                "per_metre", "1/m", 3.0, 0.0, MOST, "coordinate by position", fixed=True,
+                start_rule=lambda e: 1.0 / e.travel,
             ),
-            Parameter("per_speed", "s/m", 0.0, 0.0, 1e6, "coordinate by speed", fixed=True),
+            Parameter("per_speed", "s/m", 0.0, 0.0, MOST, "coordinate by speed", fixed=True),
             Parameter(
                 "offset", "1", 0.0, -1e9, 1e9, "coordinate where the curve begins", fixed=True,
-                start_rule=lambda e: e.position_low / max(e.travel, 1e-6),
+                start_rule=lambda e: e.position_low / e.travel,
             ),
             Parameter("closed", "1", 0.0, 0.0, 1.0, "1 where the curve repeats", fixed=True),
             Parameter(
-                "turn", "m", 3e-5, AT_ONCE, 1.0, "travel that turns the direction", fixed=True,
+                "turn", "m", 3e-5, AT_ONCE, MOST, "travel that turns the direction", fixed=True,
                 start_rule=lambda e: HELD * e.travel,
             ),
             Parameter(
-                "rest", "m/s", 0.0, 0.0, 1e3, "speed below which the curve lets go", fixed=True,
+                "rest", "m/s", 0.0, 0.0, MOST, "speed below which the curve lets go", fixed=True,
             ),
             *(
-                Parameter(f"stiff_{c}", "N", 1e-3, 1e-12, 1e6, f"bend expected of {c.upper()}",
+                Parameter(f"stiff_{c}", "N", 1e-3, LEAST, MOST, f"bend expected of {c.upper()}",
                           fixed=True)
                 for c in "eo"
             ),
-            *(Parameter(n, "N", 0.0, -1e7, 1e7, "E, in both directions", strength=True)
+            *(Parameter(n, "N", 0.0, -MOST, MOST, "E, in both directions", strength=True)
               for n in even),
-            *(Parameter(n, "N", 0.0, -1e7, 1e7, "O, that turns with the direction", strength=True)
+            *(Parameter(n, "N", 0.0, -MOST, MOST, "O, that turns with the direction", strength=True)
               for n in odd),
         ),
         states=("direction",),

@@ -22,7 +22,7 @@ from functools import cache
 from math import copysign, exp, expm1, log
 
 from twin.curve import STRIBECK_CURVES
-from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, LEAST, MOST, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 SHARES = 9  # where the elements' own parameters begin
 
@@ -105,27 +105,27 @@ def _shared(elements: int) -> tuple[Parameter, ...]:
             "elements", "1", elements, elements, elements, "number N, from the model file"
         ),
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.35, 0.0, 1e7, "static friction", strength=True, dry=True, at_least="Fc",
+            "Fs", "N", 0.35, 0.0, MOST, "static friction", strength=True, dry=True, at_least="Fc",
             start_rule=lambda e: 1.15 * e.dry_level,
         ),
         Parameter(
-            "v0", "m/s", 0.01, 1e-5, 1.0, "Stribeck velocity",
+            "v0", "m/s", 0.01, LEAST, MOST, "Stribeck velocity",
             start_rule=lambda e: 0.05 * e.speed_max,
             scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
         Parameter(
-            "sigma0", "N/m", 300.0, 1.0, 1e9, "stiffness of all elements together",
-            start_rule=lambda e: 1e3 * e.dry_level,
-            scan=lambda e: tuple(e.dry_level / z for z in (1e-3, 1e-4, 1e-5)),
+            "sigma0", "N/m", 300.0, LEAST, MOST, "stiffness of all elements together",
+            start_rule=lambda e: 300.0 * e.dry_level / e.travel,
+            scan=lambda e: tuple(e.dry_level / (z * e.travel) for z in (3e-3, 3e-4, 3e-5)),
         ),
         Parameter("spread", "1", 10.0, 1.0, 1e6, "last yield deflection over the first"),
         Parameter(
-            "C", "N/s", 30.0, 1e-3, 1e8, "attraction to the Stribeck curve",
+            "C", "N/s", 30.0, LEAST, MOST, "attraction to the Stribeck curve",
             start_rule=lambda e: 100.0 * e.dry_level,
         ),
         Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),

@@ -16,7 +16,7 @@ from math import copysign, cos, expm1, pi
 from typing import Any
 
 from twin.curve import Part
-from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V, X
+from twin.effect import DT, LEAST, MOST, OUT, WHEN, Effect, Kind, Parameter, V, X
 
 OWN = 6  # where the coefficients begin
 CROSS = 24
@@ -82,27 +82,27 @@ EFFECT = Effect(
     source="none; basis after Dung, Temlyakov, Ullrich, Hyperbolic Cross Approximation, 2018",
     parameters=(
         Parameter(
-            "start", "m", -0.15, -1e3, 1e3, "where the covered travel begins", fixed=True,
+            "start", "m", -0.15, -MOST, MOST, "where the covered travel begins", fixed=True,
             start_rule=lambda e: e.position_low,
         ),
         Parameter(
-            "length", "m", 0.3, 1e-6, 1e3, "length of the covered travel", fixed=True,
+            "length", "m", 0.3, LEAST, MOST, "length of the covered travel", fixed=True,
             start_rule=lambda e: e.travel,
         ),
         Parameter(
-            "speed", "m/s", 0.2, 1e-6, 1e3, "highest speed covered", fixed=True,
+            "speed", "m/s", 0.2, LEAST, MOST, "highest speed covered", fixed=True,
             start_rule=lambda e: e.speed_max,
         ),
         Parameter(
-            "reach1", "m", 3e-4, 1e-9, 10.0, "short memory of a reversal", fixed=True,
+            "reach1", "m", 3e-4, LEAST, MOST, "short memory of a reversal", fixed=True,
             start_rule=lambda e: 1e-3 * e.travel,
         ),
         Parameter(
-            "reach2", "m", 0.015, 1e-9, 10.0, "long memory of a reversal", fixed=True,
+            "reach2", "m", 0.015, LEAST, MOST, "long memory of a reversal", fixed=True,
             start_rule=lambda e: 0.05 * e.travel,
         ),
         Parameter("stiff", "1", 0.1, 1e-9, 1e9, "ridge on the coefficients", fixed=True),
-        *(Parameter(n, "N", 0.0, -1e7, 1e7, "a coefficient", strength=True) for n in ORDERS),
+        *(Parameter(n, "N", 0.0, -MOST, MOST, "a coefficient", strength=True) for n in ORDERS),
     ),
     states=("z1", "z2"),
     law=law,

@@ -25,12 +25,12 @@ at the mean of the rates at both ends of the step: any stiffness is stable.
 from math import copysign, exp, expm1, log1p
 
 from twin.curve import STRIBECK_CURVES
-from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, LEAST, MOST, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 
 TURNS = 16  # reversals remembered
 FULL = 1.0 - 1e-12  # part of a gap that counts as all of it
 NEAR = 1e-7  # gap below which its slope is that at its end
-MOST = 100.0  # exponent beyond which the stiffness is as good as gone
+SOFTEST = 100.0  # exponent beyond which the stiffness is as good as gone
 FORCE, DIRECTION, DEPTH, STACK = range(4)  # states; the stack comes last
 
 
@@ -52,7 +52,7 @@ def slope(gap, m, softening):
     """
     r = min(max(1.0 - gap, 0.0), 1e3)
     ratio = m if abs(gap) < NEAR else (1.0 - r**m) / gap
-    return ratio * exp(-min(softening * r, MOST))
+    return ratio * exp(-min(softening * r, SOFTEST))
 
 
 def advance(p, s, io, level):
@@ -87,7 +87,7 @@ def advance(p, s, io, level):
         else:
             path = 0.0
             s[FORCE] += direction * change
-        softened = exp(min(own * (along + 0.5 * change), MOST))
+        softened = exp(min(own * (along + 0.5 * change), SOFTEST))
         deflected += direction * change / p[4] * softened
     return deflected
 
@@ -118,25 +118,28 @@ EFFECT = Effect(
     source="Swevers et al. 2000; L. Jia 2023, eq. 2.10-2.12",
     parameters=(
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.35, 0.0, 1e7, "static friction", strength=True, dry=True, at_least="Fc",
+            "Fs", "N", 0.35, 0.0, MOST, "static friction", strength=True, dry=True, at_least="Fc",
             start_rule=lambda e: 1.15 * e.dry_level,
         ),
         Parameter(
-            "v0", "m/s", 0.01, 1e-5, 1.0, "Stribeck velocity",
+            "v0", "m/s", 0.01, LEAST, MOST, "Stribeck velocity",
             start_rule=lambda e: 0.05 * e.speed_max,
             scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
         Parameter(
-            "sigma0", "N/m", 300.0, 1.0, 1e9, "stiffness after a reversal",
-            start_rule=lambda e: 1e3 * e.dry_level,
-            scan=lambda e: tuple(e.dry_level / z for z in (1e-3, 1e-4, 1e-5)),
+            "sigma0", "N/m", 300.0, LEAST, MOST, "stiffness after a reversal",
+            start_rule=lambda e: 300.0 * e.dry_level / e.travel,
+            scan=lambda e: tuple(e.dry_level / (z * e.travel) for z in (3e-3, 3e-4, 3e-5)),
         ),
-        Parameter("sigma1", "N s/m", 0.5, 1e-6, 1e8, "bristle damping"),
+        Parameter(
+            "sigma1", "N s/m", 0.5, LEAST, MOST, "bristle damping",
+            start_rule=lambda e: 0.5 * e.dry_level / e.speed_max,
+        ),
         Parameter("b", "1", 1.5, 0.0, 10.0, "log of the factor the stiffness falls by up to Fs"),
         Parameter("m", "1", 16.0, 1.0, 50.0, "sharpness of the onset of sliding", fixed=True),
         Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),

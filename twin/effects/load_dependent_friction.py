@@ -9,7 +9,7 @@ same: A. C. Bittencourt et al., "An extended friction model to capture load and 
 in robot joints", IROS 2010. That the load is linear in these three is an assumption.
 """
 
-from twin.effect import A_OTHER, DRY, X_OTHER, Effect, Kind, Parameter, U
+from twin.effect import A_OTHER, DRY, MOST, X_OTHER, Effect, Kind, Parameter, U
 
 
 def law(p, s, io):
@@ -24,13 +24,13 @@ EFFECT = Effect(
     source="Amontons' law of friction; Bittencourt et al. 2010 (load-dependent joint friction); "
     "linear loads are an assumption",
     parameters=(
-        Parameter("motor", "1/N", 0.0, 0.0, 1.0, "growth by motor force", strength=True),
+        Parameter("motor", "1/N", 0.0, 0.0, MOST, "growth by motor force", strength=True),
         Parameter(
-            "corner", "s^2/m", 0.0, 0.0, 10.0, "growth by the other axis' acceleration",
+            "corner", "s^2/m", 0.0, 0.0, MOST, "growth by the other axis' acceleration",
             strength=True,
         ),
         Parameter(
-            "offset", "1/m", 0.0, -10.0, 10.0, "growth by the other axis' position", strength=True
+            "offset", "1/m", 0.0, -MOST, MOST, "growth by the other axis' position", strength=True
         ),
     ),
     law=law,

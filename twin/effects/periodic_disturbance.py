@@ -8,7 +8,7 @@ section 3.3 (response to an arbitrary periodic input).
 
 from math import cos, pi, sin
 
-from twin.effect import DT, OUT, TIME, Effect, Excitation, Kind, Parameter
+from twin.effect import DT, MOST, OUT, TIME, Effect, Excitation, Kind, Parameter
 
 
 def law(p, s, io):
@@ -30,8 +30,8 @@ EFFECT = Effect(
     source="Fourier series of a periodic force; Inman, Engineering Vibration, section 3.3",
     parameters=(
         Parameter("f", "Hz", 10.0, 1e-2, 5e3, "frequency", scan=frequencies),
-        Parameter("a", "N", 0.0, -1e7, 1e7, "sine term", strength=True),
-        Parameter("b", "N", 0.0, -1e7, 1e7, "cosine term", strength=True),
+        Parameter("a", "N", 0.0, -MOST, MOST, "sine term", strength=True),
+        Parameter("b", "N", 0.0, -MOST, MOST, "cosine term", strength=True),
     ),
     law=law,
     several=True,

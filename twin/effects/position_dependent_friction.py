@@ -8,7 +8,7 @@ section on the velocity maps: Fc and Fs fall along the track, v0 and sigma2 show
 from math import cos, pi
 
 from twin.curve import Coordinate, Curve
-from twin.effect import DRY, Effect, Kind, Parameter, X
+from twin.effect import DRY, LEAST, MOST, Effect, Kind, Parameter, X
 
 
 def law(p, s, io):
@@ -31,12 +31,12 @@ EFFECT = Effect(
     source="L. Jia 2023, velocity maps at nine positions",
     parameters=(
         Parameter(
-            "start", "m", -0.17, -1e3, 1e3, "where the profile begins", fixed=True,
+            "start", "m", -0.17, -MOST, MOST, "where the profile begins", fixed=True,
             start_rule=lambda e: e.position_low,
         ),
         Parameter(
-            "length", "m", 0.34, 1e-6, 1e3, "length of the profile", fixed=True,
-            start_rule=lambda e: max(e.travel, 1e-6),
+            "length", "m", 0.34, LEAST, MOST, "length of the profile", fixed=True,
+            start_rule=lambda e: e.travel,
         ),
         *(
             Parameter(f"c{k}", "1", 0.0, -2.0, 2.0, f"cosine term {k}", strength=True)

@@ -7,7 +7,7 @@ design; where turbulence has not set in, or a lubricant thins with shear, it is 
 from math import copysign
 
 from twin.curve import Coordinate, Curve
-from twin.effect import OUT, Effect, Kind, Parameter, V
+from twin.effect import LEAST, MOST, OUT, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -22,10 +22,10 @@ EFFECT = Effect(
     equation="F = -c vc^2 |v/vc|^n sgn(v);  with n = 2: -c v |v|",
     source="White, Fluid Mechanics, section 7.6",
     parameters=(
-        Parameter("c", "N s^2/m^2", 0.0, 0.0, 1e6, "drag coefficient", strength=True),
+        Parameter("c", "N s^2/m^2", 0.0, 0.0, MOST, "drag coefficient", strength=True),
         Parameter("n", "1", 2.0, 1.2, 4.0, "exponent of the speed", fixed=True),
         Parameter(
-            "vc", "m/s", 0.1, 1e-5, 1e3, "speed at which c holds whatever n is", fixed=True,
+            "vc", "m/s", 0.1, LEAST, MOST, "speed at which c holds whatever n is", fixed=True,
             start_rule=lambda e: e.speed_max,
         ),
     ),

@@ -3,17 +3,19 @@
 F = -(ahead + behind)/2 d b(x) - (ahead - behind)/2 b(x), with b a smooth bump of full width
 ``width`` centred at phase + k pitch, and d in [-1, 1] the direction of motion. Moving forwards the
 bump brakes with ``ahead``, moving backwards with ``behind``; equal values brake both ways, opposite
-values make the bump conservative. d follows the motion within 20 um of travel, so that the force
-has no jump at rest. L. Jia 2023: rollers 34 mm apart make force spikes every 34 mm; the bump's form
-(1 - r^2)^2 is this project's choice.
+values make the bump conservative. d follows the motion within a 200th of the width, so that the
+force has no jump at rest. L. Jia 2023: rollers 34 mm apart make force spikes every 34 mm; the
+bump's form (1 - r^2)^2 is this project's choice.
 """
 
 from math import copysign, expm1, floor
 
 from twin.curve import Coordinate, Curve
-from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V, X
+from twin.effect import DT, LEAST, MOST, OUT, WHEN, Effect, Kind, Parameter, V, X
 
-TURN = 2e-5  # m of travel over which a reversal turns the braking part round
+TURN = 5e-3  # of a bump's width, the travel over which a reversal turns the braking part round
+PITCH = 0.1  # of the travel, where no design tells it
+WIDTHS = (0.06, 0.18, 0.44)  # of the pitch
 TURNED = 1e-12  # less of a turn than this is left when it is over
 
 
@@ -23,7 +25,7 @@ def law(p, s, io):
     if io[V] != 0.0:
         change = copysign(1.0, io[V]) - s[0]
         if abs(change) > TURNED:
-            change *= -expm1(-abs(io[V]) * io[DT] / TURN)
+            change *= -expm1(-abs(io[V]) * io[DT] / (TURN * p[1]))
         direction += io[WHEN] * change
         s[0] += change
     turns = (io[X] - p[2]) / pitch
@@ -43,18 +45,19 @@ EFFECT = Effect(
     source="L. Jia 2023, force spikes every 34 mm; bump form is an assumption",
     parameters=(
         Parameter(
-            "pitch", "m", 0.034, 1e-4, 10.0, "distance between rollers", fixed=True, period=True,
+            "pitch", "m", 0.034, LEAST, MOST, "distance between rollers", fixed=True, period=True,
+            start_rule=lambda e: PITCH * e.travel,
         ),
         Parameter(
-            "width", "m", 0.004, 1e-4, 0.1, "full width of a bump",
-            scan=lambda e: (0.002, 0.006, 0.015),
+            "width", "m", 0.004, LEAST, MOST, "full width of a bump",
+            scan=lambda e: tuple(part * PITCH * e.travel for part in WIDTHS),
         ),
         Parameter(
-            "phase", "m", 0.0, -1.0, 1.0, "position of one bump",
-            scan=lambda e: tuple(0.034 * k / 24 for k in range(24)),
+            "phase", "m", 0.0, -MOST, MOST, "position of one bump",
+            scan=lambda e: tuple(PITCH * e.travel * k / 24 for k in range(24)),
         ),
-        Parameter("ahead", "N", 0.0, -1e7, 1e7, "braking height moving forwards", strength=True),
-        Parameter("behind", "N", 0.0, -1e7, 1e7, "braking height moving backwards", strength=True),
+        Parameter("ahead", "N", 0.0, -MOST, MOST, "braking height forwards", strength=True),
+        Parameter("behind", "N", 0.0, -MOST, MOST, "braking height backwards", strength=True),
     ),
     states=("direction",),
     law=law,

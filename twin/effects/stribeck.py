@@ -12,7 +12,7 @@ allows it, exactly that force acts, so the axis is at rest to rounding and never
 from math import copysign, exp
 
 from twin.curve import STRIBECK_CURVES
-from twin.effect import DRY, HOLD, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
+from twin.effect import DRY, HOLD, LEAST, MOST, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -37,19 +37,19 @@ EFFECT = Effect(
     source="Tustin 1947 (n = 1); Bo, Pavelescu 1982 (n); L. Jia 2023, eq. 2.4-2.5",
     parameters=(
         Parameter(
-            "Fc", "N", 0.3, 0.0, 1e7, "Coulomb friction", strength=True, dry=True,
+            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
             start_rule=lambda e: e.dry_level,
         ),
         Parameter(
-            "Fs", "N", 0.35, 0.0, 1e7, "static friction", strength=True, dry=True, at_least="Fc",
+            "Fs", "N", 0.35, 0.0, MOST, "static friction", strength=True, dry=True, at_least="Fc",
             start_rule=lambda e: 1.15 * e.dry_level,
         ),
         Parameter(
-            "v0", "m/s", 0.01, 1e-5, 1.0, "Stribeck velocity",
+            "v0", "m/s", 0.01, LEAST, MOST, "Stribeck velocity",
             start_rule=lambda e: 0.05 * e.speed_max,
             scan=lambda e: tuple(share * e.speed_max for share in (0.01, 0.03, 0.1, 0.3)),
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, 1e8, "viscous friction", strength=True),
+        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
         Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
     ),
     states=("at_rest",),

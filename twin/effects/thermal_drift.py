@@ -10,14 +10,14 @@ is an assumption. E is exact over a sample of constant power; friction keeps a t
 
 from math import exp
 
-from twin.effect import DRY, DT, FRICTION, VISCOUS, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, FRICTION, MOST, VISCOUS, Effect, Kind, Parameter, V
 
-MOST = 3.0  # exponent at which the loss ends: 1/20 of the friction is left
+LARGEST = 3.0  # exponent at which the loss ends: 1/20 of the friction is left
 
 
 def law(p, s, io):
-    io[DRY] *= exp(-min(p[0] * s[0], MOST))
-    io[VISCOUS] *= exp(-min(p[1] * s[0], MOST))
+    io[DRY] *= exp(-min(p[0] * s[0], LARGEST))
+    io[VISCOUS] *= exp(-min(p[1] * s[0], LARGEST))
     kept = exp(-io[DT] / p[2])
     s[0] = s[0] * kept + abs(io[FRICTION] * io[V]) * p[2] * (1.0 - kept)
 
@@ -30,9 +30,9 @@ EFFECT = Effect(
     source="Simoni, Beschi, Legnani, Visioli 2019 (heat from friction power); Reynolds 1886 "
     "(exponential viscosity), extended to the dry part by assumption",
     parameters=(
-        Parameter("dry", "1/J", 0.0, 0.0, 100.0, "loss of dry friction by heat", strength=True),
+        Parameter("dry", "1/J", 0.0, 0.0, MOST, "loss of dry friction by heat", strength=True),
         Parameter(
-            "viscous", "1/J", 0.0, 0.0, 100.0, "loss of viscous friction by heat", strength=True
+            "viscous", "1/J", 0.0, 0.0, MOST, "loss of viscous friction by heat", strength=True
         ),
         Parameter(
             "tau", "s", 300.0, 0.1, 1e5, "cooling time",

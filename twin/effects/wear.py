@@ -6,7 +6,7 @@ surfaces", J. Appl. Phys. 24, 1953); that friction grows in proportion to it is 
 for the small growth within one log.
 """
 
-from twin.effect import DRY, DT, WHEN, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, MOST, WHEN, Effect, Kind, Parameter, V
 
 
 def law(p, s, io):
@@ -21,7 +21,7 @@ EFFECT = Effect(
     equation="Fc, Fs -> (1 + rate s) Fc, Fs;  ds/dt = |v|",
     source="Archard 1953 (wear by distance); growth of friction in proportion is an assumption",
     parameters=(
-        Parameter("rate", "1/m", 0.0, 0.0, 1e3, "growth by distance travelled", strength=True),
+        Parameter("rate", "1/m", 0.0, 0.0, MOST, "growth by distance travelled", strength=True),
     ),
     states=("distance",),
     law=law,

@@ -7,11 +7,15 @@ from functools import cache
 
 import numpy as np
 
-from twin.effect import READING, Effect, Kind
+from twin.dimension import Scale, has_size
+from twin.effect import READING, Effect, Kind, Parameter
 from twin.effects import load_catalogue
 from twin.laws.motion import Array, Motion
 from twin.laws.stepping import Values, forces, trace
 from twin.model.machine import Fitted
+
+TRIED = Scale(1.0, 0.1, 1.0)  # N, m, s: about the motion of ``action``
+ENORMOUS = 10.0  # times what is usual there
 
 
 @cache
@@ -57,6 +61,12 @@ def companion(friction: Effect) -> Fitted:
     return Fitted.at_start(friction, legal(friction, values))
 
 
+def _span(p: Parameter) -> tuple[float, float]:
+    """Bounds of a strength, or what is enormous along the motion of ``action``."""
+    far = ENORMOUS * TRIED.size(p.unit) if has_size(p.unit) else np.inf
+    return max(p.lower, -far), min(p.upper, far)
+
+
 def moderate(effect: Effect, rng: np.random.Generator, wanted: float = 0.3) -> dict[str, float]:
     """Drawn values with which the effect's action is about ``wanted`` N rms, or its most."""
     share = dict(zip(effect.starts(), rng.random(len(effect.parameters)), strict=True))
@@ -65,7 +75,8 @@ def moderate(effect: Effect, rng: np.random.Generator, wanted: float = 0.3) -> d
         drawn = {}
         for p in effect.parameters:
             if p.strength:
-                drawn[p.name] = factor * (p.lower + share[p.name] * (p.upper - p.lower))
+                least, most = _span(p)
+                drawn[p.name] = factor * (least + share[p.name] * (most - least))
             else:
                 drawn[p.name] = p.start * (0.8 + 0.4 * share[p.name])
         return legal(effect, drawn)

@@ -7,16 +7,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from twin.core.native import Table, build_table
-from twin.effect import ELEMENTS, Effect, Kind, Parameter
+from twin.effect import ELEMENTS, LEAST, MOST, Effect, Kind, Parameter
 from twin.errors import CannotRun, InputError
 from twin.model.history import HistoryStep
 from twin.model.intervals import AxisIntervals
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 from twin.numbers import is_number
 
-MASS = Parameter(LINEAR.mass_name, LINEAR.mass, 1.0, 1e-6, 1e6, "moved mass")
-# Declared linear as all parameters are; a small motor has a millionth of a kg m^2.
-INERTIA = Parameter(ROTARY.mass_name, LINEAR.mass, 1.0, 1e-12, 1e6, "moment of inertia")
+MASS = Parameter(LINEAR.mass_name, LINEAR.mass, 1.0, LEAST, MOST, "moved mass")
+# Declared linear as all parameters are.
+INERTIA = Parameter(ROTARY.mass_name, LINEAR.mass, 1.0, LEAST, MOST, "moment of inertia")
 MOST_ELEMENTS = 1000
 OF_IMPOSED_MOTION = (Kind.FORCE, Kind.MODIFIER, Kind.FRICTION)  # need neither mass nor motor
 MOST_AXES_OF_A_PAIR = 2  # with more, which is the other axis?
@@ -133,7 +133,7 @@ class AxisModel:
                 f"an axis has one friction model, given {' and '.join(frictions)}; remove one"
             )
         for f in self.effects:
-            if not self.can_have(f.effect):
+            if not self._moves_with(f.effect):
                 raise InputError(
                     f"{f.effect.name} acts through the motor or the moved mass, and {name} = 0 "
                     f"{unit} says that the motion is imposed; remove it, or give the {name}"
@@ -145,6 +145,12 @@ class AxisModel:
         return self.mass == 0.0
 
     def can_have(self, effect: Effect) -> bool:
+        """Whether a diagnosis offers the effect: it acts, and no other has its law on this axis."""
+        present = [f.effect for f in self.effects]
+        suits = effect.suits is None or effect.suits(present, self.rotary)
+        return suits and self._moves_with(effect)
+
+    def _moves_with(self, effect: Effect) -> bool:
         """Whether the effect acts on this axis at all: imposed motion has no motor and no mass.
 
         A law that reads the motor's force would read there what it is to explain.

@@ -31,6 +31,7 @@ from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
 from identify.dataset.whittle import _underneath, fitted_levels
 from identify.estimation.force_balance import residual
+from twin.effect import LEAST
 from twin.errors import InputError
 from twin.log.check import moves
 from twin.model.machine import AxisModel, MachineModel
@@ -242,7 +243,7 @@ def test_the_rough_mass_is_exact_beside_dry_and_viscous_friction():
     pushed = replace(m, signals=np.stack([m.position, m.velocity, u]))
     assert inertia([pushed, pushed]) == pytest.approx(2.3, rel=2e-3)
     pulled = replace(m, signals=np.stack([m.position, m.velocity, -u]))
-    assert inertia([pulled]) == pytest.approx(1e-6)  # the least mass that a model may have
+    assert inertia([pulled]) == pytest.approx(LEAST)  # the least mass that a model may have
 
 
 def test_the_shortest_window_that_is_quiet_is_chosen():

@@ -26,6 +26,7 @@ from identify.dataset.prepared_log import (
     PreparedLog,
     moving,
     on_blocks,
+    scale_of,
     sticks,
     total_force,
 )
@@ -37,6 +38,7 @@ from identify.estimation.force_balance import (
     jacobian,
     residual,
 )
+from twin.dimension import Scale
 from twin.effect import Kind, Parameter
 from twin.laws.values import legal
 from twin.model.machine import AxisModel, Fitted
@@ -68,7 +70,7 @@ def central(axis: AxisModel, logs, where) -> np.ndarray:
     columns = []
     for c in where:
         value = read(axis, [c])[0]
-        step = abs(difference_step(c, value))
+        step = abs(difference_step(c, value, scale_of(LOGS)))
         low, high = max(value - step, c.parameter.lower), min(value + step, c.parameter.upper)
         ends = [residual(write(axis, [c], [v]), logs) for v in (low, high)]
         columns.append((ends[1] - ends[0]) / (high - low))
@@ -145,7 +147,7 @@ def test_a_friction_that_follows_the_actual_force_is_in_one_group_with_its_drive
     base = residual(axis, LOGS)
     for c, column in zip(where, columns.T, strict=True):
         value = read(axis, [c])[0]
-        step = difference_step(c, value)
+        step = difference_step(c, value, scale_of(LOGS))
         whole = (residual(write(axis, [c], [value + step]), LOGS) - base) / step
         np.testing.assert_allclose(column, whole, atol=2e-3 * np.abs(whole).max())
 
@@ -211,7 +213,9 @@ def test_the_residual_of_logs_in_a_row_is_theirs_in_a_row():
     np.testing.assert_array_equal(residual(axis, both), np.concatenate(apart))
     where = free_parameters(axis)[::4]
     columns = [jacobian(axis, [log], where) for log in both]
-    np.testing.assert_allclose(jacobian(axis, both, where), np.vstack(columns), rtol=1e-9)
+    together, alone = jacobian(axis, both, where), np.vstack(columns)
+    # The steps are those of each log's own motion.
+    np.testing.assert_allclose(together, alone, atol=1e-4 * np.abs(alone).max(axis=0).min())
 
 
 def test_blocks_take_what_acts_between_actuator_and_encoder():
@@ -231,20 +235,21 @@ def test_a_log_in_windows_has_the_time_of_their_middles():
 
 
 def test_a_step_of_a_difference_stays_in_the_bounds_and_is_small():
+    def step(p: Parameter, value: float) -> float:
+        return difference_step(ParameterReference("e", p), value, Scale(7.0, 0.2, 0.5))
+
     p = Parameter("a", "N", 2.0, 0.0, 5.0, "", strength=True)
-    wide = Parameter("b", "N", 0.0, -1e4, 1e4, "", strength=True)
-    assert difference_step(ParameterReference("e", p), 3.0) == pytest.approx(3e-5)
-    assert difference_step(ParameterReference("e", p), -3.0) == pytest.approx(3e-5)
-    assert difference_step(ParameterReference("e", p), 0.5) == pytest.approx(
-        2e-5
-    )  # the start's size
-    assert difference_step(ParameterReference("e", p), 5.0) == pytest.approx(-5e-5)
-    assert difference_step(ParameterReference("e", wide), 0.0) == pytest.approx(1e-8)
+    assert step(p, 3.0) == pytest.approx(3e-5)
+    assert step(p, -3.0) == pytest.approx(3e-5)
+    assert step(p, 5.0) == pytest.approx(-5e-5)
+    assert step(p, 0.0) == pytest.approx(7e-8), "of the largest force"
+    assert step(replace(p, unit="N s/m"), 0.0) == pytest.approx(1e-8 * 7.0 * 0.5 / 0.2)
     # Of a dead time of some ms, far beyond the rounding of a position over a sample.
-    narrow = replace(wide, lower=0.0, upper=6e-3)
-    assert difference_step(ParameterReference("e", narrow), 0.0) == pytest.approx(6e-11)
-    step = difference_step(ParameterReference("e", p), 2.5)
-    assert difference_step(ParameterReference("e", replace(p, upper=2.5 + step)), 2.5) == step
+    assert step(replace(p, unit="s", upper=6e-3), 0.0) == pytest.approx(6e-11)
+    assert step(replace(p, unit="s", lower=-1e4, upper=1e4), 0.0) == pytest.approx(1e-8)
+    assert step(replace(p, lower=1e-9), 1e-7) == pytest.approx(1e-12), "a scale by itself"
+    own = step(p, 2.5)
+    assert step(replace(p, upper=2.5 + own), 2.5) == own
 
 
 # --- standstill ---------------------------------------------------------------------------------

@@ -51,7 +51,7 @@ def test_every_combination_of_the_scanned_values_is_tried_once():
 
 def test_a_shape_starts_from_the_data_within_its_bounds():
     effect = CATALOGUE["coulomb_viscous"]
-    found = _clipped(effect, replace(SEEN, dry_level=0.37), {"sigma2": -2.0, "Fs": 1e12})
+    found = _clipped(effect, replace(SEEN, dry_level=0.37), {"sigma2": -2.0, "Fs": 1e20})
     assert found == {"Fc": 0.37, "Fs": effect.parameter("Fs").upper, "sigma2": 0.0}
 
 

@@ -26,6 +26,7 @@ from identify.selection import scoring
 from identify.selection.candidates import absent_effects
 from identify.selection.scoring import RIDGE, _cross_validated, on_equal_samples, score
 from twin.effect import Kind
+from twin.model.machine import AxisModel
 
 # The rules as they were decided.
 LEAST_BIC, LEAST_T, PROMISE, SAME_ERROR, AT_FLOOR = 10.0, 3.0, 0.3, 1.01, 1.3
@@ -58,14 +59,19 @@ def test_a_noise_need_not_lower_the_error_and_needs_its_evidence():
 
 
 def test_absent_are_all_effects_but_those_there_and_descriptions():
-    names = {e.name for e in absent_effects(axis_of(fitted("cogging")), CATALOGUE)}
+    def offered(axis: AxisModel) -> set[str]:
+        return {e.name for e in CATALOGUE.values() if axis.can_have(e)}
+
+    with_cogging = axis_of(fitted("cogging"))
+    names = {e.name for e in absent_effects(with_cogging, CATALOGUE)}
     described = {"empirical_map", "learned_residual", "free_curve"}
-    assert names == set(CATALOGUE) - {"cogging", "coulomb_viscous"} - described | {"cogging_2"}
+    there = {"cogging", "coulomb_viscous"}
+    assert names == offered(with_cogging) - there - described | {"cogging_2"}
     bare = replace(PLAIN, effects=())
     modifiers = {e.name for e in CATALOGUE.values() if e.kind is Kind.MODIFIER}
     assert modifiers
     found = {e.name for e in absent_effects(bare, CATALOGUE)}
-    assert found == set(CATALOGUE) - modifiers - described
+    assert found == offered(bare) - modifiers - described
     sliding = replace(PLAIN, effects=(fitted("cogging"),))
     assert {e.name for e in absent_effects(sliding, CATALOGUE)} == found - {"cogging"} | {
         "cogging_2"

@@ -11,6 +11,7 @@ import pytest
 from effect_runs import CATALOGUE, FRICTIONS
 
 from twin.curve import Coordinate, Curve, Part
+from twin.dimension import Scale, has_size
 from twin.effect import Effect, Excitation, Kind, Parameter, V
 
 LOG = Excitation(
@@ -22,7 +23,7 @@ EVERY = pytest.mark.parametrize(
     ("effect", "p"), PARAMETERS[:], ids=[f"{e.name}-{p.name}" for e, p in PARAMETERS]
 )
 
-PLACES_AND_TIMES = ("start", "low", "high", "phase", "tau", "relaxation", "b", "n")
+PLACES_AND_TIMES = ("start", "middle", "low", "high", "phase", "tau", "relaxation", "b", "n")
 
 
 @pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))
@@ -53,6 +54,20 @@ def test_bounds_follow_from_what_a_parameter_is(effect: Effect, p: Parameter) ->
         assert p.upper >= 3.0 * p.start
     for bound in (p.lower, p.upper):  # a round number: one or two digits
         assert bound == 0.0 or f"{bound:.1e}" == f"{bound:.6e}".replace("00000e", "e")
+
+
+MACHINES = [Scale(f, x, t) for f in (1e-3, 1e4) for x in (1e-3, 1e3) for t in (0.1, 10.0)]
+
+
+@EVERY
+def test_no_bound_is_a_size_of_some_machine(effect: Effect, p: Parameter) -> None:
+    """From the stage of a microscope to a press and a spindle: what is usual is far within."""
+    if has_size(p.unit):
+        for machine in MACHINES:
+            usual = machine.size(p.unit)
+            assert p.lower <= 0.0 or p.lower < 1e-2 * usual
+            assert p.lower in (0.0, -p.upper) or p.lower > 0.0
+            assert 1e2 * usual < p.upper
 
 
 RATIOS = {"ratio", "load", "recoil", "damping", "loss", "coulomb", "viscous"}

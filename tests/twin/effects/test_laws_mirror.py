@@ -74,8 +74,10 @@ MIRRORS = {
     "constant_force": negated("F0"),
     "encoder_ripple": negated("b1", "b2"),
     "force_constant_ripple": negated("a1", "a2"),
+    "gravity": negated("cosine"),
     "load_dependent_friction": negated("offset"),
     "periodic_disturbance": negated("a", "b"),
+    "spring": negated("middle", "offset", "k2"),
     "end_stop": lambda p: {**p, "low": -p["high"], "high": -p["low"]},
     "roller_spikes": lambda p: {
         **p, "phase": -p["phase"], "ahead": p["behind"], "behind": p["ahead"],

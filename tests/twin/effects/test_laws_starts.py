@@ -1,7 +1,8 @@
 """Start rules and scans are formulas in the units of the log.
 
 With lengths in other units of length, times in other units of time and forces in other units of
-force, a rule gives the same values in those units. Ladders of fixed values keep their own laws.
+force, a rule gives the same values in those units. Ladders of fixed times and ratios keep their own
+laws; of lengths and forces there are none but the periods of scales.
 """
 
 from collections.abc import Callable
@@ -74,8 +75,8 @@ def test_units_are_read_as_they_are_written() -> None:
     assert not follows_units(lambda e: e.dry_level + 1e-3, "N")
 
 
-# Rules of thumb: force levels over a deflection of a millimetre and over a time of 10 ms.
-THUMB = {"sigma0": 1.0 / 1e-3, "C": 1.0 / 1e-2}
+# A rule of thumb: force levels over a time of 10 ms.
+THUMB = {"C": 1.0 / 1e-2}
 
 
 @pytest.mark.parametrize(("effect", "p"), RULED, ids=ids(RULED))
@@ -86,14 +87,11 @@ def test_a_start_rule_follows_the_units_of_the_log(effect: Effect, p: Parameter)
         assert follows_units(p.start_rule, p.unit)
 
 
-# Scans that try fixed values: of scales and machines, not of the log.
+# Scans that try fixed times and ratios.
 ABSOLUTE = {
-    "backlash-play", "backlash-frequency", "roller_spikes-width", "roller_spikes-phase",
-    "dwell_stiction-time", "dwell_stiction-slip", "base_vibration-damping", "flexible_mode-damping",
+    "backlash-frequency", "dwell_stiction-time", "base_vibration-damping", "flexible_mode-damping",
 }  # fmt: skip
-OWN = {"base_vibration-frequency", "flexible_mode-frequency", "encoder_ripple-period", "cogging-p",
-       "force_constant_ripple-p", "cable_hysteresis-reach"}  # fmt: skip
-DEFLECTIONS = {"sigma0"}  # stiffness from fixed deflections
+OWN = {"base_vibration-frequency", "flexible_mode-frequency", "encoder_ripple-period"}
 
 
 @pytest.mark.parametrize(("effect", "p"), SCANNED, ids=ids(SCANNED))
@@ -111,10 +109,6 @@ def test_a_scan_is_sorted_within_bounds_and_in_the_units_of_the_log(
     if name in ABSOLUTE:
         for units in UNITS:
             np.testing.assert_array_equal(p.scan(scaled(LOG, *units)), tried)
-    elif p.name in DEFLECTIONS:
-        decades = np.log10(LOG.dry_level / tried)
-        np.testing.assert_allclose(np.diff(decades), -1.0)
-        np.testing.assert_allclose(decades, np.rint(decades))
     else:
         assert follows_units(p.scan, p.unit)
 
@@ -185,11 +179,11 @@ def scan(effect: str, name: str, e: Excitation = LOG) -> np.ndarray:
 def test_pitches_are_half_a_cycle_apart_from_three_cycles_on(
     effect: str, most: int, travel: float
 ) -> None:
-    """Down to 2 mm, or to as many cycles as the data can tell apart."""
+    """Up to as many cycles as the data can tell apart."""
     tried = scan(effect, "p", replace(LOG, position_low=0.03, position_high=0.03 + travel))
     halves = 2.0 * travel / tried
     np.testing.assert_allclose(halves, np.arange(6, 6 + len(tried)), rtol=1e-12)
-    assert halves[-1] / 2.0 == pytest.approx(min(np.floor(travel / 2e-3 + 1e-9), most), abs=0.01)
+    assert halves[-1] / 2.0 == pytest.approx(most, abs=0.01)
 
 
 @pytest.mark.parametrize("period", [1e-4, 2e-3, 0.05])
@@ -220,13 +214,10 @@ def test_periods_of_an_encoder_are_those_of_scales_and_those_seen() -> None:
     assert digits <= {"1.0", "1.6", "2.0", "4.0", "5.0", "8.0"}, "not periods of common scales"
 
 
-def test_reaches_of_a_cable_end_at_the_travel() -> None:
-    wide, narrow = (
-        scan("cable_hysteresis", "reach", replace(LOG, position_high=-0.13 + t))
-        for t in (1.0, 0.015)
-    )
-    np.testing.assert_allclose(narrow, np.minimum(wide, 0.015))
-    np.testing.assert_allclose(np.diff(np.log10(wide)), 0.5, atol=0.03)
+def test_reaches_of_a_hysteresis_are_half_decades_within_the_travel() -> None:
+    tried = scan("cable_hysteresis", "reach")
+    assert tried.max() < 0.2 * LOG.travel, "a reach that the motion passes several times"
+    np.testing.assert_allclose(np.diff(np.log10(tried)), 0.5, atol=0.03)
 
 
 def test_stops_are_tried_from_both_ends_alike_and_not_beyond_the_middle() -> None:
@@ -248,7 +239,7 @@ def test_lines_of_the_log_are_tried_and_a_ladder_where_there_are_none() -> None:
 def test_rollers_are_tried_all_round_one_pitch() -> None:
     effect = CATALOGUE["roller_spikes"]
     phases = scan("roller_spikes", "phase")
-    pitch = effect.parameter("pitch").start
+    pitch = effect.parameter("pitch").start_from(LOG)
     np.testing.assert_allclose(phases, np.arange(len(phases)) * pitch / len(phases))
     assert np.diff(phases).max() < scan("roller_spikes", "width").min(), "a bump between two tries"
 

@@ -1,0 +1,173 @@
+"""The same data in other units of force and length give the same fit, whatever the effect.
+
+Every effect of the catalogue is scanned for and fitted beside a friction on a log that holds a
+little of all of them, and on the same log with positions and forces a hundred times smaller or
+larger. Time has one unit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from constructed import CATALOGUE, Array, log_of, waves
+
+from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.motion import motion_of
+from identify.dataset.prepared_log import total_force
+from identify.estimation.fit import Fit, at_bounds, fit_axis
+from identify.estimation.scaling import limits_of
+from identify.estimation.variable_projection import starts
+from twin.dimension import Scale, dimension
+from twin.effect import Effect, Kind
+from twin.laws.values import moderate
+from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
+
+RATE = 1000.0  # Hz
+UNITS = [(0.01, 1.0), (100.0, 1.0), (1.0, 0.01), (1.0, 100.0), (0.01, 0.01), (100.0, 100.0)]
+FRICTION = {"Fc": 0.4, "Fs": 0.4, "sigma2": 1.1}
+MASS = 2.3  # kg
+SMALL = 0.03  # N RMS of each effect
+SAME = 1e-3  # relative, between the ends of two searches that stop at a small fall of the error
+EFFECTS = [e for e in CATALOGUE.values() if not e.is_nonparametric]
+TURNING = {e.name for e in EFFECTS if e.suits and e.suits((), True) > e.suits((), False)}
+IN_METRES = {"encoder_ripple.period"}  # tried at the signal periods of the scales that are sold
+
+
+def in_units(fitted: Fitted, length: float, force: float) -> Fitted:
+    """The same effect where lengths and forces are multiplied by these."""
+    newton, metre, _ = np.array([dimension(p.unit) for p in fitted.effect.parameters]).T
+    factors = force ** newton.astype(float) * length ** metre.astype(float)
+    values = dict(zip(fitted.values, factors * list(fitted.values.values()), strict=True))
+    return Fitted.at_start(fitted.effect, values)
+
+
+@cache
+def logged() -> tuple[Array, Array, Array]:
+    """Positions (m) of two axes and the force (N) of one that has every effect, (n,) each."""
+    rng = np.random.default_rng(1)
+    t = np.arange(round(4.0 * RATE)) / RATE
+    x, y = waves((0.09, 0.6, 0.3), (0.02, 1.7, 1.0))(t), waves((0.05, 0.9, 2.0))(t)
+    axis = AxisModel(MASS, effects=(Fitted.at_start(CATALOGUE["coulomb_viscous"], FRICTION),))
+    for effect in EFFECTS:
+        if effect.kind not in (Kind.FRICTION, Kind.SENSING):
+            axis = axis.with_effect(Fitted.at_start(effect, moderate(effect, rng, SMALL)))
+    table = axis_table({"": axis})
+    command = inertia = MASS * np.gradient(np.gradient(x, t), t)
+    for _ in range(3):  # for what depends on the motor's force
+        motion = motion_of(log_of(RATE, x, command, y), "x", "log", ripples=())
+        command = inertia - np.interp(t, motion.time, total_force(table, motion))
+    return x, y, command + rng.normal(0.0, 2e-3, len(t))
+
+
+@cache
+def begun(length: float, force: float, rubs: bool = True) -> tuple[Fit, Dataset]:
+    """The friction, if any, fitted to the log in these units."""
+    x, y, command = logged()
+    friction = in_units(Fitted.at_start(CATALOGUE["coulomb_viscous"], FRICTION), length, force)
+    axis = AxisModel(2.0 * MASS * force / length, effects=(friction,) if rubs else ())
+    model = MachineModel("stage", {"x": axis, "y": axis}, RATE)
+    log = log_of(RATE, length * x, force * command, length * y)
+    dataset = datasets(model, {"log": log}, {})["x"]
+    return fit_axis(axis, dataset.fit), dataset
+
+
+def of_friction(effect: Effect) -> bool:
+    """Whether the effect is another than a friction has in itself."""
+    return effect.suits is None or effect.suits((CATALOGUE["coulomb_viscous"],), False) == (
+        effect.suits((), False)
+    )
+
+
+@cache
+def fitted_in(effect: Effect, length: float, force: float) -> Fit:
+    """The effect fitted from its best start in these units."""
+    base, dataset = begun(length, force, of_friction(effect))
+    start = starts(base, dataset, effect)[0]
+    return fit_axis(base.axis.with_effect(start.fitted), dataset.fit)
+
+
+def differing(effect: Effect, length: float, force: float) -> list[str]:
+    """What is another in these units: relative error of the fit, parameters, bounds that hold."""
+    here, there = fitted_in(effect, 1.0, 1.0), fitted_in(effect, length, force)
+    out = []
+    if abs(there.error / force / here.error - 1.0) > SAME:
+        out.append(f"error {here.error:g} N, {there.error / force:g} N")
+    if at_bounds(here, effect.name) != at_bounds(there, effect.name):
+        out.append("bounds")
+    back = in_units(there.axis[effect.name], 1.0 / length, 1.0 / force)
+    if not IN_METRES.isdisjoint(f"{effect.name}.{p.name}" for p in effect.parameters):
+        return out
+    for p in effect.parameters:
+        one, other = here.axis[effect.name].values[p.name], back.values[p.name]
+        if abs(one - other) > SAME * max(abs(one), abs(other)):
+            out.append(f"{p.name} {one:g}, {other:g} {p.unit}")
+    return out
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+def test_a_fit_is_the_same_in_other_units(effect: Effect) -> None:
+    units = [u for u in UNITS if u[0] == 1.0 or effect.name not in TURNING]  # a radian is one
+    found = {u: differing(effect, *u) for u in units}
+    assert not any(found.values()), found
+
+
+# --- planted faults: each must be seen ------------------------------------------------------------
+
+
+def with_one(name: str, parameter: str, **changed: object) -> Effect:
+    effect = CATALOGUE[name]
+    own = tuple(replace(p, **changed) if p.name == parameter else p for p in effect.parameters)
+    return replace(effect, parameters=own)
+
+
+FAULTS = {
+    "bound": lambda: with_one("load_dependent_friction", "offset", lower=-1.0, upper=1.0),
+    "scan": lambda: with_one("cable_hysteresis", "reach", scan=lambda e: (3e-3, 6e-3)),
+    "start": lambda: with_one("end_stop", "high", scan=None, start_rule=lambda e: 0.09),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_an_absolute_size_is_seen(fault: str) -> None:
+    effect = FAULTS[fault]()
+    assert any(differing(effect, *units) for units in UNITS[:4])
+
+
+# --- values at a bound ----------------------------------------------------------------------------
+
+
+def bounded(lower: float, upper: float) -> Fit:
+    """A fit of a constant force of some newtons within bounds."""
+    dataset = begun(1.0, 1.0)[1]
+    effect = with_one("constant_force", "F0", lower=lower, upper=upper)
+    return fit_axis(AxisModel(MASS, effects=(Fitted.at_start(effect),)), dataset.fit)
+
+
+def test_a_value_at_its_bound_is_told_and_an_absent_one_is_not() -> None:
+    free = bounded(-50.0, 50.0)
+    value = free.axis["constant_force"].values["F0"]
+    assert at_bounds(free, "constant_force") == ()
+    size = 0.5 * abs(value)
+    assert at_bounds(bounded(-size, size), "constant_force") == ("constant_force.F0",)
+    upper_at_zero, lower_at_zero = bounded(-50.0, 0.0), bounded(0.0, 50.0)
+    absent = upper_at_zero if value > 0.0 else lower_at_zero
+    assert absent.axis["constant_force"].values["F0"] == 0.0
+    assert at_bounds(absent, "constant_force") == ()
+    only = (0.0, size) if value > 0.0 else (-size, 0.0)
+    assert at_bounds(bounded(*only), "constant_force") == ("constant_force.F0",)
+    assert at_bounds(bounded(*only), "another") == ()
+
+
+def test_a_curve_over_speed_is_sought_where_the_motion_is() -> None:
+    """What falls far beyond the highest speed is a constant; a value given beyond is kept."""
+    p, scale = CATALOGUE["stribeck"].parameter("v0"), Scale(force=20.0, length=0.3, time=1.5)
+    speed = 0.3 / 1.5
+    low, high = limits_of(p, 0.01, scale)
+    assert low < 1e-6 * speed
+    assert high == pytest.approx(4.0 * speed)
+    assert limits_of(p, 9.0 * speed, scale)[1] == pytest.approx(9.0 * speed)
+    tau = CATALOGUE["actuator_lag"].parameter("tau")
+    assert limits_of(tau, 0.0, scale) == (tau.lower, tau.upper), "time has one unit"

@@ -1,0 +1,83 @@
+"""A diagnosis offers each law once, by the name that fits the axis and what it has already."""
+
+import numpy as np
+import pytest
+from effect_runs import CATALOGUE, FRICTIONS
+
+from twin.effect import Effect
+from twin.laws.motion import Motion
+from twin.laws.stepping import forces
+from twin.laws.values import moderate
+from twin.model.file import load_model
+from twin.model.machine import AxisModel, Fitted
+
+CABLE = {"cable_slab", "cable_hysteresis"}
+GENERAL = {"spring", "presliding_hysteresis"}
+BARE = AxisModel(1.0)
+ONE_LAW = [("cable_slab", "spring"), ("cable_hysteresis", "presliding_hysteresis")]
+
+
+def offered(axis: AxisModel) -> set[str]:
+    return {e.name for e in CATALOGUE.after(axis.names) if axis.can_have(e)}
+
+
+def having(*names: str, rotary: bool = False) -> AxisModel:
+    fitted = tuple(Fitted.at_start(CATALOGUE[n]) for n in names)
+    return AxisModel(1.0, effects=fitted, rotary=rotary)
+
+
+@pytest.mark.parametrize("pair", ONE_LAW, ids=str)
+def test_two_names_are_one_law(pair: tuple[str, str]) -> None:
+    rng, motion = np.random.default_rng(4), Motion.cycles(0.07)
+    special, general = (CATALOGUE[n] for n in pair)
+    values = {p.name: 0.0 for p in general.parameters} | moderate(special, rng)
+
+    def force(effect: Effect) -> np.ndarray:
+        return forces([Fitted.at_start(effect, values if effect is general else {
+            p.name: values[p.name] for p in effect.parameters
+        })], motion)[effect.name]  # fmt: skip
+
+    assert np.abs(force(special)).max() > 0.1
+    np.testing.assert_allclose(force(general), force(special), rtol=1e-12)
+
+
+def test_a_machine_without_a_cable_is_offered_no_cable() -> None:
+    assert offered(BARE) >= GENERAL
+    assert not CABLE & offered(BARE)
+    for name in CABLE:
+        beside = offered(having(name))
+        assert not GENERAL & beside
+        assert CABLE - {name} <= beside
+    assert not CABLE & offered(having("spring"))
+
+
+def test_viscous_friction_is_offered_where_no_friction_has_it() -> None:
+    assert "viscous_friction" in offered(BARE)
+    assert "viscous_friction" in offered(having("cogging"))
+    for friction in FRICTIONS:
+        assert "viscous_friction" not in offered(having(friction.name))
+
+
+def test_gravity_is_offered_where_the_axis_turns() -> None:
+    assert "gravity" in offered(having(rotary=True))
+    assert "gravity" not in offered(BARE)
+    assert "constant_force" in offered(BARE), "the weight of a tilted slide"
+
+
+def test_what_is_not_offered_may_be_given() -> None:
+    axis = having("coulomb_viscous", "spring", "cable_slab", "viscous_friction", "gravity")
+    assert len(axis.effects) == 5
+
+
+def test_the_stage_with_a_cable_keeps_its_names() -> None:
+    stage = load_model("proton_xy", CATALOGUE)
+    for axis in stage.axes.values():
+        assert not GENERAL & offered(axis)
+        assert "cable_hysteresis" in offered(axis)
+
+
+def test_one_effect_may_be_had_ten_times() -> None:
+    names = ["cogging", *(f"cogging_{k}" for k in range(2, 11))]
+    assert all(n in CATALOGUE for n in names)
+    assert "cogging_11" in offered(having(*names))
+    assert not any(n in CATALOGUE for n in ("cogging_1", "cogging_01", "cogging_99", "lugre_2"))
