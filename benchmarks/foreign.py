@@ -124,10 +124,11 @@ def diagnosed(
 def added_on_logs(base: Machine, found: AxisDiagnosis, seed: int) -> float:
     """Floors of error on the logs of a diagnosis beyond those of the machine without the effect.
 
-    There are none where the model's own parameters take the effect up.
+    In floors of that machine, as an effect may raise the floor that is told. There are none where
+    the model's own parameters take the effect up.
     """
     _, fit = fitted(STAGE, "x", *logs_of(base, seed, DURATION))
-    return float(np.sqrt(max(found.base.ratio**2 - fit.ratio**2, 0.0)))
+    return float(np.sqrt(max(found.base.error**2 - fit.error**2, 0.0)) / fit.floor)
 
 
 def planted_row(name: str, wanted: float, seed: int, forms: Sequence[str] = ()) -> Row:
