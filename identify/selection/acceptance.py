@@ -7,7 +7,8 @@ thresholds (``RULE``):
 * part: of what the smaller model leaves of the squared force error above the noise floor, the part
   that the larger one takes. Of all of it or of that of a typical block (geometric mean),
   whichever is more, as a few blocks may hold most of an error; on the training logs or on logs
-  that were not fitted, whichever is less, as either alone can be imitated.
+  that were not fitted, whichever is less, as either alone can be imitated. Nothing is taken
+  typically by what makes the whole error rise.
 * t: the logarithmic gain over blocks over its standard error; on the training logs less what as
   many parameters take of noise. The more changes were tried, the more is asked (Bonferroni).
 * control: the part that the same change takes where it is true to nothing (``controls``).
@@ -53,8 +54,8 @@ class Taken:
 
     @property
     def part(self) -> float:
-        """The larger of the two parts."""
-        return max(self.whole, self.typical)
+        """The larger of the two parts; that of the whole where this rises."""
+        return larger(self.whole, self.typical)
 
 
 @dataclass(frozen=True)
@@ -148,10 +149,10 @@ class Judged:
 
     @property
     def at_floor(self) -> bool:
-        """Whether noise is all that is left, on the training logs or on the others."""
-        return self.fit.at_floor or bool(
-            self.dataset.holdout and self.other_error < RULE.at_floor * self.other_floor
-        )
+        """Whether noise is all that is left, on the training logs and on those not fitted."""
+        held = self.dataset.holdout and np.isfinite(self.other_error)
+        above = held and self.other_error > RULE.at_floor * self.other_floor
+        return self.fit.at_floor and not above
 
 
 def least_t(among: int) -> float:
@@ -200,6 +201,11 @@ def parts(before: Array, after: Array, count: Array, quiet: float) -> tuple[floa
 
     first, second = ((of(before), of(after)) for of in (whole, typical))
     return _part(*first, quiet), _part(*second, quiet)
+
+
+def larger(whole: float, typical: float) -> float:
+    """The larger part, but nothing is taken typically by what makes the whole error rise."""
+    return max(whole, typical) if whole > 0.0 else whole
 
 
 def _part(before: float, after: float, quiet: float) -> float:

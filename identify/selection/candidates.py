@@ -170,6 +170,4 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
 
 def ordered(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """Proved ones first, then those that were refitted, then by what they leave."""
-    return tuple(
-        sorted(candidates, key=lambda c: (not c.supported, c.score is None, c.gain.after))
-    )
+    return tuple(sorted(candidates, key=lambda c: (not c.supported, c.score is None, c.gain.after)))

@@ -19,7 +19,7 @@ from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, fit_axis, fit_roughly
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import starts
-from identify.selection.acceptance import Judged
+from identify.selection.acceptance import Judged, parts
 from identify.selection.bends import held_bends
 from identify.selection.controls import Columns, Trial, change_of, with_unit_penalty
 from identify.selection.curves import Shape, columns_of, shapes_of, sticking
@@ -100,8 +100,8 @@ class Added:
         before, after = (
             float(np.mean(residual(f.axis, dataset.heads)[both] ** 2)) for f in (old, best[0])
         )
-        above = max(before - old.floor**2, 1e-300)
-        return Look(self, (before - after) / above, tuple(f.axis for f in best))
+        promise, _ = parts(np.array([before]), np.array([after]), np.ones(1), old.floor**2)
+        return Look(self, promise, tuple(f.axis for f in best))
 
     def refit(self, judged: Judged, look: Look) -> Fit:
         return simplified(fit_axis(look.axes[0], judged.dataset.fit), judged.dataset, self.effect)

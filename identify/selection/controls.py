@@ -21,7 +21,7 @@ from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sti
 from identify.estimation.evidence import blocks_of, by_blocks
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.subspace import orthonormal
-from identify.selection.acceptance import Judged, parts
+from identify.selection.acceptance import Judged, larger, parts
 from twin.parallel import spread
 
 Array = NDArray[np.float64]
@@ -232,7 +232,7 @@ def _parts(part: _Part, products: Array, steps: Array, without: Array, quiet: fl
         np.maximum(_squares(p, s), ROUNDING * p[:, 0, 0] + TINY) / count
         for p, s in ((part.own, without), (products, steps))
     )
-    return max(parts(before, after, count, quiet))
+    return larger(*parts(before, after, count, quiet))
 
 
 def _squares(products: Array, steps: Array) -> Array:

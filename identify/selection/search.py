@@ -135,11 +135,9 @@ def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
     return replace(found, dataset=dataset, base=first, final=final if found.steps else first)
 
 
-def _search(
-    found: Found, catalogue: Catalogue, progress: Progress | None, shifts: int = RULE.most_shifts
-) -> Found:
-    """Go on from what was found; shifts: how often a change may still alter the channel delay."""
-    dataset, first, judged, steps = found.dataset, found.base, found.final, found.steps
+def _search(found: Found, catalogue: Catalogue, progress: Progress | None) -> Found:
+    """Go on from what was found."""
+    first, judged, steps = found.base, found.final, found.steps
     passed, ranking, last = [*found.passed], found.ranking, list(found.last)
     while len(steps) < RULE.most_steps:
         judged, last, candidates = tried_beside(judged, catalogue, progress)
@@ -152,13 +150,32 @@ def _search(
         judged, steps = _needed(new[-1].tried.judged, (*steps, *new), first)
         if judged.at_floor:
             break
-        if shifts and (moved := moved_by(judged.fit, dataset)):
-            again = _begun(fit_axis(first.fit.axis, moved.fit), moved)
-            return _search(again, catalogue, progress, shifts - 1)
-        fit = fit_thoroughly(judged.fit.axis, dataset, judged.fit.begun)
-        dataset, fit = synchronised(fit, dataset)
-        judged = Judged(fit, dataset)
-    return Found(dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
+        fit = fit_thoroughly(judged.fit.axis, judged.dataset, judged.fit.begun)
+        dataset, fit = synchronised(fit, judged.dataset)
+        judged = _settled(Judged(fit, dataset))
+    first = (
+        first if first.dataset is judged.dataset else _refitted_on(first.fit.axis, first, judged)
+    )
+    return Found(judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
+
+
+def _settled(judged: Judged) -> Judged:
+    """The fit with the channel delay that it finds, where that is another than the dataset has.
+
+    An effect that the model lacked may have looked like a delay, or hidden one. So a change brings
+    its own delay, and is judged with it.
+    """
+    moved = moved_by(judged.fit, judged.dataset)
+    if moved is None:
+        return judged
+    fit = replace(fit_axis(judged.fit.axis, moved.fit), begun=judged.fit.begun)
+    return Judged(fit, moved) if fit.error < judged.fit.error else judged
+
+
+def _refitted_on(axis: AxisModel, begun: Judged, judged: Judged) -> Judged:
+    """An axis fitted to the dataset of a judged fit."""
+    dataset = judged.dataset
+    return Judged(replace(fit_axis(axis, dataset.fit), begun=begun.fit.begun), dataset)
 
 
 def tried_beside(
@@ -183,7 +200,7 @@ def tried_beside(
         return found
 
     looks = spread(look, changes)
-    tried = _refitted(judged, looks, len(looks))
+    tried = _refitted(judged, looks, len({e.kind for e in effects}))
     enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
     if not enough:
         curves = [c.look(judged, trial) for c in reshaped_of(judged.fit, judged.dataset)]
@@ -212,7 +229,8 @@ def _refitted(
 ) -> list[Tried]:
     """The changes that promise enough, refitted; the better ones from all starts if none is enough.
 
-    among: of how many they are. known: what was refitted before.
+    among: of how many independent ones they are; effects of one kind are alike. known: what was
+    refitted before.
     """
     asked = RULE.promise * RULE.least_part
     waiting = sorted((k for k in looks if k.promise >= asked), key=lambda k: -k.promise)
@@ -243,6 +261,8 @@ def judged_change(judged: Judged, look: Look, fit: Fit, among: int = 1) -> Tried
     among: of how many changes it is chosen.
     """
     change, after = look.change, Judged(fit, judged.dataset)
+    if not fit.at_floor:
+        after = _settled(after)
     found = candidate_of(judged, after, _effect(change), parameters(change), among)
     if found.supported and found.score:
         taken = control(change, judged, after)
@@ -336,7 +356,7 @@ def _together(judged: Judged, tried: Sequence[Tried], catalogue: Catalogue) -> l
         axis = way.change.undone(both.fit.axis, judged.fit.axis)
         if axis is None or score(judged, both).refused:
             continue
-        alone = Judged(fit_axis(axis, both.dataset.fit), both.dataset)
+        alone = _refitted_on(axis, both, both)
         if _is_needed(way.change, alone, both):
             return [Step(way, with_others=True), replace(second, with_others=True)]
     return []
@@ -357,7 +377,7 @@ def _needed(
             continue
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
         if axis is not None:
-            without = Judged(_refit(axis, judged), judged.dataset)
+            without = _refitted_on(axis, judged, judged)
             if _is_needed(step.change, without, judged):
                 # The shapes of later effects were found beside this one; they may differ without.
                 again = fit_thoroughly(without.fit.axis, judged.dataset, judged.fit.begun)
@@ -374,7 +394,3 @@ def _needed(
 def _replaces(change: Change, other: Change) -> bool:
     """Whether a change is a free curve in the place of the law that another one added."""
     return isinstance(change, Reshaped) and not change.shape.beside and change.name == other.name
-
-
-def _refit(axis: AxisModel, judged: Judged) -> Fit:
-    return replace(fit_axis(axis, judged.dataset.fit), begun=judged.fit.begun)

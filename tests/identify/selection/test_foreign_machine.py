@@ -4,11 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from foreign_diagnoses import CATALOGUE, STAGE, diagnosed, model_for
-from foreign_effects import INSIDE, OUTSIDE
-from foreign_kernel import SLIP_ELEMENTS
-from foreign_machine import AHEAD, BEHIND, FORCE, PLACE, drawn, gaussian, logs_of, run
 
+from benchmarks.foreign import CATALOGUE, STAGE, diagnosed, model_for
+from benchmarks.second_simulator.effects import INSIDE, OUTSIDE
+from benchmarks.second_simulator.kernel import SLIP_ELEMENTS
+from benchmarks.second_simulator.machine import (
+    AHEAD,
+    BEHIND,
+    FORCE,
+    PLACE,
+    drawn,
+    gaussian,
+    logs_of,
+    run,
+)
 from identify import workflow
 from identify.selection.diagnosis import Verdict
 from twin.curve import Coordinate
@@ -68,7 +77,7 @@ def test_an_effect_of_no_catalogue_is_not_given_a_name(effect, size, terms):
     assert answer.best is None
     # What nothing measured foretells, as a random walk, is told as noise of that size; a drag that
     # levels off is another curve of the friction over speed.
-    if curves := [(c.shape.effect, c.shape.shape.curve.over) for c in answer.curves]:
+    if curves := [(f.effect, f.shape and f.shape.over) for f in answer.findings]:
         assert (effect, curves) == ("saturating drag", [("lugre", Coordinate.SPEED)])
     else:
         assert answer.verdict is Verdict.UNEXPLAINED or answer.dataset.force_noise > 0.0
@@ -94,7 +103,7 @@ def test_bumps_of_another_form_are_no_reason_to_name_another_effect(seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_bumps_that_let_go_at_rest_are_told_as_bumps_of_another_shape(seed):
     machine = drawn(np.random.default_rng(seed), RATE, bump=gaussian).having(turn=0.0)
-    answer = diagnosed(STAGE, machine, seed).with_findings()
+    answer = diagnosed(STAGE, machine, seed)
     assert answer.best is None
     if not answer.base.at_floor:
         assert answer.verdict is Verdict.WRONG_SHAPE
@@ -109,7 +118,7 @@ def test_friction_that_varies_along_the_track_differently_each_way_is_told(seed)
     machine = drawn(rng, 2e3)
     for row, place in zip((AHEAD, BEHIND), rng.uniform(-0.1, 0.1, 2), strict=True):
         machine = machine.plus(row, 0.03 * gaussian(PLACE - place, 0.05))
-    answer = diagnosed(STAGE, machine, seed).with_findings()
+    answer = diagnosed(STAGE, machine, seed)
     (finding,) = answer.findings
     assert (answer.verdict, finding.effect) == (Verdict.WRONG_SHAPE, "lugre")
     assert finding.shape is not None
