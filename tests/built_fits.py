@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.floor import NoiseFloor
 from identify.dataset.given_logs import Role
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog
@@ -68,7 +69,8 @@ def built_fit(
     kept = np.ones(len(residual), dtype=bool) if kept is None else kept
     scaling = Scaling(free_parameters(axis))
     fit = Fit(axis, logs, scaling, outcome, residual, kept, begun or axis)
-    fit.__dict__.update(floor=floor, floor_of_logs=floor, lessened=lessened, at_bound=())
+    noise = NoiseFloor(floor, floor, floor, {"rounding": 0.0, "aliasing": 0.0})
+    fit.__dict__.update(noise=noise, lessened=lessened, at_bound=())
     if jacobian is not None:
         fit.__dict__["jacobian"] = jacobian
     return fit
