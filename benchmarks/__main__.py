@@ -16,8 +16,9 @@ from benchmarks.judgement import told
 
 # Each is loaded when it runs: some need packages that the others do without.
 ALL = (
-    "simulation", "second_start", "peer_fits", "diagnosis", "passes", "kinds", "stages", "mcap_logs",
-    "effect_cost", "import_time", "emps", "withheld", "foreign", "thesis", "selftest", "fuzz",
+    "simulation", "second_start", "peer_fits", "diagnosis", "passes", "kinds", "stages",
+    "mcap_logs", "effect_cost", "import_time", "emps", "withheld", "foreign", "thesis", "selftest",
+    "fuzz",
     "mutation.noticed",
 )  # fmt: skip
 

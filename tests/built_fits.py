@@ -69,7 +69,7 @@ def built_fit(
     kept = np.ones(len(residual), dtype=bool) if kept is None else kept
     scaling = Scaling(free_parameters(axis))
     fit = Fit(axis, logs, scaling, outcome, residual, kept, begun or axis)
-    noise = NoiseFloor(floor, floor, floor, {"sensors": floor})
+    noise = NoiseFloor(floor, floor, floor, {"rounding": 0.0, "aliasing": 0.0})
     fit.__dict__.update(noise=noise, lessened=lessened, at_bound=())
     if jacobian is not None:
         fit.__dict__["jacobian"] = jacobian

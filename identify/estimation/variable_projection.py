@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
 from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, Outcome
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.levenberg_marquardt import minimise
@@ -79,7 +80,8 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     """
     excitation = with_what_repeats(base, dataset)
     nothing, absent = np.zeros(0), Fitted.at_start(effect)
-    found = [Start(shape, absent, nothing, nothing) for shape in tried_shapes(effect, excitation)]
+    shapes = _seen_to_repeat(effect, list(tried_shapes(effect, excitation)), base.logs)
+    found = [Start(shape, absent, nothing, nothing) for shape in shapes]
     if len(found) <= FULL_SHAPES:
         whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
         return _best(whole, found, effect.strengths, REFINED_STARTS)
@@ -97,6 +99,19 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     likely = found[1:] if _beyond_chance(base, first) else []
     others = [_try(whole, s.shape, effect.strengths) for s in (*likely, *unseen)]
     return sorted((first, *others), key=lambda s: s.squared_error)[:REFINED_STARTS]
+
+
+def _seen_to_repeat(
+    effect: Effect, shapes: list[dict[str, float]], logs: Sequence[PreparedLog]
+) -> list[dict[str, float]]:
+    """The shapes whose periods the logs show often enough to tell; all, where there are none.
+
+    Harmonics of a longer one would fit better, as the others follow whatever else is slow.
+    """
+    lows, highs = zip(*(log.extent[1] for log in logs), strict=True)
+    longest = (max(highs) - min(lows)) / RULE.fewest_cycles
+    repeating = [p.name for p in effect.parameters if p.period]
+    return [s for s in shapes if all(s.get(p, 0.0) <= longest for p in repeating)] or shapes
 
 
 def _beyond_chance(base: Fit, start: Start) -> bool:

@@ -8,12 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.coordinates import gathered
+from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.dataset.noise_floor import floor_of, unrounded_floor_of
 from identify.estimation.decision import RULE
 from identify.estimation.evidence import Evidence, Gain, evidence, held_out_gain, rms
 from identify.estimation.fit import Fit, at_bounds, error_on
-from identify.estimation.time_origin import phases_found
+from identify.estimation.force_balance import averaged_force
+from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.time_origin import depends_on_time_origin, phases_found
 from identify.selection.acceptance import Judged, Score, Taken, score
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
@@ -22,6 +26,8 @@ from twin.model.machine import AxisModel, MachineModel
 Array = NDArray[np.float64]
 
 MOST_INERTIA = 3.0  # times the moved mass of the base or its start, that an effect may leave
+MOTION = ("position", "velocity", "acceleration", "direction")
+SAME_FORCE = 0.5  # of a force's square; where the motion leaves less of it, it is one of the motion
 NO_SCORE = "a linear step takes too little for a refit"
 
 
@@ -142,10 +148,22 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
         travel = np.ptp(np.concatenate([log.motion.position for log in fit.logs]))
         if periods and travel < RULE.fewest_cycles * max(periods):
             return "too few of its periods are seen"
+        alone = replace(fit.axis, effects=(fitted,))
+        if depends_on_time_origin(alone, dataset) and _follows_motion(alone, dataset):
+            return "the motion repeats with it, so that any force of the motion could be it"
     masses = (before.fit.axis.mass, before.fit.begun.mass)
     if not any(max(m, fit.axis.mass) <= MOST_INERTIA * min(m, fit.axis.mass) for m in masses):
         return "it takes the place of the inertia"
     return None
+
+
+def _follows_motion(alone: AxisModel, dataset: Dataset) -> bool:
+    """Whether most of a force in time is told by where the axis is, how fast, and how it turns."""
+    force = averaged_force(alone, dataset.fit)
+    where = gathered(dataset.fit)
+    columns = np.column_stack([np.ones(len(force)), *(where[name] for name in MOTION)])
+    left = unabsorbed(force, orthonormal(columns))
+    return float(left @ left) < SAME_FORCE * float(force @ force)
 
 
 def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:

@@ -87,7 +87,7 @@ class Added:
         left = fit.error**2 - fit.floor**2
         if found[0].share(fit) * fit.error**2 < RULE.promise * RULE.least_part * left:
             return Look(self, 0.0, axes)
-        columns = _strength_columns(axes[0], self.name, dataset.fit)
+        columns = _strength_columns(axes[0], self.name, fit)
         return Look(self, trial.part(columns, sticking=sticks(axes[0])), axes)
 
     def _on_heads(self, judged: Judged, found: Sequence[Fitted]) -> Look:
@@ -113,7 +113,7 @@ class Added:
         if self.effect.kind is Kind.FRICTION or not self.effect.strengths:
             return change_of(without, fit), _resting(without, fit)
         axis = without.fit.axis.with_effect(fit.fit.axis[self.name])
-        return _strength_columns(axis, self.name, without.dataset.fit), sticks(axis)
+        return _strength_columns(axis, self.name, without.fit), sticks(axis)
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class Freed:
             now, *then = (residual(a, logs) for a in axes)
             return split_by_log(np.column_stack([t - now for t in then]), logs)
 
-        promise = trial.part(with_unit_penalty(columns, judged.fit.logs), sticking=sticks(axis))
+        promise = trial.part(with_unit_penalty(columns, judged.fit), sticking=sticks(axis))
         return Look(self, promise, tuple(axes))
 
     def refit(self, judged: Judged, look: Look) -> Fit:
@@ -242,7 +242,7 @@ def axis_less(effect: Effect, axis: AxisModel, base: AxisModel) -> AxisModel:
     return axis.without(effect.name)
 
 
-def _strength_columns(axis: AxisModel, name: str, training: Sequence[PreparedLog]) -> Columns:
+def _strength_columns(axis: AxisModel, name: str, fit: Fit) -> Columns:
     """The forces of an effect's free strengths."""
     law = axis[name]
     free = [p for p in law.effect.strengths if p.name not in law.fixed]
@@ -251,7 +251,7 @@ def _strength_columns(axis: AxisModel, name: str, training: Sequence[PreparedLog
     def columns(logs: Sequence[PreparedLog]) -> list[Array]:
         return split_by_log(jacobian(axis, logs, where), logs)
 
-    return with_unit_penalty(columns, training)
+    return with_unit_penalty(columns, fit)
 
 
 def _resting(without: Judged, fit: Judged) -> bool:

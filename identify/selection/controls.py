@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.estimation.evidence import blocks_of, by_blocks
+from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.subspace import orthonormal
 from identify.selection.acceptance import Judged, larger, parts
@@ -97,16 +98,19 @@ def change_of(before: Judged, after: Judged) -> Columns:
         both = [residual(j.fit.axis, logs) / j.fit.lessened for j in (before, after)]
         return split_by_log((both[1] - both[0])[:, None], logs)
 
-    return with_unit_penalty(columns, before.dataset.fit)
+    return with_unit_penalty(columns, before.fit)
 
 
-def with_unit_penalty(columns: Columns, training: Sequence[PreparedLog]) -> Columns:
-    """The same, N per unit -> N, such that a weak penalty on their strengths is one."""
-    own = columns(training)
-    size = unit_penalty(np.concatenate(own))
+def with_unit_penalty(columns: Columns, fit: Fit) -> Columns:
+    """The same, N per unit -> N, such that a weak penalty on their strengths is one.
+
+    By the test functions that a fit keeps: at rest a late reading of a friction may be any force.
+    """
+    own = columns(fit.logs)
+    size = unit_penalty(np.concatenate(own)[fit.kept])
 
     def scaled(logs: Sequence[PreparedLog]) -> list[Array]:
-        return [part / size for part in (own if logs is training else columns(logs))]
+        return [part / size for part in (own if logs is fit.logs else columns(logs))]
 
     return scaled
 

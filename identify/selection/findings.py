@@ -114,7 +114,9 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
         beside = score(less, final, taken, among)
     chosen, tested = _errors(less.fit, final.fit, dataset)
     name = steps[0].change.name
-    axis = final.fit.axis if name in final.fit.axis.names else less.fit.axis
+    # A free curve may have taken the place of the law, which is then as it was before.
+    fits = (final.fit, less.fit, *(s.tried.judged.fit for s in steps))
+    axis = next(fit.axis for fit in fits if name in fit.axis.names)
     added = any(isinstance(s.change, Added) for s in steps)
     others = [s.change.name for s in found.steps if s.with_others and s not in steps]
     tied = (t.change.name for s in steps for t in s.level)

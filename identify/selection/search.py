@@ -373,8 +373,8 @@ def _needed(
 ) -> tuple[Judged, tuple[Step, ...]]:
     """The fit and the steps without earlier ones that are not accepted beside the later ones."""
     for step in steps[:-1]:
-        if any(_replaces(s.change, step.change) for s in steps):
-            continue
+        if any(s.change.name == step.change.name for s in steps if s is not step):
+            continue  # another change of this law presupposes it
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
         if axis is not None:
             without = _refitted_on(axis, judged, judged)
@@ -389,8 +389,3 @@ def _needed(
         dropped = (*kept[-1].dropped, step.change.name)
         steps = (*kept[:-1], replace(kept[-1], dropped=dropped))
     return judged, steps
-
-
-def _replaces(change: Change, other: Change) -> bool:
-    """Whether a change is a free curve in the place of the law that another one added."""
-    return isinstance(change, Reshaped) and not change.shape.beside and change.name == other.name
