@@ -110,7 +110,8 @@ class Added:
         return axis_less(self.effect, axis, base) if self.name in axis.names else None
 
     def columns(self, without: Judged, fit: Judged) -> tuple[Columns, bool]:
-        if self.effect.kind is Kind.FRICTION or not self.effect.strengths:
+        replaced = self.name not in fit.fit.axis.names  # by a free curve
+        if replaced or self.effect.kind is Kind.FRICTION or not self.effect.strengths:
             return change_of(without, fit), _resting(without, fit)
         axis = without.fit.axis.with_effect(fit.fit.axis[self.name])
         return _strength_columns(axis, self.name, without.fit), sticks(axis)
