@@ -121,15 +121,15 @@ def cogging(*a_turn: int) -> tuple[Fitted, ...]:
 LAAS = (
     Case(
         "LAAS: all cogging", real_machines.laas_speed, having("laas", *LAAS_BASE),
-        Expected(("cogging",)),
+        Expected(("cogging",), shapes=("cogging",)),
     ),
     Case(
         "LAAS: cogging but 72 a turn", real_machines.laas_speed,
-        having("laas", *LAAS_BASE, *cogging(72)), Expected(("cogging",)),
+        having("laas", *LAAS_BASE, *cogging(72)), Expected(("cogging",), shapes=("cogging",)),
     ),
     Case(
         "LAAS: cogging but 72 and 12 a turn", real_machines.laas_speed,
-        having("laas", *LAAS_BASE, *cogging(72, 12)), Expected(("cogging",)),
+        having("laas", *LAAS_BASE, *cogging(72, 12)), Expected(("cogging",), shapes=("cogging",)),
     ),
     Case(
         "LAAS: friction, one speed", real_machines.laas_speed, having("laas", *cogging(72, 12)),

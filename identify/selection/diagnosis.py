@@ -15,7 +15,7 @@ from identify.estimation.residual_dependence import Dependence, find_dependence
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added
-from identify.selection.findings import Finding, FindingKind, findings_of
+from identify.selection.findings import Finding, FindingKind, findings_of, without_law
 from identify.selection.search import Found, Progress, Step, Tried, is_level, search
 from twin.effects import Catalogue
 
@@ -104,9 +104,7 @@ def diagnose_axis(
     if any(log.force_noise for log in dataset.fit):  # an effect may explain it yet
         dataset = dataset.with_force_noise(0.0)
         base = finished(base.axis, base.begun, dataset.fit, base.outcome)
-    found = _with_ties(search(base, dataset, catalogue, progress))
-    found = _with_own_noise(found)
-    findings = findings_of(found)
+    found, findings = _proved(_with_ties(search(base, dataset, catalogue, progress)))
     final = found.final
     quiet = final.at_floor
     return AxisDiagnosis(
@@ -129,6 +127,17 @@ def _verdict(findings: tuple[Finding, ...], quiet: bool) -> Verdict:
     if findings:
         return Verdict.WRONG_SHAPE
     return Verdict.NOTHING_MISSING if quiet else Verdict.UNEXPLAINED
+
+
+def _proved(found: Found) -> tuple[Found, tuple[Finding, ...]]:
+    """What was found and is accepted beside all else at the end, the weakest left out first."""
+    found = _with_own_noise(found)
+    findings = findings_of(found)
+    doubted = [f for f in findings if replace(f.score, among=1).refused]
+    if not doubted:
+        return found, findings
+    weakest = min(doubted, key=lambda f: f.score.part).effect
+    return _proved(without_law(weakest, found))
 
 
 def _with_own_noise(found: Found) -> Found:

@@ -69,12 +69,7 @@ class Finding:
     @property
     def confidence(self) -> float | None:
         """How often such an answer was right, 0..1; None where test logs contradict it."""
-        return None if self.contradicted else confidence(self.least_left, self.score)
-
-    @property
-    def least_left(self) -> float:
-        """What is left over the noise floor where it is least: on training or on other logs."""
-        return min(self.left, self.left_fitted)
+        return None if self.contradicted else confidence(self.score.part)
 
 
 def findings_of(found: Found) -> tuple[Finding, ...]:
@@ -90,6 +85,13 @@ def findings_of(found: Found) -> tuple[Finding, ...]:
     least = error_in(dataset.chosen_on, final.fit, dataset)
     left = least / (final.other_floor if dataset.holdout else final.fit.floor)
     return tuple(replace(f, left=left, left_fitted=final.fit.ratio) for f in out)
+
+
+def without_law(name: str, found: Found) -> Found:
+    """What was found without all changes of one law, the rest refitted."""
+    own = [s for s in found.steps if s.change.name == name]
+    rest = tuple(s for s in found.steps if s not in own)
+    return replace(found, final=_without(own, found), steps=rest)
 
 
 def _without(steps: Sequence[Step], found: Found) -> Judged:

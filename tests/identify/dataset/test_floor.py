@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from foreign_machine import PLACE, READING, drawn, run
+from benchmarks.second_simulator.machine import PLACE, READING, drawn, run
 from machines import one_axis
 
 from identify import workflow

@@ -38,7 +38,7 @@ def is_right(
     shape = SimpleNamespace(over=over)
     finding = replace(finding, kind=FindingKind.WRONG_SHAPE, shape=shape)
     answer = _answer(finding, built, Case((planted,), 5.0, 1, "plain", known))
-    assert (answer.names, answer.left) == ((told,), finding.least_left)
+    assert (answer.names, answer.part) == ((told,), finding.score.part)
     return answer.right
 
 
