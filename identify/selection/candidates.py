@@ -25,6 +25,7 @@ from twin.model.machine import AxisModel, MachineModel
 
 Array = NDArray[np.float64]
 
+SURE = 0.85  # of a noise floor; of less error its estimate would be refuted
 MOST_INERTIA = 3.0  # times the moved mass of the base or its start, that an effect may leave
 MOTION = ("position", "velocity", "acceleration", "direction")
 SAME_FORCE = 0.5  # of a force's square; where the motion leaves less of it, it is one of the motion
@@ -176,7 +177,7 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
     error = rms(error_on(fit.axis, logs))
     less, floor = unrounded_floor_of(fit.axis, logs), floor_of(fit.axis, logs)
     part = (floor**2 - less**2) / error**2
-    explained = RULE.least_part < part and RULE.not_above * floor < error < RULE.at_floor * floor
+    explained = RULE.least_part < part and SURE * floor < error < RULE.at_floor * floor
     plain = Candidate(
         effect, dataset.axis, fit, Evidence(0.0, 1, fit.samples), Gain(error, error, 0.0)
     )

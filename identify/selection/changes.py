@@ -30,6 +30,7 @@ from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
 
+SAME_ERROR = 1.01  # relative error that simpler values of an effect may have
 HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
 OTHER_BENDS = (0.6, 1.5)  # times what a law holds by design, at which its exponent is tried
 HOPELESS = 2.0  # times the squared error of the present friction, after a rough fit of another
@@ -232,7 +233,7 @@ def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
     if simple == dict(fitted.values):
         return fit
     again = fit_axis(fit.axis.with_effect(replace(fitted, values=simple)), dataset.fit)
-    return again if again.error < RULE.same_error * fit.error else fit
+    return again if again.error < SAME_ERROR * fit.error else fit
 
 
 def axis_less(effect: Effect, axis: AxisModel, base: AxisModel) -> AxisModel:

@@ -48,7 +48,9 @@ from twin.parallel import counting, spread
 
 Progress = Callable[[int, int], None]
 SEARCHED = 30.0  # s of motion in each role, in which what a model lacks shows many times
-LEADERS = 2  # looks that are refitted first, and tell what others must promise
+LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
+NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
+SETTLED = 0.999  # of the error, below which another refit is a better optimum
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,10 +306,10 @@ def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried
         return judged, tried
     best = max(proved, key=lambda t: t.candidate.part)
     axis = best.change.undone(best.judged.fit.axis, judged.fit.axis)
-    if axis is None or best.candidate.part > RULE.nearly_all:
+    if axis is None or best.candidate.part > NEARLY_ALL:
         return judged, tried
     refitted = replace(fit_axis(axis, judged.dataset.fit), begun=judged.fit.begun)
-    if refitted.error > RULE.settled * judged.fit.error:
+    if refitted.error > SETTLED * judged.fit.error:
         return judged, tried
     judged = Judged(refitted, judged.dataset)
     again = [_scored_again(judged, t) for t in tried]
@@ -347,7 +349,7 @@ def _together(judged: Judged, tried: Sequence[Tried], catalogue: Catalogue) -> l
             and found.part > RULE.promise * RULE.least_part and found.score.t > 1.0
         )  # fmt: skip
 
-    ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[: RULE.most_ways]
+    ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[: LEADERS]
     for way in ways:
         beside, seconds, _ = tried_beside(way.judged, catalogue)
         if not (then := _accepted(beside, seconds)):

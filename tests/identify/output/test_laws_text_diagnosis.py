@@ -88,7 +88,8 @@ def test_a_finding_is_told_with_what_it_takes_and_what_could_not_be_real():
         "times)",
         "Found: p = 0.0261 m, a1 = 0.127 N",
         f"{100.0 * COGGING.confidence:.0f} % of such answers were right on machines with a known "
-        "truth: 1.00 times the noise floor is left on the selection logs, 1.00 times on the training logs",
+        "truth: 1.00 times the noise floor is left on the selection logs, "
+        "1.00 times on the training logs",
     )
     alone = replace(LUGRE, chosen=replace(LUGRE.chosen, on=Role.TRAINING), left=1.33)
     assert finding_in_words(alone)[-1].endswith(
