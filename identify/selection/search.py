@@ -150,6 +150,7 @@ def _search(
             break
         passed += new
         judged, steps = _needed(new[-1].tried.judged, (*steps, *new), first)
+        passed[-1] = steps[-1]  # which tells what it made needless
         if judged.at_floor:
             break
         if shifts and (moved := moved_by(judged.fit, dataset)):
