@@ -295,6 +295,8 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         return [Step(noise[0])]
     if not lowering:
         return []
+    # A curve is any law's: it takes at once what several laws make, and none is needed after it.
+    lowering = [t for t in lowering if not isinstance(t.change, Reshaped)] or lowering
     best = max(lowering, key=lambda t: t.candidate.part)
     level = [t for t in lowering if t is not best and is_level(t, best)]
     first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))

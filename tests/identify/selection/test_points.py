@@ -98,7 +98,9 @@ def lagged(tau: float, seed: int) -> Log:
     return log_of(RATE, x.position, x.force + tau * RATE * np.gradient(x.force) + noise)
 
 
-@pytest.mark.parametrize(("tau", "told"), [(0.05, None), (0.15, "actuator_lag.tau ends at a bound")])
+@pytest.mark.parametrize(
+    ("tau", "told"), [(0.05, None), (0.15, "actuator_lag.tau ends at a bound")]
+)
 def test_a_lag_at_its_upper_bound_is_refused(tau: float, told: str | None) -> None:
     known = replace(SLIDE, mass_fixed=True)
     fit, dataset = begun(known, {"one": lagged(tau, 1)}, {"held": lagged(tau, 2)})
@@ -177,11 +179,6 @@ def many_coggings(x: Array, v: Array) -> Array:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True,
-    reason="the friction's curve over position takes it by the part that does not turn with the "
-    "direction, which is no friction: part 0.95, t 26, control 0.32; the first cogging 0.53",
-)
 def test_what_does_not_turn_with_the_direction_is_no_friction() -> None:
     """Five coggings over four of the longest period: a curve of 40 numbers holds them all."""
     found = asked(SLIDE, SLIDE, few("cogging"), many_coggings, Ride(1, 5.0))
@@ -218,7 +215,9 @@ NEAR_BUMPS = ("backlash", "cogging", "flexible_mode", "presliding_hysteresis")
 
 @pytest.mark.parametrize("size", [1.0, 5.0])
 @pytest.mark.parametrize(
-    "names", [NEAR_BUMPS, pytest.param(tuple(CATALOGUE), marks=pytest.mark.slow)], ids=["few", "all"]
+    "names",
+    [NEAR_BUMPS, pytest.param(tuple(CATALOGUE), marks=pytest.mark.slow)],
+    ids=["few", "all"],
 )
 def test_bumps_of_another_form_alone_are_no_other_effect(
     size: float, names: tuple[str, ...]
@@ -261,9 +260,7 @@ def test_of_coloured_noise_alone_nothing_is_missing_over_a_floor_of_its_size(pol
 
 def test_both_of_two_hidden_effects_are_named() -> None:
     """Friction that warms behind a hysteresis takes next to nothing of what both leave."""
-    true = having(
-        SLIDE, "presliding_hysteresis", reach=0.004, f0=0.05, f1=0.03, f2=0.02, f3=0.01
-    )
+    true = having(SLIDE, "presliding_hysteresis", reach=0.004, f0=0.05, f1=0.03, f2=0.02, f3=0.01)
     true = having(true, "thermal_drift", dry=0.4, viscous=0.0, tau=10.0)
     rivals = few("presliding_hysteresis", "thermal_drift", "cogging", "asymmetric_friction", "wear")
     found = asked(SLIDE, true, rivals, ride=Ride(1, 8.0))
