@@ -107,8 +107,11 @@ def begun(
 
 
 def asked(
-    base: AxisModel, true: AxisModel, catalogue: Catalogue,
-    beside: Callable[[Array, Array], Array] | None = None, ride: Ride = Ride(1),
+    base: AxisModel,
+    true: AxisModel,
+    catalogue: Catalogue,
+    beside: Callable[[Array, Array], Array] | None = None,
+    ride: Ride = Ride(1),
 ) -> AxisDiagnosis:
     """The diagnosis of a base from two logs of another machine, and one held out."""
     rides = [replace(ride, seed=ride.seed + i) for i in range(3)]

@@ -6,7 +6,7 @@ the truth; one that takes nothing would let anything pass.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -34,7 +34,9 @@ RATE = 1000.0  # Hz
 SIZE = 0.05  # N RMS beside what the base takes, 50 times the noise
 SEEN = Excitation(-0.05, 0.05, 0.3, 0.3, 3.0, 1.0 / RATE)
 STICKY = Fitted.at_start(CATALOGUE["lugre"])
-PHYSICAL = [e for e in CATALOGUE.values() if e.strengths and not (e.is_nonparametric or is_noise(e))]
+PHYSICAL = [
+    e for e in CATALOGUE.values() if e.strengths and not (e.is_nonparametric or is_noise(e))
+]
 FRICTIONS = [e for e in PHYSICAL if e.kind is Kind.FRICTION]
 OTHERS = [e for e in PHYSICAL if e.kind is not Kind.FRICTION]
 AXES = (

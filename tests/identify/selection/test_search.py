@@ -1,4 +1,4 @@
-"""The search on planted machines: forward, level changes, backward, and two that need each other."""
+"""The search on planted machines: forward, level changes, backward, two that need each other."""
 
 from __future__ import annotations
 
