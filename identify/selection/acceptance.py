@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,6 +158,11 @@ class Judged:
         """Whether noise is all that is left, on the training logs and on those not fitted."""
         tells = self.dataset.holdout and np.isfinite(self.other_error)
         return self.fit.at_floor and (self.other_at_floor or not tells)
+
+
+def least_t(among: int) -> float:
+    """The t that chance reaches once in twenty times in the best of so many (Bonferroni)."""
+    return NormalDist().inv_cdf(1.0 - RULE.chance / max(among, 1))
 
 
 def score(before: Judged, after: Judged, control: float = 0.0, among: int = 1) -> Score:
