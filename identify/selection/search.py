@@ -48,6 +48,7 @@ from twin.parallel import counting, spread
 
 Progress = Callable[[int, int], None]
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
+AS_MUCH = 0.9  # of a free curve's part: a law that takes it goes first, as a curve is any law's
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
 SETTLED = 0.999  # of the error, below which another refit is a better optimum
 
@@ -331,6 +332,11 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
     if not lowering:
         return []
     best = max(lowering, key=lambda t: t.candidate.part)
+    if isinstance(best.change, Reshaped):
+        least = AS_MUCH * best.candidate.part
+        laws = [t for t in lowering if not isinstance(t.change, Reshaped)]
+        lowering = [t for t in laws if t.candidate.part >= least] or lowering
+        best = max(lowering, key=lambda t: t.candidate.part)
     level = [t for t in lowering if t is not best and is_level(t, best)]
     first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))
     return [Step(first, tuple(t for t in (best, *level) if t is not first))]
