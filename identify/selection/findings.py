@@ -13,7 +13,7 @@ from identify.estimation.fit import Fit, fit_axis
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.bends import Bend
 from identify.selection.bent_curve import bent_curve
-from identify.selection.changes import Added, Change, Freed, Reshaped, control
+from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.confidence import confidence
 from identify.selection.found_shape import FoundShape, found_shape
 from identify.selection.search import Found, Step
@@ -101,19 +101,17 @@ def _without(steps: Sequence[Step], found: Found) -> Judged:
         axis = step.change.undone(axis, found.base.fit.axis) or axis
     if len(steps) == len(found.steps):
         return found.base
-    return Judged(fit_axis(axis, found.dataset.fit), found.dataset)
+    near = fit_axis(axis, found.dataset.part.fit).axis  # on little of the logs, then on all
+    return Judged(fit_axis(near, found.dataset.fit), found.dataset)
 
 
 def _finding(steps: Sequence[Step], found: Found) -> Finding:
     """The finding of the steps that are about one law."""
     dataset, final, less = found.dataset, found.final, _without(steps, found)
-    own = steps[0].tried.candidate
-    if own.is_noise and own.score:  # it lowers no error
-        beside = own.score
-    else:
-        among = own.score.among if own.score else 1
-        taken = control(steps[0].change, less, final)
-        beside = score(less, final, taken, among)
+    own = steps[0].tried.candidate.score
+    assert own is not None  # it was accepted
+    noise = steps[0].tried.candidate.is_noise  # which lowers no error
+    beside = own if noise else score(less, final, own.control, own.among)
     chosen, tested = _errors(less.fit, final.fit, dataset)
     name = steps[0].change.name
     # A free curve may have taken the place of the law, which is then as it was before.

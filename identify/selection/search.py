@@ -47,7 +47,6 @@ from twin.model.machine import AxisModel
 from twin.parallel import counting, spread
 
 Progress = Callable[[int, int], None]
-SEARCHED = 30.0  # s of motion in each role, in which what a model lacks shows many times
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
 SETTLED = 0.999  # of the error, below which another refit is a better optimum
@@ -108,7 +107,7 @@ def search(
     Long logs are searched by their beginnings, with one fit of the answer to all of them; where
     this leaves clearly more, it goes on from there on all of them.
     """
-    part = dataset.shortened(SEARCHED)
+    part = dataset.part
     if part is dataset:
         return _search(_begun(base, dataset), catalogue, progress)
     found = _search(_begun(fit_axis(base.axis, part.fit), part), catalogue, progress)
@@ -150,6 +149,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress | None) -> Fo
             break
         passed += new
         judged, steps = _needed(new[-1].tried.judged, (*steps, *new), first)
+        passed[-1] = steps[-1]  # which tells what it made needless
         if judged.at_floor:
             break
         fit = fit_thoroughly(judged.fit.axis, judged.dataset, judged.fit.begun)
@@ -349,7 +349,7 @@ def _together(judged: Judged, tried: Sequence[Tried], catalogue: Catalogue) -> l
             and found.part > RULE.promise * RULE.least_part and found.score.t > 1.0
         )  # fmt: skip
 
-    ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[: LEADERS]
+    ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[:LEADERS]
     for way in ways:
         beside, seconds, _ = tried_beside(way.judged, catalogue)
         if not (then := _accepted(beside, seconds)):

@@ -179,11 +179,6 @@ def many_coggings(x: Array, v: Array) -> Array:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True,
-    reason="the friction's curve over position takes it by the part that does not turn with the "
-    "direction, which is no friction: part 0.95, t 26, control 0.32; the first cogging 0.53",
-)
 def test_what_does_not_turn_with_the_direction_is_no_friction() -> None:
     """Five coggings over four of the longest period: a curve of 40 numbers holds them all."""
     found = asked(SLIDE, SLIDE, few("cogging"), many_coggings, Ride(1, 5.0))
