@@ -148,11 +148,16 @@ class Judged:
         return float(np.trace(solve(gram + rows.T @ rows, gram)))
 
     @property
+    def other_at_floor(self) -> bool:
+        """Whether noise is all that is left on logs that were not fitted; not of none."""
+        error, held = self.other_error, bool(self.dataset.holdout)
+        return held and error < RULE.at_floor * self.other_floor
+
+    @property
     def at_floor(self) -> bool:
         """Whether noise is all that is left, on the training logs and on those not fitted."""
-        held = self.dataset.holdout and np.isfinite(self.other_error)
-        above = held and self.other_error > RULE.at_floor * self.other_floor
-        return self.fit.at_floor and not above
+        tells = self.dataset.holdout and np.isfinite(self.other_error)
+        return self.fit.at_floor and (self.other_at_floor or not tells)
 
 
 def least_t(among: int) -> float:

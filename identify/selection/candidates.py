@@ -13,7 +13,15 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.dataset.noise_floor import floor_of, unrounded_floor_of
 from identify.estimation.decision import RULE
-from identify.estimation.evidence import Evidence, Gain, evidence, held_out_gain, rms
+from identify.estimation.evidence import (
+    Evidence,
+    Gain,
+    effective_samples,
+    evidence,
+    held_out_gain,
+    noise_gain,
+    rms,
+)
 from identify.estimation.fit import Fit, at_bounds, error_on
 from identify.estimation.force_balance import averaged_force
 from identify.estimation.subspace import orthonormal, unabsorbed
@@ -174,17 +182,17 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
     """
     dataset, fit = before.dataset, after.fit
     logs = (*dataset.fit, *dataset.holdout)
-    error = rms(error_on(fit.axis, logs))
-    less, floor = unrounded_floor_of(fit.axis, logs), floor_of(fit.axis, logs)
-    part = (floor**2 - less**2) / error**2
-    explained = RULE.least_part < part and SURE * floor < error < RULE.at_floor * floor
+    left = error_on(fit.axis, logs)
+    error, less, floor = rms(left), unrounded_floor_of(fit.axis, logs), floor_of(fit.axis, logs)
+    part = min((floor**2 - less**2) / error**2, 1.0)
     plain = Candidate(
         effect, dataset.axis, fit, Evidence(0.0, 1, fit.samples), Gain(error, error, 0.0)
     )
-    if not explained:
+    if not (RULE.least_part < part and SURE * floor < error < RULE.at_floor * floor):
         return plain
-    taken = Taken(np.inf, part, part)
-    return replace(plain, score=Score(taken, taken), gain=Gain(error, error, np.inf))
+    t = float(np.sqrt(max(effective_samples(left) * noise_gain(left, less, floor), 0.0)))
+    taken = Taken(t, part, part)
+    return replace(plain, score=Score(taken, taken), gain=Gain(error, error, t))
 
 
 def ordered(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:

@@ -106,7 +106,8 @@ def diagnose_axis(
         base = finished(base.axis, base.begun, dataset.fit, base.outcome)
     found, findings = _proved(_with_ties(search(base, dataset, catalogue, progress)))
     final = found.final
-    quiet = final.at_floor
+    # Either may be known by too low a floor; what the logs differ by is told in a remark.
+    quiet = final.fit.at_floor or final.other_at_floor
     return AxisDiagnosis(
         dataset=found.dataset,
         base=found.base.fit,
