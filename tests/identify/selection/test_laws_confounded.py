@@ -8,7 +8,15 @@ from types import SimpleNamespace
 import built_results as made
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, built_fit, fitted
+from built_fits import (
+    CATALOGUE,
+    PLAIN,
+    axis_of,
+    built_dataset,
+    built_fit,
+    fitted,
+    known_floor,
+)
 
 from identify import demo
 from identify.estimation.evidence import rms
@@ -38,7 +46,7 @@ def dataset():
 
 def refit_of(monkeypatch, dataset, given_axis, widths=1e-9, floor=1e-3, catalogue=()):
     fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
-    fit.__dict__["floor"] = floor
+    fit.__dict__["noise"] = known_floor(floor)
     monkeypatch.setattr(given, "half_widths", lambda f: np.full(len(f.scaling.where), widths))
     return given.refit(given_axis, fit, Catalogue([CATALOGUE[n] for n in catalogue])), fit
 
