@@ -142,7 +142,8 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress | None) -> Fo
     first, judged, steps = found.base, found.final, found.steps
     passed, ranking, last = [*found.passed], found.ranking, list(found.last)
     while len(steps) < RULE.most_steps:
-        judged, last, candidates = tried_beside(judged, catalogue, progress)
+        taken = [s.change.name for s in steps]
+        judged, last, candidates = tried_beside(judged, catalogue, progress, taken)
         if not steps:
             first, ranking = judged, ordered(candidates)
         new = _accepted(judged, last) or _together(judged, last, catalogue)
@@ -182,14 +183,21 @@ def _refitted_on(axis: AxisModel, begun: Judged, judged: Judged) -> Judged:
 
 
 def tried_beside(
-    judged: Judged, catalogue: Catalogue, progress: Progress | None = None
+    judged: Judged,
+    catalogue: Catalogue,
+    progress: Progress | None = None,
+    taken: Sequence[str] = (),
 ) -> tuple[Judged, list[Tried], list[Candidate]]:
     """Every change beside a fit: the fit at its best, those refitted, and all absent effects.
+
+    taken: names of laws that the search added; a free curve may stand in the place of one, or of
+    one that the model had from the beginning, which is then not absent.
 
     If the values of the best without its change are a better start for the fit, it is refitted from
     there: a fit short of its optimum would let every change in.
     """
-    effects = absent_effects(judged.fit.axis, catalogue)
+    known = {*taken, *judged.fit.begun.names}
+    effects = [e for e in absent_effects(judged.fit.axis, catalogue) if e.name not in known]
     plain = [Added(e) for e in effects if not is_noise(e)]
     changes: list[Change] = [*plain, *freed_of(judged.fit.axis)]
     one_more = counting(len(changes), progress)
