@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
-from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, fit_axis, fit_roughly
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import starts
@@ -85,11 +84,10 @@ class Added:
         if self.effect.kind is Kind.FRICTION:
             return self._on_heads(judged, [s.fitted for s in found])
         axes = tuple(fit.axis.with_effect(s.fitted) for s in found)
-        left = fit.error**2 - fit.floor**2
-        if found[0].share(fit) * fit.error**2 < RULE.promise * RULE.least_part * left:
-            return Look(self, 0.0, axes)
-        columns = _strength_columns(axes[0], self.name, fit)
-        return Look(self, trial.part(columns, sticking=sticks(axes[0])), axes)
+        # Of the training logs: where a period is only scanned, others tell little of it.
+        left = max(1.0 - found[0].share(fit), 0.0) * fit.error**2
+        promise, _ = parts(np.array([fit.error**2]), np.array([left]), np.ones(1), fit.floor**2)
+        return Look(self, promise, axes)
 
     def _on_heads(self, judged: Judged, found: Sequence[Fitted]) -> Look:
         """Another friction, which no linear step puts in the place of one: a fit on the heads."""
