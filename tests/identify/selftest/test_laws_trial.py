@@ -8,8 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, built, built_dataset, built_fit, fitted
-from built_results import errors
-from identify.selection.decoys import Proof
+from built_results import errors, score_of
 
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
@@ -81,20 +80,22 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
         planted=(), model=SimpleNamespace(axes={"x": PLAIN}), reshaped={"lugre"}, right={"gms"},
     )  # fmt: skip
     asked = {}
-    finding = Finding("wear", ("cogging",), 0.9, *errors(2.0, 1.0), "N", {}, Proof(0.9, 0.1))
+    finding = Finding(
+        "wear", ("cogging",), 0.9, *errors(2.0, 1.0), "N", {}, score_of(0.9, 9.0, 0.1)
+    )
     findings = (
         finding, replace(finding, effect="gms"), replace(finding, effect="wear", tied=()),
         replace(
             finding, effect="lugre", kind=FindingKind.WRONG_SHAPE, shape=over(Coordinate.SPEED)
         ),
         replace(
-            finding, effect="cable", kind=FindingKind.WRONG_SHAPE, tied=(), proof=None,
+            finding, effect="cable", kind=FindingKind.WRONG_SHAPE, tied=(),
             shape=over(Coordinate.POSITION),
         ),
     )  # fmt: skip
     found = AxisDiagnosis(
         dataset, base, tuple(built(n, bic=b) for n, b in (("wear", 90.0), ("gms", 80.0))), (),
-        final, Verdict.UNEXPLAINED, SimpleNamespace(depends_on="time"),
+        final, Verdict.UNEXPLAINED, findings, SimpleNamespace(depends_on="time"),
     )  # fmt: skip
 
     def build(stage, effects, strength, variation, rng):
@@ -106,7 +107,7 @@ def test_a_trial_diagnoses_what_was_built(monkeypatch, dataset, known):
 
     def diagnose(given, where, catalogue):
         asked.update(catalogue=set(catalogue))
-        return SimpleNamespace(with_findings=lambda: replace(found, findings=findings))
+        return found
 
     monkeypatch.setattr(trial, "machine", build)
     monkeypatch.setattr(trial, "prepared", lambda built, strength: "dataset")
