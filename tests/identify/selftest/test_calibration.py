@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from built_results import errors, score_of
 
 from identify.selection import confidence as stated
