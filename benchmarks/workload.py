@@ -108,12 +108,13 @@ def make(duration: float = DURATION) -> Workload:
     whole = load_model("proton_xy", load_catalogue())
     model = replace(whole, axes={AXIS: whole.axes[AXIS]}, mjcf=None, mjcf_name=None)
     machine = model.with_axis(AXIS, other_machine(model.axes[AXIS], np.random.default_rng(1)))
-    plain = _recorded(machine, duration)
+    plain = recorded(machine, duration)
     hidden = machine.axes[AXIS].with_effect(_hidden_effect(model, plain))
-    return Workload(model, machine, plain, _recorded(machine.with_axis(AXIS, hidden), duration))
+    return Workload(model, machine, plain, recorded(machine.with_axis(AXIS, hidden), duration))
 
 
-def _recorded(machine: MachineModel, duration: float) -> dict[str, Log]:
+def recorded(machine: MachineModel, duration: float) -> dict[str, Log]:
+    """Logs of random moves of a machine, each that long (s)."""
     return {
         f"log_{i}": simulate(machine, "tracking", seed=i, duration=duration) for i in range(LOGS)
     }

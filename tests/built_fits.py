@@ -50,6 +50,11 @@ def fitted(name: str, **values: float) -> Fitted:
 PLAIN = axis_of()
 
 
+def known_floor(value: float) -> NoiseFloor:
+    """A noise floor (N RMS) without uncertainty."""
+    return NoiseFloor(value, value, value, {"rounding": 0.0, "aliasing": 0.0})
+
+
 def built_fit(
     error: float,
     floor: float = 1.0,
@@ -69,8 +74,7 @@ def built_fit(
     kept = np.ones(len(residual), dtype=bool) if kept is None else kept
     scaling = Scaling(free_parameters(axis))
     fit = Fit(axis, logs, scaling, outcome, residual, kept, begun or axis)
-    noise = NoiseFloor(floor, floor, floor, {"rounding": 0.0, "aliasing": 0.0})
-    fit.__dict__.update(noise=noise, lessened=lessened, at_bound=())
+    fit.__dict__.update(noise=known_floor(floor), lessened=lessened, at_bound=())
     if jacobian is not None:
         fit.__dict__["jacobian"] = jacobian
     return fit

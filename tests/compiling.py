@@ -45,8 +45,8 @@ def mujoco() -> None:
 
 
 def second_simulator() -> None:
-    """The simulator of tests/foreign_machine.py."""
-    from foreign_machine import drawn, run
+    """The simulator of benchmarks/second_simulator/."""
+    from benchmarks.second_simulator.machine import drawn, run
 
     run(drawn(np.random.default_rng(0), 1e3), 1, 0.5)
 

@@ -23,6 +23,8 @@ ROOMS = (
 # The thesis asks for a mixture of two laws, which it imports.
 MIXTURES = IDENTIFY / "thesis" / "mixed_friction.py"
 MOST_FLOORS = 10
+# Functions that tell what a model or a result holds, without its logs.
+READING = {"followed", "nonparametric_labels", "speeds_of"}
 ONE_OF_EACH = re.compile(r"np\.gradient|savgol|0\.6745|np\.diff\([^)]*\) / ")
 UNIT_SELECTORS = re.compile(r"""\bunit\s*(==|!=|in|not in)\s*[(\[{]?["'](?!1["'])""")
 
@@ -68,6 +70,18 @@ def test_a_room_imports_only_from_those_before_it(arrows) -> None:
     for name, used in arrows.items():
         later = [u for u in used if ROOMS.index(room(u)) > ROOMS.index(room(name))]
         assert not later, f"{name} imports {', '.join(later)}"
+
+
+def test_output_computes_nothing(arrows) -> None:
+    """It has from the rooms that compute their classes alone, and what reads off a model."""
+    computing = ROOMS[: ROOMS.index("results")]
+    for name, path in modules(IDENTIFY).items():
+        if room(name) != "output":
+            continue
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.ImportFrom) and room(node.module or "") in computing:
+                used = {a.name for a in node.names if a.name[0].islower()} - READING
+                assert not used or room(node.module) == "selftest", f"{name} has {used}"
 
 
 def test_no_module_of_the_machine_imports_identify() -> None:

@@ -37,6 +37,7 @@ Array = NDArray[np.float64]
 
 TRIED = 8.0  # s of motion on which nonlinear parameters are scanned before all of it is used
 SHORTEST_HEAD = 2.0  # s of each log
+ENOUGH = 30.0  # s of motion in each role, in which a search is made before all of it is fitted
 MARGIN = 0.05  # of the range of the fit logs, by which a log of another role may exceed it
 LEAST_SHARED = 0.2  # part of the logs of a role that must lie within it
 
@@ -114,8 +115,15 @@ class Dataset:
         each = max(TRIED / len(self.fit), SHORTEST_HEAD)
         return tuple(PreparedLog.of(w.motion.head(each), w.test_function.length) for w in self.fit)
 
-    def shortened(self, seconds: float) -> Dataset:
-        """The same with the beginnings of its training and selection logs, each role that long."""
+    @cached_property
+    def part(self) -> Dataset:
+        """The same with the beginnings of its training and selection logs; itself if it is short.
+
+        What a model lacks shows in them many times, and all of a long log tells little more.
+        """
+        return self._shortened(ENOUGH)
+
+    def _shortened(self, seconds: float) -> Dataset:
         if all(sum(map(_length, logs)) <= seconds for logs in (self.fit, self.holdout)):
             return self
 

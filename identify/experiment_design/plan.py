@@ -78,7 +78,7 @@ class Plan:
     @property
     def decides(self) -> bool:
         """Whether it is expected to separate the explanations; with a single one, always."""
-        return self.chosen.gain > RULE.least_separation or len(self.between) == 1
+        return self.chosen.gain > RULE.least_bic or len(self.between) == 1
 
 
 @parallel()
@@ -169,7 +169,7 @@ def _planned(
     arena.machine.require_mass()
     logs = arena.logs
     favourite, evidence = favoured(arena)
-    if evidence > RULE.least_separation:
+    if evidence > RULE.least_bic:
         # The logs already refute a rival, so they would decide whatever the new experiment is.
         arena = replace(arena, logs=())
     experiments, too_long = proposals(arena.machine, arena.name, duration)
@@ -187,7 +187,7 @@ def _planned(
         between=names,
         ranking=(chosen, *others),
         gap=gap(chosen.motion, chosen.where, logs),
-        favoured=favourite if evidence > RULE.least_separation else None,
+        favoured=favourite if evidence > RULE.least_bic else None,
         excited_by={n: effects[n].excited_by for n in names if n in effects},
         supposed=supposed,
         not_run=(*too_long, *not_run, *(t.not_run for t in (chosen, *others) if t.not_run)),

@@ -176,7 +176,7 @@ def _step(s: Step, d: AxisDiagnosis) -> dict[str, Any]:
 def _candidate(c: Candidate, d: AxisDiagnosis) -> dict[str, Any]:
     return {
         "effect": c.effect.name,
-        "delta_bic": c.delta_bic,
+        "delta_bic": c.delta_bic if c.score else None,
         "holdout_error_before": c.gain.before,
         "holdout_error_after": c.gain.after,
         "unit": c.fit.axis.units.force,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Outcome
 from identify.output.words.estimation import outcome_in_words, prepared_in_words
-from identify.output.words.numbers import PLAIN, Numbers
+from identify.output.words.numbers import PLAIN, Numbers, listed
 from identify.output.words.selection import (
     also_chose_in_words,
     moved_in_words,
@@ -29,7 +29,7 @@ def remarks_on(result: Diagnosis, axis: str, numbers: Numbers = PLAIN) -> tuple[
     if found.base.ended is not Outcome.CONVERGED:
         out.append(words(outcome_in_words(found.base.ended)))
     if found.final is not found.base:
-        with_it = f"with {' and '.join(f.effect for f in found.findings)}"
+        with_it = f"with {listed([f.effect for f in found.findings])}"
         if found.final.ended is not Outcome.CONVERGED:
             out.append(f"{with_it}: {words(outcome_in_words(found.final.ended))}")
         out += [f"{with_it}, {words(moved_in_words(m, numbers))}" for m in told.moved]

@@ -66,7 +66,7 @@ def _trial(o: TrialResult) -> dict[str, Any]:
         "shown": o.shown, "verdict": o.verdict.lower(),
         "answers": [
             {"names": list(a.names), "kind": a.kind.value, "right": a.right,
-             "confidence": a.confidence, "left": a.left}
+             "confidence": a.confidence, "left": a.part}
             for a in o.answers
         ],
         "ratio_before": o.ratio, "ratio_after": o.left, "test_ratio": o.tested,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from identify.dataset.given_logs import Role
 from identify.estimation.intervals import Estimate, NoInterval
 from identify.experiment_design.plan import Plan
 from identify.output.remarks import remarks_on
@@ -139,7 +140,8 @@ def diagnose_text(result: Diagnosis) -> str:
         named = f" Missing: {named_in_words(d)}." if d.named else ""
         lines.append(f"axis {axis}: {words(verdict_in_words(d))}{named}")
         lines.append(f"  {words('force error')} {_errors(d, result.told[axis])}")
-        lines.append(f"  {named_errors_in_words(d)}")
+        if d.tested.on is not Role.TRAINING:
+            lines.append(f"  {named_errors_in_words(d)}")
         lines += [f"  {tie}" for tie in ties_in_words(d)]
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
@@ -178,6 +180,8 @@ def _errors(found: AxisDiagnosis, told: Told) -> str:
 def _ranking_line(c: Candidate, found: AxisDiagnosis) -> str:
     unit = c.fit.axis.units.force
     tail = f"   {why}" if (why := why_not(found, c)) else ""
+    if c.score is None:
+        return f"  {c.effect.name:28s} not refitted: {why}"
     return (
         f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   {tested_on(found)} error "
         f"{c.gain.before:.4g} -> {c.gain.after:.4g} {unit}{tail}"

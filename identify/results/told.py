@@ -46,7 +46,7 @@ def told_of(found: AxisDiagnosis) -> Told:
     floors = {Role.TRAINING: final.floor}
     for role in (Role.SELECTION, Role.TEST):
         if logs := dataset.having(role):
-            floors[role] = floor_of(final.axis, logs)
+            floors[role] = min(floor_of(final.axis, logs), error_in(role, final, dataset))
     judged, before = Judged(base, dataset), estimates(base)
     return Told(
         before=before,
@@ -54,6 +54,6 @@ def told_of(found: AxisDiagnosis) -> Told:
         moved=() if final is base else moved_parameters(base, final),
         tested=found.tested,
         chosen=found.chosen,
-        floors={role: min(f, error_in(role, final, dataset)) for role, f in floors.items()},
+        floors=floors,
         selection_ratio=judged.other_error / judged.other_floor if dataset.holdout else None,
     )

@@ -7,9 +7,10 @@ thresholds (``RULE``):
 * part: of what the smaller model leaves of the squared force error above the noise floor, the part
   that the larger one takes. Of all of it or of that of a typical block (geometric mean),
   whichever is more, as a few blocks may hold most of an error; on the training logs or on logs
-  that were not fitted, whichever is less, as either alone can be imitated.
-* t: the logarithmic gain over blocks over its standard error; on the training logs less what
-  what as many parameters take of noise.
+  that were not fitted, whichever is less, as either alone can be imitated. Nothing is taken
+  typically by what makes the whole error rise.
+* t: the logarithmic gain over blocks over its standard error; on the training logs less what as
+  many parameters take of noise. The more changes were tried, the more is asked (Bonferroni).
 * control: the part that the same change takes where it is true to nothing (``controls``).
 """
 
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,20 +54,22 @@ class Taken:
 
     @property
     def part(self) -> float:
-        """The larger of the two parts."""
-        return max(self.whole, self.typical)
+        """The larger of the two parts; that of the whole where this rises."""
+        return larger(self.whole, self.typical)
 
 
 @dataclass(frozen=True)
 class Score:
     """A change against the model without it, on the training logs and on logs not fitted to.
 
-    control: the part that all but one in twenty of its controls stay below.
+    control: the part that all but one in twenty of its controls stay below. among: of how many
+    changes it was chosen.
     """
 
     training: Taken
     other: Taken
     control: float = 0.0
+    among: int = 1
 
     @property
     def t(self) -> float:
@@ -82,10 +86,9 @@ class Score:
         """Why the change is not accepted, in words; None where it is."""
         if self.part < RULE.least_part:
             return f"takes {100.0 * max(self.part, 0.0):.0f} % of what is left"
-        if self.t < RULE.sure:
-            return f"gain uncertain (t = {self.t:.1f})"
-        clearly = 1.0 - self.part < RULE.beside_controls * (1.0 - self.control)
-        if not (clearly or (self.t > RULE.least_t and self.part > self.control)):
+        if self.t < (least := least_t(self.among)):
+            return f"gain uncertain: t = {self.t:.1f}, where {least:.1f} is sure"
+        if self.part <= self.control:
             return f"its controls take {100.0 * self.control:.0f} %"
         return None
 
@@ -145,20 +148,30 @@ class Judged:
         return float(np.trace(solve(gram + rows.T @ rows, gram)))
 
     @property
+    def other_at_floor(self) -> bool:
+        """Whether noise is all that is left on logs that were not fitted; not of none."""
+        error, held = self.other_error, bool(self.dataset.holdout)
+        return held and error < RULE.at_floor * self.other_floor
+
+    @property
     def at_floor(self) -> bool:
-        """Whether noise is all that is left, on the training logs or on the others."""
-        return self.fit.at_floor or bool(
-            self.dataset.holdout and self.other_error < RULE.at_floor * self.other_floor
-        )
+        """Whether noise is all that is left, on the training logs and on those not fitted."""
+        tells = self.dataset.holdout and np.isfinite(self.other_error)
+        return self.fit.at_floor and (self.other_at_floor or not tells)
 
 
-def score(before: Judged, after: Judged, control: float = 0.0) -> Score:
-    """What ``after`` takes of the error that ``before`` leaves."""
+def least_t(among: int) -> float:
+    """The t that chance reaches once in twenty times in the best of so many (Bonferroni)."""
+    return NormalDist().inv_cdf(1.0 - RULE.chance / max(among, 1))
+
+
+def score(before: Judged, after: Judged, control: float = 0.0, among: int = 1) -> Score:
+    """What ``after`` takes of the error that ``before`` leaves; see Score."""
     samples = effective_samples(after.fit.residual)
     charge = max(after.parameters - before.parameters, 0.0) / samples
     training = taken(before.training, after.training, before.fit.floor, charge)
     other = taken(before.other, after.other, before.other_floor)
-    return Score(training, other, control)
+    return Score(training, other, control, among)
 
 
 def taken(before: Array, after: Array, floor: float, charge: float = 0.0) -> Taken:
@@ -193,6 +206,11 @@ def parts(before: Array, after: Array, count: Array, quiet: float) -> tuple[floa
 
     first, second = ((of(before), of(after)) for of in (whole, typical))
     return _part(*first, quiet), _part(*second, quiet)
+
+
+def larger(whole: float, typical: float) -> float:
+    """The larger part, but nothing is taken typically by what makes the whole error rise."""
+    return max(whole, typical) if whole > 0.0 else whole
 
 
 def _part(before: float, after: float, quiet: float) -> float:

@@ -8,12 +8,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.coordinates import gathered
+from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.dataset.noise_floor import floor_of, unrounded_floor_of
 from identify.estimation.decision import RULE
-from identify.estimation.evidence import Evidence, Gain, evidence, held_out_gain, rms
+from identify.estimation.evidence import (
+    Evidence,
+    Gain,
+    effective_samples,
+    evidence,
+    held_out_gain,
+    noise_gain,
+    rms,
+)
 from identify.estimation.fit import Fit, at_bounds, error_on
-from identify.estimation.time_origin import phases_found
+from identify.estimation.force_balance import averaged_force
+from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.time_origin import depends_on_time_origin, phases_found
 from identify.selection.acceptance import Judged, Score, Taken, score
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
@@ -21,7 +33,10 @@ from twin.model.machine import AxisModel, MachineModel
 
 Array = NDArray[np.float64]
 
+SURE = 0.85  # of a noise floor; of less error its estimate would be refuted
 MOST_INERTIA = 3.0  # times the moved mass of the base or its start, that an effect may leave
+MOTION = ("position", "velocity", "acceleration", "direction")
+SAME_FORCE = 0.5  # of a force's square; where the motion leaves less of it, it is one of the motion
 NO_SCORE = "a linear step takes too little for a refit"
 
 
@@ -99,11 +114,11 @@ class Candidate:
 
 
 def candidate_of(
-    before: Judged, after: Judged, effect: Effect, control: float, own: Sequence[str]
+    before: Judged, after: Judged, effect: Effect, own: Sequence[str], among: int = 1
 ) -> Candidate:
-    """What speaks for a fitted larger model.
+    """What speaks for a fitted larger model, before its controls are asked.
 
-    control: what its controls take. own: names of the parameters whose values must be its own.
+    own: names of the parameters whose values must be its own. among: of how many it was chosen.
     """
     base, fit, dataset = before.fit, after.fit, before.dataset
     shared = base.kept & fit.kept
@@ -117,7 +132,7 @@ def candidate_of(
         fit=fit,
         evidence=evidence(left, less, added),
         gain=held_out_gain(before.other[both], after.other[both], base.floor),
-        score=score(before, after, control),
+        score=score(before, after, among=among),
         doubt=doubt(before, fit, effect, own),
     )
 
@@ -142,10 +157,22 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
         travel = np.ptp(np.concatenate([log.motion.position for log in fit.logs]))
         if periods and travel < RULE.fewest_cycles * max(periods):
             return "too few of its periods are seen"
+        alone = replace(fit.axis, effects=(fitted,))
+        if depends_on_time_origin(alone, dataset) and _follows_motion(alone, dataset):
+            return "the motion repeats with it, so that any force of the motion could be it"
     masses = (before.fit.axis.mass, before.fit.begun.mass)
     if not any(max(m, fit.axis.mass) <= MOST_INERTIA * min(m, fit.axis.mass) for m in masses):
         return "it takes the place of the inertia"
     return None
+
+
+def _follows_motion(alone: AxisModel, dataset: Dataset) -> bool:
+    """Whether most of a force in time is told by where the axis is, how fast, and how it turns."""
+    force = averaged_force(alone, dataset.fit)
+    where = gathered(dataset.fit)
+    columns = np.column_stack([np.ones(len(force)), *(where[name] for name in MOTION)])
+    left = unabsorbed(force, orthonormal(columns))
+    return float(left @ left) < SAME_FORCE * float(force @ force)
 
 
 def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
@@ -155,21 +182,19 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
     """
     dataset, fit = before.dataset, after.fit
     logs = (*dataset.fit, *dataset.holdout)
-    error = rms(error_on(fit.axis, logs))
-    less, floor = unrounded_floor_of(fit.axis, logs), floor_of(fit.axis, logs)
-    part = (floor**2 - less**2) / error**2
-    explained = RULE.least_part < part and RULE.not_above * floor < error < RULE.at_floor * floor
+    left = error_on(fit.axis, logs)
+    error, less, floor = rms(left), unrounded_floor_of(fit.axis, logs), floor_of(fit.axis, logs)
+    part = min((floor**2 - less**2) / error**2, 1.0)
     plain = Candidate(
         effect, dataset.axis, fit, Evidence(0.0, 1, fit.samples), Gain(error, error, 0.0)
     )
-    if not explained:
+    if not (RULE.least_part < part and SURE * floor < error < RULE.at_floor * floor):
         return plain
-    taken = Taken(np.inf, part, part)
-    return replace(plain, score=Score(taken, taken), gain=Gain(error, error, np.inf))
+    t = float(np.sqrt(max(effective_samples(left) * noise_gain(left, less, floor), 0.0)))
+    taken = Taken(t, part, part)
+    return replace(plain, score=Score(taken, taken), gain=Gain(error, error, t))
 
 
 def ordered(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Proved ones first, then by the part that they take, then by evidence."""
-    return tuple(
-        sorted(candidates, key=lambda c: (not c.supported, -round(c.part, 2), -c.delta_bic))
-    )
+    """Proved ones first, then those that were refitted, then by what they leave."""
+    return tuple(sorted(candidates, key=lambda c: (not c.supported, c.score is None, c.gain.after)))

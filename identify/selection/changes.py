@@ -19,7 +19,7 @@ from identify.estimation.decision import RULE
 from identify.estimation.fit import Fit, fit_axis, fit_roughly
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import starts
-from identify.selection.acceptance import Judged
+from identify.selection.acceptance import Judged, parts
 from identify.selection.bends import held_bends
 from identify.selection.controls import Columns, Trial, change_of, with_unit_penalty
 from identify.selection.curves import Shape, columns_of, shapes_of, sticking
@@ -30,6 +30,7 @@ from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
 
+SAME_ERROR = 1.01  # relative error that simpler values of an effect may have
 HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
 OTHER_BENDS = (0.6, 1.5)  # times what a law holds by design, at which its exponent is tried
 HOPELESS = 2.0  # times the squared error of the present friction, after a rough fit of another
@@ -100,8 +101,8 @@ class Added:
         before, after = (
             float(np.mean(residual(f.axis, dataset.heads)[both] ** 2)) for f in (old, best[0])
         )
-        above = max(before - old.floor**2, 1e-300)
-        return Look(self, (before - after) / above, tuple(f.axis for f in best))
+        promise, _ = parts(np.array([before]), np.array([after]), np.ones(1), old.floor**2)
+        return Look(self, promise, tuple(f.axis for f in best))
 
     def refit(self, judged: Judged, look: Look) -> Fit:
         return simplified(fit_axis(look.axes[0], judged.dataset.fit), judged.dataset, self.effect)
@@ -110,7 +111,8 @@ class Added:
         return axis_less(self.effect, axis, base) if self.name in axis.names else None
 
     def columns(self, without: Judged, fit: Judged) -> tuple[Columns, bool]:
-        if self.effect.kind is Kind.FRICTION or not self.effect.strengths:
+        replaced = self.name not in fit.fit.axis.names  # by a free curve
+        if replaced or self.effect.kind is Kind.FRICTION or not self.effect.strengths:
             return change_of(without, fit), _resting(without, fit)
         axis = without.fit.axis.with_effect(fit.fit.axis[self.name])
         return _strength_columns(axis, self.name, without.fit), sticks(axis)
@@ -231,7 +233,7 @@ def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
     if simple == dict(fitted.values):
         return fit
     again = fit_axis(fit.axis.with_effect(replace(fitted, values=simple)), dataset.fit)
-    return again if again.error < RULE.same_error * fit.error else fit
+    return again if again.error < SAME_ERROR * fit.error else fit
 
 
 def axis_less(effect: Effect, axis: AxisModel, base: AxisModel) -> AxisModel:

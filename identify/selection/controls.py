@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
+from identify.estimation.decision import RULE
 from identify.estimation.evidence import blocks_of, by_blocks
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.subspace import orthonormal
-from identify.selection.acceptance import Judged, parts
+from identify.selection.acceptance import Judged, larger, parts
 from twin.parallel import spread
 
 Array = NDArray[np.float64]
@@ -30,7 +31,6 @@ Columns = Callable[[Sequence[PreparedLog]], list[Array]]
 Falsify = Callable[[Array, np.random.Generator], Array]
 
 CONTROLS = 40
-RARE = 0.05  # of the controls take more than that which a change is set against
 SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
 STRETCHES = 8  # of a log, each with a sign of its own
 SAME = (
@@ -79,11 +79,11 @@ class Trial:
         return self._with(columns, sticking).part(None)
 
     def control(self, columns: Columns, *, sticking: bool) -> float:
-        """The part that all but RARE of the columns' controls stay below."""
+        """The part that all but one in twenty of the columns' controls stay below."""
         tried = self._with(columns, sticking)
         falsify = _signed if _survives_shifts(tried.training.columns) else _shifted
         found = spread(lambda i: tried.part((falsify, SEED + i)), range(CONTROLS))
-        return float(np.quantile(found, 1.0 - RARE, method="inverted_cdf"))
+        return float(np.quantile(found, 1.0 - RULE.chance, method="inverted_cdf"))
 
     def _with(self, columns: Columns, sticking: bool) -> _Tried:
         training = self.training.with_columns(columns, sticking)
@@ -236,7 +236,7 @@ def _parts(part: _Part, products: Array, steps: Array, without: Array, quiet: fl
         np.maximum(_squares(p, s), ROUNDING * p[:, 0, 0] + TINY) / count
         for p, s in ((part.own, without), (products, steps))
     )
-    return max(parts(before, after, count, quiet))
+    return larger(*parts(before, after, count, quiet))
 
 
 def _squares(products: Array, steps: Array) -> Array:

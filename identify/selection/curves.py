@@ -35,12 +35,13 @@ COARSELY = STIFFNESS[::2]  # how smooth a curve may be, to tell whether it helps
 class Shape:
     """A free curve for a law: where it lies, and how smooth it is.
 
-    period: m, of the curve; None where it does not repeat. empty: the free curve at zero, laid over
-    the law's coordinate. lets_go: whether it does at standstill. stiffness: of each part that the
-    data ask for.
+    effect, kind: name and kind of the effect whose law it is. period: m, of the curve; None where
+    it does not repeat. empty: the free curve at zero, laid over the law's coordinate. lets_go:
+    whether it does at standstill. stiffness: of each part that the data ask for.
     """
 
     effect: str
+    kind: Kind
     curve: Curve
     period: float | None
     empty: Fitted
@@ -98,7 +99,7 @@ def having_shape(effect: Effect, model: MachineModel, axis: str | None) -> list[
 
 def sticking(axis: AxisModel, shape: Shape) -> bool:
     """Whether a curve says nothing of test functions with standstill."""
-    return sticks(axis) or axis[shape.effect].effect.kind is not Kind.FORCE
+    return sticks(axis) or shape.kind is not Kind.FORCE
 
 
 def columns_of(axis: AxisModel, shape: Shape, samples: int) -> Columns:
@@ -159,6 +160,8 @@ def _smoothed(
 ) -> tuple[Shape | None, float]:
     """A form with its best smoothing, and its squared cross-validated error; None without any."""
     shape = _laid(fit.axis, law, curve, dataset, lets_go)
+    if shape is None:
+        return None, np.inf
     mask = moving(dataset.fit, sticking(fit.axis, shape))[fit.kept]
     linear = Linearised.about(fit, dataset, shape.empty, mask)
     stiffness = choose_stiffness(linear, COARSELY)
@@ -178,12 +181,16 @@ def _has(axis: AxisModel, shape: Shape) -> bool:
     )
 
 
-def _laid(axis: AxisModel, law: Fitted, curve: Curve, dataset: Dataset, lets_go: bool) -> Shape:
-    free = next(e for e in load_catalogue().after(axis.names) if e.free_shape)
-    assert free.free_shape is not None
+def _laid(
+    axis: AxisModel, law: Fitted, curve: Curve, dataset: Dataset, lets_go: bool
+) -> Shape | None:
+    """The curve at zero; None where the axis has as many as it can have."""
+    free = next((e for e in load_catalogue().after(axis.names) if e.free_shape), None)
+    if free is None or free.free_shape is None:
+        return None
     period = None if curve.period is None else law.values[curve.period]
     values = free.free_shape.laid(curve, period, dataset.excitation, lets_go)
     empty = Fitted.at_start(free, values)
     if not curve.by_direction:
         empty = replace(empty, fixed=empty.fixed | set(free.parts[1].strengths))
-    return Shape(law.effect.name, curve, period, empty, lets_go, {})
+    return Shape(law.effect.name, law.effect.kind, curve, period, empty, lets_go, {})

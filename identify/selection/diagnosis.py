@@ -8,14 +8,14 @@ from functools import cached_property
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.errors import Errors
-from identify.estimation.fit import Fit, finished
+from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.remainder import with_own_noise
 from identify.estimation.repeating_force import Repeat, not_general
 from identify.estimation.residual_dependence import Dependence, find_dependence
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added
-from identify.selection.findings import Finding, FindingKind, findings_of
+from identify.selection.findings import Finding, FindingKind, findings_of, without_law
 from identify.selection.search import Found, Progress, Step, Tried, is_level, search
 from twin.effects import Catalogue
 
@@ -88,8 +88,8 @@ class AxisDiagnosis:
     @property
     def best(self) -> Candidate | None:
         """The candidate that is named first, where one is."""
-        by_name = {s.change.name: s.tried.candidate for s in self.steps}
-        return by_name[self.named[0]] if self.named else None
+        added = (s.tried.candidate for s in self.steps if isinstance(s.change, Added))
+        return next((c for c in added if c.effect.name in self.named[:1]), None)
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
@@ -104,11 +104,10 @@ def diagnose_axis(
     if any(log.force_noise for log in dataset.fit):  # an effect may explain it yet
         dataset = dataset.with_force_noise(0.0)
         base = finished(base.axis, base.begun, dataset.fit, base.outcome)
-    found = _with_ties(search(base, dataset, catalogue, progress))
-    found = _with_own_noise(found)
-    findings = findings_of(found)
+    found, findings = _proved(_with_ties(search(base, dataset, catalogue, progress)))
     final = found.final
-    quiet = final.at_floor
+    # Either may be known by too low a floor; what the logs differ by is told in a remark.
+    quiet = final.fit.at_floor or final.other_at_floor
     return AxisDiagnosis(
         dataset=found.dataset,
         base=found.base.fit,
@@ -129,6 +128,17 @@ def _verdict(findings: tuple[Finding, ...], quiet: bool) -> Verdict:
     if findings:
         return Verdict.WRONG_SHAPE
     return Verdict.NOTHING_MISSING if quiet else Verdict.UNEXPLAINED
+
+
+def _proved(found: Found) -> tuple[Found, tuple[Finding, ...]]:
+    """What was found and is accepted beside all else at the end, the weakest left out first."""
+    found = _with_own_noise(found)
+    findings = findings_of(found)
+    doubted = [f for f in findings if replace(f.score, among=1).refused]
+    if not doubted:
+        return found, findings
+    weakest = min(doubted, key=lambda f: f.score.part).effect
+    return _proved(without_law(weakest, found))
 
 
 def _with_own_noise(found: Found) -> Found:
@@ -152,8 +162,6 @@ def _with_ties(found: Found) -> Found:
 
 
 def _compared_again(step: Step, found: Found) -> Step:
-    from identify.estimation.fit import fit_axis
-
     final = found.final
     names = {s.change.name for s in found.steps}
     axis = step.change.undone(final.fit.axis, found.base.fit.axis)
@@ -162,7 +170,9 @@ def _compared_again(step: Step, found: Found) -> Step:
     own = replace(step.tried, judged=final)
 
     def beside(rival: Tried) -> bool:
-        if not isinstance(rival.change, Added) or rival.change.name in names:
+        if not isinstance(rival.change, Added):
+            return rival.change.name not in names
+        if rival.change.name in names:
             return False
         law = rival.judged.fit.axis[rival.change.name]
         fit = fit_axis(axis.with_effect(law), found.dataset.fit)

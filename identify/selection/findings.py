@@ -13,7 +13,7 @@ from identify.estimation.fit import Fit, fit_axis
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.bends import Bend
 from identify.selection.bent_curve import bent_curve
-from identify.selection.changes import Added, Change, Freed, Reshaped, control
+from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.confidence import confidence
 from identify.selection.found_shape import FoundShape, found_shape
 from identify.selection.search import Found, Step
@@ -69,12 +69,7 @@ class Finding:
     @property
     def confidence(self) -> float | None:
         """How often such an answer was right, 0..1; None where test logs contradict it."""
-        return None if self.contradicted else confidence(self.least_left, self.score)
-
-    @property
-    def least_left(self) -> float:
-        """What is left over the noise floor where it is least: on training or on other logs."""
-        return min(self.left, self.left_fitted)
+        return None if self.contradicted else confidence(self.score.part)
 
 
 def findings_of(found: Found) -> tuple[Finding, ...]:
@@ -92,6 +87,13 @@ def findings_of(found: Found) -> tuple[Finding, ...]:
     return tuple(replace(f, left=left, left_fitted=final.fit.ratio) for f in out)
 
 
+def without_law(name: str, found: Found) -> Found:
+    """What was found without all changes of one law, the rest refitted."""
+    own = [s for s in found.steps if s.change.name == name]
+    rest = tuple(s for s in found.steps if s not in own)
+    return replace(found, final=_without(own, found), steps=rest)
+
+
 def _without(steps: Sequence[Step], found: Found) -> Judged:
     """The final fit without some steps, refitted."""
     axis = found.final.fit.axis
@@ -99,20 +101,22 @@ def _without(steps: Sequence[Step], found: Found) -> Judged:
         axis = step.change.undone(axis, found.base.fit.axis) or axis
     if len(steps) == len(found.steps):
         return found.base
-    return Judged(fit_axis(axis, found.dataset.fit), found.dataset)
+    near = fit_axis(axis, found.dataset.part.fit).axis  # on little of the logs, then on all
+    return Judged(fit_axis(near, found.dataset.fit), found.dataset)
 
 
 def _finding(steps: Sequence[Step], found: Found) -> Finding:
     """The finding of the steps that are about one law."""
     dataset, final, less = found.dataset, found.final, _without(steps, found)
-    own = steps[0].tried.candidate
-    if own.is_noise and own.score:  # it lowers no error
-        beside = own.score
-    else:
-        beside = replace(score(less, final), control=control(steps[0].change, less, final))
+    own = steps[0].tried.candidate.score
+    assert own is not None  # it was accepted
+    noise = steps[0].tried.candidate.is_noise  # which lowers no error
+    beside = own if noise else score(less, final, own.control, own.among)
     chosen, tested = _errors(less.fit, final.fit, dataset)
     name = steps[0].change.name
-    axis = final.fit.axis if name in final.fit.axis.names else less.fit.axis
+    # A free curve may have taken the place of the law, which is then as it was before.
+    fits = (final.fit, less.fit, *(s.tried.judged.fit for s in steps))
+    axis = next(fit.axis for fit in fits if name in fit.axis.names)
     added = any(isinstance(s.change, Added) for s in steps)
     others = [s.change.name for s in found.steps if s.with_others and s not in steps]
     tied = (t.change.name for s in steps for t in s.level)

@@ -20,7 +20,7 @@ from identify.dataset.excitation import excitation
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.smoothed import Linearised, choose_stiffness
 from identify.estimation.thorough_fit import fit_without
-from identify.selection.acceptance import Judged
+from identify.selection.acceptance import Judged, score
 from identify.selection.candidates import Candidate, candidate_of
 from identify.selection.controls import change_control
 from identify.selection.curves import Shape
@@ -49,8 +49,10 @@ def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
             break
         best = again
     before, after = Judged(base, dataset), Judged(best.fit, dataset)
-    found = candidate_of(before, after, effect, change_control(before, after), ())
-    return replace(found, evidence=replace(found.evidence, parameters=best.parameters))
+    found = candidate_of(before, after, effect, ())
+    beside = replace(score(before, after), control=change_control(before, after))
+    evidence = replace(found.evidence, parameters=best.parameters)
+    return replace(found, evidence=evidence, score=beside)
 
 
 def fit_in_place(base: Fit, dataset: Dataset, shape: Shape) -> Fit:

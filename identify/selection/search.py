@@ -20,7 +20,7 @@ from identify.estimation.scaling import Scaling
 from identify.estimation.thorough_fit import fit_thoroughly
 from identify.estimation.time_origin import synchronised, time_origins, with_given_origins
 from identify.estimation.variable_projection import starts
-from identify.selection.acceptance import Judged, score
+from identify.selection.acceptance import Judged, least_t, score
 from identify.selection.candidates import (
     Candidate,
     absent_effects,
@@ -47,8 +47,10 @@ from twin.model.machine import AxisModel
 from twin.parallel import counting, spread
 
 Progress = Callable[[int, int], None]
-SEARCHED = 30.0  # s of motion in each role, in which what a model lacks shows many times
-LEADERS = 2  # looks that are refitted first, and tell what others must promise
+LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
+AS_MUCH = 0.9  # of a free curve's part: a law that takes it goes first, as a curve is any law's
+NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
+SETTLED = 0.999  # of the error, below which another refit is a better optimum
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +108,7 @@ def search(
     Long logs are searched by their beginnings, with one fit of the answer to all of them; where
     this leaves clearly more, it goes on from there on all of them.
     """
-    part = dataset.shortened(SEARCHED)
+    part = dataset.part
     if part is dataset:
         return _search(_begun(base, dataset), catalogue, progress)
     found = _search(_begun(fit_axis(base.axis, part.fit), part), catalogue, progress)
@@ -135,14 +137,13 @@ def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
     return replace(found, dataset=dataset, base=first, final=final if found.steps else first)
 
 
-def _search(
-    found: Found, catalogue: Catalogue, progress: Progress | None, shifts: int = RULE.most_shifts
-) -> Found:
-    """Go on from what was found; shifts: how often a change may still alter the channel delay."""
-    dataset, first, judged, steps = found.dataset, found.base, found.final, found.steps
+def _search(found: Found, catalogue: Catalogue, progress: Progress | None) -> Found:
+    """Go on from what was found."""
+    first, judged, steps = found.base, found.final, found.steps
     passed, ranking, last = [*found.passed], found.ranking, list(found.last)
     while len(steps) < RULE.most_steps:
-        judged, last, candidates = tried_beside(judged, catalogue, progress)
+        taken = [s.change.name for s in steps]
+        judged, last, candidates = tried_beside(judged, catalogue, progress, taken)
         if not steps:
             first, ranking = judged, ordered(candidates)
         new = _accepted(judged, last) or _together(judged, last, catalogue)
@@ -153,24 +154,50 @@ def _search(
         passed[-1] = steps[-1]  # which tells what it made needless
         if judged.at_floor:
             break
-        if shifts and (moved := moved_by(judged.fit, dataset)):
-            again = _begun(fit_axis(first.fit.axis, moved.fit), moved)
-            return _search(again, catalogue, progress, shifts - 1)
-        fit = fit_thoroughly(judged.fit.axis, dataset, judged.fit.begun)
-        dataset, fit = synchronised(fit, dataset)
-        judged = Judged(fit, dataset)
-    return Found(dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
+        fit = fit_thoroughly(judged.fit.axis, judged.dataset, judged.fit.begun)
+        dataset, fit = synchronised(fit, judged.dataset)
+        judged = _settled(Judged(fit, dataset))
+    first = (
+        first if first.dataset is judged.dataset else _refitted_on(first.fit.axis, first, judged)
+    )
+    return Found(judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
+
+
+def _settled(judged: Judged) -> Judged:
+    """The fit with the channel delay that it finds, where that is another than the dataset has.
+
+    An effect that the model lacked may have looked like a delay, or hidden one. So a change brings
+    its own delay, and is judged with it.
+    """
+    moved = moved_by(judged.fit, judged.dataset)
+    if moved is None:
+        return judged
+    fit = replace(fit_axis(judged.fit.axis, moved.fit), begun=judged.fit.begun)
+    return Judged(fit, moved) if fit.error < judged.fit.error else judged
+
+
+def _refitted_on(axis: AxisModel, begun: Judged, judged: Judged) -> Judged:
+    """An axis fitted to the dataset of a judged fit."""
+    dataset = judged.dataset
+    return Judged(replace(fit_axis(axis, dataset.fit), begun=begun.fit.begun), dataset)
 
 
 def tried_beside(
-    judged: Judged, catalogue: Catalogue, progress: Progress | None = None
+    judged: Judged,
+    catalogue: Catalogue,
+    progress: Progress | None = None,
+    taken: Sequence[str] = (),
 ) -> tuple[Judged, list[Tried], list[Candidate]]:
     """Every change beside a fit: the fit at its best, those refitted, and all absent effects.
+
+    taken: names of laws that the search added; a free curve may stand in the place of one, or of
+    one that the model had from the beginning, which is then not absent.
 
     If the values of the best without its change are a better start for the fit, it is refitted from
     there: a fit short of its optimum would let every change in.
     """
-    effects = absent_effects(judged.fit.axis, catalogue)
+    known = {*taken, *judged.fit.begun.names}
+    effects = [e for e in absent_effects(judged.fit.axis, catalogue) if e.name not in known]
     plain = [Added(e) for e in effects if not is_noise(e)]
     changes: list[Change] = [*plain, *freed_of(judged.fit.axis)]
     one_more = counting(len(changes), progress)
@@ -184,12 +211,12 @@ def tried_beside(
         return found
 
     looks = spread(look, changes)
-    tried = _refitted(judged, looks)
+    tried = _refitted(judged, looks, len({e.kind for e in effects}))
     enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
     if not enough:
         curves = [c.look(judged, trial) for c in reshaped_of(judged.fit, judged.dataset)]
         best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
-        tried += _refitted(judged, best, tried)
+        tried += _refitted(judged, best, len(curves), tried)
     judged, tried = _at_its_best(judged, tried)
     give_back()
     noise = [as_noise(judged, e) for e in effects if is_noise(e)]
@@ -205,11 +232,17 @@ def is_level(one: Tried, best: Tried) -> bool:
     if len(effects) == 2 and all(e.dead_time for e in effects):
         return True  # which of the two is late, no log of both can tell
     by = score(one.judged, best.judged)
-    return by.t < RULE.sure or by.part < RULE.least_part
+    return by.t < least_t(1) or by.part < RULE.least_part
 
 
-def _refitted(judged: Judged, looks: Sequence[Look], known: Sequence[Tried] = ()) -> list[Tried]:
-    """The changes that promise enough, refitted; the better ones thoroughly if none is enough."""
+def _refitted(
+    judged: Judged, looks: Sequence[Look], among: int, known: Sequence[Tried] = ()
+) -> list[Tried]:
+    """The changes that promise enough, refitted; the better ones from all starts if none is enough.
+
+    among: of how many independent ones they are; effects of one kind are alike. known: what was
+    refitted before.
+    """
     asked = RULE.promise * RULE.least_part
     waiting = sorted((k for k in looks if k.promise >= asked), key=lambda k: -k.promise)
     first = spread(lambda k: (k, _fit_of(judged, k)), waiting[:LEADERS])
@@ -220,7 +253,7 @@ def _refitted(judged: Judged, looks: Sequence[Look], known: Sequence[Tried] = ()
     if not any(f.at_floor for _, f in fits):
         fits.sort(key=lambda pair: -_roughly(judged, pair[1]))
         fits[:LEADERS] = spread(lambda p: (p[0], from_all_starts(judged, *p)), fits[:LEADERS])
-    return spread(lambda pair: judged_change(judged, *pair), fits)
+    return spread(lambda pair: judged_change(judged, *pair, among), fits)
 
 
 def _fit_of(judged: Judged, look: Look) -> Fit:
@@ -233,10 +266,15 @@ def _roughly(judged: Judged, fit: Fit) -> float:
     return (judged.fit.error**2 - fit.error**2) / above
 
 
-def judged_change(judged: Judged, look: Look, fit: Fit) -> Tried:
-    """A refitted change with its score; its controls are asked only where they could decide."""
+def judged_change(judged: Judged, look: Look, fit: Fit, among: int = 1) -> Tried:
+    """A refitted change with its score; its controls are asked only where they could decide.
+
+    among: of how many changes it is chosen.
+    """
     change, after = look.change, Judged(fit, judged.dataset)
-    found = candidate_of(judged, after, _effect(change), 0.0, parameters(change))
+    if not fit.at_floor:
+        after = _settled(after)
+    found = candidate_of(judged, after, _effect(change), parameters(change), among)
     if found.supported and found.score:
         taken = control(change, judged, after)
         found = replace(found, score=replace(found.score, control=taken))
@@ -277,13 +315,19 @@ def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried
         return judged, tried
     best = max(proved, key=lambda t: t.candidate.part)
     axis = best.change.undone(best.judged.fit.axis, judged.fit.axis)
-    if axis is None or best.candidate.part > RULE.nearly_all:
+    if axis is None or best.candidate.part > NEARLY_ALL:
         return judged, tried
-    again = replace(fit_axis(axis, judged.dataset.fit), begun=judged.fit.begun)
-    if again.error > RULE.settled * judged.fit.error:
+    refitted = replace(fit_axis(axis, judged.dataset.fit), begun=judged.fit.begun)
+    if refitted.error > SETTLED * judged.fit.error:
         return judged, tried
-    judged = Judged(again, judged.dataset)
-    return judged, [judged_change(judged, t.look, t.judged.fit) for t in tried]
+    judged = Judged(refitted, judged.dataset)
+    again = [_scored_again(judged, t) for t in tried]
+    return judged, again
+
+
+def _scored_again(judged: Judged, tried: Tried) -> Tried:
+    among = tried.candidate.score.among if tried.candidate.score else 1
+    return judged_change(judged, tried.look, tried.judged.fit, among)
 
 
 def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
@@ -295,9 +339,12 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         return [Step(noise[0])]
     if not lowering:
         return []
-    # A curve is any law's: it takes at once what several laws make, and none is needed after it.
-    lowering = [t for t in lowering if not isinstance(t.change, Reshaped)] or lowering
     best = max(lowering, key=lambda t: t.candidate.part)
+    if isinstance(best.change, Reshaped):
+        least = AS_MUCH * best.candidate.part
+        laws = [t for t in lowering if not isinstance(t.change, Reshaped)]
+        lowering = [t for t in laws if t.candidate.part >= least] or lowering
+        best = max(lowering, key=lambda t: t.candidate.part)
     level = [t for t in lowering if t is not best and is_level(t, best)]
     first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))
     return [Step(first, tuple(t for t in (best, *level) if t is not first))]
@@ -316,7 +363,7 @@ def _together(judged: Judged, tried: Sequence[Tried], catalogue: Catalogue) -> l
             and found.part > RULE.promise * RULE.least_part and found.score.t > 1.0
         )  # fmt: skip
 
-    ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[: RULE.most_ways]
+    ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[:LEADERS]
     for way in ways:
         beside, seconds, _ = tried_beside(way.judged, catalogue)
         if not (then := _accepted(beside, seconds)):
@@ -325,7 +372,7 @@ def _together(judged: Judged, tried: Sequence[Tried], catalogue: Catalogue) -> l
         axis = way.change.undone(both.fit.axis, judged.fit.axis)
         if axis is None or score(judged, both).refused:
             continue
-        alone = Judged(fit_axis(axis, both.dataset.fit), both.dataset)
+        alone = _refitted_on(axis, both, both)
         if _is_needed(way.change, alone, both):
             return [Step(way, with_others=True), replace(second, with_others=True)]
     return []
@@ -342,9 +389,11 @@ def _needed(
 ) -> tuple[Judged, tuple[Step, ...]]:
     """The fit and the steps without earlier ones that are not accepted beside the later ones."""
     for step in steps[:-1]:
+        if any(s.change.name == step.change.name for s in steps if s is not step):
+            continue  # another change of this law presupposes it
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
         if axis is not None:
-            without = Judged(_refit(axis, judged), judged.dataset)
+            without = _refitted_on(axis, judged, judged)
             if _is_needed(step.change, without, judged):
                 # The shapes of later effects were found beside this one; they may differ without.
                 again = fit_thoroughly(without.fit.axis, judged.dataset, judged.fit.begun)
@@ -356,7 +405,3 @@ def _needed(
         dropped = (*kept[-1].dropped, step.change.name)
         steps = (*kept[:-1], replace(kept[-1], dropped=dropped))
     return judged, steps
-
-
-def _refit(axis: AxisModel, judged: Judged) -> Fit:
-    return replace(fit_axis(axis, judged.dataset.fit), begun=judged.fit.begun)

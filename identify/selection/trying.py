@@ -47,8 +47,8 @@ def reshape(
         for shape in shapes_of(fit, before.dataset, effect.name):
             change = Reshaped(shape, fit.axis[effect.name])
             look = change.look(before, trial)
-            fit = change.refit(before, look)
-            tried.append((judged_change(before, look, fit).candidate, change))
+            after = change.refit(before, look)
+            tried.append((judged_change(before, look, after).candidate, change))
     if not tried:
         raise InputError(
             f"the logs show no other shape of {effect.name}: no curve in its place lowers their "

@@ -50,14 +50,14 @@ def answers_of(results: Sequence[TrialResult]) -> list[Answer]:
 
 
 def levels(answers: Sequence[Answer]) -> tuple[Level, ...]:
-    """How often answers were right by the error they left: a falling staircase of a few levels.
+    """How often answers were right by the part they took: a falling staircase of a few levels.
 
     Levels hold equally many answers, at least LEAST_ANSWERS; one that is not below the one before
     is joined with it (isotonic regression: pool adjacent violators, R. E. Barlow et al.,
     Statistical Inference under Order Restrictions, 1972). The rate of a level is (right + 1) /
     (answers + 2), Laplace's rule, so that none is certain. The last has no end.
     """
-    ordered = sorted(answers, key=lambda a: a.left)
+    ordered = sorted(answers, key=lambda a: -a.part)
     count = min(max(len(ordered) // LEAST_ANSWERS, 1), MOST_LEVELS)
     pooled: list[list[Answer]] = []
     for part in np.array_split(np.arange(len(ordered)), count):
@@ -65,7 +65,7 @@ def levels(answers: Sequence[Answer]) -> tuple[Level, ...]:
         while len(pooled) > 1 and _rate(pooled[-1]) >= _rate(pooled[-2]):
             last = pooled.pop()
             pooled[-1] += last
-    ends = [part[-1].left for part in pooled[:-1]] + [np.inf]
+    ends = [group[-1].part for group in pooled[:-1]] + [0.0]
     return tuple(Level(end, _rate(part)) for end, part in zip(ends, pooled, strict=True))
 
 

@@ -39,15 +39,15 @@ NEARLY = 0.8  # part of the strongest dependence from which a coordinate counts 
 class Answer:
     """A finding of the diagnosis, and whether it is right.
 
-    names: the effect, and those declared as ambiguous with it. left: error over the noise floor
-    that its confidence is read from. confidence: stated, 0..1. coordinate: that of the curve which
+    names: the effect, and those declared as ambiguous with it. part: of what was left, from which
+    its confidence is read. confidence: stated, 0..1. coordinate: that of the curve which
     it shows, where a law has another shape.
     """
 
     names: tuple[str, ...]
     kind: FindingKind
     right: bool
-    left: float = np.nan
+    part: float = np.nan
     confidence: float = np.nan
     coordinate: str | None = None
 
@@ -182,7 +182,7 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
             right |= any(f.effect.name in names and _is_another(f) for f in built.planted)
     over = OVER[finding.shape.over] if finding.shape else None
     sure = np.nan if finding.confidence is None else finding.confidence
-    return Answer(names, finding.kind, right, finding.least_left, sure, over)
+    return Answer(names, finding.kind, right, finding.score.part, sure, over)
 
 
 def _is_another(planted: Fitted) -> bool:

@@ -13,6 +13,8 @@ from machines import one_axis
 from identify.dataset.dataset import datasets
 from identify.dataset.given_logs import Role
 from identify.estimation.channel_delay import realigned
+from identify.estimation.evidence import rms
+from identify.estimation.fit import error_on
 from identify.output.diagnosis_json import diagnose_json
 from identify.results.results import Diagnosis
 from identify.workflow import add_named, diagnose
@@ -26,7 +28,7 @@ from twin.simulator import ReducedSimulator
 STAGE = replace(one_axis(load_model("proton_xy", CATALOGUE)), sample_rate=2000.0)
 PULLED = STAGE.with_axis("x", STAGE.axes["x"].with_effect(effect("quadratic_drag", {"c": 30.0})))
 KNOWN = Catalogue([CATALOGUE["quadratic_drag"], CATALOGUE["constant_force"]])
-TESTED = {"test_error_before", "test_error_after", "test_error_on", "explains"}
+TESTED = {"test_error_before", "test_error_after", "test_error_on", "explains", "noise_floors"}
 
 
 def logged(seed: int, seconds: float = 4.0) -> Log:
@@ -73,11 +75,15 @@ def test_a_test_log_decides_nothing_and_gives_the_errors(found):
 
 
 def test_an_addition_tells_the_errors_on_the_logs_of_each_role(found):
-    step, dataset = add_named(found).step, found.axes["x"].dataset
-    assert (step.test_error_before, step.test_error_after) == pytest.approx(
-        (found.axes["x"].tested.before, found.axes["x"].tested.after)
-    )
-    assert step.test_error_after != step.holdout_error_after
+    added, dataset = add_named(found), found.axes["x"].dataset
+    step = added.step
+    for axis, tested, chosen in (
+        (found.axes["x"].base.axis, step.test_error_before, step.holdout_error_before),
+        (added.model.axes["x"], step.test_error_after, step.holdout_error_after),
+    ):
+        assert tested == pytest.approx(rms(error_on(axis, dataset.test)))
+        assert chosen == pytest.approx(rms(error_on(axis, dataset.holdout)))
+        assert abs(tested - chosen) > 0.1 * chosen
     assert [len(dataset.having(role)) for role in Role] == [1, 1, 1]
 
 

@@ -110,7 +110,7 @@ def _answer(found: AxisDiagnosis) -> str:
 
 
 def _runner_up(found: AxisDiagnosis) -> list[str]:
-    others = [c for c in found.ranking if c.effect.name not in found.named]
+    others = [c for c in found.ranking if c.score and c.effect.name not in found.named]
     if not others:
         return []
     second = others[0]

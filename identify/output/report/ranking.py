@@ -82,7 +82,7 @@ def _table(found: AxisDiagnosis) -> Table:
         Row(
             (
                 title_case(c.effect.name),
-                number(c.delta_bic),
+                number(c.delta_bic) if c.score else "",
                 scale.text(c.gain.before),
                 scale.text(c.gain.after),
                 f"{100.0 * max(c.part, 0.0):.0f} %" if c.score else "",

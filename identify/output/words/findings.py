@@ -92,8 +92,9 @@ def _sure(finding: Finding) -> str:
     if finding.confidence is None:
         return "No confidence is stated, as the test logs do not confirm it"
     sure = (
-        f"{100.0 * finding.confidence:.0f} % of such answers were right in the self-test: "
-        f"{_over(finding.left)} times the noise floor is left on the {finding.chosen.on.value} logs"
+        f"{100.0 * finding.confidence:.0f} % of such answers were right on machines with a known "
+        f"truth: {_over(finding.left)} times the noise floor is left on the "
+        f"{finding.chosen.on.value} logs"
     )
     if finding.chosen.on is not Role.TRAINING:
         sure += f", {_over(finding.left_fitted)} times on the training logs"
@@ -102,7 +103,7 @@ def _sure(finding: Finding) -> str:
 
 def _over(left: float) -> str:
     """Error over noise floor: noise is part of what is left, and so never more."""
-    return f"{max(left, 1.0):.3g}"
+    return f"{max(left, 1.0):.2f}"
 
 
 def shares_in_words(found: AxisDiagnosis) -> list[str]:

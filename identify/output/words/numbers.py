@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 RAISED = str.maketrans("+-0123456789", "⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -22,6 +22,12 @@ class Numbers:
     span: Callable[[float, float, str], str]
     ratio: Callable[[float], str]
     change: Callable[[float, float, str], tuple[str, str]]
+
+
+def listed(names: Sequence[str]) -> str:
+    """E.g. "a, b and c"."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def with_unit(number: str, unit: str) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from identify.dataset.given_logs import Role
 from identify.estimation.repeating_force import Repeat
 from identify.estimation.residual_dependence import Dependence
-from identify.output.words.numbers import PLAIN, Numbers, capitalised
+from identify.output.words.numbers import PLAIN, Numbers, capitalised, listed
 from identify.results.addition import Addition
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
@@ -66,7 +66,9 @@ def effect_in_words(found: AxisDiagnosis, effect: str) -> str:
 def named_in_words(found: AxisDiagnosis) -> str:
     """Every effect that is named, e.g. "cogging or wear, and lugre"; empty where none is."""
     each = [" or ".join((effect_in_words(found, name), *alike)) for name, *alike in found.answers]
-    return (", and " if any(alike for _, *alike in found.answers) else " and ").join(each)
+    if any(alike for _, *alike in found.answers):
+        return ", and ".join(each)
+    return listed(each) if each else ""
 
 
 def ties_in_words(found: AxisDiagnosis) -> list[str]:

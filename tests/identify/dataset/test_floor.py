@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from foreign_machine import PLACE, READING, drawn, run
 from machines import one_axis
 
+from benchmarks.second_simulator.machine import PLACE, READING, drawn, run
 from identify import workflow
 from identify.dataset.floor import noise_beside
 from identify.dataset.whittle import levels_with_dip

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from foreign_machine import FORCE_CONSTANT, drawn, run
 
+from benchmarks.second_simulator.machine import FORCE_CONSTANT, drawn, run
 from identify import workflow
 from identify.dataset.dataset import datasets
 from identify.dataset.noise_floor import noise_of

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from built_fits import PLAIN, built_fit
+from built_fits import PLAIN, built_fit, known_floor
 from constructed import effect, fit_of, moved, windowed
 from linear_cases import cut, linear, without
 from scipy.stats import t as student
@@ -239,7 +239,7 @@ def test_estimates_are_the_values_with_their_intervals_within_the_bounds():
     noise = np.random.default_rng(9).normal(0.0, 0.3, len(log))
     log = replace(log, command=log.command - residual(axis, [log]) + noise)
     fit = fit_of(axis, log)
-    fit.__dict__["floor"] = fit.error
+    fit.__dict__["noise"] = known_floor(fit.error)
     found = estimates(fit)
     half = half_widths(fit)
     free = [e for e in found if e.free]
@@ -253,7 +253,7 @@ def test_estimates_are_the_values_with_their_intervals_within_the_bounds():
     assert next(e for e in free if e.label == "coulomb_viscous.sigma2").low == 0.0
     held = {e.label: e.value for e in found if not e.free}
     assert held == {"coulomb_viscous.Fs": 0.41, "cable_slab.k2": 0.0, "cable_slab.k3": 0.0}
-    fit.__dict__["floor"] = fit.error / 3.01
+    fit.__dict__["noise"] = known_floor(fit.error / 3.01)
     assert all(isinstance(e.reason, ModelWrong) for e in estimates(fit) if e.free)
     assert all(e.low is None and e.high is None for e in estimates(fit))
     unmoved = fit_of(replace(axis, mass_fixed=True), log)

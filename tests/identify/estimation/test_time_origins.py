@@ -66,9 +66,8 @@ def test_without_a_line_in_time_no_clock_is_set():
 
 
 def test_a_pump_is_named_whatever_its_phase_in_each_log(dataset):
-    found = diagnose_axis(
-        fit_axis(STAGE.axes["x"], dataset.fit), with_time_origins(STAGE.axes["x"], dataset), FEW
-    )
+    known = with_time_origins(STAGE.axes["x"], dataset)
+    found = diagnose_axis(fit_axis(STAGE.axes["x"], known.fit), known, FEW)
     assert found.verdict is Verdict.MISSING_EFFECTS
     assert found.named == ("periodic_disturbance",)
     values = found.final.axis["periodic_disturbance"].values

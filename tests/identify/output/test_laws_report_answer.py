@@ -91,7 +91,7 @@ def test_the_answer_for_an_ambiguity():
     words = refit_in_words(made.refit_of(0.01), SCALED)
     assert second.remarks[-1] == f"{words[0].upper()}{words[1:]}."
     assert second.remarks[0].startswith("Nearest candidate: constant force, ΔBIC 66.0")
-    assert second.remarks[0].endswith("gain uncertain (t = 1.3).")
+    assert second.remarks[0].endswith("gain uncertain: t = 1.3, where 1.6 is sure.")
     assert [(t.name, t.value) for t in second.tiles] == [
         ("Force error", "1.07 N"), ("Error over noise floor", number(1.07 / 0.97)),
         ("Position, free run", "1.90 mm"),
@@ -191,7 +191,7 @@ def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
     assert "1.97 µm replayed by MuJoCo" in first.tiles[2].remark
     assert (first.tone is Tone.STRONG) is kept
     assert (first.sentence == "The logs prove the effect.") is kept
-    assert ("gain uncertain (t = 1.3)" in first.sentence) is not kept
+    assert ("gain uncertain: t = 1.3, where 1.6 is sure" in first.sentence) is not kept
     assert len(cards(made.diagnosed(), additions=(made.addition(),))) == 2
 
 

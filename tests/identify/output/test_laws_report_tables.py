@@ -168,7 +168,7 @@ def test_candidates_have_their_evidence_errors_and_values():
     ]  # fmt: skip
     assert cells == [
         ["510", "7.13 N", "2.17 N", "91 %", ""], ["423", "7.34 N", "2.38 N", "89 %", ""],
-        ["66.0", "7.46 N", "2.50 N", "89 %", "gain uncertain (t = 1.3)"],
+        ["66.0", "7.46 N", "2.50 N", "89 %", "gain uncertain: t = 1.3, where 1.6 is sure"],
     ]  # fmt: skip
     values = rows["Cogging"]["Values"].replace("\u00a0", " ")
     assert values.startswith("p = 26.1 mm, a1 = 127 mN, b1 = 35.3 mN, a2 = 0 N")

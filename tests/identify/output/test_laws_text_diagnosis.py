@@ -69,7 +69,8 @@ def test_a_diagnosis():
         advice(),
         "cogging evidence 510.0 held-out error 7.13 -> 2.17 N",
         "quadratic_drag evidence 423.0 held-out error 7.34 -> 2.38 N",
-        "constant_force evidence 66.0 held-out error 7.46 -> 2.5 N gain uncertain (t = 1.3)",
+        "constant_force evidence 66.0 held-out error 7.46 -> 2.5 N gain uncertain: t = 1.3, where "
+        "1.6 is sure",
         "step 1: with cogging the held-out error falls from 7.13 to 2.17 N",
         "step 2: with lugre the held-out error falls from 7.57 to 2.61 N; no longer needed: wear",
         *(f"note: {r}" for r in remarks_on(result, "x")),
@@ -87,8 +88,9 @@ def test_a_finding_is_told_with_what_it_takes_and_what_could_not_be_real():
         "The same force shifted in time, which cannot be real, removes at most 14 % (19 of 20 "
         "times)",
         "Found: p = 0.0261 m, a1 = 0.127 N",
-        f"{100.0 * COGGING.confidence:.0f} % of such answers were right in the self-test: 1 times "
-        "the noise floor is left on the selection logs, 1 times on the training logs",
+        f"{100.0 * COGGING.confidence:.0f} % of such answers were right on machines with a known "
+        "truth: 1.00 times the noise floor is left on the selection logs, "
+        "1.00 times on the training logs",
     )
     alone = replace(LUGRE, chosen=replace(LUGRE.chosen, on=Role.TRAINING), left=1.33)
     assert finding_in_words(alone)[-1].endswith(
@@ -181,7 +183,7 @@ def test_two_effects_that_need_each_other_are_told_as_such():
     )  # fmt: skip
     x = made.diagnosis_of(findings=pair, ranking=(made.WEAK, replace(made.LATER, score=None)))
     assert [why_not(x, c) for c in x.ranking] == [
-        "gain uncertain (t = 1.3)", "proved only together with cogging",
+        "gain uncertain: t = 1.3, where 1.6 is sure", "proved only together with cogging",
     ]  # fmt: skip
     (said,) = together_in_words(x)
     taken = (7.81**2 - 2.39**2) / (7.81**2 - 2.11**2)

@@ -97,7 +97,7 @@ def test_page_says_the_verdict(case: Case, page: str) -> None:
     assert best is not None
     assert "Axis x: cogging is missing" in text
     assert verdict_in_words(case.x) in text
-    assert "Runner-up: quadratic drag" in text
+    assert "Next: twin add cogging MODEL LOG... -o better.toml" in text
     scale = Scale.of("N", [case.x.base.error])
     before = number(case.x.base.error / scale.size)
     assert f"{before} → {scale.text(best.fit.error)}" in text

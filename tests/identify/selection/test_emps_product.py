@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from emps_published import direction_dependent, identify, prediction_error, symmetric
 
-from identify.output.remarks import remarks
+from identify.output.remarks import remarks_on
 from identify.selection.diagnosis import Verdict
 from identify.workflow import add, diagnose
 from twin.effects import Catalogue, load_catalogue
@@ -136,4 +136,4 @@ def test_the_term_of_a_screw_turn_is_present_in_each_run_but_not_general(found):
     final = found.leading.final
     for amplitude in repeat.amplitude.values():
         assert final.floor < amplitude < 2.0 * final.error
-    assert any("no function of position" in note for note in remarks(found.leading, None))
+    assert any("no function of position" in note for note in remarks_on(found, "x"))

@@ -4,11 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from foreign_diagnoses import CATALOGUE, STAGE, diagnosed, model_for
-from foreign_effects import INSIDE, OUTSIDE
-from foreign_kernel import SLIP_ELEMENTS
-from foreign_machine import AHEAD, BEHIND, FORCE, PLACE, drawn, gaussian, logs_of, run
 
+from benchmarks.foreign import CATALOGUE, STAGE, diagnosed, model_for
+from benchmarks.second_simulator.effects import INSIDE, OUTSIDE
+from benchmarks.second_simulator.kernel import SLIP_ELEMENTS
+from benchmarks.second_simulator.machine import (
+    AHEAD,
+    BEHIND,
+    FORCE,
+    PLACE,
+    drawn,
+    gaussian,
+    logs_of,
+    run,
+)
 from identify import workflow
 from identify.selection.diagnosis import Verdict
 from twin.curve import Coordinate

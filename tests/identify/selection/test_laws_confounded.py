@@ -8,7 +8,15 @@ from types import SimpleNamespace
 import built_results as made
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, built_fit, fitted
+from built_fits import (
+    CATALOGUE,
+    PLAIN,
+    axis_of,
+    built_dataset,
+    built_fit,
+    fitted,
+    known_floor,
+)
 
 from identify import demo
 from identify.estimation.evidence import rms
@@ -17,7 +25,8 @@ from identify.estimation.force_balance import residual
 from identify.experiment_design import rival_hypotheses as explanations
 from identify.experiment_design.discrimination import Explanation
 from identify.experiment_design.rival_hypotheses import differing_axis, explained, require_different
-from identify.output.signature import FORCE, draw, exemplary_motion, signature
+from identify.experiment_design.signature import FORCE, exemplary_motion, signature
+from identify.output.signature import draw
 from identify.selection import confounded as given
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -37,7 +46,7 @@ def dataset():
 
 def refit_of(monkeypatch, dataset, given_axis, widths=1e-9, floor=1e-3, catalogue=()):
     fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
-    fit.__dict__["floor"] = floor
+    fit.__dict__["noise"] = known_floor(floor)
     monkeypatch.setattr(given, "half_widths", lambda f: np.full(len(f.scaling.where), widths))
     return given.refit(given_axis, fit, Catalogue([CATALOGUE[n] for n in catalogue])), fit
 
@@ -164,7 +173,7 @@ def test_the_signature_of_an_effect_is_drawn_at_its_force(tmp_path):
     peaks = [np.abs(again.velocity[a:b]).max() for a, b in ((0, 3000), (3000, 9000), (9000, 21000))]
     np.testing.assert_allclose(peaks, 0.15 * np.pi / np.array([1.5, 3.0, 6.0]), rtol=1e-2)
     with pytest.raises(InputError, match="end the name"):
-        draw(CATALOGUE["constant_force"], CATALOGUE, tmp_path / "f.txt")
+        draw(CATALOGUE["constant_force"], motion, force, tmp_path / "f.txt")
 
 
 def test_the_signature_of_a_friction_is_its_own_and_of_others_is_beside_one():
@@ -181,8 +190,8 @@ def test_the_picture_of_an_effect_is_over_time_position_and_speed(monkeypatch, t
 
     shown = []
     monkeypatch.setattr(plt, "close", shown.append)
-    draw(CATALOGUE["constant_force"], CATALOGUE, tmp_path / "f.svg")
     motion, force = signature(CATALOGUE["constant_force"], CATALOGUE)
+    draw(CATALOGUE["constant_force"], motion, force, tmp_path / "f.svg")
     (figure,) = shown
     across = {
         "Time (s)": motion.time, "Position (mm)": 1e3 * motion.position,

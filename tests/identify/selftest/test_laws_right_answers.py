@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 from built_fits import CATALOGUE, axis_of, fitted
-from built_results import errors
+from built_results import errors, score_of
 
 from identify.selection.findings import Finding, FindingKind
 from identify.selftest.case import Case
@@ -16,6 +16,7 @@ from identify.selftest.trial import _answer, _is_another
 from twin.curve import Coordinate
 from twin.model.machine import Fitted
 
+SCORE = score_of(0.613, 7.3, 0.137)
 LONE = next(n for n, e in OUTSIDE.items() if {c.over for c in e.curves} == {Coordinate.POSITION})
 
 
@@ -34,11 +35,11 @@ def is_right(
         model=model, planted=(Fitted.at_start(effect),), reshaped=frozenset(reshaped),
         right=frozenset(),
     )  # fmt: skip
-    finding = Finding(told, (), 0.9, *errors(2.0, 1.0), "N", {}, None)
+    finding = Finding(told, (), 0.9, *errors(2.0, 1.0), "N", {}, SCORE)
     shape = SimpleNamespace(over=over)
     finding = replace(finding, kind=FindingKind.WRONG_SHAPE, shape=shape)
     answer = _answer(finding, built, Case((planted,), 5.0, 1, "plain", known))
-    assert (answer.names, answer.left) == ((told,), finding.least_left)
+    assert (answer.names, answer.part) == ((told,), finding.score.part)
     return answer.right
 
 
@@ -80,7 +81,7 @@ def test_another_shape_is_right_where_the_law_of_the_machine_has_one():
 )
 def test_what_resembles_is_right_where_the_machine_has_another_exponent(told, n, right):
     built = SimpleNamespace(planted=(fitted("dahl", n=n),))
-    finding = Finding(told, (), 0.9, *errors(2.0, 1.0), "N", {}, None)
+    finding = Finding(told, (), 0.9, *errors(2.0, 1.0), "N", {}, SCORE)
     finding = replace(finding, kind=FindingKind.RESEMBLES)
     assert _answer(finding, built, Case(("dahl",), 5.0, 1)).right is right
 

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from foreign_kernel import COULOMB, DAHL, SLIP_ELEMENTS
-from foreign_machine import (
+
+from benchmarks.second_simulator.kernel import COULOMB, DAHL, SLIP_ELEMENTS
+from benchmarks.second_simulator.machine import (
     AHEAD,
     BEHIND,
     FORCE,

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from foreign_kernel import (
+
+from benchmarks.second_simulator.kernel import (
     AHEAD,
     BEHIND,
     FORCE,
@@ -21,8 +22,7 @@ from foreign_kernel import (
     Plant,
     simulate,
 )  # fmt: skip
-from foreign_motion import random_moves
-
+from benchmarks.second_simulator.motion import random_moves
 from twin.log import AxisLog, Log
 
 PLACE = np.linspace(-HALF_SPAN, HALF_SPAN, PLACES)  # m

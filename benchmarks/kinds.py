@@ -1,0 +1,82 @@
+"""What the diagnosis of each of fifteen kinds of hidden effect costs, in passes over the logs.
+
+Five logs, 1.5 million samples, of a machine whose bumps have another form than the model's besides,
+so that more than one thing is wrong. The cost is CPU time of `identify.workflow.diagnose` on logs
+that are read, over that of a pass before and after (``workload``).
+"""
+
+from __future__ import annotations
+
+from time import process_time
+
+import numpy as np
+
+from benchmarks import workload
+from benchmarks.figures import Figure, Target
+from benchmarks.workload import AXIS, Workload
+from identify.estimation.force_balance import residual
+from identify.experiment_design.planting import added_force, strength_for
+from identify.selftest.drawing import drawn_values
+from identify.selftest.laws import BUMPS
+from identify.workflow import diagnose, fit
+from twin.effects import load_catalogue
+from twin.log import Log
+from twin.model.machine import Fitted
+
+TITLE = "Diagnosis of fifteen kinds of hidden effect, bumps of another form, in passes"
+KINDS = (
+    "actuator_deadband", "actuator_lag", "asymmetric_friction", "base_vibration",
+    "cable_hysteresis", "cogging", "dwell_stiction", "flexible_mode", "force_constant_ripple",
+    "load_dependent_friction", "periodic_disturbance", "position_dependent_friction",
+    "quadratic_drag", "thermal_drift", "wear",
+)  # fmt: skip
+FLOORS = 8.0  # RMS force of the effect over the noise floor
+MEDIAN, DEAREST = 200.0, 600.0  # passes
+
+
+def measure() -> list[Figure]:
+    """The median and the dearest, and whether each is named."""
+    work = workload.make()
+    costs = {name: _cost(work, name) for name in KINDS}
+    each = ", ".join(f"{name} {passes:.0f} ({told})" for name, (passes, told) in costs.items())
+    passes = sorted(p for p, _ in costs.values())
+    return [
+        Figure(
+            "median of the kinds", float(np.median(passes)), "passes", Target(high=MEDIAN), each
+        ),
+        Figure("the dearest kind", passes[-1], "passes", Target(high=DEAREST)),
+    ]
+
+
+def _cost(work: Workload, name: str) -> tuple[float, str]:
+    """Passes of the diagnosis of a machine with that effect, and what it names."""
+    logs = _logs(work, name)
+    before, begun = work.timed_pass(), process_time()
+    found = diagnose(work.model, logs, catalogue=load_catalogue())
+    spent = process_time() - begun
+    named = " and ".join("/".join(answer) for answer in found.leading.answers) or "-"
+    return spent / (0.5 * (before + work.timed_pass())), named
+
+
+def _logs(work: Workload, name: str) -> dict[str, Log]:
+    """Logs of the machine with bumps of another form and the effect, some floors large."""
+    axis = work.machine.axes[AXIS]
+    own, bumps = axis["roller_spikes"].values, BUMPS[0]
+    values = {p.name: own[p.name] for p in bumps.parameters if p.name in own}
+    axis = axis.without("roller_spikes").with_effect(Fitted.at_start(bumps, values))
+    axis = axis.with_effect(_sized(work, name))
+    return workload.recorded(work.machine.with_axis(AXIS, axis), workload.DURATION)
+
+
+def _sized(work: Workload, name: str) -> Fitted:
+    """The effect with a force of FLOORS on the first log, as the model's fit sees it."""
+    effect, first = load_catalogue()[name], dict([next(iter(work.plain.items()))])
+    found = fit(work.model, first)
+    base, covered = found.fits[AXIS], found.datasets[AXIS].excitation
+    without = residual(base.axis, base.logs)
+    return strength_for(
+        effect,
+        lambda fitted: added_force(fitted, base.axis, base.logs, without),
+        FLOORS * base.floor,
+        drawn_values(effect, covered, np.random.default_rng(1)),
+    )
