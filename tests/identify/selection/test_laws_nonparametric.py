@@ -215,7 +215,7 @@ def test_parts_that_were_not_chosen_are_zero_and_held(about):
 
 NOT_SMOOTHED = pytest.mark.xfail(
     strict=True,
-    reason="where a block alone visits a place, cross-validation leaves the smoothing out: part -3e10",
+    reason="where a block alone visits a place, the smoothing is left out: part -3e10",
 )
 
 
