@@ -29,7 +29,7 @@ class Tenth:
 
 def reliability(results: Sequence[TrialResult]) -> list[Tenth]:
     """Stated confidence against how often right, by tenths of it; empty tenths are left out."""
-    answers = answers_of(results)
+    answers = [a for a in answers_of(results) if np.isfinite(a.confidence)]  # no test contradicts
     out = []
     for i in range(TENTHS):
         inside = [a for a in answers if min(int(a.confidence * TENTHS), TENTHS - 1) == i]
