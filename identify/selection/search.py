@@ -48,6 +48,7 @@ from twin.parallel import counting, spread
 
 Progress = Callable[[int, int], None]
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
+AS_MUCH = 0.9  # of a free curve's part: a law that takes it goes first, as a curve is any law's
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
 SETTLED = 0.999  # of the error, below which another refit is a better optimum
 
@@ -141,7 +142,8 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress | None) -> Fo
     first, judged, steps = found.base, found.final, found.steps
     passed, ranking, last = [*found.passed], found.ranking, list(found.last)
     while len(steps) < RULE.most_steps:
-        judged, last, candidates = tried_beside(judged, catalogue, progress)
+        taken = [s.change.name for s in steps]
+        judged, last, candidates = tried_beside(judged, catalogue, progress, taken)
         if not steps:
             first, ranking = judged, ordered(candidates)
         new = _accepted(judged, last) or _together(judged, last, catalogue)
@@ -181,14 +183,21 @@ def _refitted_on(axis: AxisModel, begun: Judged, judged: Judged) -> Judged:
 
 
 def tried_beside(
-    judged: Judged, catalogue: Catalogue, progress: Progress | None = None
+    judged: Judged,
+    catalogue: Catalogue,
+    progress: Progress | None = None,
+    taken: Sequence[str] = (),
 ) -> tuple[Judged, list[Tried], list[Candidate]]:
     """Every change beside a fit: the fit at its best, those refitted, and all absent effects.
+
+    taken: names of laws that the search added; a free curve may stand in the place of one, or of
+    one that the model had from the beginning, which is then not absent.
 
     If the values of the best without its change are a better start for the fit, it is refitted from
     there: a fit short of its optimum would let every change in.
     """
-    effects = absent_effects(judged.fit.axis, catalogue)
+    known = {*taken, *judged.fit.begun.names}
+    effects = [e for e in absent_effects(judged.fit.axis, catalogue) if e.name not in known]
     plain = [Added(e) for e in effects if not is_noise(e)]
     changes: list[Change] = [*plain, *freed_of(judged.fit.axis)]
     one_more = counting(len(changes), progress)
@@ -331,6 +340,11 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
     if not lowering:
         return []
     best = max(lowering, key=lambda t: t.candidate.part)
+    if isinstance(best.change, Reshaped):
+        least = AS_MUCH * best.candidate.part
+        laws = [t for t in lowering if not isinstance(t.change, Reshaped)]
+        lowering = [t for t in laws if t.candidate.part >= least] or lowering
+        best = max(lowering, key=lambda t: t.candidate.part)
     level = [t for t in lowering if t is not best and is_level(t, best)]
     first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))
     return [Step(first, tuple(t for t in (best, *level) if t is not first))]
