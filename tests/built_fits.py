@@ -13,7 +13,7 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.floor import NoiseFloor
 from identify.dataset.given_logs import Role
 from identify.dataset.motion import Motion
-from identify.dataset.prepared_log import PreparedLog
+from identify.dataset.prepared_log import PreparedLog, total_force
 from identify.estimation.evidence import Evidence, Gain
 from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.scaling import Scaling
@@ -23,7 +23,7 @@ from identify.selection.changes import Added, Look
 from identify.selection.search import Step, Tried
 from twin.effect import Effect, Excitation
 from twin.effects import load_catalogue
-from twin.model.machine import AxisModel, Fitted, Hardware
+from twin.model.machine import AxisModel, Fitted, Hardware, axis_table
 from twin.model.parameters import free_parameters
 
 Array = NDArray[np.float64]
@@ -141,6 +141,13 @@ def built_motion(name: str = "run", seconds: float = 3.0, seed: int = 1, slow: f
         name=name, axis="x", signals=np.stack([x, v, u]), others=others, period=PERIOD, start=0.0,
         sample_period=PERIOD, position_noise=3e-9, raw=np.stack([v, u]),
     )  # fmt: skip
+
+
+def pushed(motion: Motion, law: Fitted) -> Motion:
+    """The motion with the command that it takes against one force more."""
+    force = total_force(axis_table({"": AxisModel(5.3, HARDWARE, (law,))}), motion)
+    x, v, u = motion.signals
+    return replace(motion, signals=np.stack([x, v, u - force]), raw=np.stack([v, u - force]))
 
 
 def built_dataset(*names: str, held: Sequence[str] = (), window: float = 0.04) -> Dataset:

@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, built_dataset, built_fit, fitted
+from built_fits import (
+    CATALOGUE,
+    PLAIN,
+    built_dataset,
+    built_fit,
+    built_motion,
+    fitted,
+    pushed,
+)
 
+from identify.dataset.dataset import Dataset
+from identify.dataset.prepared_log import PreparedLog
 from identify.estimation import variable_projection as search
 from identify.estimation.evidence import effective_samples
-from identify.estimation.fit import Outcome, finished
+from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.variable_projection import (
     Start,
     _best,
@@ -23,11 +32,9 @@ from identify.estimation.variable_projection import (
     with_what_repeats,
 )
 from twin.effect import Excitation
-from twin.model.machine import Fitted
 
 # The rules as they were decided.
-CHANCE, FULL_SHAPES, REFINED_STARTS = 4.0, 4, 2
-RESCORED_SHAPES, RESIDUAL_LINES = 12, 6
+CHANCE, REFINED_STARTS, RESIDUAL_LINES, FEWEST_CYCLES = 4.0, 2, 6, 2.5
 RNG = np.random.default_rng(3)
 SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
 
@@ -72,52 +79,50 @@ def test_the_best_tries_come_first_and_no_more_than_asked(monkeypatch):
     assert [s.squared_error for s in found] == pytest.approx([1.0, 2.0, 3.0])
 
 
+def planted(effect: str, **values: float) -> Dataset:
+    """Two logs, longer than their heads, of an axis with one effect more; without values none."""
+    motions = [built_motion(name, 7.0, seed) for seed, name in enumerate(("one", "two"))]
+    if values:
+        motions = [pushed(m, fitted(effect, **values)) for m in motions]
+    return replace(built_dataset(), fit=tuple(PreparedLog.of(m, 0.04) for m in motions))
+
+
 @pytest.mark.parametrize(
-    ("effect", "shapes", "worth", "rounds"),
+    ("effect", "values"),
     [
-        ("quadratic_drag", 1, True, [("whole", 1, 1)]),
-        ("dahl", FULL_SHAPES, True, [("whole", FULL_SHAPES, 2)]),
-        ("backlash", FULL_SHAPES, False, [("whole", FULL_SHAPES, 1)]),
-        ("dahl", 5, True, [("head", 5, 2)]),
-        ("backlash", 5, True, [("head", 5, 1), ("whole", FULL_SHAPES, 1)]),
-        ("backlash", 5, False, [("head", 5, 1), ("whole", 1, 1)]),
-        ("cogging", RESCORED_SHAPES, True, [("head", 12, 6), ("whole", 4, 6)]),
-        ("cogging", 13, True, [("head", 13, 2), ("head", 12, 6), ("whole", 4, 6)]),
-        ("end_stop", 25, True, [("head", 25, None), ("whole", 4, None)]),
+        ("quadratic_drag", {"c": 5.0}),
+        ("periodic_disturbance", {"f": 11.0, "a": 0.1, "b": 0.05}),
+        ("cogging", {"p": 0.0213, "a1": 0.1, "b2": 0.05}),
+        ("end_stop", {"low": -0.045, "high": 0.04, "stiffness": 500.0}),
     ],
 )
-def test_many_shapes_are_sifted_on_the_heads_first(monkeypatch, effect, shapes, worth, rounds):
-    seen, whole = [], []
-    effect = CATALOGUE[effect]
+def test_the_first_start_has_the_scanned_values_nearest_to_the_planted_ones(effect, values):
+    """However many shapes there are, and although most are seen on the heads of the logs alone."""
+    dataset, effect = planted(effect, **values), CATALOGUE[effect]
+    base = fit_axis(PLAIN, dataset.fit)
+    shapes = list(tried_shapes(effect, with_what_repeats(base, dataset)))
+    found = starts(base, dataset, effect)
+    assert len(found) == min(REFINED_STARTS, len(shapes))
+    for name, value in found[0].shape.items():
+        assert value == min((s[name] for s in shapes), key=lambda v: abs(v - values[name]))
+    assert [s.squared_error for s in found] == sorted(s.squared_error for s in found)
+    assert found[0].share(base) > 0.9
 
-    def best(ground, tried, strengths, count):
-        assert all(isinstance(s.fitted, Fitted) and "i" in s.shape for s in tried)
-        seen.append((ground, len(tried), len(strengths)))
-        return list(tried)[:count]
 
-    def tried_on_all(ground, shape, strengths):
-        whole.append(shape["i"])
-        assert (ground, len(strengths)) == ("whole", len(effect.strengths))
-        return of_size(9.0 - shape["i"], shape)
+def test_where_nothing_gains_more_than_chance_one_start_is_enough():
+    dataset = planted("cogging")
+    found = starts(fit_axis(PLAIN, dataset.fit), dataset, CATALOGUE["cogging"])
+    assert len(found) == 1
 
-    monkeypatch.setattr(search, "with_what_repeats", lambda base, dataset: SEEN)
-    monkeypatch.setattr(search, "tried_shapes", lambda e, x: ({"i": i} for i in range(shapes)))
-    monkeypatch.setattr(search, "_best", best)
-    monkeypatch.setattr(search, "_try", tried_on_all)
-    monkeypatch.setattr(search, "_beyond_chance", lambda base, start: worth)
 
-    def of(*given, on_heads):
-        assert given == ("base", "dataset", effect, SEEN)
-        return "head" if on_heads else "whole"
-
-    monkeypatch.setattr(search, "_Ground", SimpleNamespace(of=of))
-    found = starts("base", "dataset", effect)
-    full = len(effect.strengths)
-    wanted = [(g, n, full if k is None else k) for g, n, k in rounds]
-    assert seen + ([("whole", len(whole), full)] if whole else []) == wanted
-    assert len(found) == min(REFINED_STARTS, rounds[-1][1])
-    if whole:  # those on all of the logs by what they leave there, the last of them least
-        assert [s.shape["i"] for s in found] == whole[::-1][:REFINED_STARTS]
+def test_a_wave_longer_than_the_logs_can_show_is_no_start():
+    dataset = planted("cogging", p=0.09, a1=0.3)  # m; the travel is 0.1 m
+    base = fit_axis(PLAIN, dataset.fit)
+    position = np.concatenate([log.motion.position for log in dataset.fit])
+    longest = np.ptp(position) / FEWEST_CYCLES
+    seen = with_what_repeats(base, dataset)
+    assert any(s["p"] > 2.0 * longest for s in tried_shapes(CATALOGUE["cogging"], seen))
+    assert all(s.shape["p"] <= longest for s in starts(base, dataset, CATALOGUE["cogging"]))
 
 
 @pytest.mark.parametrize(("rows", "tries"), [(11, 80), (9, 99)])

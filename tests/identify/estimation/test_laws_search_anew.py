@@ -7,11 +7,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, built_fit, fitted
+from built_fits import (
+    CATALOGUE,
+    PERIOD,
+    PLAIN,
+    axis_of,
+    built_dataset,
+    built_fit,
+    built_motion,
+    fitted,
+    pushed,
+)
 
+from identify.dataset.prepared_log import PreparedLog
 from identify.estimation import thorough_fit
-from identify.estimation import variable_projection as search
-from identify.estimation.fit import Outcome, finished
+from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.thorough_fit import (
     _is_nearest,
@@ -146,22 +156,25 @@ def test_a_law_is_silent_where_the_motion_does_not_reach_it():
         assert start.is_silent is silent
 
 
-@pytest.mark.parametrize("worth", [True, False])
-def test_what_is_silent_on_the_heads_is_tried_on_all_of_the_logs(monkeypatch, worth):
-    """Whatever the best of the others gains; the heads' order tells nothing of the silent ones."""
-    on_heads = [of_shape(i, {"low": i}, silent=i in (0.0, 3.0, 5.0)) for i in np.arange(6.0)]
-    left = {0.0: 9.0, 3.0: 8.0, 5.0: 1.0}  # of squared error on all of the logs; others: 7 N^2
-
-    def tried(ground, shape, strengths):
-        assert ground == "whole"
-        return of_shape(left.get(shape["low"], 7.0 + 0.1 * shape["low"]), shape)
-
-    monkeypatch.setattr(search, "with_what_repeats", lambda base, dataset: SEEN)
-    monkeypatch.setattr(search, "tried_shapes", lambda e, x: ({"low": i} for i in range(6)))
-    monkeypatch.setattr(search, "_best", lambda *_: on_heads)
-    monkeypatch.setattr(search, "_try", tried)
-    monkeypatch.setattr(search, "_beyond_chance", lambda base, start: worth)
-    grounds = SimpleNamespace(of=lambda *_, on_heads: "head" if on_heads else "whole")
-    monkeypatch.setattr(search, "_Ground", grounds)
-    found = starts("base", "dataset", CATALOGUE["end_stop"])
-    assert [s.shape["low"] for s in found] == [5.0, 1.0]
+def test_a_stop_that_only_a_late_move_reaches_is_the_first_start():
+    """The heads, on which no strength of it makes a force, tell nothing of it."""
+    plain = built_motion("late", 10.0)
+    time = PERIOD * np.arange(len(plain.position))
+    turn = 2.0 * np.pi * np.clip(time - 8.5, 0.0, 1.5) / 1.5
+    x = plain.position + 0.04 * np.sin(turn) * (1.0 - np.cos(turn))
+    v = np.gradient(x, PERIOD)
+    u = plain.command + 5.3 * np.gradient(v - plain.velocity, PERIOD)
+    motion = replace(plain, signals=np.stack([x, v, u]), raw=np.stack([v, u]))
+    low, high = (x.min() + 0.05 * np.ptp(x), x.max() - 0.05 * np.ptp(x))
+    stopped = pushed(motion, fitted("end_stop", low=low, high=high, stiffness=2000.0))
+    covered = replace(SEEN, position_low=float(x.min()), position_high=float(x.max()))
+    dataset = replace(
+        built_dataset(), fit=(PreparedLog.of(stopped, 0.04),), covered=lambda: covered
+    )
+    (head,) = dataset.heads
+    found = starts(fit_axis(PLAIN, dataset.fit), dataset, CATALOGUE["end_stop"])
+    first = found[0].shape
+    assert first["low"] < head.motion.position.min()
+    assert first["high"] > head.motion.position.max()
+    assert not found[0].is_silent
+    assert (first["low"], first["high"]) == pytest.approx((low, high), abs=0.03 * np.ptp(x))
