@@ -125,13 +125,20 @@ def noise_gain(residual: Array, before: float, after: float) -> float:
     return float(power / before**2 - power / after**2 - 2.0 * np.log(after / before))
 
 
-def left_out(residual: Array, jacobian: Array, scale: Array, blocks: int = BLOCKS) -> Array:
+def left_out(
+    residual: Array,
+    jacobian: Array,
+    scale: Array,
+    blocks: int = BLOCKS,
+    penalty: Array | float = 0.0,
+) -> Array:
     """Residual (n,) by cross-validation: each block predicted by a fit to the other blocks.
 
     Exact for a model linear in its parameters: (I - H_bb)^-1 r_b with the hat matrix H. scale (k,):
-    weight of the priors in units of the columns, which keeps the inverse finite.
+    weight of the priors in units of the columns, which keeps the inverse finite. penalty (k, k): of
+    what is smoothed.
     """
-    information = jacobian.T @ jacobian + np.diag(scale**2)
+    information = jacobian.T @ jacobian + np.diag(scale**2) + penalty
     out = residual.copy()
     for span in blocks_of(len(residual), blocks):
         block = jacobian[span]

@@ -121,11 +121,17 @@ class Judged:
         fit, logs = self.fit, self.dataset.holdout
         if not logs:
             columns, out = fit.jacobian, np.full(len(fit.kept), np.nan)
-            weak = RIDGE * np.linalg.norm(columns, axis=0)
-            out[fit.kept] = left_out(fit.residual, columns, weak) / fit.lessened
+            weak, rows = RIDGE * np.linalg.norm(columns, axis=0), self._smoothing
+            left = left_out(fit.residual, columns, weak, penalty=rows.T @ rows)
+            out[fit.kept] = left / fit.lessened
             return out
         kept = moving(logs, sticks(fit.axis))
         return np.where(kept, residual(fit.axis, logs) / fit.lessened, np.nan)
+
+    @property
+    def _smoothing(self) -> Array:
+        """Penalty rows (m, k) of the free curves of the fit, N per unit."""
+        return smoothing(self.fit.axis, self.fit.scaling.where, len(self.fit.residual))
 
     @cached_property
     def other_error(self) -> float:
@@ -144,7 +150,7 @@ class Judged:
         fit, where = self.fit, self.fit.scaling.where
         if not has_nonparametric(fit.axis):
             return float(len(where))
-        gram, rows = fit.jacobian.T @ fit.jacobian, smoothing(fit.axis, where, len(fit.residual))
+        gram, rows = fit.jacobian.T @ fit.jacobian, self._smoothing
         return float(np.trace(solve(gram + rows.T @ rows, gram)))
 
     @property

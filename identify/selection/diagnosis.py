@@ -134,7 +134,9 @@ def _proved(found: Found) -> tuple[Found, tuple[Finding, ...]]:
     """What was found and is accepted beside all else at the end, the weakest left out first."""
     found = _with_own_noise(found)
     findings = findings_of(found)
-    doubted = [f for f in findings if replace(f.score, among=1).refused]
+    # A curve whose band holds the law everywhere tells nothing beside other findings.
+    sure = [f for f in findings if f.is_sure] or findings
+    doubted = [f for f in findings if replace(f.score, among=1).refused or f not in sure]
     if not doubted:
         return found, findings
     weakest = min(doubted, key=lambda f: f.score.part).effect

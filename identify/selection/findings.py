@@ -67,6 +67,13 @@ class Finding:
         return self.tested.on is Role.TEST and self.tested.after >= self.tested.before
 
     @property
+    def is_sure(self) -> bool:
+        """Whether a wrong shape differs from the law somewhere by more than its band."""
+        if self.kind is not FindingKind.WRONG_SHAPE or self.shape is None or self.bend:
+            return True
+        return self.shape.differs
+
+    @property
     def confidence(self) -> float | None:
         """How often such an answer was right, 0..1; None where test logs contradict it."""
         return None if self.contradicted else confidence(self.score.part)

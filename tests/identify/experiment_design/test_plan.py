@@ -125,7 +125,7 @@ def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
     for seed in range(1, 7):
         poor, held = poorly_logged(case, machine, seed)
         before = diagnose(case.stage, poor, held, catalogue=catalogue, test_function=WINDOW)
-        if abs(separation(before.axes["x"].ranking)) < RULE.least_separation:
+        if abs(separation(before.axes["x"].ranking)) < RULE.least_bic:
             break
     else:
         pytest.fail("the poor motion tells the two apart")
@@ -148,7 +148,7 @@ def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
     after = diagnose(case.stage, logs, held, catalogue=catalogue, test_function=WINDOW).axes["x"]
     assert after.verdict is Verdict.MISSING_EFFECTS
     assert after.ranking[0].effect.name == truth
-    assert separation(after.ranking) > RULE.least_separation
+    assert separation(after.ranking) > RULE.least_bic
 
 
 @pytest.mark.slow
@@ -225,7 +225,7 @@ def assert_only_what_a_refit_leaves_counts() -> None:
     other = replace(x.with_effect(effect("lugre", **lugre)), mass=15.2)
     arena = Arena(stage, "x", (Explanation("a", x), Explanation("b", other)), test_function=WINDOW)
     for trial in contest(arena, proposals(stage, "x", 4.0)[0])[0]:
-        assert trial.gain < RULE.least_separation
+        assert trial.gain < RULE.least_bic
 
 
 def test_only_what_a_refit_leaves_counts(monkeypatch):

@@ -213,13 +213,7 @@ def test_parts_that_were_not_chosen_are_zero_and_held(about):
     assert "found nothing to depend on" in nonparametric_in_words(empty)
 
 
-NOT_SMOOTHED = pytest.mark.xfail(
-    strict=True,
-    reason="where a block alone visits a place, the smoothing is left out: part -3e10",
-)
-
-
-@pytest.mark.parametrize("held", [("held",), pytest.param((), marks=NOT_SMOOTHED)])
+@pytest.mark.parametrize("held", [("held",), ()])
 def test_curves_count_as_many_parameters_as_they_are_worth(held):
     dataset = built_machine(built_dataset("run", held=held), PLAIN, lambda x, turn: 40.0 * x**2)
     made = fit_nonparametric(fit_axis(PLAIN, dataset.fit), dataset, MAP)
