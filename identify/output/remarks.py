@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from identify.estimation.decision import RULE
 from identify.estimation.fit import Outcome
-from identify.output.words.estimation import outcome_in_words, prepared_in_words
+from identify.output.words.estimation import (
+    aliasing_in_words,
+    outcome_in_words,
+    prepared_in_words,
+)
 from identify.output.words.numbers import PLAIN, Numbers, listed
 from identify.output.words.selection import (
     also_chose_in_words,
@@ -40,6 +44,8 @@ def remarks_on(result: Diagnosis, axis: str, numbers: Numbers = PLAIN) -> tuple[
             "no log was held out, so candidates were judged by cross-validation on blocks of the "
             "training logs, which is a weaker test. Give --holdout a log of another experiment."
         )
+    if aliased := aliasing_in_words(found.final.noise, found.base.axis.units, numbers):
+        out.append(aliased)
     if found.verdict is Verdict.NOTHING_MISSING and (beyond := _beyond_in_words(told)):
         out.append(words(beyond))
     if found.findings and (also := also_chose_in_words(found.dataset.tested_on)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.floor import NoiseFloor
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import (
     AlwaysAtRest,
@@ -16,7 +17,8 @@ from identify.estimation.intervals import (
     OpenSided,
 )
 from identify.estimation.simulated_motion import MotionFit
-from twin.model.units import units_of
+from identify.output.words.numbers import PLAIN, Numbers
+from twin.model.units import AxisUnits, units_of
 
 WORTH_SAYING = 0.05  # part of a held-out log beyond the fit logs that a reader should know of
 OUTCOMES = {
@@ -147,4 +149,17 @@ def channel_delay_in_words(dataset: Dataset) -> str | None:
     return (
         f"axis {dataset.axis}: the {words('force')} acts {1e6 * dataset.channel_delay:.0f} us "
         f"({samples:.2f} samples) before its time stamp, {why}"
+    )
+
+
+def aliasing_in_words(noise: NoiseFloor, units: AxisUnits, numbers: Numbers = PLAIN) -> str | None:
+    """That thinning the log made most of its noise, and what to log; None where it did not."""
+    folded = noise.parts.get("aliasing", 0.0)
+    if folded**2 < 0.5 * noise.value**2 or folded == 0.0:
+        return None
+    return (
+        f"{numbers.amount(folded, units.force)} of the noise floor of "
+        f"{numbers.amount(noise.value, units.force)} is the command's fast part, which the log "
+        "keeps only every few samples of the controller: log at the control rate, or the drive's "
+        "averaged current"
     )

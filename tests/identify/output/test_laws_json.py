@@ -11,6 +11,7 @@ import pytest
 from built_fits import CATALOGUE, NOISE
 from strict_json import expected_refit, strict
 
+from identify.dataset.floor import NoiseFloor
 from identify.output.as_json import (
     add_json,
     compare_json,
@@ -18,10 +19,15 @@ from identify.output.as_json import (
     plan_json,
 )
 from identify.output.machine_json import check_json, effect_json
-from identify.output.words.estimation import no_interval_in_words, outcome_in_words
+from identify.output.words.estimation import (
+    aliasing_in_words,
+    no_interval_in_words,
+    outcome_in_words,
+)
 from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.validation import loop_in_words, region_in_words
 from twin.log.check import CheckReport, Fault, Finding, Severity
+from twin.model.units import LINEAR
 
 
 def test_what_is_not_finite_is_null_at_any_depth():
@@ -198,3 +204,13 @@ def test_a_check():
     ]  # fmt: skip
     assert strict(check_json({"a": CheckReport((mild,))}))["ok"] is True
     assert check_json({}) == {"ok": True, "logs": {}}
+
+
+@pytest.mark.parametrize(("folded", "told"), [(0.038, True), (0.02, False), (0.0, False)])
+def test_a_thinned_log_is_told_with_what_to_log_instead(folded: float, told: bool) -> None:
+    noise = NoiseFloor(0.04, 0.03, 0.05, {"sensors": 0.01, "aliasing": folded})
+    said = aliasing_in_words(noise, LINEAR)
+    assert (said is not None) is told
+    if said is not None:
+        assert "0.038 N of the noise floor of 0.04 N" in said
+        assert "log at the control rate, or the drive's averaged current" in said
