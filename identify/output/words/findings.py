@@ -150,6 +150,11 @@ def shape_in_words(effect: str, shape: FoundShape, numbers: Numbers = PLAIN) -> 
     """Where a law surely differs most from the curve found, and what that does at standstill."""
     sure = {name: np.abs(c.found - c.assumed) - c.band for name, c in shape.curves.items()}
     direction = max(sure, key=lambda name: np.nanmax(sure[name]))
+    if not shape.differs:
+        return (
+            f"At no single {shape.over.value} does the curve for {effect} differ from its law by "
+            "more than its 90 % band."
+        )
     curve, at = shape.curves[direction], int(np.nanargmax(sure[direction]))
     unit, band = shape.force_unit, numbers.amount(float(curve.band[at]), shape.force_unit)
     assumed, found = numbers.change(float(curve.assumed[at]), float(curve.found[at]), unit)
