@@ -44,7 +44,7 @@ def remarks_on(result: Diagnosis, axis: str, numbers: Numbers = PLAIN) -> tuple[
             "no log was held out, so candidates were judged by cross-validation on blocks of the "
             "training logs, which is a weaker test. Give --holdout a log of another experiment."
         )
-    if aliased := aliasing_in_words(found.final.noise, found.base.axis.units, numbers):
+    if aliased := told.noise and aliasing_in_words(told.noise, found.base.axis.units, numbers):
         out.append(aliased)
     if found.verdict is Verdict.NOTHING_MISSING and (beyond := _beyond_in_words(told)):
         out.append(words(beyond))

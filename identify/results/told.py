@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from identify.dataset.floor import NoiseFloor
 from identify.dataset.given_logs import Role
 from identify.dataset.noise_floor import floor_of
 from identify.estimation.errors import Errors, error_in
@@ -23,7 +24,7 @@ class Told:
     floors: noise floor of the final model on the logs of each role, N RMS, the only one that is
     told: never more than what the model leaves there, as noise is part of that. selection_ratio:
     error of the model without what was found on the selection logs over their noise floor; None
-    where there are none.
+    where there are none. noise: the floor on the training logs with its parts.
     """
 
     before: tuple[Estimate, ...]
@@ -33,6 +34,7 @@ class Told:
     chosen: Errors
     floors: Mapping[Role, float]
     selection_ratio: float | None = None
+    noise: NoiseFloor | None = None
 
     @property
     def floor(self) -> float:
@@ -56,4 +58,5 @@ def told_of(found: AxisDiagnosis) -> Told:
         chosen=found.chosen,
         floors=floors,
         selection_ratio=judged.other_error / judged.other_floor if dataset.holdout else None,
+        noise=final.noise,
     )

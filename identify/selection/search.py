@@ -48,7 +48,7 @@ from twin.parallel import counting, spread
 
 Progress = Callable[[int, int], None]
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
-AS_MUCH = 0.66  # of the part of a free curve, whose ten numbers are any law's: such a law goes first
+AS_MUCH = 0.66  # of the part of a free curve, whose ten numbers are any law's: it goes first
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
 SETTLED = 0.999  # of the error, below which another refit is a better optimum
 
