@@ -133,7 +133,10 @@ LAAS = (
     ),
     Case(
         "LAAS: friction, one speed", real_machines.laas_speed, having("laas", *cogging(72, 12)),
-        Expected((*FRICTIONS, "viscous_friction"), ("constant_force",), known=("cogging",)),
+        Expected(
+            (*FRICTIONS, "viscous_friction"), ("constant_force",), known=("cogging",),
+            known_shapes=("cogging",),
+        ),
     ),
     Case(
         "LAAS: friction, reversals", real_machines.laas_accelerations,
