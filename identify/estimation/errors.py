@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import forces_lessened
 from identify.dataset.given_logs import Role
 from identify.dataset.prepared_log import moving, sticks
-from identify.estimation.evidence import Gain, held_out_gain, rms
+from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on
-from identify.estimation.force_balance import residual
 
 
 @dataclass(frozen=True)
@@ -42,22 +40,3 @@ def error_if_any(role: Role, fit: Fit, dataset: Dataset) -> float | None:
 def holdout_error(fit: Fit, dataset: Dataset) -> float | None:
     """RMS force error on the held-out logs in N, or None where there are none."""
     return error_if_any(Role.SELECTION, fit, dataset)
-
-
-def gain_held_out(before: Fit, after: Fit, dataset: Dataset) -> Gain | None:
-    """What a fit takes of another's error on the held-out logs; None where none can say it.
-
-    On the test functions that both can use. An effect that makes the motor's force small makes
-    every force and error small with it.
-    """
-    if not dataset.holdout:
-        return None
-    held = moving(dataset.holdout, sticks(before.axis) or sticks(after.axis))
-    if not held.any():
-        return None
-    motions = [log.motion for log in dataset.holdout]  # it may differ from the fit logs
-    pair = [
-        residual(f.axis, dataset.holdout)[held] / forces_lessened(f.axis, motions)
-        for f in (before, after)
-    ]
-    return held_out_gain(pair[0], pair[1], before.floor)

@@ -56,16 +56,6 @@ class Evidence:
         """BIC before minus BIC after the addition; positive supports it."""
         return float(self.samples * self.log_gain - self.parameters * np.log(self.samples))
 
-    def over(self, other: Evidence) -> float:
-        """Difference of BIC between two larger models; positive where this one is better.
-
-        Both use the smaller of the two sample sizes. Each is an estimate, and where both gains are
-        large, its error of a part in a thousand would count as evidence.
-        """
-        samples = min(self.samples, other.samples)
-        gained = self.log_gain - other.log_gain
-        return float(samples * gained - (self.parameters - other.parameters) * np.log(samples))
-
 
 def evidence(before: Array, after: Array, parameters: int) -> Evidence:
     """Evidence from residuals before and after (n,) N on the same samples."""
@@ -90,11 +80,6 @@ class Gain:
     def left(self) -> float:
         """Part of the squared error that is left."""
         return (self.after / self.before) ** 2 if self.before > 0.0 else 1.0
-
-    @property
-    def falls(self) -> bool:
-        """Whether the error falls."""
-        return self.after < self.before
 
 
 def held_out_gain(before: Array, after: Array, floor: float) -> Gain:

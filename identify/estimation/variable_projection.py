@@ -18,14 +18,13 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.decision import RULE
-from identify.estimation.fit import Fit, Outcome
+from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.levenberg_marquardt import minimise
-from identify.estimation.scaling import Scaling
 from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.effect import Effect, Excitation, Kind, Parameter
 from twin.model.machine import AxisModel, Fitted
-from twin.model.parameters import ParameterReference, read, write
+from twin.model.parameters import ParameterReference, read
 
 Array = NDArray[np.float64]
 
@@ -153,31 +152,6 @@ def _unlike(found: Sequence[Start]) -> list[Start]:
     """
     others = (s for s in found[1:] if not s.shape.items() & found[0].shape.items())
     return [found[0], *itertools.islice(others, REFINED_STARTS - 1)]
-
-
-def one_linear_step(base: Fit, start: Start) -> Fit:
-    """The base with the effect at this start, as a linear step of both predicts it.
-
-    The residual is the predicted one, so that nothing is walked. What a linear step of the base
-    alone would take of it remains, or that would count for the effect.
-    """
-    left = start.left + base.residual - base.unabsorbed
-    where = base.scaling.where
-    norms = np.linalg.norm(base.jacobian, axis=0)
-    norms[norms == 0.0] = np.inf  # a knot of a curve that the motion does not reach stays
-    columns = base.jacobian / norms
-    followed = columns.T @ (left - start.force)
-    step = np.linalg.lstsq(columns.T @ columns, followed, rcond=1e-12)[0] / norms
-    lower, upper = np.array(base.scaling.limits).reshape(-1, 2).T
-    moved = write(base.axis, where, np.clip(read(base.axis, where) + step, lower, upper))
-    axis = moved.with_effect(start.fitted)
-    return replace(
-        base,
-        axis=axis,
-        scaling=Scaling.of(axis, base.logs),
-        outcome=Outcome.NOT_CONVERGED,
-        residual=left,
-    )
 
 
 def with_what_repeats(base: Fit, dataset: Dataset) -> Excitation:

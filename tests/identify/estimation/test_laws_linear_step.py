@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from built_fits import CATALOGUE, built_dataset
 
-from identify.estimation.fit import Outcome
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import (
     _bounded_step,
     _Ground,
     _try,
-    one_linear_step,
 )
 from twin.effect import Excitation
 from twin.model.machine import Fitted
@@ -133,47 +129,3 @@ def test_a_ground_on_the_heads_is_that_part_of_the_whole(base, monkeypatch):
     np.testing.assert_allclose(head.basis.T @ head.basis, np.eye(head.basis.shape[1]), atol=1e-9)
     columns = base.jacobian[rows]
     np.testing.assert_allclose(head.basis @ (head.basis.T @ columns), columns, atol=1e-6)
-
-
-def test_the_base_moves_along_by_one_linear_step_within_its_bounds(dataset, base):
-    effect = CATALOGUE["cable_slab"]
-    ground = _Ground.of(base, dataset, effect, SEEN, on_heads=False)
-    start = _try(ground, {}, effect.strengths)
-    found = one_linear_step(base, start)
-    assert found.axis.names == (*base.axis.names, "cable_slab")
-    assert found.axis["cable_slab"] == start.fitted
-    assert len(found.scaling.where) == len(base.scaling.where) + len(effect.strengths)
-    assert (found.outcome, found.begun) == (Outcome.NOT_CONVERGED, base.begun)
-    # What the base could take by itself is no gain of the effect: it remains.
-    own = base.residual - base.unabsorbed
-    np.testing.assert_allclose(found.residual, start.left + own, rtol=0, atol=1e-12)
-    # All is linear here, so what is predicted is what a walk gives, and normal to the columns.
-    np.testing.assert_allclose(
-        found.residual, residual(found.axis, dataset.fit)[base.kept], atol=1e-3 * base.error
-    )
-    norms = np.linalg.norm(base.jacobian, axis=0)
-    moved = base.jacobian.T @ (found.residual - own) / norms
-    np.testing.assert_allclose(moved, 0.0, atol=1e-3)
-    assert found.axis.mass != base.axis.mass
-    tight = replace(base, residual=base.residual)
-    tight.__dict__["jacobian"] = base.jacobian * -1e-9  # steps of a huge size, the wrong way
-    far = one_linear_step(tight, start).axis
-    for f in far.effects[:2]:
-        for p in f.effect.parameters:
-            assert p.lower <= f.values[p.name] <= p.upper
-
-
-def test_what_the_motion_does_not_reach_stays_in_a_linear_step(dataset, base):
-    """As the outer knots of a curve: their columns are nothing, and so is their step."""
-    effect = CATALOGUE["cable_slab"]
-    start = _try(
-        _Ground.of(base, dataset, effect, SEEN, on_heads=False), {}, effect.strengths
-    )  # fmt: skip
-    unseen = next(i for i, c in enumerate(base.scaling.where) if c.effect == "constant_force")
-    partly = replace(base, residual=base.residual)
-    columns = base.jacobian.copy()
-    columns[:, unseen] = 0.0
-    partly.__dict__["jacobian"] = columns
-    found = one_linear_step(partly, start).axis
-    assert found["constant_force"].values == base.axis["constant_force"].values
-    assert found.mass != base.axis.mass
