@@ -19,6 +19,8 @@ from identify.selection.findings import Finding, FindingKind, findings_of, witho
 from identify.selection.search import Found, Progress, Step, Tried, is_level, search
 from twin.effects import Catalogue
 
+SEEN = (3.0, 0.02)  # t and part from which a change is real, and worth a word, though too small
+
 
 class Verdict(Enum):
     """The answer of a diagnosis."""
@@ -185,9 +187,7 @@ def _compared_again(step: Step, found: Found) -> Step:
 
 def _small(found: Found) -> tuple[str, ...]:
     """Effects that the data show beside what was found, each too small to matter."""
-    out = []
-    for tried in found.last:
-        own = tried.candidate.score
-        if own and own.t > 3.0 and own.part > 0.02 and tried.candidate.doubt is None:
-            out.append(tried.change.name)
-    return tuple(out) if found.final.at_floor is False else ()
+    if found.final.at_floor:
+        return ()
+    scored = [(t, s) for t in found.last if (s := t.candidate.score) and not t.candidate.doubt]
+    return tuple(t.change.name for t, s in scored if s.t > SEEN[0] and s.part > SEEN[1])

@@ -50,6 +50,7 @@ Progress = Callable[[int, int], None]
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
 AS_MUCH = 0.66  # of the part of a free curve, whose ten numbers are any law's: it goes first
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
+MAY_HELP = 1.0  # t from which a change that is refused alone is followed one round further
 SETTLED = 0.999  # of the error, below which another refit is a better optimum
 
 
@@ -120,7 +121,8 @@ def search(
 
 def _begun(base: Fit, dataset: Dataset) -> Found:
     """What is found before a search."""
-    return Found(dataset, Judged(base, dataset), Judged(base, dataset), (), (), (), ())
+    judged = Judged(base, dataset)
+    return Found(dataset, judged, judged, (), (), (), ())
 
 
 def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
@@ -317,12 +319,10 @@ def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried
     axis = best.change.undone(best.judged.fit.axis, judged.fit.axis)
     if axis is None or best.candidate.part > NEARLY_ALL:
         return judged, tried
-    refitted = replace(fit_axis(axis, judged.dataset.fit), begun=judged.fit.begun)
-    if refitted.error > SETTLED * judged.fit.error:
+    refitted = _refitted_on(axis, judged, judged)
+    if refitted.fit.error > SETTLED * judged.fit.error:
         return judged, tried
-    judged = Judged(refitted, judged.dataset)
-    again = [_scored_again(judged, t) for t in tried]
-    return judged, again
+    return refitted, [_scored_again(refitted, t) for t in tried]
 
 
 def _scored_again(judged: Judged, tried: Tried) -> Tried:
@@ -360,7 +360,7 @@ def _together(judged: Judged, tried: Sequence[Tried], catalogue: Catalogue) -> l
         found = t.candidate
         return bool(
             found.score and not found.doubt
-            and found.part > RULE.promise * RULE.least_part and found.score.t > 1.0
+            and found.part > RULE.promise * RULE.least_part and found.score.t > MAY_HELP
         )  # fmt: skip
 
     ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[:LEADERS]
