@@ -55,6 +55,10 @@ class Change(Protocol):
     def name(self) -> str:
         """Name of the effect that it is about."""
 
+    @property
+    def effect(self) -> Effect:
+        """The effect that it adds or changes; of a free curve the curve itself."""
+
     def look(self, judged: Judged, trial: Trial) -> Look:
         """One linear step beside a fit."""
 
@@ -166,6 +170,10 @@ class Reshaped:
     @property
     def name(self) -> str:
         return self.shape.effect
+
+    @property
+    def effect(self) -> Effect:
+        return self.shape.empty.effect
 
     def look(self, judged: Judged, trial: Trial) -> Look:
         columns, resting = self.columns(judged, judged)

@@ -276,15 +276,11 @@ def judged_change(judged: Judged, look: Look, fit: Fit, among: int = 1) -> Tried
     change, after = look.change, Judged(fit, judged.dataset)
     if not fit.at_floor:
         after = _settled(after)
-    found = candidate_of(judged, after, _effect(change), parameters(change), among)
+    found = candidate_of(judged, after, change.effect, parameters(change), among)
     if found.supported and found.score:
         taken = control(change, judged, after)
         found = replace(found, score=replace(found.score, control=taken))
     return Tried(change, look, after, found)
-
-
-def _effect(change: Change) -> Effect:
-    return change.shape.empty.effect if isinstance(change, Reshaped) else change.effect  # type: ignore[attr-defined]
 
 
 def parameters(change: Change) -> tuple[str, ...]:
@@ -298,7 +294,7 @@ def _as_looked(judged: Judged, look: Look) -> Candidate:
     """An absent effect that was not refitted, as its linear step predicts it."""
     axis = look.axes[0]
     fit = replace(judged.fit, axis=axis, scaling=Scaling.of(axis, judged.fit.logs))
-    return Candidate.looked(judged, fit, look.change.effect, look.promise)  # type: ignore[attr-defined]
+    return Candidate.looked(judged, fit, look.change.effect, look.promise)
 
 
 def as_noise(judged: Judged, effect: Effect) -> Tried:
