@@ -22,7 +22,7 @@ from twin.signals import between, local_parabola
 Array = NDArray[np.float64]
 
 LESSENED = 0.5  # of the commanded force; below it errors are divided by actual over commanded
-KEPT = 8  # true motions of logs
+KEPT = 8  # true motions of logs, and as many actual forces
 PASSES = 3  # iterations from a reading to the true position
 
 
@@ -38,11 +38,14 @@ def is_noise(effect: Effect) -> bool:
 
 def actual_force(axis: AxisModel, motion: Motion) -> Array:
     """The command after the axis' actuation effects, (n,) N at the log's own rate."""
-    command = motion.raw[1]
     part = parts_of(axis, Kind.ACTUATION)
-    if not part.effects:
-        return command
-    return command + _added(part, motion, motion.at_samples(0.5), motion.sample_period)
+    return _behind_command(_Valued.of(part), motion) if part.effects else motion.raw[1]
+
+
+@lru_cache(maxsize=KEPT)  # while a fit moves other parameters, the actual force stays
+def _behind_command(actuation: _Valued, motion: Motion) -> Array:
+    fine = motion.at_samples(0.5)
+    return motion.raw[1] + _added(actuation.axis, motion, fine, motion.sample_period)
 
 
 def forces_lessened(axis: AxisModel, motions: Sequence[Motion]) -> float:
@@ -72,11 +75,22 @@ def _added(actuation: AxisModel, motion: Motion, signals: Array, period: float) 
 
 
 @dataclass(frozen=True)
-class _Sensing:
-    """Sensing effects of an axis, the same where their names and values are."""
+class _Valued:
+    """Effects of an axis, the same where their names and values are, and the mass if they read it.
+
+    values: of each effect, its name and vector of values.
+    """
 
     values: tuple[tuple[str, tuple[float, ...]], ...]
+    mass: float | None
     axis: AxisModel = field(compare=False)
+
+    @classmethod
+    def of(cls, axis: AxisModel) -> _Valued:
+        """All effects of an axis."""
+        values = tuple((f.effect.name, tuple(f.vector())) for f in axis.effects)
+        heavy = any(f.effect.reads(slot) for f in axis.effects for slot in ("MASS", "MOVED"))
+        return cls(values, axis.mass if heavy else None, axis)
 
 
 def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
@@ -87,12 +101,11 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
     sensing = [f for f in axis.effects if f.effect.kind is Kind.SENSING and not is_noise(f.effect)]
     if not sensing:
         return motion, np.broadcast_to(0.0, motion.raw.shape[1])
-    values = tuple((f.effect.name, tuple(f.vector())) for f in sensing)
-    return _behind(_Sensing(values, replace(axis, effects=tuple(sensing))), motion)
+    return _behind(_Valued.of(replace(axis, effects=tuple(sensing))), motion)
 
 
 @lru_cache(maxsize=KEPT)  # while a fit moves other parameters, the true motion stays
-def _behind(sensing: _Sensing, motion: Motion) -> tuple[Motion, Array]:
+def _behind(sensing: _Valued, motion: Motion) -> tuple[Motion, Array]:
     error, rate = reading_error(sensing.axis, motion)
     blocks = motion.signals.copy()
     for block, at_samples in zip(blocks, (error, rate), strict=False):

@@ -162,7 +162,7 @@ class Motion:
         travelled *= instant - 0.5
         return middle + travelled
 
-    @property
+    @cached_property
     def smoothed_position(self) -> Array:
         """Position (n,) m at the start of each sample, smoothed."""
         return local_parabola(self.position_at_samples(0.0), SMOOTHED)

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,8 @@ BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to t
 BAND_OF_BOTH = 0.25  # its end beside a measured velocity, whose noise vanishes towards 0.5
 LOUDER = 2.0  # times the power of the quietest log, beyond which it is no noise: estimates scatter
 PLAIN = 3.0  # times the reading's noise where the band begins; above it the force's noise shows
+
+_SLOW_ROUNDING: WeakKeyDictionary[Motion, dict[int, Array]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,10 +149,14 @@ def passed(
 def slow_rounding(motion: Motion, segment: int) -> Array:
     """One-sided power (segment // 2 + 1,) m^2/Hz of the slow steps of the readings' rounding.
 
-    At speed rounding is white and already in the median spectrum; its slow steps are not.
+    At speed rounding is white and already in the median spectrum; its slow steps are not. It is a
+    property of the log alone, which every fit asks for, and kept as long as the log is.
     """
-    pieces = _less_lines(pieces_of(motion.rounding, segment))
-    return np.asarray(densities(pieces, motion.sample_period).mean(axis=0))
+    known = _SLOW_ROUNDING.setdefault(motion, {})
+    if segment not in known:
+        pieces = _less_lines(pieces_of(motion.rounding, segment))
+        known[segment] = np.asarray(densities(pieces, motion.sample_period).mean(axis=0))
+    return known[segment]
 
 
 def _white_rounding(motion: Motion) -> float:

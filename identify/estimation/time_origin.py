@@ -100,6 +100,8 @@ def without_timed_forces(axis: AxisModel, log: PreparedLog) -> AxisModel:
 
 
 def _set(log: PreparedLog, time_origin: float) -> PreparedLog:
+    if log.motion.time_origin == time_origin:
+        return log  # with all that was computed of it
     return replace(log, motion=replace(log.motion, time_origin=time_origin))
 
 

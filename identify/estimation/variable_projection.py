@@ -29,12 +29,13 @@ from twin.model.parameters import ParameterReference, read
 Array = NDArray[np.float64]
 
 RIDGE = 1e-4  # keeps the linear step finite along directions that the base explains already
-MANY_SHAPES = 100  # of which every other value is tried first, then what is beside the best
+MANY_SHAPES = 50  # of which every other value is tried first, then what is beside the best
 BESIDE = 4  # best shapes whose neighbours are tried
 RESCORED_SHAPES = 12  # best shapes of a coarse scan that are tried with every strength
 CHANCE = 4.0  # twice the gain in log likelihood, for each strength, that a scan of noise finds
 FULL_SHAPES = 4  # best shapes on the logs' heads that are tried on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
+FURTHER = 10.0  # times the squared error of the first, from which a start is not fitted
 EXACT = 1e-13  # relative fall of the squared error below which strengths within bounds are found
 MOST_STEPS = 100
 
@@ -87,7 +88,7 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     head = _Ground.of(base, dataset, effect, excitation, on_heads=True)
     coarse = [p for p in effect.strengths if p.screened]
     if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
-        found = _best(head, found, coarse, RESCORED_SHAPES)
+        found = _scanned(head, found, coarse)[:RESCORED_SHAPES]
     found = _scanned(head, found, effect.strengths)
     if effect.kind is Kind.FRICTION:
         return _unlike(found)
@@ -149,8 +150,10 @@ def _unlike(found: Sequence[Start]) -> list[Start]:
     """The first of some starts, and the next that shares no value of its shape, where one does.
 
     The linear step ranks stiffnesses poorly where all are far off; each may lead to another fit.
+    One that is much further off than the first does not.
     """
-    others = (s for s in found[1:] if not s.shape.items() & found[0].shape.items())
+    near = (s for s in found[1:] if s.squared_error < FURTHER * found[0].squared_error)
+    others = (s for s in near if not s.shape.items() & found[0].shape.items())
     return [found[0], *itertools.islice(others, REFINED_STARTS - 1)]
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import permutations
 
 import numpy as np
@@ -92,6 +93,19 @@ class Arena:
     explanations: tuple[Explanation, ...]
     logs: tuple[PreparedLog, ...] = ()
     test_function: float | None = None
+
+    @cached_property
+    def known(self) -> list[Array]:
+        """Of each explanation, residual and Jacobian (n, 1 + k) on the existing logs."""
+        return [_answer(e.axis, self.logs) for e in self.explanations]
+
+    def answers(self, logs: Sequence[PreparedLog]) -> list[Array]:
+        """The same on ``logs_with`` a new one: that of the existing logs is computed once."""
+        old, new = logs[:-1], logs[-1:]
+        same = all(a is b for a, b in zip(old, self.logs, strict=True))
+        known = self.known if same else [_answer(e.axis, old) for e in self.explanations]
+        pairs = zip(known, self.explanations, strict=True)
+        return [np.concatenate([own, _answer(e.axis, new)]) for own, e in pairs]
 
     def record(self, truth: Explanation, experiment: Experiment) -> Motion:
         """The log that the experiment would give if ``truth`` were true, with measurement noise.
@@ -181,8 +195,8 @@ def _discriminating(arena: Arena, experiment: Experiment, motion: Motion) -> Sim
     new = logs[-1]
     axes = [e.axis for e in arena.explanations]
     kept = moving(logs, any(map(sticks, axes)))
-    forces = [residual(axis, logs)[kept] for axis in axes]
-    bases = [refit_basis(axis, logs, kept) for axis in axes]
+    answers = [answer[kept] for answer in arena.answers(logs)]
+    forces, bases = [a[:, 0] for a in answers], [orthonormal(a[:, 1:]) for a in answers]
     # The new log was simulated with the first explanation: only its residual there is noise.
     noise = unabsorbed(forces[0], bases[0])
     found = []
@@ -240,12 +254,12 @@ def _spread(values: Array, kept: NDArray[np.bool_]) -> Array:
     return out
 
 
-def refit_basis(axis: AxisModel, logs: Sequence[PreparedLog], kept: NDArray[np.bool_]) -> Array:
-    """Orthonormal basis (n, r) of the forces that a refit of the axis can reproduce."""
+def _answer(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
+    """Residual and Jacobian (n, 1 + k) of an axis on logs."""
     where = free_parameters(axis)
-    if not where:
-        return np.zeros((int(kept.sum()), 0))
-    return orthonormal(jacobian(axis, logs, where)[kept])
+    if not logs:
+        return np.zeros((0, 1 + len(where)))
+    return np.column_stack([residual(axis, logs), jacobian(axis, logs, where)])
 
 
 def refitted(arena: Arena, simulated: SimulatedExperiment) -> SimulatedExperiment:
@@ -254,22 +268,31 @@ def refitted(arena: Arena, simulated: SimulatedExperiment) -> SimulatedExperimen
     The linear step of `contest` is exact only for small differences; this is exact, and slower.
     With a single explanation the simulated experiment is returned unchanged.
     """
+    if len(arena.explanations) < 2:
+        return simulated
     found = []
-    for truth, rival in permutations(arena.explanations, 2):
+    for truth in arena.explanations:
         try:
             motion = arena.record(truth, simulated.experiment)
         except CannotRun as why:
             cannot = NotRun(simulated.experiment, str(why), simulated.units, truth.name)
             return replace(simulated, gain=0.0, difference=0.0, not_run=cannot)
-        logs = arena.logs_with(motion)
-        fits = [fit_axis(e.axis, logs) for e in (truth, rival)]
-        kept = fits[0].kept & fits[1].kept
-        after, before = (residual(f.axis, logs)[kept] for f in fits)
-        added = len(fits[0].scaling.where) - len(fits[1].scaling.where)
-        excess = _spread(before**2 - after**2, kept)[-len(logs[-1]) :].mean()
-        difference = float(np.sqrt(max(excess, 0.0)))
-        found.append((evidence(before, after, added).delta_bic, difference))
-    if not found:
-        return simulated
+        found.append(_beside_rivals(arena, truth, arena.logs_with(motion)))
     gain, difference = min(found)
     return replace(simulated, gain=gain, difference=difference)
+
+
+def _beside_rivals(
+    arena: Arena, truth: Explanation, logs: tuple[PreparedLog, ...]
+) -> tuple[float, float]:
+    """Evidence against the nearest rival of a truth, and its difference (N RMS) on the new log."""
+    own, found = fit_axis(truth.axis, logs), []
+    for rival in (e for e in arena.explanations if e is not truth):
+        fit = fit_axis(rival.axis, logs)
+        kept = own.kept & fit.kept
+        after, before = (residual(f.axis, logs)[kept] for f in (own, fit))
+        excess = _spread(before**2 - after**2, kept)[-len(logs[-1]) :].mean()
+        added = len(own.scaling.where) - len(fit.scaling.where)
+        difference = float(np.sqrt(max(excess, 0.0)))
+        found.append((evidence(before, after, added).delta_bic, difference))
+    return min(found)

@@ -133,7 +133,8 @@ def next_experiment(
     rivals = _rivals(found)
     if len(rivals) < 2:
         return None
-    arena = replace(_between_candidates(model, found.dataset, rivals), test_function=test_function)
+    some = found.dataset.part  # as in a search: all of long logs would tell little more
+    arena = replace(_between_candidates(model, some, rivals), test_function=test_function)
     return _planned(
         arena, NEXT_DURATION, NEXT_VERIFIED, False, {c.effect.name: c.effect for c in rivals}
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -17,7 +18,7 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.estimation.fit import Fit, fit_axis, fit_roughly
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.variable_projection import starts
+from identify.estimation.variable_projection import Start, starts
 from identify.selection.acceptance import Judged, parts
 from identify.selection.bends import held_bends
 from identify.selection.controls import Columns, Trial, change_of, with_unit_penalty
@@ -30,9 +31,9 @@ from twin.model.parameters import ParameterReference
 Array = NDArray[np.float64]
 
 SAME_ERROR = 1.01  # relative error that simpler values of an effect may have
-HEAD_EVALUATIONS = 12  # of a friction fitted on the heads of the logs
+HEAD_EVALUATIONS = 4  # of a friction fitted on the heads; more do not change their order
 OTHER_BENDS = (0.6, 1.5)  # times what a law holds by design, at which its exponent is tried
-HOPELESS = 2.0  # times the squared error of the present friction, after a rough fit of another
+HOPELESS = 10.0  # times the squared error of the present friction, after another's linear step
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,23 +87,23 @@ class Added:
         fit, dataset = judged.fit, judged.dataset
         found = starts(fit, dataset, self.effect)
         if self.effect.kind is Kind.FRICTION:
-            return self._on_heads(judged, [s.fitted for s in found])
+            return self._on_heads(judged, found)
         axes = tuple(fit.axis.with_effect(s.fitted) for s in found)
         # Of the training logs: where a period is only scanned, others tell little of it.
         left = max(1.0 - found[0].share(fit), 0.0) * fit.error**2
         promise, _ = parts(np.array([fit.error**2]), np.array([left]), np.ones(1), fit.floor**2)
         return Look(self, promise, axes)
 
-    def _on_heads(self, judged: Judged, found: Sequence[Fitted]) -> Look:
+    def _on_heads(self, judged: Judged, found: Sequence[Start]) -> Look:
         """Another friction, which no linear step puts in the place of one: a fit on the heads."""
-        fit, dataset = judged.fit, judged.dataset
-        old = fit_axis(fit.axis, dataset.heads)
-        tried = [_to_heads(fit.axis.with_effect(f), dataset, old) for f in found]
-        best = sorted(tried, key=lambda f: f.error)
-        both = moving(dataset.heads, sticks(old.axis) or sticks(best[0].axis))
-        before, after = (
-            float(np.mean(residual(f.axis, dataset.heads)[both] ** 2)) for f in (old, best[0])
-        )
+        fit, heads = judged.fit, judged.dataset.heads
+        old = _on_heads(fit, judged.dataset)
+        if np.mean(found[0].left ** 2) > HOPELESS * old.error**2:
+            return Look(self, -np.inf, tuple(fit.axis.with_effect(s.fitted) for s in found))
+        fits = [fit_roughly(fit.axis.with_effect(s.fitted), heads, HEAD_EVALUATIONS) for s in found]
+        best = sorted(fits, key=lambda f: f.error)
+        both = moving(heads, sticks(old.axis) or sticks(best[0].axis))
+        before, after = (float(np.mean(residual(f.axis, heads)[both] ** 2)) for f in (old, best[0]))
         promise, _ = parts(np.array([before]), np.array([after]), np.ones(1), old.floor**2)
         return Look(self, promise, tuple(f.axis for f in best))
 
@@ -266,11 +267,7 @@ def _resting(without: Judged, fit: Judged) -> bool:
     return sticks(without.fit.axis) or sticks(fit.fit.axis)
 
 
-def _to_heads(axis: AxisModel, dataset: Dataset, old: Fit) -> Fit:
-    """An axis with another friction fitted to the heads, to its end unless that is hopeless."""
-    fit = fit_roughly(axis, dataset.heads, HEAD_EVALUATIONS)
-    both = fit.kept & old.kept
-    left, present = (f.residual[both[f.kept]] for f in (fit, old))
-    if left @ left > HOPELESS * (present @ present):
-        return fit
-    return fit_axis(fit.axis, dataset.heads, HEAD_EVALUATIONS)
+@lru_cache(maxsize=4)  # every other friction is looked at beside the same fit
+def _on_heads(fit: Fit, dataset: Dataset) -> Fit:
+    """The axis of a fit, fitted to the heads alone."""
+    return fit_axis(fit.axis, dataset.heads)

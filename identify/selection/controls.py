@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 Columns = Callable[[Sequence[PreparedLog]], list[Array]]
 Falsify = Callable[[Array, np.random.Generator], Array]
 
-CONTROLS = 40
+CONTROLS = 20  # of which one in twenty is left aside
 SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
 STRETCHES = 8  # of a log, each with a sign of its own
 SAME = (

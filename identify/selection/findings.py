@@ -9,7 +9,7 @@ from enum import Enum
 from identify.dataset.dataset import Dataset
 from identify.dataset.given_logs import Role
 from identify.estimation.errors import Errors, error_in
-from identify.estimation.fit import Fit, fit_axis
+from identify.estimation.fit import Fit, finished, fit_axis
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.bends import Bend
 from identify.selection.bent_curve import bent_curve
@@ -102,14 +102,17 @@ def without_law(name: str, found: Found) -> Found:
 
 
 def _without(steps: Sequence[Step], found: Found) -> Judged:
-    """The final fit without some steps, refitted."""
+    """The final fit without some steps, refitted; of long logs on the part that was searched."""
     axis = found.final.fit.axis
     for step in reversed(steps):
         axis = step.change.undone(axis, found.base.fit.axis) or axis
     if len(steps) == len(found.steps):
         return found.base
-    near = fit_axis(axis, found.dataset.part.fit).axis  # on little of the logs, then on all
-    return Judged(fit_axis(near, found.dataset.fit), found.dataset)
+    dataset = found.dataset
+    less = replace(fit_axis(axis, dataset.part.fit), begun=found.final.fit.begun)
+    if dataset.part is not dataset:
+        less = finished(less.axis, less.begun, dataset.fit, less.outcome)
+    return Judged(less, dataset)
 
 
 def _finding(steps: Sequence[Step], found: Found) -> Finding:
@@ -118,7 +121,8 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
     own = steps[0].tried.candidate.score
     assert own is not None  # it was accepted
     noise = steps[0].tried.candidate.is_noise  # which lowers no error
-    beside = own if noise else score(less, final, own.control, own.among)
+    alone = noise or any(step.held for step in steps)  # then the others tell nothing against it
+    beside = own if alone else score(less, final, own.control, own.among)
     chosen, tested = _errors(less.fit, final.fit, dataset)
     name = steps[0].change.name
     # A free curve may have taken the place of the law, which is then as it was before.

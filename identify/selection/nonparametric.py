@@ -59,6 +59,8 @@ def fit_in_place(base: Fit, dataset: Dataset, shape: Shape) -> Fit:
     """Fit a free curve in the place of a law, or beside it, see ``Shape.beside``."""
     axis = base.axis if shape.beside else base.axis.without(shape.effect)
     first = _attempt(_as_it_is(base, axis, dataset), dataset, shape.empty)
+    if first.fit.at_floor:
+        return first.fit
     # The law's own shape had distorted the other values, so choose again beside the refit.
     again = first.fit.axis.without(shape.empty.effect.name)
     second = _attempt(_as_it_is(base, again, dataset), dataset, shape.empty)

@@ -11,12 +11,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.estimation.channel_delay import moved_by, realigned
 from identify.estimation.decision import RULE
-from identify.estimation.fit import Fit, finished, fit_axis
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Fit, error_on, finished, fit_axis
 from identify.estimation.scaling import Scaling
+from identify.estimation.subspace import unabsorbed
 from identify.estimation.thorough_fit import fit_thoroughly
 from identify.estimation.time_origin import synchronised, time_origins, with_given_origins
 from identify.estimation.variable_projection import starts
@@ -51,6 +55,7 @@ LEADERS = 2  # refitted first, to tell what others must promise; or followed whe
 AS_MUCH = 0.66  # of the part of a free curve, whose ten numbers are any law's: it goes first
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
 MAY_HELP = 1.0  # t from which a change that is refused alone is followed one round further
+OUTSIDE = 0.1  # of the square of a law's force, below which a free curve can make it as well
 SETTLED = 0.999  # of the error, below which another refit is a better optimum
 
 
@@ -68,13 +73,15 @@ class Tried:
 class Step:
     """A change that was accepted, and those that are level with it.
 
-    with_others: whether it is accepted only together with another step. dropped: names of earlier
-    changes that were not needed any more beside it.
+    with_others: whether it is accepted only together with another step. held: whether a later free
+    curve can make its force too, and so tells nothing against it. dropped: names of earlier changes
+    that were not needed any more beside it.
     """
 
     tried: Tried
     level: tuple[Tried, ...] = ()
     with_others: bool = False
+    held: bool = False
     dropped: tuple[str, ...] = ()
 
     @property
@@ -127,16 +134,19 @@ def _begun(base: Fit, dataset: Dataset) -> Found:
 
 def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
     """What was found on the beginnings of logs, fitted to the whole of them."""
-    part = found.dataset
+    part, given = found.dataset, dataset.fit
     if part.channel_delay != dataset.channel_delay:
         dataset = realigned(dataset, part.channel_delay)
     dataset = with_given_origins(dataset, time_origins(part))
-    fits = [
-        replace(fit_axis(axis, dataset.fit), begun=base.begun)
-        for axis in (found.base.fit.axis, found.final.fit.axis)
-    ]
-    first, final = (Judged(fit, dataset) for fit in fits)
-    return replace(found, dataset=dataset, base=first, final=final if found.steps else first)
+    same = all(a is b for a, b in zip(given, dataset.fit, strict=True))
+    first = base
+    if not same or rms(error_on(found.base.fit.axis, given)) < base.error:
+        first = replace(fit_axis(found.base.fit.axis, dataset.fit), begun=base.begun)
+    judged = final = Judged(first, dataset)
+    if found.steps:
+        fit = fit_axis(found.final.fit.axis, dataset.fit)
+        final = Judged(replace(fit, begun=base.begun), dataset)
+    return replace(found, dataset=dataset, base=judged, final=final)
 
 
 def _search(found: Found, catalogue: Catalogue, progress: Progress | None) -> Found:
@@ -380,16 +390,25 @@ def _is_needed(change: Change, without: Judged, fit: Judged) -> bool:
     return plain.accepted and replace(plain, control=control(change, without, fit)).accepted
 
 
+def _is_held(change: Change, without: Judged, fit: Judged) -> bool:
+    """Whether a fit without a change can make its force all the same, by a free curve."""
+    own = np.concatenate(change.columns(without, fit)[0](without.dataset.fit))[without.fit.kept]
+    return bool(np.sum(unabsorbed(own, without.fit.basis) ** 2) < OUTSIDE * np.sum(own**2))
+
+
 def _needed(
     judged: Judged, steps: tuple[Step, ...], first: Judged
 ) -> tuple[Judged, tuple[Step, ...]]:
     """The fit and the steps without earlier ones that are not accepted beside the later ones."""
     for step in steps[:-1]:
-        if any(s.change.name == step.change.name for s in steps if s is not step):
+        if step.held or any(s.change.name == step.change.name for s in steps if s is not step):
             continue  # another change of this law presupposes it
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
         if axis is not None:
             without = _refitted_on(axis, judged, judged)
+            if isinstance(steps[-1].change, Reshaped) and _is_held(step.change, without, judged):
+                steps = tuple(replace(s, held=True) if s is step else s for s in steps)
+                continue
             if _is_needed(step.change, without, judged):
                 # The shapes of later effects were found beside this one; they may differ without.
                 again = fit_thoroughly(without.fit.axis, judged.dataset, judged.fit.begun)

@@ -23,7 +23,6 @@ from identify.experiment_design.discrimination import (
     _informative,
     contest,
     favoured,
-    refit_basis,
     refitted,
     require_within_limits,
 )
@@ -110,16 +109,6 @@ def test_windows_at_rest_count_for_nothing():
     assert found.where[kept].all()
     both = _discriminating(arena(sticking, SECOND), Tracking(2.0), rest)
     assert not both.where[~kept].any()
-
-
-def test_the_basis_of_a_refit_spans_its_columns():
-    kept = np.ones(len(OLD), dtype=bool)
-    basis = refit_basis(ONE, [OLD], kept)
-    columns = jacobian(ONE, [OLD], free_parameters(ONE))
-    np.testing.assert_allclose(basis.T @ basis, np.eye(basis.shape[1]), atol=1e-8)
-    np.testing.assert_allclose(absorbed(basis[:, 0], columns), 0.0, atol=1e-5)
-    held = replace(PLAIN, effects=(), mass_fixed=True)
-    assert refit_basis(held, [OLD], kept).shape == (len(OLD), 0)
 
 
 def test_the_logs_favour_the_explanation_with_the_least_error():
