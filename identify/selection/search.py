@@ -347,13 +347,31 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         return []
     best = max(lowering, key=lambda t: t.candidate.part)
     if isinstance(best.change, Reshaped):
-        least = AS_MUCH * best.candidate.part
-        laws = [t for t in lowering if not isinstance(t.change, Reshaped)]
-        lowering = [t for t in laws if t.candidate.part >= least] or lowering
+        lowering = _laws_for(best, judged, tried) or lowering
         best = max(lowering, key=lambda t: t.candidate.part)
     level = [t for t in lowering if t is not best and is_level(t, best)]
     first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))
     return [Step(first, tuple(t for t in (best, *level) if t is not first))]
+
+
+def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Tried]:
+    """The laws that take about as much as a free curve, whose ten numbers are any law's.
+
+    It has shown that something is missing, so none of them has to be the best of many by itself.
+    """
+    laws = []
+    for t in tried:
+        found = t.candidate
+        if not found.score or isinstance(t.change, Reshaped):
+            continue
+        if found.part >= AS_MUCH * curve.candidate.part and not found.supported:
+            found = replace(found, score=replace(found.score, among=1))
+            if found.supported and found.score:
+                taken = control(t.change, judged, t.judged)
+                found = replace(found, score=replace(found.score, control=taken))
+        if found.supported and found.part >= AS_MUCH * curve.candidate.part:
+            laws.append(replace(t, candidate=found))
+    return laws
 
 
 def _together(judged: Judged, tried: Sequence[Tried], catalogue: Catalogue) -> list[Step]:
