@@ -84,7 +84,7 @@ def test_a_long_command_says_a_line_in_ten_seconds(tmp_path: Path) -> None:
     done = process(*arguments, folder=tmp_path)
     assert json.loads(done.stdout)["file"] == "experiment.toml"
     lines = [line for line in done.stderr.splitlines() if "so far)" in line]
-    assert lines
+    assert lines, done.stderr
     assert all(LINE.fullmatch(line) for line in lines), lines
 
 
