@@ -51,11 +51,11 @@ class Part:
         if self.total > COUNTED:
             counted = f"{100 * self.done // self.total} %"
         much = "" if self.total < 2 else f": {counted}"
-        long = "" if left is None else f", about {in_words(left)} left of this part"
+        long = "" if left is None else f", about {roughly(left)} left of this part"
         return f"{self.what}{much}{long}"
 
 
-def in_words(seconds: float) -> str:
+def roughly(seconds: float) -> str:
     """A time as roughly as it is known."""
     if seconds < 100.0:
         return f"{max(round(seconds), 1)} s"
@@ -77,7 +77,7 @@ class Shown:
 
     def __str__(self) -> str:
         now = monotonic()
-        return f"{self.part.words(now)} ({in_words(now - self.begun)} so far)"
+        return f"{self.part.words(now)} ({roughly(now - self.begun)} so far)"
 
 
 @contextmanager

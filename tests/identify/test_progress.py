@@ -13,7 +13,7 @@ import pytest
 from cli_runs import process
 from planted_logs import SLIDE, Ride, begun, few, having, logged
 
-from identify.cli.progress import Part, in_words
+from identify.cli.progress import Part, roughly
 from identify.selection.diagnosis import diagnose_axis
 from twin.progress import within
 
@@ -139,4 +139,4 @@ def test_the_time_left_is_by_what_was_done_since_the_part_began() -> None:
     [(0.2, "1 s"), (99.0, "99 s"), (100.0, "2 min"), (5900.0, "98 min"), (9000.0, "2.5 h")],
 )
 def test_a_time_is_told_as_roughly_as_it_is_known(seconds: float, words: str) -> None:
-    assert in_words(seconds) == words
+    assert roughly(seconds) == words
