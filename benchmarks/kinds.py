@@ -68,6 +68,7 @@ def _memory(work: Workload) -> Figure:
     """Peak memory of a diagnosis of one kind, in a process of its own."""
     work = replace(work, plain=_logs(work, HIDDEN), hidden={})
     with saved(work) as (model, logs, _):
+        twin("diagnose", model, *logs)  # fills numba's caches
         effects, cost = twin("effects"), twin("diagnose", model, *logs)
     return Figure(
         f"peak memory of a diagnosis over the arrays of its logs, {HIDDEN}",
