@@ -120,10 +120,21 @@ def search(base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress
         return _search(_begun(base, dataset), catalogue, progress)
     found = _search(_begun(fit_axis(base.axis, part.fit), part), catalogue, progress)
     progress("answer fitted to the whole logs", 0, 1)
+    _forget(found)
     whole = _on_whole(found, base, dataset)
     if found.final.fit.ratio * RULE.at_floor > whole.final.fit.ratio or whole.final.at_floor:
         return whole
     return _search(whole, catalogue, progress)
+
+
+def _forget(found: Found) -> None:
+    """Let go of the matrices of a search, which nobody needs beside those of another dataset."""
+    tried = [*found.last, *(t for s in found.passed for t in (s.tried, *s.level))]
+    fits = [found.base.fit, found.final.fit, *(t.judged.fit for t in tried)]
+    for fit in (*fits, *(c.fit for c in found.ranking)):
+        fit.forget()
+    Trial.beside.cache_clear()
+    give_back()
 
 
 def _begun(base: Fit, dataset: Dataset) -> Found:
