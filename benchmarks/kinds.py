@@ -2,18 +2,21 @@
 
 Five logs, 1.5 million samples, of a machine whose bumps have another form than the model's besides,
 so that more than one thing is wrong. The cost is CPU time of `identify.workflow.diagnose` on logs
-that are read, over that of a pass before and after (``workload``).
+that are read, over that of a pass before and after (``workload``). The memory is that of the
+process of `twin diagnose` on the files of one kind's logs, as in ``passes``.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from time import process_time
 
 import numpy as np
 
 from benchmarks import workload
 from benchmarks.figures import Figure, Target
-from benchmarks.workload import AXIS, Workload
+from benchmarks.processes import twin
+from benchmarks.workload import AXIS, HIDDEN, Workload, saved
 from identify.estimation.force_balance import residual
 from identify.experiment_design.planting import added_force, strength_for
 from identify.selftest.drawing import drawn_values
@@ -32,6 +35,8 @@ KINDS = (
 )  # fmt: skip
 FLOORS = 8.0  # RMS force of the effect over the noise floor
 MEDIAN, DEAREST = 200.0, 600.0  # passes
+MEMORY = 2.0  # times the arrays of the logs
+MB = 1e6
 
 
 def measure() -> list[Figure]:
@@ -45,6 +50,7 @@ def measure() -> list[Figure]:
             "median of the kinds", float(np.median(passes)), "passes", Target(high=MEDIAN), each
         ),
         Figure("the dearest kind", passes[-1], "passes", Target(high=DEAREST)),
+        _memory(work),
     ]
 
 
@@ -56,6 +62,20 @@ def _cost(work: Workload, name: str) -> tuple[float, str]:
     spent = process_time() - begun
     named = " and ".join("/".join(answer) for answer in found.leading.answers) or "-"
     return spent / (0.5 * (before + work.timed_pass())), named
+
+
+def _memory(work: Workload) -> Figure:
+    """Peak memory of a diagnosis of one kind, in a process of its own."""
+    work = replace(work, plain=_logs(work, HIDDEN), hidden={})
+    with saved(work) as (model, logs, _):
+        twin("diagnose", model, *logs)  # fills numba's caches
+        effects, cost = twin("effects"), twin("diagnose", model, *logs)
+    return Figure(
+        f"peak memory of a diagnosis over the arrays of its logs, {HIDDEN}",
+        (cost.memory - effects.memory) / work.log_bytes, "1", Target(high=MEMORY),
+        f"{cost.memory / MB:.0f} MB, arrays {work.log_bytes / MB:.0f} MB, of which measured "
+        f"{work.measured_bytes / MB:.0f} MB",
+    )  # fmt: skip
 
 
 def _logs(work: Workload, name: str) -> dict[str, Log]:

@@ -24,6 +24,7 @@ from twin.log import Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import Fitted, MachineModel
 from twin.numbers import require_seed
+from twin.progress import Progress, silent
 from twin.simulator import ReducedSimulator
 
 DURATION = 12.0  # s of each log
@@ -55,7 +56,7 @@ def demo(
     folder: Path,
     seed: int,
     say: Callable[[str], None] = print,
-    progress: workflow.Progress = workflow.silent,
+    progress: Progress = silent,
 ) -> Demo:
     """Make a machine with a hidden effect, log it, and diagnose the logs.
 
@@ -101,7 +102,7 @@ def demo(
 
 
 def _record(
-    machine: MachineModel, experiment: str, path: Path, seed: int, progress: workflow.Progress
+    machine: MachineModel, experiment: str, path: Path, seed: int, progress: Progress
 ) -> Log:
     log = simulate(
         machine, experiment, seed=seed, duration=DURATION,

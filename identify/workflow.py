@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -42,16 +42,13 @@ from twin.log import Log
 from twin.memory import give_back
 from twin.model.machine import MachineModel
 from twin.parallel import parallel
+from twin.progress import Progress, silent, within
 
 if TYPE_CHECKING:
     from identify.thesis.chapters import Reproduction
 
 Logs = Mapping[str, Log]
-Progress = Callable[[str, int, int], None]
-
-
-def silent(what: str, done: int, total: int) -> None:
-    """Progress that is not shown."""
+READING = "reading and preparing the logs"
 
 
 @parallel()
@@ -73,16 +70,18 @@ def fit(
     and where nothing can be fitted: an axis that comes to rest within every test function, a force
     that is not a number.
     """
+    progress(READING, 0, 1)
     found, given = datasets(model, logs, holdout or {}, test_function, test), model
     fits: dict[str, Fit] = {}
     for i, (axis, dataset) in enumerate(list(found.items())):
+        progress("fitting", i, len(found))
         fits = {a: replace(f) for a, f in fits.items()}  # less the matrices that they computed
         dataset = telling(dataset, sticks(model.axes[axis]))
         require_residual(model.axes[axis], dataset)
         dataset, fitted = fit_aligned(model.axes[axis], dataset)
         found[axis], fits[axis] = with_own_noise(fitted, dataset)
         require_finite(fits[axis].residual, found[axis])
-        progress("fitting", i + 1, len(found))
+    progress("intervals of the parameters", 0, 1)
     held, tested = (
         {a: error_if_any(role, f, found[a]) for a, f in fits.items()}
         for role in (Role.SELECTION, Role.TEST)
@@ -121,6 +120,7 @@ def compare(
     progress: Progress = silent,
 ) -> Comparison:  # fmt: skip
     """The errors of a model with its present values, and where it fails. Raises InputError."""
+    progress(READING, 0, 1)
     found = {
         axis: telling(dataset, sticks(model.axes[axis]))
         for axis, dataset in datasets(model, logs, {}, test_function).items()
@@ -182,10 +182,11 @@ def diagnose(
             fitted,
             result.datasets[axis],
             known,
-            partial(progress, f"trying effects on {axis}"),
+            within(progress, f"diagnosis of {axis}"),
         )
         for axis, fitted in result.fits.items()
     }
+    progress("intervals and the next experiment", 0, 1)
     told = {axis: told_of(d) for axis, d in axes.items()}
     model = _begun(result.model, axes, told)
     plans, not_planned = next_experiments(axes, model, test_function)
@@ -246,9 +247,9 @@ def add(
             f"{f', {effect.numbered(effect.number + 1).name} is another' if effect.several else ''}"
         )
     attempt = fit_nonparametric if effect.is_nonparametric else try_effect
+    progress("adding", 0, 1)
     tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]
     best = max(tried, key=lambda c: (c.supported, c.part, c.delta_bic))
-    progress("adding", 1, 1)
     having = [n for n in names if n not in open_axes]
     made = addition(best, before.fits[best.axis], before.datasets, before.model, given)
     return _with_notes(made, axis_in_words(effect.name, best.axis, names, having))
@@ -282,8 +283,8 @@ def add_shape(
     names = having_shape(effect, model, axis)
     before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
     fits = {n: before.fits[n] for n in names if n in before.fits}
+    progress("adding", 0, 1)
     best, shape = reshape(effect, fits, before.datasets)
-    progress("adding", 1, 1)
     return _with_notes(addition(best, fits[best.axis], before.datasets, before.model, model, shape))
 
 

@@ -56,7 +56,7 @@ def stubbed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, fold
                     [f"warned of {p}" for p in paths or ()],
                 ),
             ),
-            ("bars_on_stderr", lambda: nullcontext(Stub())),
+            ("progress_on_stderr", lambda: nullcontext(Stub())),
         ):
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, answer)
@@ -64,7 +64,7 @@ def stubbed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, fold
     monkeypatch.setattr(
         "identify.cli.shared.read_measured", lambda paths, beside=None: logs_of(paths)
     )
-    monkeypatch.setattr("identify.cli.shared.bars_on_stderr", lambda: nullcontext(Stub()))
+    monkeypatch.setattr("identify.cli.shared.progress_on_stderr", lambda: nullcontext(Stub()))
 
     def run(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["twin", *map(str, arguments)])

@@ -72,13 +72,14 @@ def spread(job: Callable[[T], R], items: Iterable[T], done: Done | None = None) 
 def counting(total: int, done: Done | None) -> Callable[[], None]:
     """A function that tells ``done`` of one more of so many, from any thread.
 
-    The calls come one at a time and count up: done(1, total), done(2, total) and so on.
+    The calls come one at a time and count up: done(0, total) now, done(1, total) and so on.
     """
-    lock, numbers = Lock(), itertools.count(1)
+    lock, numbers = Lock(), itertools.count()
 
     def one_more() -> None:
         if done is not None:
             with lock:
                 done(next(numbers), total)
 
+    one_more()
     return one_more

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import Effects, Json, app, catalogue_with, machine_model, say
 
 
@@ -22,7 +23,9 @@ def agree(
 
     catalogue = catalogue_with(effects)
     fits = [machine_model(name, catalogue) for name in (a, b)]
-    result = workflow.agree(*fits, catalogue=catalogue)
+    with progress_on_stderr() as progress:
+        progress("comparing the fits", 0, 1)
+        result = workflow.agree(*fits, catalogue=catalogue)
     say(agree_text(result), {"a": a, "b": b, **agree_json(result)}, as_json_)
     if not result.agrees:
         raise typer.Exit(1)

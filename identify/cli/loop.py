@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from identify.cli.apart import require_apart
+from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
     Effects,
     FitLogs,
@@ -21,7 +22,6 @@ from identify.cli.shared import (
     Test,
     TestFunction,
     app,
-    bars_on_stderr,
     catalogue_with,
     left_out,
     machine_model,
@@ -74,8 +74,8 @@ def fit(
     )  # fmt: skip
     fitted, text, found = result.model, as_text.fit_text(result), as_json.fit_json(result)
     if objective is Objective.SIMULATION:
-        with bars_on_stderr() as bars:
-            refined = workflow.fit_simulation(result, progress=bars)
+        with progress_on_stderr() as progress:
+            refined = workflow.fit_simulation(result, progress=progress)
         fitted, text, found = refined.model, str(refined), simulation_fit_json(refined)
     if out:
         save_model(fitted, out)
@@ -106,8 +106,8 @@ def compare(
         require_folder(mcap)
     machine = machine_model(model, catalogue_with(effects))
     recorded, findings = read_checked(logs)
-    with bars_on_stderr() as bars, left_out() as silent:
-        result = workflow.compare(machine, recorded, test_function=test_function, progress=bars)
+    with progress_on_stderr() as progress, left_out() as silent:
+        result = workflow.compare(machine, recorded, test_function=test_function, progress=progress)
     if out:
         from identify.output.report import write_report
 
@@ -220,8 +220,8 @@ def demo(
     def tell(text: str) -> None:
         print(text, file=sys.stderr if as_json_ else sys.stdout, flush=True)
 
-    with bars_on_stderr() as bars:
-        result = run(machine, catalogue, out, seed, tell, bars)
+    with progress_on_stderr() as progress:
+        result = run(machine, catalogue, out, seed, tell, progress)
     hidden = result.hidden.effect.name
     summary = {
         "hidden": hidden,

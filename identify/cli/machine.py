@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
     Effects,
     Json,
     Logs,
     app,
-    bars_on_stderr,
     catalogue_with,
     machine_model,
     read_checked,
@@ -52,10 +52,10 @@ def simulate(
     stage = machine_model(model, catalogue_with(effects))
     chosen = load_experiment(experiment) if experiment.endswith(SUFFIX) else experiment
     reach = Reach(stage)
-    with bars_on_stderr() as bars:
+    with progress_on_stderr() as progress:
         parts = simulate_parts(
             stage, chosen, seed=seed, duration=duration, axis=axis,
-            progress=partial(bars, "simulating"),
+            progress=partial(progress, "simulating"),
         )  # fmt: skip
         samples = record_log(map(reach.take, parts), out)
     rate = stage.sample_rate

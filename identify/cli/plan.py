@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
     Effects,
     Holdout,
@@ -15,7 +16,6 @@ from identify.cli.shared import (
     Model,
     TestFunction,
     app,
-    bars_on_stderr,
     catalogue_with,
     machine_model,
     read_checked,
@@ -65,11 +65,11 @@ def plan(
     machine = machine_model(model, catalogue)
     rivals = [_rival(name, catalogue) for name in between or ()]
     recorded, findings = read_checked(logs, beside=holdout)
-    with bars_on_stderr() as bars:
+    with progress_on_stderr() as progress:
         result = workflow.plan(
             machine, recorded, read_measured(holdout, beside=logs), between=rivals,
             catalogue=catalogue, axis=axis, duration=duration, test_function=test_function,
-            progress=bars,
+            progress=progress,
         )  # fmt: skip
     text, file = as_text.plan_text(result), None
     if result.decides:

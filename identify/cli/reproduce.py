@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
     Json,
     app,
-    bars_on_stderr,
     catalogue_with,
     machine_model,
     read_measured,
@@ -64,8 +64,8 @@ def reproduce(
         machine = machine_model(model, catalogue_with(None))
         result = reproduce_on_logs(chapter or (), machine, dict(read_measured(log)), axis=axis)
     else:
-        with bars_on_stderr() as bars:
-            result = workflow.reproduce(chapter or (), small=small, seed=drawn, progress=bars)
+        with progress_on_stderr() as progress:
+            result = workflow.reproduce(chapter or (), small=small, seed=drawn, progress=progress)
     _write(out, result, as_json_)
 
 

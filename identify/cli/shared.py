@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from identify.cli.apart import Command
+from identify.cli.progress import progress_on_stderr
 from twin.errors import InputError
 
 if TYPE_CHECKING:
-    from identify.workflow import Progress
     from twin.effects import Catalogue
     from twin.log import Log
     from twin.log.check import CheckReport
@@ -96,27 +96,6 @@ Effects = Annotated[
 ]
 
 
-@contextmanager
-def bars_on_stderr() -> Iterator[Progress]:
-    """Progress bars on standard error, one for each kind of work; none where nobody sees it."""
-    if not sys.stderr.isatty():
-        yield lambda what, done, total: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    tasks: dict[str, Any] = {}
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-
-        def show(what: str, done: int, total: int) -> None:
-            if what not in tasks:
-                tasks[what] = bars.add_task(what, total=total)
-            bars.update(tasks[what], completed=done)
-
-        yield show
-
-
 def say(text: str, result: dict[str, Any], as_json: bool, warnings: Sequence[str] = ()) -> None:
     """Print the warnings on standard error, and the result as text or as one JSON object."""
     from identify.output.plain import plain
@@ -171,8 +150,8 @@ def with_roles(
     held, tests = holdout or [], test or []
     recorded, findings = read_checked(logs, beside=[*held, *tests])
     others = read_measured(held, beside=[*logs, *tests]), read_measured(tests, [*logs, *held])
-    with bars_on_stderr() as bars, left_out() as silent:
-        result = job(model, recorded, *others, progress=bars)
+    with progress_on_stderr() as progress, left_out() as silent:
+        result = job(model, recorded, *others, progress=progress)
     return result, findings, silent
 
 

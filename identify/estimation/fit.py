@@ -107,6 +107,11 @@ class Fit:
         """Orthonormal basis (n, r) of the forces that the free parameters can add."""
         return orthonormal(self.jacobian)
 
+    def forget(self) -> None:
+        """Let go of these matrices, which are most of its memory; they are computed again."""
+        for name in ("jacobian", "basis"):
+            self.__dict__.pop(name, None)
+
     @cached_property
     def unabsorbed(self) -> Array:
         """The residual (n,) N after a linear step of the free parameters.

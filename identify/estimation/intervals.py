@@ -252,7 +252,9 @@ def half_widths_of(fit: Fit, weights: Array) -> Array:
     shift = np.abs(own.T @ inverse @ (columns.T @ fit.residual))
     variance = np.einsum("ij,ik,kj->j", own, covariance, own)
     over_time = QUANTILE * np.sqrt(np.maximum(variance, 0.0))
-    out[known] = np.maximum(over_time, _by_influence(columns @ inverse @ own, fit.residual)) + shift
+    out[known] = (
+        np.maximum(over_time, _by_influence(columns @ (inverse @ own), fit.residual)) + shift
+    )
     return out
 
 
@@ -263,20 +265,21 @@ def _by_influence(influence: Array, residual: Array) -> Array:
     an equal share of the squared influence, which is what the data tell of the estimate with the
     other parameters held. So all groups count alike, and the fit takes as much from each (CR2).
     """
-    size = np.abs(influence.T, order="C")
+    out = [_by_groups(column, residual) for column in influence.T]
+    return GROUPS_QUANTILE * np.array(out)
+
+
+def _by_groups(influence: Array, residual: Array) -> float:
+    """The same of one estimate, as one standard deviation; influence (n,)."""
+    size = np.abs(influence)
     told = np.sort(size) ** 2
-    shares = np.cumsum(told, axis=1) - 0.5 * told
-    whole = told.sum(axis=1)
-    whole[whole == 0.0] = 1.0  # of a sum of no parameters
-    out = np.empty(len(size))
-    for j, (share, own) in enumerate(zip(shares, size, strict=True)):
-        first = np.searchsorted(share, whole[j] * np.arange(1, GROUPS) / GROUPS)
-        edges = np.sqrt(told[j, np.minimum(first, len(own) - 1)])
-        group = np.count_nonzero(own >= edges[:, None], axis=0)
-        left = np.maximum(1.0 - np.bincount(group, own**2, GROUPS) / whole[j], TINY)
-        moved = np.bincount(group, influence[:, j] * residual, GROUPS)
-        out[j] = np.sqrt((moved**2 / left).sum())
-    return GROUPS_QUANTILE * out
+    whole = told.sum() or 1.0  # of a sum of no parameters
+    first = np.searchsorted(np.cumsum(told) - 0.5 * told, whole * np.arange(1, GROUPS) / GROUPS)
+    edges = np.sqrt(told[np.minimum(first, len(size) - 1)])
+    group = np.count_nonzero(size >= edges[:, None], axis=0)
+    left = np.maximum(1.0 - np.bincount(group, size**2, GROUPS) / whole, TINY)
+    moved = np.bincount(group, influence * residual, GROUPS)
+    return float(np.sqrt((moved**2 / left).sum()))
 
 
 def _held(fit: Fit) -> list[Estimate]:

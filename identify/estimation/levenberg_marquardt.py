@@ -77,10 +77,12 @@ def minimise(
             if good and fall >= tolerance:
                 columns, exact = _secant(columns, moved - x, trial - force), False
             else:
+                del columns  # not to be held beside the new ones
                 columns, exact = jacobian(moved), True
             x, force, cost = moved, trial, trial_cost
             damping = max(damping * (0.1 if kept > POOR else 1.0), LEAST_DAMPING)
         elif not exact:
+            del columns
             columns, exact = jacobian(x), True
         elif damping <= FIRST_DAMPING and _cost(force + columns @ step) > (1.0 - tolerance) * cost:
             return Solution(x, True)  # nearly undamped and not cut at bounds, it promises no more
@@ -104,7 +106,9 @@ def _secant(columns: Array, step: Array, change: Array) -> Array:
     size = float(weighed @ step)
     if size == 0.0:
         return columns
-    return columns + np.outer((change - columns @ step) / size, weighed)
+    out = np.outer((change - columns @ step) / size, weighed)
+    out += columns
+    return out
 
 
 def _step(columns: Array, force: Array, damping: float, at_low: Mask, at_high: Mask) -> Array:

@@ -85,11 +85,15 @@ class Linearised:
     def spread(self, stiffness: Mapping[str, float]) -> Array:
         """Covariance (k, k) of all parameters for noise of 1 N; zero for those left out."""
         used, penalty = self._chosen(stiffness)
-        columns = self.columns[:, used]
+        columns = self._columns(used)
         full = columns.T @ columns + penalty[np.ix_(used, used)]
         out = np.zeros((len(used), len(used)))
         out[np.ix_(used, used)] = solve(full, np.eye(len(full)))
         return out
+
+    def _columns(self, used: NDArray[np.bool_]) -> Array:
+        """The columns used, which are not copied where that is all of them: they are large."""
+        return self.columns if used.all() else self.columns[:, used]
 
     def _chosen(self, stiffness: Mapping[str, float]) -> tuple[NDArray[np.bool_], Array]:
         """Which columns are used, and the penalty (k, k), with these parts and their stiffness."""
@@ -129,7 +133,7 @@ class Linearised:
     def solution(self, stiffness: Mapping[str, float]) -> tuple[Array, float]:
         """Change (k,) of all parameters that fits best, and its effective degrees of freedom."""
         used, penalty = self._chosen(stiffness)
-        columns = self.columns[:, used]
+        columns = self._columns(used)
         gram = columns.T @ columns
         full = gram + penalty[np.ix_(used, used)]
         out = np.zeros(len(self.where))

@@ -9,9 +9,9 @@ W. G. Hunter, A. M. Reiner, "Designs for discriminating between two rival models
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import permutations
 
 import numpy as np
@@ -37,10 +37,10 @@ from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters, read
 from twin.model.units import AxisUnits
 from twin.parallel import spread
+from twin.progress import Progress, silent
 from twin.simulator import ReducedSimulator
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 SEED = 0  # of the random moves and the noise; `twin simulate` draws the same moves by default
 
@@ -173,19 +173,19 @@ def favoured(arena: Arena) -> tuple[str, float]:
 
 
 def contest(
-    arena: Arena, experiments: Sequence[Experiment], progress: Progress | None = None
+    arena: Arena, experiments: Sequence[Experiment], progress: Progress = silent
 ) -> tuple[list[SimulatedExperiment], tuple[NotRun, ...]]:
     """Every experiment simulated and judged, best first; and those that the machine cannot run."""
     judge = _discriminating if len(arena.explanations) > 1 else _informative
     motions, not_run = [], []
     for i, experiment in enumerate(experiments):
+        progress("trying experiments", i, len(experiments))
         try:
             motions.append((experiment, arena.record(arena.explanations[0], experiment)))
         except CannotRun as why:
             not_run.append(NotRun(experiment, str(why), arena.machine.axes[arena.name].units))
-        if progress:
-            progress("trying experiments", i + 1, len(experiments))
-    judged = spread(lambda pair: judge(arena, *pair), motions)
+    judging = partial(progress, "judging experiments")
+    judged = spread(lambda pair: judge(arena, *pair), motions, judging)
     return sorted(judged, key=lambda t: -t.gain), tuple(not_run)
 
 

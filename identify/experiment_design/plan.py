@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from identify.dataset.dataset import Dataset, datasets
@@ -38,9 +38,9 @@ from twin.experiments.trajectory.setpoint import require_length
 from twin.log import Log
 from twin.model.machine import MachineModel
 from twin.parallel import parallel
+from twin.progress import Progress, silent, within
 
 Logs = Mapping[str, Log]
-Progress = Callable[[str, int, int], None]
 
 DURATION = 20.0  # s of a planned experiment
 NEXT_DURATION = 10.0  # s of the one that a diagnosis proposes
@@ -92,7 +92,7 @@ def plan(
     axis: str | None = None,
     duration: float = DURATION,
     test_function: float | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Plan:
     """Find the experiment within the machine's limits that decides between explanations.
 
@@ -112,9 +112,11 @@ def plan(
     if not logs:
         require_test_function(test_function, duration)
     catalogue = usable(catalogue, model)
+    progress("preparing the logs and the rivals", 0, 1)
     dataset = _dataset(model, logs or {}, holdout or {}, between, axis, test_function)
     arena = replace(
-        _arena(model, dataset, bool(logs), between, catalogue), test_function=test_function
+        _arena(model, dataset, bool(logs), between, catalogue, progress),
+        test_function=test_function,
     )
     return _planned(arena, duration, VERIFIED, not logs, _named(between, catalogue), progress)
 
@@ -165,7 +167,7 @@ def _planned(
     verified: int,
     supposed: bool,
     effects: Mapping[str, Effect],
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Plan:
     arena.machine.require_mass()
     logs = arena.logs
@@ -181,6 +183,7 @@ def _planned(
             f"axis {arena.name} can run none of the experiments; check its limits and force_limit; "
             f"the first: {first}"
         )
+    progress("best experiments judged by refits", 0, 1)
     chosen, *others = _verified(arena, ranked, verified)
     names = tuple(e.name for e in arena.explanations)
     return Plan(
@@ -242,6 +245,7 @@ def _arena(
     recorded: bool,
     between: Sequence[Rival],
     catalogue: Catalogue,
+    progress: Progress,
 ) -> Arena:
     own = model.axes[dataset.axis]
     if recorded:
@@ -251,7 +255,7 @@ def _arena(
         known = explained(between, model, dataset, recorded)
         return Arena(model, dataset.axis, known, logs)
     if recorded:
-        found = diagnose_axis(base, dataset, catalogue)
+        found = diagnose_axis(base, dataset, catalogue, within(progress, "diagnosis"))
         own = base.axis
         if found.best is not None and len(found.ranking) > 1:
             rivals = _rivals(found)

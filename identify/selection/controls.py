@@ -57,7 +57,7 @@ class Trial:
     other_quiet: float
 
     @classmethod
-    @lru_cache(maxsize=8)  # every change is tried beside the same fit, and its controls again
+    @lru_cache(maxsize=2)  # every change is tried beside the same fit, and its controls again
     def beside(cls, judged: Judged) -> Trial:
         """The trial beside a fit."""
         fit, holdout = judged.fit, judged.dataset.holdout

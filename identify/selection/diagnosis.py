@@ -16,8 +16,9 @@ from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added
 from identify.selection.findings import Finding, FindingKind, findings_of, without_law
-from identify.selection.search import Found, Progress, Step, Tried, is_level, search
+from identify.selection.search import Found, Step, Tried, is_level, search
 from twin.effects import Catalogue
+from twin.progress import Progress, silent
 
 SEEN = (3.0, 0.02)  # t and part from which a change is real, and worth a word, though too small
 
@@ -100,13 +101,15 @@ class AxisDiagnosis:
 
 
 def diagnose_axis(
-    base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress | None = None
+    base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress = silent
 ) -> AxisDiagnosis:
     """Find what one fitted axis lacks, and what each finding explains."""
     if any(log.force_noise for log in dataset.fit):  # an effect may explain it yet
         dataset = dataset.with_force_noise(0.0)
         base = finished(base.axis, base.begun, dataset.fit, base.outcome)
-    found, findings = _proved(_with_ties(search(base, dataset, catalogue, progress)))
+    searched = search(base, dataset, catalogue, progress)
+    progress("what each finding explains", 0, 1)
+    found, findings = _proved(_with_ties(searched))
     final = found.final
     # Either may be known by too low a floor; what the logs differ by is told in a remark.
     quiet = final.fit.at_floor or final.other_at_floor

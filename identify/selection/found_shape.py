@@ -69,14 +69,16 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
     law = averaged_force(fit.axis, dataset.fit) - averaged_force(without, dataset.fit)
     own = np.array([c.effect == shape.empty.effect.name for c in linear.where])
     hats = linear.columns[:, own]
-    assumed = _read_off(hats, law[fit.kept][mask])
+    gram, met = hats.T @ hats, hats.T @ law[fit.kept][mask]
+    del hats  # columns of all logs are large
+    assumed = _read_off(gram, met)
     correction, spread = _corrected(linear, shape.stiffness)
     coordinate, index = _knots(shape)
     curves = {}
     for name, weights in _directions(shape, index, len(assumed)).items():
         full = np.zeros((len(weights), len(own)))
         full[:, own] = weights
-        visits = np.linalg.norm(hats @ weights.T, axis=0)
+        visits = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", weights, gram, weights), 0.0))
         been = np.where(visits > SELDOM * visits.max(), 1.0, np.nan)
         curves[name] = Drawn(
             assumed=been * (weights @ assumed),
@@ -106,11 +108,10 @@ def _directions(shape: Shape, index: list[int], strengths: int) -> dict[str, Arr
     return {AHEAD: even + odd, BEHIND: even - odd}
 
 
-def _read_off(columns: Array, force: Array) -> Array:
-    """Strengths (k,) whose columns (n, k) come nearest to a force (n,) N."""
-    gram = columns.T @ columns
+def _read_off(gram: Array, met: Array) -> Array:
+    """Strengths (k,) whose columns come nearest to a force; products (k, k), with it (k,)."""
     weak = WEAK * np.trace(gram) / len(gram) * np.eye(len(gram))
-    return np.asarray(solve(gram + weak, (columns.T @ force)[:, None])[:, 0])
+    return np.asarray(solve(gram + weak, met[:, None])[:, 0])
 
 
 def _corrected(linear: Linearised, stiffness: Mapping[str, float]) -> tuple[Array, Array]:

@@ -8,8 +8,9 @@ further: two that are accepted together, and each beside the other, are needed t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -48,9 +49,9 @@ from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.memory import give_back
 from twin.model.machine import AxisModel
-from twin.parallel import counting, spread
+from twin.parallel import spread
+from twin.progress import Progress, silent, within
 
-Progress = Callable[[int, int], None]
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
 AS_MUCH = 0.66  # of the part of a free curve, whose ten numbers are any law's: it goes first
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
@@ -108,9 +109,7 @@ class Found:
     last: tuple[Tried, ...]
 
 
-def search(
-    base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress | None = None
-) -> Found:
+def search(base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress = silent) -> Found:
     """Change one fitted axis while changes are accepted.
 
     Long logs are searched by their beginnings, with one fit of the answer to all of them; where
@@ -120,10 +119,22 @@ def search(
     if part is dataset:
         return _search(_begun(base, dataset), catalogue, progress)
     found = _search(_begun(fit_axis(base.axis, part.fit), part), catalogue, progress)
+    progress("answer fitted to the whole logs", 0, 1)
+    _forget(found)
     whole = _on_whole(found, base, dataset)
     if found.final.fit.ratio * RULE.at_floor > whole.final.fit.ratio or whole.final.at_floor:
         return whole
     return _search(whole, catalogue, progress)
+
+
+def _forget(found: Found) -> None:
+    """Let go of the matrices of a search, which nobody needs beside those of another dataset."""
+    tried = [*found.last, *(t for s in found.passed for t in (s.tried, *s.level))]
+    fits = [found.base.fit, found.final.fit, *(t.judged.fit for t in tried)]
+    for fit in (*fits, *(c.fit for c in found.ranking)):
+        fit.forget()
+    Trial.beside.cache_clear()
+    give_back()
 
 
 def _begun(base: Fit, dataset: Dataset) -> Found:
@@ -149,19 +160,21 @@ def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
     return replace(found, dataset=dataset, base=judged, final=final)
 
 
-def _search(found: Found, catalogue: Catalogue, progress: Progress | None) -> Found:
+def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
     """Go on from what was found."""
     first, judged, steps = found.base, found.final, found.steps
     passed, ranking, last = [*found.passed], found.ranking, list(found.last)
     while len(steps) < RULE.most_steps:
         taken = [s.change.name for s in steps]
-        judged, last, candidates = tried_beside(judged, catalogue, progress, taken)
+        step = within(progress, f"step {len(steps) + 1} of at most {RULE.most_steps}")
+        judged, last, candidates = tried_beside(judged, catalogue, step, taken)
         if not steps:
             first, ranking = judged, ordered(candidates)
-        new = _accepted(judged, last) or _together(judged, last, catalogue)
+        new = _accepted(judged, last) or _together(judged, last, catalogue, step)
         if not new:
             break
         passed += new
+        step("all values refitted", 0, 1)
         judged, steps = _needed(new[-1].tried.judged, (*steps, *new), first)
         passed[-1] = steps[-1]  # which tells what it made needless
         if judged.at_floor:
@@ -197,7 +210,7 @@ def _refitted_on(axis: AxisModel, begun: Judged, judged: Judged) -> Judged:
 def tried_beside(
     judged: Judged,
     catalogue: Catalogue,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     taken: Sequence[str] = (),
 ) -> tuple[Judged, list[Tried], list[Candidate]]:
     """Every change beside a fit: the fit at its best, those refitted, and all absent effects.
@@ -212,23 +225,18 @@ def tried_beside(
     effects = [e for e in absent_effects(judged.fit.axis, catalogue) if e.name not in known]
     plain = [Added(e) for e in effects if not is_noise(e)]
     changes: list[Change] = [*plain, *freed_of(judged.fit.axis)]
-    one_more = counting(len(changes), progress)
     if judged.at_floor:
         changes = []
     trial = Trial.beside(judged)
-
-    def look(change: Change) -> Look:
-        found = change.look(judged, trial)
-        one_more()
-        return found
-
-    looks = spread(look, changes)
-    tried = _refitted(judged, looks, len({e.kind for e in effects}))
+    trying = partial(progress, "trying changes")
+    looks = spread(lambda c: c.look(judged, trial), changes, trying)
+    tried = _refitted(judged, looks, len({e.kind for e in effects}), progress)
     enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
     if not enough:
+        progress("trying free curves", 0, 1)
         curves = [c.look(judged, trial) for c in reshaped_of(judged.fit, judged.dataset)]
         best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
-        tried += _refitted(judged, best, len(curves), tried)
+        tried += _refitted(judged, best, len(curves), progress, tried)
     judged, tried = _at_its_best(judged, tried)
     give_back()
     noise = [as_noise(judged, e) for e in effects if is_noise(e)]
@@ -248,7 +256,11 @@ def is_level(one: Tried, best: Tried) -> bool:
 
 
 def _refitted(
-    judged: Judged, looks: Sequence[Look], among: int, known: Sequence[Tried] = ()
+    judged: Judged,
+    looks: Sequence[Look],
+    among: int,
+    progress: Progress,
+    known: Sequence[Tried] = (),
 ) -> list[Tried]:
     """The changes that promise enough, refitted; the better ones from all starts if none is enough.
 
@@ -257,15 +269,18 @@ def _refitted(
     """
     asked = RULE.promise * RULE.least_part
     waiting = sorted((k for k in looks if k.promise >= asked), key=lambda k: -k.promise)
-    first = spread(lambda k: (k, _fit_of(judged, k)), waiting[:LEADERS])
+    refitting = partial(progress, "refitting the promising")
+    first = spread(lambda k: (k, _fit_of(judged, k)), waiting[:LEADERS], refitting)
     most = max((_roughly(judged, f) for _, f in first), default=0.0)
     most = max([most, *(t.candidate.part for t in known)])
     rest = [k for k in waiting[LEADERS:] if k.promise >= RULE.promise * most]
-    fits = [*first, *spread(lambda k: (k, _fit_of(judged, k)), rest)]
+    fits = [*first, *spread(lambda k: (k, _fit_of(judged, k)), rest, refitting)]
     if not any(f.at_floor for _, f in fits):
         fits.sort(key=lambda pair: -_roughly(judged, pair[1]))
-        fits[:LEADERS] = spread(lambda p: (p[0], from_all_starts(judged, *p)), fits[:LEADERS])
-    return spread(lambda pair: judged_change(judged, *pair, among), fits)
+        anew = partial(progress, "refitting the best from other starts")
+        fits[:LEADERS] = spread(lambda p: (p[0], from_all_starts(judged, *p)), fits[:LEADERS], anew)
+    judging = partial(progress, "judging the refitted")
+    return spread(lambda pair: judged_change(judged, *pair, among), fits, judging)
 
 
 def _fit_of(judged: Judged, look: Look) -> Fit:
@@ -359,22 +374,17 @@ def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Trie
 
     It has shown that something is missing, so none of them has to be the best of many by itself.
     """
-    laws = []
-    for t in tried:
-        found = t.candidate
-        if not found.score or isinstance(t.change, Reshaped):
-            continue
-        if found.part >= AS_MUCH * curve.candidate.part and not found.supported:
-            found = replace(found, score=replace(found.score, among=1))
-            if found.supported and found.score:
-                taken = control(t.change, judged, t.judged)
-                found = replace(found, score=replace(found.score, control=taken))
-        if found.supported and found.part >= AS_MUCH * curve.candidate.part:
-            laws.append(replace(t, candidate=found))
-    return laws
+    least = AS_MUCH * curve.candidate.part
+    laws = [t for t in tried if not isinstance(t.change, Reshaped) and t.candidate.part >= least]
+    alone = (
+        t if t.candidate.supported else judged_change(judged, t.look, t.judged.fit) for t in laws
+    )
+    return [t for t in alone if t.candidate.supported]
 
 
-def _together(judged: Judged, tried: Sequence[Tried], catalogue: Catalogue) -> list[Step]:
+def _together(
+    judged: Judged, tried: Sequence[Tried], catalogue: Catalogue, progress: Progress
+) -> list[Step]:
     """Two changes that are accepted together, and each beside the other; none where there are not.
 
     While one is missing, it distorts what the other leaves, so that neither is accepted alone.
@@ -389,7 +399,9 @@ def _together(judged: Judged, tried: Sequence[Tried], catalogue: Catalogue) -> l
 
     ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[:LEADERS]
     for way in ways:
-        beside, seconds, _ = tried_beside(way.judged, catalogue)
+        beside, seconds, _ = tried_beside(
+            way.judged, catalogue, within(progress, f"beside {way.change.name}")
+        )
         if not (then := _accepted(beside, seconds)):
             continue
         both, second = then[0].tried.judged, then[0]

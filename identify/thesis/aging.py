@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import datasets
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.intervals import half_widths
-from identify.thesis.chapter import Progress, Recovered
+from identify.thesis.chapter import Recovered
 from identify.thesis.residuals import friction_of
 from twin.effect import DRY, DT, IO_SIZE, Kind
 from twin.experiments.named import simulate
 from twin.log import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import free_parameters
+from twin.progress import Progress
 from twin.simulator import FineSimulator
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from identify.dataset.dataset import datasets
 from identify.estimation.cable_force import CableForce, cable_force
 from identify.estimation.evidence import rms
 from identify.measure import cable_force as of_passes
-from identify.thesis.chapter import Chapter, Progress, Recovered
+from identify.thesis.chapter import Chapter, Recovered
 from identify.thesis.printed import ROLLER_PITCH
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
@@ -25,6 +25,7 @@ from twin.experiments.kinds import Passes
 from twin.experiments.named import simulate
 from twin.log import Log
 from twin.model.machine import AxisModel, MachineModel
+from twin.progress import Progress
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
 Array = NDArray[np.float64]

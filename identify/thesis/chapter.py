@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from twin.effects import Catalogue
 from twin.log import Log
 from twin.model.machine import MachineModel
+from twin.progress import Progress
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]  # what, done, of how many
 Size = TypeVar("Size")
 Result = TypeVar("Result", covariant=True)
 

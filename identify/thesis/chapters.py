@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from identify.thesis import cable, dynamic, future, models, residuals, simulation, track, twin
-from identify.thesis.chapter import Chapter, Progress
+from identify.thesis.chapter import Chapter
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.log import Log
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
+from twin.progress import Progress
 
 CHAPTERS: Mapping[str, Chapter[Any, Any]] = {
     "models": models.CHAPTER,

@@ -26,7 +26,7 @@ from identify.estimation.presliding import Presliding
 from identify.estimation.replay import Beginning, Replay, measured_beginning
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
 from identify.thesis.cable import of_position
-from identify.thesis.chapter import Chapter, Progress, Recovered
+from identify.thesis.chapter import Chapter, Recovered
 from identify.thesis.informed import Informed, informed
 from identify.thesis.track import APART, FIRST
 from twin.core.control import Controller
@@ -39,6 +39,7 @@ from twin.experiments.trajectory import open_loop_sine
 from twin.log import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import ParameterReference, free_parameters, read, write
+from twin.progress import Progress
 from twin.simulator import FineSimulator
 
 Array = NDArray[np.float64]

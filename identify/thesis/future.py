@@ -22,7 +22,7 @@ from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.velocity_map import velocity_map
 from identify.selection.nonparametric import fit_nonparametric
 from identify.thesis.aging import Aging, aging
-from identify.thesis.chapter import Chapter, Progress
+from identify.thesis.chapter import Chapter
 from identify.thesis.mixed_friction import mixed
 from identify.thesis.mixtures import EQUAL, Mixture, mixture
 from identify.thesis.residuals import friction_of
@@ -32,6 +32,7 @@ from twin.effects import Catalogue
 from twin.experiments.kinds import Staircase
 from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.progress import Progress
 from twin.simulator import FineSimulator
 
 Array = NDArray[np.float64]

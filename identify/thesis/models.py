@@ -22,12 +22,13 @@ from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.prescribed_motion import force_along
 from identify.thesis.behaviours import LEG, LOOP, RATE, behaviours, turning
-from identify.thesis.chapter import Chapter, Progress
+from identify.thesis.chapter import Chapter
 from identify.thesis.residuals import friction_of, frictions
 from identify.thesis.traits import Traits, traits
 from twin.effect import Effect, Excitation, Kind
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.progress import Progress
 
 Array = NDArray[np.float64]
 

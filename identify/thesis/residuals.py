@@ -18,13 +18,14 @@ from identify.estimation.channel_delay import fit_aligned, realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on
 from identify.selection.diagnosis import Verdict, diagnose_axis
-from identify.thesis.chapter import Chapter, Progress, Recovered
+from identify.thesis.chapter import Chapter, Recovered
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
 from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.experiments.named import simulate
 from twin.log import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.progress import Progress
 from twin.simulator import FineSimulator
 
 
@@ -95,9 +96,7 @@ def run(
     dataset, base = fit_aligned(model.axes[name], datasets(model, logs, held)[name])
     whole = datasets(model, apart, {}, dataset.test_function_length)[name]
     known = catalogue if size.everything else frictions(catalogue)
-    found = diagnose_axis(
-        base, dataset, known, lambda done, total: progress("trying effects", done, total)
-    )
+    found = diagnose_axis(base, dataset, known, progress)
     tests = [realigned(whole, d.channel_delay).fit for d in (dataset, found.dataset)]
     return ResidualResult(
         first=first.effect.name,

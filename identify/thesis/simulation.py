@@ -24,7 +24,7 @@ from identify.estimation.force_balance import residual
 from identify.estimation.presliding import Presliding
 from identify.estimation.stribeck_curve import StribeckCurve, fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
-from identify.thesis.chapter import Chapter, Progress, Recovered
+from identify.thesis.chapter import Chapter, Recovered
 from identify.thesis.maps_of_logs import map_of_logs
 from identify.thesis.printed import SIMULATION
 from twin.effect import Kind
@@ -34,6 +34,7 @@ from twin.experiments.named import simulate
 from twin.log import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import ParameterReference, write
+from twin.progress import Progress
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
 Array = NDArray[np.float64]

@@ -25,7 +25,7 @@ from identify.estimation.map_curve import NAMES, stribeck_through
 from identify.estimation.prescribed_motion import steady_friction
 from identify.estimation.stribeck_curve import fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
-from identify.thesis.chapter import Chapter, Progress
+from identify.thesis.chapter import Chapter
 from identify.thesis.maps_of_logs import track_of_logs
 from twin.effect import Kind
 from twin.effects import Catalogue
@@ -33,6 +33,7 @@ from twin.experiments.kinds import Staircase
 from twin.experiments.named import simulate
 from twin.log import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.progress import Progress
 from twin.simulator import FineSimulator
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from identify.dataset.motion import motion_of
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.intervals import scatter
 from identify.measure import only_axis
-from identify.thesis.chapter import Chapter, Progress
+from identify.thesis.chapter import Chapter
 from identify.validation.agreement import Agreement, agreement
 from twin.core.control import Controller
 from twin.effect import Kind
@@ -28,6 +28,7 @@ from twin.experiments.replay import replay
 from twin.experiments.trajectory.setpoint import Setpoint
 from twin.log import Log
 from twin.model.machine import Fitted, MachineModel
+from twin.progress import Progress
 from twin.signals import local_parabola, rate
 from twin.simulator import FineSimulator, MujocoSimulator, ReducedSimulator
 

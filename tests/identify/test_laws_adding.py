@@ -46,7 +46,7 @@ def test_an_effect_is_added_where_it_helps_most(monkeypatch):
     assert seen[0][1]["test_function"] == 0.07
     bars = []
     found = add(wear, made.MODEL, "logs", axis="x", progress=lambda *done: bars.append(done))
-    assert (found[0].axis, bars) == ("x", [("adding", 1, 1)])
+    assert (found[0].axis, bars) == ("x", [("adding", 0, 1)])
     with pytest.raises(InputError, match="already"):
         add(CATALOGUE["coulomb_viscous"], made.MODEL, "logs")
     with pytest.raises(InputError, match="no axis"):

@@ -126,7 +126,7 @@ def test_how_many_jobs_have_ended_is_told_one_at_a_time_and_counts_up():
         told.append((at, len(within)))
         within.pop()
 
-    expected = [((k + 1, 12), 1) for k in range(12)]
+    expected = [((k, 12), 1) for k in range(13)]
     with parallel(4):
         spread(lambda k: time.sleep(0.001 * (12 - k)), range(12), tell)
     assert told == expected

@@ -177,7 +177,7 @@ def planned(monkeypatch):
 def test_a_plan_between_rivals_hands_on_what_it_was_asked(monkeypatch, logs):
     asked = planned(monkeypatch)
     monkeypatch.setattr(plans, "usable", lambda catalogue, model: catalogue)
-    rivals, bar = [CATALOGUE["wear"], CATALOGUE["cogging"]], object()
+    rivals, bar = [CATALOGUE["wear"], CATALOGUE["cogging"]], lambda *told: None
     found = plans.plan(
         STAGE, logs, {"h": "held"}, catalogue={"gms": 1}, between=rivals, axis="x", duration=7.0,
         test_function=0.07, progress=bar,
