@@ -17,6 +17,7 @@ from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.confidence import confidence
 from identify.selection.found_shape import FoundShape, found_shape
 from identify.selection.search import Found, Step
+from twin.model.machine import AxisModel
 
 
 class FindingKind(Enum):
@@ -109,10 +110,21 @@ def _without(steps: Sequence[Step], found: Found) -> Judged:
     if len(steps) == len(found.steps):
         return found.base
     dataset = found.dataset
-    less = replace(fit_axis(axis, dataset.part.fit), begun=found.final.fit.begun)
+    fits = [fit_axis(a, dataset.part.fit) for a in (axis, *_alike(axis, found.passed))]
+    less = replace(min(fits, key=lambda f: f.error), begun=found.final.fit.begun)
     if dataset.part is not dataset:
         less = finished(less.axis, less.begun, dataset.fit, less.outcome)
     return Judged(less, dataset)
+
+
+def _alike(axis: AxisModel, passed: Sequence[Step]) -> list[AxisModel]:
+    """The axes that a search passed which have the same laws with the same parameters free."""
+
+    def laws(a: AxisModel) -> dict[str, frozenset[str]]:
+        return {f.effect.name: f.fixed for f in a.effects}
+
+    known = (s.tried.judged.fit.axis for s in passed)
+    return [a for a in known if laws(a) == laws(axis)]
 
 
 def _finding(steps: Sequence[Step], found: Found) -> Finding:
