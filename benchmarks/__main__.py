@@ -18,7 +18,7 @@ from benchmarks.judgement import told
 ALL = (
     "simulation", "second_start", "peer_fits", "diagnosis", "passes", "kinds", "stages",
     "mcap_logs", "effect_cost", "import_time", "emps", "withheld", "foreign", "thesis", "selftest",
-    "fuzz",
+    "rule", "fuzz",
     "mutation.noticed",
 )  # fmt: skip
 

@@ -35,7 +35,6 @@ from identify.estimation.smoothing import has_nonparametric, smoothing
 
 Array = NDArray[np.float64]
 
-UNSURE = RULE.at_floor**2 - 1.0  # squared floors: no less is ever left above a floor so uncertain
 RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion does not excite
 TINY = 1e-300  # N^2, of a residual that is nothing
 
@@ -220,5 +219,6 @@ def larger(whole: float, typical: float) -> float:
 
 
 def _part(before: float, after: float, quiet: float) -> float:
-    left = max(before - quiet, UNSURE * quiet, TINY)
+    # No less is ever left above a floor than that by which it is uncertain.
+    left = max(before - quiet, (RULE.at_floor**2 - 1.0) * quiet, TINY)
     return min((before - after) / left, 1.0)
