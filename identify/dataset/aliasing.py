@@ -7,7 +7,8 @@ answers the logged reading error e is known: a fraction 1 - 1/n of the gain g, s
 holds -e (g (1 - 1/n) - m w^2), and between its two terms the power has a dip that no independent
 noises make. The coherence of the two is sqrt(1 - 1/n), whatever machine and controller, and folded
 is the same fraction 1 - 1/n of the command's power near the log's Nyquist frequency. Where the log
-has the control rate the axis moves by just what was logged, and there is no dip.
+has the control rate the axis moves by just what was logged, and there is no dip. The rounding of
+readings at even speed can make one; but then the readings that were logged tell the whole command.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from twin.signals import Array
 TOP = (0.25, 0.45)  # of the sample rate, where a command holds no motion
 COHERENT = 0.6  # least coherence: half of the samples left out make 0.71, chance less than 0.55
 SHOWN = 0.25  # of the command's power near Nyquist, that the dip must show in the residual
+UNTOLD = 1e-3  # of what is folded, in the command beside what readings made of it; from 0.01
 LEAST = 0.5  # of that power is folded, where every other sample is left out
 
 
@@ -42,8 +44,11 @@ def folded(
     if level < SHOWN * float(np.median(top, axis=0).mean() / np.log(2.0)):
         return 0.0, 0.0
     each = top.mean(axis=1)
+    level = max(coherence**2, LEAST) * float(each.mean())
+    if motion.command_noise < UNTOLD * level:
+        return 0.0, 0.0
     scatter = float(each.std() / each.mean() / np.sqrt(max(len(each) / 2.0, 1.0)))
-    return max(coherence**2, LEAST) * float(each.mean()), scatter
+    return level, scatter
 
 
 def _near_nyquist(motion: Motion, step: float) -> Array:

@@ -13,8 +13,9 @@ from identify.dataset.noise_floor import (
     median_spectrum,
     noises_of,
     passed,
-    slow_rounding,
+    rounding_in,
     together,
+    unrounded,
 )
 from identify.dataset.prepared_log import PreparedLog
 from twin.model.machine import AxisModel
@@ -88,19 +89,14 @@ def _within(room: float, noise: Noise) -> Noise:
 def _of_parts(axis: AxisModel, logs: Sequence[PreparedLog], noises: Sequence[Noise]) -> NoiseFloor:
     """The floor of logs with these noises."""
     motions = [log.motion for log in logs]
-    silent = [replace(n, force=0.0, reading=0.0, folded=0.0) for n in noises]
-    sensors = [replace(n, folded=0.0) for n in noises]
-    folds = [replace(s, force=n.folded) for s, n in zip(silent, noises, strict=True)]
+    sensors = [replace(unrounded(n, m), folded=0.0) for n, m in zip(noises, motions, strict=True)]
+    folds = [replace(n, force=n.folded, reading=0.0, folded=0.0) for n in noises]
 
-    def size(each: Sequence[Noise], slow: bool = False) -> float:
-        pairs = list(zip(each, logs, strict=True))
-        beside = [slow_rounding(w.motion, n.segment) if slow else 0.0 for n, w in pairs]
-        parts = [
-            passed(n, w.motion, w.test_function, b) for (n, w), b in zip(pairs, beside, strict=True)
-        ]
-        return together(parts, motions)
+    def size(each: Sequence[Noise]) -> float:
+        pairs = zip(each, logs, strict=True)
+        return together([passed(n, w.motion, w.test_function) for n, w in pairs], motions)
 
-    rounds, told = size(silent, slow=True), any(is_noise(f.effect) for f in axis.effects)
+    rounds, told = rounding_in(axis, logs), any(is_noise(f.effect) for f in axis.effects)
     parts = {
         "sensors": size(sensors),
         "rounding": rounds if told else 0.0,

@@ -201,7 +201,7 @@ class Motion:
             return self.raw[0]
         return self.raw[0] - between(ripple(self.readings, self.ripples), self.sample_period)
 
-    @property
+    @cached_property
     def rounding(self) -> Array:
         """What rounding to the readings' step made of the position, (n + 1,) m, about."""
         return rounding(self.readings, self.resolution)

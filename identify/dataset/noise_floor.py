@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from identify.dataset.aliasing import folded
 from identify.dataset.drive import actual_force, is_noise
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, at_rest, on_blocks, sticks, total_force
+from identify.dataset.rounding import rounding_variance, white_rounding
 from identify.dataset.spectrum import densities, pieces_of
 from identify.dataset.test_function import TestFunction
 from identify.dataset.velocity import part_left, rate_gain
@@ -39,8 +39,6 @@ BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to t
 BAND_OF_BOTH = 0.25  # its end beside a measured velocity, whose noise vanishes towards 0.5
 LOUDER = 2.0  # times the power of the quietest log, beyond which it is no noise: estimates scatter
 PLAIN = 3.0  # times the reading's noise where the band begins; above it the force's noise shows
-
-_SLOW_ROUNDING: WeakKeyDictionary[Motion, dict[int, Array]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,32 +67,47 @@ class Noise:
 
 
 def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
-    """RMS noise floor in N of the force residual of these logs."""
-    sensors = noise_floor(axis, [(log.motion, log.test_function) for log in logs])
-    return _with_own(sensors, logs)
+    """RMS noise floor in N of the force residual of these logs.
+
+    What the rounding of readings makes is a part of it where the axis has that effect; else it is
+    what the model lacks.
+    """
+    floor = unrounded_floor_of(axis, logs)
+    if not any(is_noise(f.effect) for f in axis.effects):
+        return floor
+    return float(np.hypot(floor, rounding_in(axis, logs)))
 
 
 def unrounded_floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     """The floor (N RMS) that these logs would have, had their readings not been rounded."""
-    parts = []
     motions = [log.motion for log in logs]
+    noises = map(unrounded, noises_of(axis, motions), motions)
+    parts = [passed(n, log.motion, log.test_function) for n, log in zip(noises, logs, strict=True)]
+    own = np.sqrt(np.mean([log.force_noise**2 for log in logs]))  # which no sensor makes
+    return float(np.hypot(together(parts, motions), own))
+
+
+def unrounded(noise: Noise, motion: Motion) -> Noise:
+    """The noise less that of rounding at speed, which is as white as other noise of readings."""
+    white = white_rounding(motion.resolution, motion.sample_period)
+    return replace(noise, reading=max(noise.reading - white, 0.0))
+
+
+def rounding_in(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
+    """RMS in N of what the rounding of readings adds to the force residual of these logs."""
+    motions = [log.motion for log in logs]
+    parts = []
     for noise, log in zip(noises_of(axis, motions), logs, strict=True):
-        own = max(noise.reading - _white_rounding(log.motion), 0.0)
-        parts.append(passed(replace(noise, reading=own), log.motion, log.test_function))
-    return _with_own(together(parts, motions), logs)
+        own = unrounded(noise, log.motion).reading / (2.0 * log.motion.sample_period)
+        parts.append(rounding_variance(log, sticks(axis), noise.segment, own))
+    return axis.mass * together(parts, motions)
 
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
-    """RMS in N of what measurement noise alone leaves in the force residual of these logs."""
-    return _passed_together(axis, noises_of(axis, [motion for motion, _ in logs]), logs)
-
-
-def _passed_together(
-    axis: AxisModel, noises: Sequence[Noise], logs: Sequence[tuple[Motion, TestFunction]]
-) -> float:
-    """RMS in N of what the test functions of these logs pass of their noise."""
-    each = [_variance(axis, n, *log) for n, log in zip(noises, logs, strict=True)]
-    return together(each, [motion for motion, _ in logs])
+    """RMS in N of what white noise leaves in the force residual, that of rounding at speed too."""
+    motions = [motion for motion, _ in logs]
+    noises = noises_of(axis, motions)
+    return together([passed(n, *log) for n, log in zip(noises, logs, strict=True)], motions)
 
 
 def noises_of(axis: AxisModel, motions: Sequence[Motion]) -> tuple[Noise, ...]:
@@ -118,50 +131,15 @@ def _noises_of(axis: AxisModel, motions: tuple[Motion, ...]) -> tuple[Noise, ...
     return tuple(noises if thinned else [replace(noise, folded=0.0) for noise in noises])
 
 
-def _with_own(sensors: float, logs: Sequence[PreparedLog]) -> float:
-    """Noise of sensors, N RMS, together with that which no sensor makes."""
-    return float(np.hypot(sensors, np.sqrt(np.mean([log.force_noise**2 for log in logs]))))
-
-
 def together(variances: Sequence[float], motions: Sequence[Motion]) -> float:
     seconds = [m.signals.shape[1] * m.period for m in motions]  # as many test functions has each
     return float(np.sqrt(np.average(variances, weights=seconds)))
 
 
-def _variance(axis: AxisModel, noise: Noise, motion: Motion, test_function: TestFunction) -> float:
-    if not any(is_noise(f.effect) for f in axis.effects):
-        return passed(noise, motion, test_function)
-    return passed(noise, motion, test_function, slow_rounding(motion, noise.segment))
-
-
-def passed(
-    noise: Noise, motion: Motion, test_function: TestFunction, beside: Array | float = 0.0
-) -> float:
-    """Variance, N^2, of the noise that a test function passes.
-
-    beside: (k,) m^2/Hz, of the readings, beside their white noise.
-    """
+def passed(noise: Noise, motion: Motion, test_function: TestFunction) -> float:
+    """Variance, N^2, of the noise that a test function passes."""
     response = test_function.response(motion.sample_period, noise.segment)
-    power = noise.power + noise.bend * beside
-    return float(np.trapezoid(power * response, noise.frequency))
-
-
-def slow_rounding(motion: Motion, segment: int) -> Array:
-    """One-sided power (segment // 2 + 1,) m^2/Hz of the slow steps of the readings' rounding.
-
-    At speed rounding is white and already in the median spectrum; its slow steps are not. It is a
-    property of the log alone, which every fit asks for, and kept as long as the log is.
-    """
-    known = _SLOW_ROUNDING.setdefault(motion, {})
-    if segment not in known:
-        pieces = _less_lines(pieces_of(motion.rounding, segment))
-        known[segment] = np.asarray(densities(pieces, motion.sample_period).mean(axis=0))
-    return known[segment]
-
-
-def _white_rounding(motion: Motion) -> float:
-    """One-sided power, m^2/Hz, of rounding at speed: a twelfth of the squared step, white."""
-    return motion.resolution**2 / 12.0 * 2.0 * motion.sample_period
+    return float(np.trapezoid(noise.power * response, noise.frequency))
 
 
 def _band(motion: Motion, frequency: Array) -> NDArray[np.bool_]:
@@ -197,7 +175,9 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     bend = _bend(axis, motion, frequency)
     band = _band(motion, frequency)
     force, reading = map(float, fitted_levels(np.stack([half, bend], axis=1)[band], power[band]))
-    most = max(force, PLAIN * reading * float(bend[band][0]))
+    # Rounding is white in the mean alone: where it has less in the band, it has more below it.
+    plain = max(reading, white_rounding(motion.resolution, dt))
+    most = max(force, PLAIN * plain * float(bend[band][0]))
     if force < most:
         force = motion.command_noise
     more, scatter = folded(motion, frequency[band], power[band], half[band], bend[band])

@@ -85,11 +85,46 @@ def _gathering(apart: Array, noise: float, fewest: int) -> float:
 def rounding(readings: Array, step: float) -> Array:
     """What rounding to a step (m) made of the position that readings (n,) m tell, (n,) m, about.
 
-    Where a reading changes, the position was half way; between such times it goes straight. Where
-    every reading is another, nothing of it shows.
+    Where a reading changes, the position was half way. Between such times it went by the cubic that
+    has the slopes of the parabolas through three changes, within half a step of the reading. Zero
+    before the first change and after the last; where every reading is another, nothing of it shows.
     """
-    if step == 0.0:
-        return np.zeros(len(readings))
+    out = np.zeros(len(readings))
+    times, middle = _passed(readings, step) if step else (out[:0], out[:0])
+    if len(times) < 3:
+        return out
+    apart = np.diff(times)
+    slope = np.diff(middle) / apart
+    inner = (slope[:-1] * apart[1:] + slope[1:] * apart[:-1]) / (apart[1:] + apart[:-1])
+    slope = np.concatenate([slope[:1], inner, slope[-1:]])
+    inside = np.arange(np.ceil(times[0]), times[-1], dtype=int)
+    gap = np.searchsorted(times, inside, side="right") - 1
+    done = (inside - times[gap]) / apart[gap]
+    left = 1.0 - done
+    path = (
+        left**2 * (1.0 + 2.0 * done) * middle[gap] + done**2 * (1.0 + 2.0 * left) * middle[gap + 1]
+    )
+    path += apart[gap] * done * left * (left * slope[gap] - done * slope[gap + 1])
+    out[inside] = np.clip(readings[inside] - path, -0.5 * step, 0.5 * step)
+    return out
+
+
+def _passed(readings: Array, step: float) -> tuple[Array, Array]:
+    """When (m,) samples readings (n,) m passed half way between two steps (m), and these (m,) m.
+
+    A reading that turns back sooner than it passes the next step, before and after, turns by noise
+    about one time, the mean.
+    """
     at = np.flatnonzero(np.abs(np.diff(readings)) > 0.5 * step)
-    middle = 0.5 * (readings[at] + readings[at + 1])
-    return np.asarray(readings - np.interp(np.arange(len(readings)), at + 0.5, middle))
+    times: Array = np.asarray(at + 0.5)
+    middle: Array = 0.5 * (readings[at] + readings[at + 1])
+    apart, back = np.diff(times), np.abs(np.diff(middle)) < 0.5 * step
+    on = np.concatenate([[-1], np.flatnonzero(~back), [-1]])  # the last of a list where none is
+    if len(on) == 2:
+        return times, middle
+    after = np.searchsorted(on[1:-1], np.arange(len(apart)))
+    longest = np.append(apart, np.inf)
+    nearest = np.minimum(longest[on[after]], longest[on[after + 1]])
+    group = np.concatenate([[0], np.cumsum(~(back & (apart < nearest)))])
+    count = np.bincount(group)
+    return np.bincount(group, times) / count, np.bincount(group, middle) / count

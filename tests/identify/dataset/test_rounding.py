@@ -101,7 +101,9 @@ def test_the_floor_without_rounding_is_that_of_exact_readings(coarse):
     axis = STAGE.axes["x"]
     exact = floor_of(axis, dataset_of(0.0).fit)
     assert unrounded_floor_of(axis, coarse.fit) == pytest.approx(exact, rel=0.15)
-    assert floor_of(axis, coarse.fit) > 1.3 * exact
+    assert floor_of(axis, coarse.fit) == unrounded_floor_of(axis, coarse.fit)
+    known = Fitted.at_start(CATALOGUE["encoder_quantization"], {"step": STEP})
+    assert floor_of(axis.with_effect(known), coarse.fit) > 1.3 * exact
 
 
 @pytest.mark.parametrize("step", [0.0, STEP, 2e-6])

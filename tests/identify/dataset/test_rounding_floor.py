@@ -1,0 +1,114 @@
+"""What the rounding of readings adds to a floor, against what it was in planted logs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from constructed import CATALOGUE, effect, log_of, waves, windowed
+from machines import one_axis
+from planted_logs import RATE, SLIDE, Ride, logged
+
+from identify import workflow
+from identify.dataset.floor import noise_beside
+from identify.dataset.motion import motion_of
+from identify.dataset.noise_floor import floor_of, noise_of, rounding_in, unrounded_floor_of
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.dataset.rounding import white_rounding
+from identify.estimation.force_balance import residual
+from twin.experiments.named import simulate
+from twin.model.file import load_model
+from twin.model.machine import AxisModel, Fitted
+from twin.simulator import ReducedSimulator
+
+MASS = 1.7
+PLAIN = AxisModel(MASS)
+KNOWING = PLAIN.with_effect(effect("encoder_quantization"))
+# step m, rate Hz, length of the test functions s, amplitude m and frequency Hz of the motion
+MOTIONS = {
+    "few steps, at the turns": (1e-6, 2000.0, 0.2, 2e-4, 0.2),
+    "slow": (1e-5, 4000.0, 0.1, 2e-3, 0.3),
+    "a step a sample": (1e-6, 4000.0, 0.1, 2e-3, 0.3),
+    "ten steps a sample": (1e-7, 4000.0, 0.1, 2e-3, 0.3),
+    "fast": (1e-6, 1000.0, 0.05, 0.03, 0.5),
+    "fast, short": (1e-6, 4000.0, 0.02, 0.03, 1.3),
+    "fast, often sampled": (1e-6, 10e3, 0.05, 0.03, 1.3),
+}
+
+
+def rounded(step, rate, length, amplitude, often, reading=0.0, force=0.0, duration=8.0):
+    """A log of an exact motion with white noise of reading (m) and force (N), then rounded."""
+    rng, t = np.random.default_rng(1), np.arange(round(duration * rate)) / rate
+    terms = ((amplitude, often, 0.4), (0.13 * amplitude, 2.4 * often, 1.0))
+    pull = waves(*((-MASS * a * (2.0 * np.pi * f) ** 2, f, p) for a, f, p in terms))
+    x = waves(*terms)(t) + rng.normal(0.0, 1.0, len(t)) * reading
+    u = pull(t + 0.5 / rate) + rng.normal(0.0, 1.0, len(t)) * force
+    x = step * np.rint(x / step) if step else x
+    return windowed(motion_of(log_of(rate, x, u), "x", "log", ripples=()), length)
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("reading", [0.0, 0.03, 0.5], ids="{:g} steps of noise".format)
+def test_the_floor_with_the_step_is_what_rounding_and_noise_leave(motion, reading):
+    log = rounded(*MOTIONS[motion], reading=reading * MOTIONS[motion][0])
+    assert floor_of(KNOWING, [log]) == pytest.approx(rms(residual(PLAIN, [log])), rel=0.2)
+
+
+@pytest.mark.parametrize("motion", ["slow", "a step a sample", "fast"])
+def test_the_floor_beside_noise_of_the_force(motion):
+    """Without the step it is that of the other noise; rounding is then what the model lacks."""
+    noise = 0.01
+    log = rounded(*MOTIONS[motion], force=noise)
+    own = noise * np.linalg.norm(log.fine.weights)
+    assert floor_of(PLAIN, [log]) == unrounded_floor_of(PLAIN, [log])
+    assert floor_of(PLAIN, [log]) == pytest.approx(own, rel=0.2)
+    assert noise_beside(PLAIN, [log]).value == pytest.approx(floor_of(PLAIN, [log]))
+    error = rms(residual(PLAIN, [log]))
+    told = noise_beside(KNOWING, [log])
+    assert told.value == pytest.approx(error, rel=0.2)
+    assert told.parts["rounding"] == pytest.approx(rounding_in(PLAIN, [log]))
+    assert noise_beside(PLAIN, [log]).high > told.value
+
+
+def test_moves_of_even_speed_have_rounding_where_their_speed_puts_it():
+    """As white noise most of these logs would be told 1.75 times too large.
+
+    Of a single log no more is sure: a tone that its test functions pass is as large as it is near
+    to zero, and there nothing tells it from a motion.
+    """
+    ratios = []
+    for seed in range(100, 124):
+        log = logged(SLIDE, Ride(seed, fast=0.05), noise=0.0).axes["x"]
+        steps = 3e-6 * np.rint(log.position / 3e-6)
+        motion = motion_of(log_of(RATE, steps, log.force), "x", "ride", ripples=())
+        one = PreparedLog.of(motion, 0.1)
+        rate = np.diff(steps - log.position)[: motion.raw.shape[1]] * RATE
+        true = SLIDE.mass * rms(one.fine.acceleration(rate)[moving([one], sticks(SLIDE))])
+        ratios.append(rounding_in(SLIDE, [one]) / true)
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.2)
+
+
+def test_rounding_is_not_taken_for_noise_of_the_force():
+    """Less of it in the band than white noise has does not show what it has below."""
+    log = rounded(5e-7, 10e3, 0.1, 2e-4, 1.0, force=1e-4)
+    planted = 2.0 / 10e3 * 1e-4**2
+    found = noise_of(PLAIN, log.motion)
+    assert found.force == pytest.approx(planted, rel=0.3)
+    assert found.most >= 3.0 * white_rounding(5e-7, 1e-4)
+
+
+def test_rounding_at_even_speed_is_no_aliasing_where_the_readings_tell_the_command():
+    """A tone of rounding beside another looks like the dip of a thinned log."""
+    stage = one_axis(load_model("proton_xy", CATALOGUE))
+    axis = stage.axes["x"]
+    quiet = replace(axis.hardware, current_noise=1e-5, encoder_noise=1e-10)
+    steps = Fitted.at_start(CATALOGUE["encoder_quantization"], {"step": 2.3e-7})
+    machine = replace(stage, axes={"x": replace(axis, hardware=quiet).with_effect(steps)})
+    log = simulate(machine, "moves", seed=1, duration=8.0, simulator=ReducedSimulator)
+    fit = workflow.fit(stage, {"log": log}, test_function=0.1).fits["x"]
+    floor = noise_beside(fit.axis.with_effect(steps), fit.logs)
+    assert floor.parts["aliasing"] == 0.0
+    assert floor.value == pytest.approx(fit.error, rel=0.2)
