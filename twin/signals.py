@@ -32,6 +32,20 @@ def rate(signal: Array, period: float) -> Array:
     return np.asarray(np.gradient(signal, period))
 
 
+def cubic_through(times: Array, values: Array, at: Array) -> Array:
+    """Values (m,) at times ``at`` between the first and the last of these times (n,), n > 2.
+
+    Between two of them by the cubic that has there the slopes of the parabolas through three.
+    """
+    slope, apart = np.gradient(values, times), np.diff(times)
+    gap = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(apart) - 1)
+    apart, done = apart[gap], (at - times[gap]) / apart[gap]
+    left = 1.0 - done
+    first, last = left**2 * (1.0 + 2.0 * done), done**2 * (1.0 + 2.0 * left)
+    ends = first * values[gap] + last * values[gap + 1]
+    return np.asarray(ends + apart * done * left * (left * slope[gap] - done * slope[gap + 1]))
+
+
 def local_parabola(
     signal: Array, samples: int, *, derivative: int = 0, period: float = 1.0
 ) -> Array:

@@ -41,7 +41,7 @@ def folded(
     if coherence < COHERENT:
         return 0.0, 0.0
     top = _near_nyquist(motion, float(frequency[1] - frequency[0]))
-    if level < SHOWN * float(np.median(top, axis=0).mean() / np.log(2.0)):
+    if level <= SHOWN * float(np.median(top, axis=0).mean() / np.log(2.0)):
         return 0.0, 0.0
     each = top.mean(axis=1)
     level = max(coherence**2, LEAST) * float(each.mean())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.signals import Array, usual_size
+from twin.signals import Array, cubic_through, usual_size
 
 GAP = 8.0  # ratio of differences between readings that only a resolution leaves empty
 WHOLE = 0.15  # of a step, RMS, by which such differences may miss whole steps
@@ -93,18 +93,8 @@ def rounding(readings: Array, step: float) -> Array:
     times, middle = _passed(readings, step) if step else (out[:0], out[:0])
     if len(times) < 3:
         return out
-    apart = np.diff(times)
-    slope = np.diff(middle) / apart
-    inner = (slope[:-1] * apart[1:] + slope[1:] * apart[:-1]) / (apart[1:] + apart[:-1])
-    slope = np.concatenate([slope[:1], inner, slope[-1:]])
     inside = np.arange(np.ceil(times[0]), times[-1], dtype=int)
-    gap = np.searchsorted(times, inside, side="right") - 1
-    done = (inside - times[gap]) / apart[gap]
-    left = 1.0 - done
-    path = (
-        left**2 * (1.0 + 2.0 * done) * middle[gap] + done**2 * (1.0 + 2.0 * left) * middle[gap + 1]
-    )
-    path += apart[gap] * done * left * (left * slope[gap] - done * slope[gap + 1])
+    path = cubic_through(times, middle, inside)
     out[inside] = np.clip(readings[inside] - path, -0.5 * step, 0.5 * step)
     return out
 

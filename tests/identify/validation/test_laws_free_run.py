@@ -143,10 +143,10 @@ def test_each_log_has_its_own_error_and_that_of_its_noise(monkeypatch):
     errors, floors = position_errors(stage(), {"x": dataset}, lambda *at: told.append(at))
     assert errors["x"] == size
     assert floors["x"] == {k: 10 * size[k] for k in size}
-    assert told == [(1, 2), (2, 2)]
+    assert told == [(0, 2), (1, 2), (2, 2)]
     with parallel(2):
         position_errors(stage(), {"x": dataset}, lambda *at: told.append(at))
-    assert told[2:] == told[:2]
+    assert told[3:] == told[:3]
 
 
 def test_measured_is_the_model_and_what_is_left_on_one_clock():
