@@ -45,7 +45,7 @@ def folded(
         return 0.0, 0.0
     each = top.mean(axis=1)
     level = max(coherence**2, LEAST) * float(each.mean())
-    if motion.command_noise < UNTOLD * level:
+    if motion.command_noise <= UNTOLD * level:
         return 0.0, 0.0
     scatter = float(each.std() / each.mean() / np.sqrt(max(len(each) / 2.0, 1.0)))
     return level, scatter
