@@ -7,6 +7,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from identify.analysis.dynamic_friction import dynamic_friction
+from identify.analysis.maps import along_track, cable_force, friction_map, velocity_map
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.given_logs import Role
 from identify.dataset.prepared_log import sticks
@@ -20,7 +22,6 @@ from identify.estimation.remainder import noise_known, with_own_noise
 from identify.estimation.replay import simulated_error
 from identify.estimation.simulated_motion import fit_simulated_motion
 from identify.experiment_design.plan import next_experiments, plan
-from identify.measure import cable_force, velocity_map
 from identify.output.text import diagnose_text as diagnose_text  # with it results print themselves
 from identify.output.words.selection import axis_in_words, notes_in_words
 from identify.results.addition import Addition, addition
@@ -341,11 +342,14 @@ __all__ = [
     "add_named",
     "add_shape",
     "agree",
+    "along_track",
     "cable_force",
     "compare",
     "diagnose",
+    "dynamic_friction",
     "fit",
     "fit_simulation",
+    "friction_map",
     "plan",
     "reproduce",
     "velocity_map",

@@ -18,7 +18,7 @@ IDENTIFY, TWIN = (Path(package.__file__).parent for package in (identify, twin))
 # In the order in which data pass them: a room imports only from those before it.
 ROOMS = (
     "dataset", "estimation", "selection", "validation", "experiment_design", "selftest",
-    "measure", "thesis", "results", "output", "workflow", "testing", "demo", "cli", "start",
+    "analysis", "thesis", "results", "output", "workflow", "testing", "demo", "cli", "start",
 )  # fmt: skip
 # The thesis asks for a mixture of two laws, which it imports.
 MIXTURES = IDENTIFY / "thesis" / "mixed_friction.py"

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.analysis.maps import cable_force as of_passes
 from identify.dataset.dataset import datasets
 from identify.estimation.cable_force import CableForce, cable_force
 from identify.estimation.evidence import rms
-from identify.measure import cable_force as of_passes
 from identify.thesis.chapter import Chapter, Recovered
 from identify.thesis.printed import ROLLER_PITCH
 from twin.effect import Effect, Kind

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.analysis.maps import only_axis
 from identify.dataset.dataset import datasets
 from identify.estimation.map_curve import MapCurve, curve_through
 from identify.estimation.velocity_map import VelocityMap, velocity_map
-from identify.measure import only_axis
 from twin.errors import InputError
 from twin.log import Log
 from twin.model.machine import AxisModel, MachineModel

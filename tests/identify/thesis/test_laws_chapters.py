@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from built_fits import CATALOGUE, axis_of, built_fit, fitted
-from constructed import COVERED, log_of
+from constructed import COVERED
 from scipy.stats import t as student
 
 from identify.estimation import curve_band
@@ -26,22 +26,6 @@ SPEEDS = np.array([0.001, 0.003, 0.006, 0.01, 0.015, 0.03, 0.06, 0.1, 0.2])
 
 def silent(*_) -> None:
     """No progress."""
-
-
-def test_signals_of_a_log_are_those_of_its_motion():
-    rate, turn = 2000.0, 2.0 * np.pi * 2.0
-    t = np.arange(6001) / rate
-    x = 0.03 * np.sin(turn * t)
-    found = twin._signals(log_of(rate, x, np.cos(t)), "x")
-    inner = slice(200, -200)
-    wanted = {
-        "position": x, "velocity": 0.03 * turn * np.cos(turn * t),
-        "acceleration": -0.03 * turn**2 * np.sin(turn * t), "force": np.cos(t),
-    }  # fmt: skip
-    for name, values in wanted.items():
-        np.testing.assert_allclose(
-            found[name][inner], values[inner], atol=2e-3 * np.abs(values).max()
-        )
 
 
 def test_the_band_of_a_curve_follows_from_what_each_parameter_does_to_it(monkeypatch):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,7 +16,7 @@ from twin.core.control import Controller
 from twin.effect import Kind
 from twin.log import AxisLog, Log
 from twin.model.file import load_model
-from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.model.machine import AxisModel, Fitted
 from twin.model.parameters import free_parameters
 
 TRACK = load_model("thesis_track", CATALOGUE)
@@ -245,21 +244,6 @@ def test_errors_of_the_closed_loop_are_parts_of_what_the_machine_did():
     found = twin.closed_loop_errors(log_of(1e3, x, force), log_of(1e3, 1.03 * x, 0.8 * force), "x")
     expected = {"position": 0.03, "velocity": 0.03, "acceleration": 0.03, "force": 0.2}
     assert found == pytest.approx(expected)
-
-
-@pytest.mark.parametrize("own", [{"encoder_noise": 3e-7}, {"encoder_resolution": 2e-6}, {}])
-def test_a_twin_is_as_noisy_as_the_log_where_the_model_does_not_say(monkeypatch, own):
-    monkeypatch.setattr(twin, "replay", lambda model, log, **more: model)
-    quiet = replace(HARDWARE, encoder_noise=0.0, encoder_resolution=0.0)
-    model = MachineModel("m", {"x": replace(axis_of(), hardware=replace(quiet, **own))}, 1e3)
-    t = np.arange(4000) / 1e3
-    noise = 5e-6 * np.random.default_rng(1).standard_normal(len(t))
-    log = log_of(1e3, 0.02 * np.sin(5.0 * t) + noise, np.cos(5.0 * t))
-    found = twin.twin_of(model, log).axes["x"].hardware
-    if own:
-        assert found == replace(quiet, **own)
-    else:
-        assert found.encoder_noise == pytest.approx(5e-6, rel=0.1)
 
 
 # --- noise of the simulation study ----------------------------------------------------------

@@ -1,4 +1,4 @@
-"""What logs show without a fit of the whole model: friction by speed, the force of the cable."""
+"""A model to begin with, from logs alone: mass, the simplest friction, a constant force."""
 
 from __future__ import annotations
 
@@ -6,17 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.excitation import excitation
 from identify.dataset.given_logs import require_samples
 from identify.dataset.motion import Motion, motion_of
 from identify.dataset.reading_ripple import ripples_of_widest
 from identify.dataset.test_function import TestFunction
-from identify.estimation.cable_force import CableForce
-from identify.estimation.cable_force import cable_force as of_cable
 from identify.estimation.first_values import FirstValues, first_values
-from identify.estimation.velocity_map import VelocityMap
-from identify.estimation.velocity_map import velocity_map as of_velocity
 from twin.effect import Effect, Excitation, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -25,36 +20,8 @@ from twin.log.check import moves
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.units import AxisUnits
 
-TEST_FUNCTION = 0.02  # s, short enough for spikes of a few millimetres at 0.1 m/s
+TEST_FUNCTION = 0.02  # s, over which the acceleration that was reached is averaged
 MARGIN = 0.05  # of the way that was covered, beyond its ends
-
-
-def velocity_map(
-    model: MachineModel, logs: Mapping[str, Log], *, axis: str | None = None
-) -> VelocityMap:
-    """Friction against velocity, from logs with stretches of constant speed (L. Jia 2023).
-
-    The forces of the model's other effects are taken off. axis: the only one that moves where None.
-    Raises InputError where no log holds a constant speed.
-    """
-    name, dataset = only_axis(datasets(model, logs, {}), axis)
-    return VelocityMap.joined([of_velocity(model.axes[name], log.motion) for log in dataset.fit])
-
-
-def cable_force(
-    model: MachineModel,
-    logs: Mapping[str, Log],
-    *,
-    axis: str | None = None,
-    test_function: float = TEST_FUNCTION,
-) -> CableForce:
-    """The force of the cable slab, and the spikes of rollers, from passes in both directions.
-
-    Only the mass of the model is used. test_function: s, the finest detail. Raises InputError where
-    the logs hold fewer than two passes each way.
-    """
-    name, dataset = only_axis(datasets(model, logs, {}, test_function), axis)
-    return of_cable(model.axes[name], dataset.fit)
 
 
 def first_model(logs: Mapping[str, Log], name: str, catalogue: Catalogue) -> MachineModel:
@@ -158,13 +125,3 @@ def _simplest_friction(catalogue: Catalogue) -> Effect:
         e for e in catalogue.values() if e.kind is Kind.FRICTION and not e.is_nonparametric
     ]
     return min(frictions, key=lambda e: (len(e.parameters), len(e.states)))
-
-
-def only_axis(found: Mapping[str, Dataset], axis: str | None) -> tuple[str, Dataset]:
-    """The axis of that name, or the only one that moves; InputError where it is not clear."""
-    if axis is None and len(found) > 1:
-        raise InputError(f"{', '.join(found)} move in the logs; give the axis")
-    name = axis or next(iter(found))
-    if name not in found:
-        raise InputError(f"axis {name} does not move in the logs; there moves {', '.join(found)}")
-    return name, found[name]

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from identify.analysis.following import closed_loop_errors, identified, twin_of
 from identify.testing import assert_agree
-from identify.thesis.twin import closed_loop_errors, identified, twin_of
 from identify.workflow import agree
 from twin.core.control import Controller
 from twin.effects import load_catalogue
