@@ -22,7 +22,6 @@ if TYPE_CHECKING:
         fit_simulation,
         friction_map,
         plan,
-        reproduce,
         velocity_map,
     )
 
@@ -39,7 +38,6 @@ __all__ = [
     "fit_simulation",
     "friction_map",
     "plan",
-    "reproduce",
     "velocity_map",
 ]
 

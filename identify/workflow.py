@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 from identify.analysis.dynamic_friction import dynamic_friction
 from identify.analysis.maps import along_track, cable_force, friction_map, velocity_map
@@ -44,9 +43,6 @@ from twin.memory import give_back
 from twin.model.machine import MachineModel
 from twin.parallel import parallel
 from twin.progress import Progress, silent, within
-
-if TYPE_CHECKING:
-    from identify.thesis.chapters import Reproduction
 
 Logs = Mapping[str, Log]
 READING = "reading and preparing the logs"
@@ -318,19 +314,6 @@ def agree(
     return agreement(a, b, load_catalogue() if catalogue is None else catalogue)
 
 
-@parallel()
-def reproduce(
-    chapters: Sequence[str] = (), *, small: bool = False, seed: int = 1, progress: Progress = silent
-) -> Reproduction:
-    """Run chapters of the thesis's study on the twin, all where none is named. Raises InputError.
-
-    small: fewer speeds, trials and passes.
-    """
-    from identify.thesis import chapters as thesis
-
-    return thesis.reproduce(load_catalogue(), chapters, small=small, seed=seed, progress=progress)
-
-
 __all__ = [
     "Addition",
     "Agreement",
@@ -351,6 +334,5 @@ __all__ = [
     "fit_simulation",
     "friction_map",
     "plan",
-    "reproduce",
     "velocity_map",
 ]
