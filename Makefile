@@ -11,7 +11,7 @@ endif
 # What Python compiles is kept for its next start: the tests start it fifty times.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo check test bench clean
+.PHONY: demo check test bench thesis clean
 
 demo: $(VENV)/runtime
 	$(BIN)/twin demo --out demo
@@ -32,6 +32,10 @@ bench: $(VENV)/benchmarks
 	$(BIN)/python -m benchmarks
 	$(BIN)/python -m pytest -n 2 -m slow
 
+# The study of the thesis (studies/thesis), in five minutes; its report and numbers into thesis/.
+thesis: $(VENV)/runtime
+	$(BIN)/python -m studies.thesis --out thesis
+
 $(VENV)/runtime: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
@@ -46,5 +50,5 @@ $(VENV)/benchmarks: $(VENV)/tests
 	@touch $@
 
 clean:
-	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) demo thesis build dist .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

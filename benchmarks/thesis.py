@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
-import identify
 from benchmarks.figures import Figure, Target
+from identify.analysis.dynamic_friction import DYNAMIC
 from identify.dataset.dataset import datasets
 from identify.estimation.presliding import Presliding
-from identify.thesis.simulation import DYNAMIC, SimulationResult
-from twin.effect import Kind
-from twin.effects import load_catalogue
+from studies.thesis.models import overall
+from studies.thesis.reproduction import reproduce
+from studies.thesis.study import friction_of, machine
 from twin.experiments.kinds import OpenLoopSine
 from twin.experiments.named import simulate
-from twin.model.file import load_model
 from twin.model.parameters import ParameterReference, read
 
 Array = NDArray[np.float64]
@@ -41,44 +40,39 @@ def measure() -> list[Figure]:
 
 def _chapters() -> list[Figure]:
     begun = process_time()
-    done = identify.reproduce()
+    done = reproduce()
     spent, wall = process_time() - begun, sum(done.seconds.values())
+    found = {name: chapter.numbers for name, chapter in done.chapters.items()}
     figures = [Figure("all chapters", spent, "s CPU", Target(high=600.0), f"{wall:.0f} s wall")]
-    chapter = done.chapters["simulation"]
-    assert isinstance(chapter, SimulationResult)
     figures += [
-        Figure(f"mean of {name} off the planted value", abs(p.error), "1", Target(high=1e-3))
-        for name, p in chapter.parameters.items()
+        Figure(f"mean of {name} off the planted value", abs(p["error"]), "1", Target(high=1e-3))
+        for name, p in found["simulation"]["parameters"].items()
     ]
-    cable = done.chapters["cable"]
-    off = abs(cable.pitch.mean - cable.pitch.true)
-    dynamic = done.chapters["dynamic"]
+    cable, dynamic, elements = found["cable"], found["dynamic"], found["future"]["elements"]
+    off = abs(cable["pitch"]["mean"] - cable["pitch"]["true"])
     figures += [
-        Figure(f"{name} of the open-loop sine off, largest of the places",
-               float(np.abs(p.values / p.true - 1.0).max()), "1", Target(high=2e-3))
-        for name, p in dynamic.fitted.items()
+        Figure(f"{name} of the open-loop sine off, largest of the places", p["largest_error"], "1",
+               Target(high=2e-3))
+        for name, p in dynamic["parameters"].items()
     ]  # fmt: skip
-    rest, own = dynamic.first_period.max(axis=0)
-    future = done.chapters["future"]
-    figures += [
+    rest, own = (max(e) for e in dynamic["position_error"]["first_period"].values())
+    ratios = found["models"]["error_over_noise_floor"]
+    return [
+        *figures,
         Figure("misfit of the first period, from rest", 1e3 * rest, "mm"),
         Figure("the same from the estimated beginning", 1e6 * own, "um"),
         Figure("frictions fitted to their own data, largest error over noise floor",
-               float(done.chapters["models"].own.max()), "1", Target(high=1.2)),
-        Figure("elements chosen less planted", future.chosen.count - future.planted, "1",
+               max(overall(by_law[law]) for law, by_law in ratios.items()), "1", Target(high=1.2)),
+        Figure("elements chosen less planted", elements["found"] - elements["planted"], "1",
                Target(low=0.0, high=0.0)),
-    ]  # fmt: skip
-    return [
-        *figures,
         Figure("pitch of the spikes off", 1e3 * off, "mm", Target(high=0.1)),
-        Figure("cable force off, RMS", 1e3 * cable.rms_error, "mN"),
-    ]
+        Figure("cable force off, RMS", 1e3 * cable["rms_error"], "mN"),
+    ]  # fmt: skip
 
 
 def _dynamic() -> list[Figure]:
-    model = load_model("thesis_simulation", load_catalogue())
-    name, axis = next(iter(model.axes.items()))
-    friction = next(f for f in axis.effects if f.effect.kind is Kind.FRICTION)
+    model, name, axis = machine("simulation")
+    friction = friction_of(axis)
     log = simulate(model, OpenLoopSine(name, DURATION, amplitude=AMPLITUDE, period=PERIOD))
     references = [ParameterReference(friction.effect.name, friction.effect.parameter(p))
                   for p in DYNAMIC]  # fmt: skip

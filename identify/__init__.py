@@ -1,4 +1,7 @@
-"""The model against measurements: fit, compare, diagnose, add, plan, agree, reproduce."""
+"""The model against measurements: fit, compare, diagnose, add, plan, agree.
+
+And what logs show by themselves: friction by speed and place, its dynamic part, the cable's force.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,15 @@ if TYPE_CHECKING:
         add,
         add_shape,
         agree,
+        along_track,
         cable_force,
         compare,
         diagnose,
+        dynamic_friction,
         fit,
         fit_simulation,
+        friction_map,
         plan,
-        reproduce,
         velocity_map,
     )
 
@@ -24,13 +29,15 @@ __all__ = [
     "add",
     "add_shape",
     "agree",
+    "along_track",
     "cable_force",
     "compare",
     "diagnose",
+    "dynamic_friction",
     "fit",
     "fit_simulation",
+    "friction_map",
     "plan",
-    "reproduce",
     "velocity_map",
 ]
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
+from identify.analysis.dynamic_friction import dynamic_friction
+from identify.analysis.maps import along_track, cable_force, friction_map, velocity_map
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.given_logs import Role
 from identify.dataset.prepared_log import sticks
@@ -20,7 +21,6 @@ from identify.estimation.remainder import noise_known, with_own_noise
 from identify.estimation.replay import simulated_error
 from identify.estimation.simulated_motion import fit_simulated_motion
 from identify.experiment_design.plan import next_experiments, plan
-from identify.measure import cable_force, velocity_map
 from identify.output.text import diagnose_text as diagnose_text  # with it results print themselves
 from identify.output.words.selection import axis_in_words, notes_in_words
 from identify.results.addition import Addition, addition
@@ -43,9 +43,6 @@ from twin.memory import give_back
 from twin.model.machine import MachineModel
 from twin.parallel import parallel
 from twin.progress import Progress, silent, within
-
-if TYPE_CHECKING:
-    from identify.thesis.chapters import Reproduction
 
 Logs = Mapping[str, Log]
 READING = "reading and preparing the logs"
@@ -317,19 +314,6 @@ def agree(
     return agreement(a, b, load_catalogue() if catalogue is None else catalogue)
 
 
-@parallel()
-def reproduce(
-    chapters: Sequence[str] = (), *, small: bool = False, seed: int = 1, progress: Progress = silent
-) -> Reproduction:
-    """Run chapters of the thesis's study on the twin, all where none is named. Raises InputError.
-
-    small: fewer speeds, trials and passes.
-    """
-    from identify.thesis import chapters as thesis
-
-    return thesis.reproduce(load_catalogue(), chapters, small=small, seed=seed, progress=progress)
-
-
 __all__ = [
     "Addition",
     "Agreement",
@@ -341,12 +325,14 @@ __all__ = [
     "add_named",
     "add_shape",
     "agree",
+    "along_track",
     "cable_force",
     "compare",
     "diagnose",
+    "dynamic_friction",
     "fit",
     "fit_simulation",
+    "friction_map",
     "plan",
-    "reproduce",
     "velocity_map",
 ]

@@ -18,7 +18,7 @@ import pytest
 BEGUN = pytest.StashKey[float]()
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
-PACKAGES = ("twin", "identify", "benchmarks")
+PACKAGES = ("twin", "identify", "studies", "benchmarks")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -1,6 +1,7 @@
 """What travels inside the package, and what the architecture forbids."""
 
 import ast
+import tomllib
 from pathlib import Path
 
 from twin.effects import load_catalogue
@@ -22,6 +23,22 @@ def imports(path: Path) -> set[str]:
 def test_twin_never_imports_identify():
     for path in (ROOT / "twin").rglob("*.py"):
         assert not any(name.split(".")[0] == "identify" for name in imports(path)), path
+
+
+def test_studies_stay_outside_and_use_public_names_alone():
+    """The packages know nothing of them, and travel without them."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert settings["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"] == [
+        "twin", "identify"
+    ]  # fmt: skip
+    for package in ("twin", "identify"):
+        for path in (ROOT / package).rglob("*.py"):
+            assert not any(name.split(".")[0] == "studies" for name in imports(path)), path
+    for path in (ROOT / "studies").rglob("*.py"):
+        nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+        names = [a.name for n in nodes if isinstance(n, ast.ImportFrom) for a in n.names]
+        names += [n.attr for n in nodes if isinstance(n, ast.Attribute)]
+        assert not [n for n in names if n.startswith("_") and not n.endswith("__")], path
 
 
 def test_every_model_of_the_package_loads_from_its_name_alone():

@@ -99,5 +99,6 @@ def test_the_two_commands_are_targets_of_the_makefile():
 
 
 def test_the_files_it_names_exist():
-    for name in re.findall(r"`((?:examples|models|tests|twin|identify|benchmarks)/[\w./]*)`", TEXT):
+    folders = "examples|models|tests|twin|identify|studies|benchmarks"
+    for name in re.findall(rf"`((?:{folders})/[\w./]*)`", TEXT):
         assert (ROOT / name).exists(), name

@@ -18,10 +18,8 @@ IDENTIFY, TWIN = (Path(package.__file__).parent for package in (identify, twin))
 # In the order in which data pass them: a room imports only from those before it.
 ROOMS = (
     "dataset", "estimation", "selection", "validation", "experiment_design", "selftest",
-    "measure", "thesis", "results", "output", "workflow", "testing", "demo", "cli", "start",
+    "analysis", "results", "output", "workflow", "testing", "demo", "cli", "start",
 )  # fmt: skip
-# The thesis asks for a mixture of two laws, which it imports.
-MIXTURES = IDENTIFY / "thesis" / "mixed_friction.py"
 MOST_FLOORS = 10
 # Functions that tell what a model or a result holds, without its logs.
 READING = {"followed", "nonparametric_labels", "speeds_of"}
@@ -173,6 +171,6 @@ def words(path: Path) -> Iterator[object]:
     for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Constant):
             yield node.value
-        elif isinstance(node, ast.alias | ast.ImportFrom) and path != MIXTURES:
+        elif isinstance(node, ast.alias | ast.ImportFrom):
             named = node.name if isinstance(node, ast.alias) else node.module or ""
             yield named.split(".")[-1]

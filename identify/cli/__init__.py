@@ -9,15 +9,25 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from identify.cli import agree, loop, machine, plan, reproduce, selftest
+from identify.cli import agree, loop, machine, plan, selftest
 from identify.cli.shared import app
 from twin.errors import InputError
 from twin.threads import VARIABLES
 
-__all__ = ["agree", "loop", "machine", "main", "plan", "reproduce", "selftest"]
+__all__ = ["agree", "loop", "machine", "main", "plan", "selftest"]
 
 OBJECTS = 100_000  # that may be made before cycles among them are sought
 INTERRUPTED = 130  # exit code that typer makes of Ctrl-C, without a word
+ANYTHING = {"ignore_unknown_options": True, "allow_extra_args": True}
+
+
+@app.command(hidden=True, add_help_option=False, context_settings=ANYTHING)
+def reproduce() -> None:
+    """Say where it went."""
+    raise InputError(
+        "reproduce is no command any more; run the thesis's study from the source folder with "
+        "`make thesis` or `python -m studies.thesis`"
+    )
 
 
 def main() -> None:

@@ -122,7 +122,7 @@ def new(
     as_json_: Json = False,
 ) -> None:
     """Propose a first model from logs: mass, friction, constant force, and their hardware."""
-    from identify.measure import first_model, not_determined
+    from identify.analysis.first_model import first_model, not_determined
     from twin.effects import load_catalogue
     from twin.model.file import save_model
 

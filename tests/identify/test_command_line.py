@@ -160,3 +160,10 @@ def test_adding_what_the_data_do_not_support_is_said_with_exit_code_one(folder):
     )
     assert result.returncode == 1
     assert json.loads(result.stdout)["kept"] is False
+
+
+@pytest.mark.parametrize("more", [(), ("--help",), ("--chapter", "cable", "--log", "a", "b")])
+def test_the_study_that_was_a_command_is_told_where_it_went(tmp_path, more):
+    said = refusal("reproduce", *more, folder=tmp_path)
+    assert "`make thesis` or `python -m studies.thesis`" in said
+    assert "reproduce" not in twin("--help", folder=tmp_path).stdout

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cli_runs import twin
 
-from identify.measure import first_model, not_determined
+from identify.analysis.first_model import first_model, not_determined
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.log import ROTARY_UNITS, AxisLog, Log

@@ -11,13 +11,13 @@ from cli_runs import refusal
 from constructed import CATALOGUE, effect, log_of
 from machines import one_axis
 
+from identify.analysis.first_model import first_model
 from identify.dataset.dataset import by_log, datasets
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.shared_samples import share_samples
 from identify.estimation.channel_delay import aligned
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
-from identify.measure import first_model
 from identify.output.as_json import fit_json
 from identify.output.text import fit_text
 from identify.validation.free_run import HORIZON, free_run, rms_error

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from constructed import CATALOGUE, log_of
 
+from identify.analysis.first_model import first_model
 from identify.dataset.beginning import FOREIGN, HELD, beginnings
 from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
 from identify.dataset.test_function import LEAST_BLOCKS
 from identify.dataset.time_scale import HIDES, QUIET, SHOWS, Scale
-from identify.measure import first_model
 from identify.output.words.estimation import prepared_in_words
 from identify.workflow import compare, fit
 from twin.errors import InputError

@@ -6,7 +6,6 @@ import json
 from dataclasses import replace
 from types import SimpleNamespace
 
-import built_chapters as chapters
 import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted
@@ -24,7 +23,7 @@ from identify.output.words.selection import notes_in_words, step_in_words
 from identify.results.addition import Addition
 from identify.results.results import SimulationFit
 from identify.selection.confounded import MovedParameter
-from identify.validation.agreement import Agreement, Cause
+from identify.validation.agreement import Agreement, AxisAgreement, Cause, Difference
 from twin.effect import Kind
 from twin.laws import verdict
 from twin.model.history import HistoryStep
@@ -144,9 +143,20 @@ def test_a_step_of_a_models_history_is_said(action, said) -> None:
 
 # --- whether two fits agree ----------------------------------------------------------------
 
-SAME = chapters.differences(0.7, -1.9, 2.3)
+
+def differences(*ratios: float) -> AxisAgreement:
+    """Parameters p0, p1, ... that differ by so many joint standard errors."""
+    shown = [
+        Difference(f"p{i}", 2.0 + i, 2.0 + i + ratio * (0.1 + 0.01 * i), 0.1 + 0.01 * i, unit, 3.1)
+        for i, (ratio, unit) in enumerate(zip(ratios, ("kg", "N", "N s/m"), strict=False))
+    ]
+    cause = Cause("payload_mass", 0.93)
+    return AxisAgreement(shown, (), (), (), (1.02, 1.07), "N", 0.0139, (cause,))
+
+
+SAME = differences(0.7, -1.9, 2.3)
 OTHER = replace(
-    chapters.differences(11.0, -1.3, -4.7), only_a=("wear",), only_b=("gms", "cogging"),
+    differences(11.0, -1.3, -4.7), only_a=("wear",), only_b=("gms", "cogging"),
     not_compared=("p7",), above_floor=(7.3, 1.9),
     causes=(Cause("payload_mass", 0.61, ("constant_force",)), Cause("wear", 0.23)),
 )  # fmt: skip

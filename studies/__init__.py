@@ -1,0 +1,1 @@
+"""Studies made with the package, which do not travel with it."""

@@ -1,0 +1,362 @@
+"""Parts of the chapters against closed forms: motions, laws, planted values, noise, starts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from built_fits import CATALOGUE, HARDWARE, axis_of, fitted
+
+from identify.dataset.motion import motion_of
+from identify.estimation.prescribed_motion import force_along
+from identify.estimation.stribeck_curve import StribeckCurve
+from identify.estimation.velocity_map import VelocityMap, velocity_map
+from studies.thesis import (
+    behaviours,
+    cable,
+    dynamic,
+    future,
+    models,
+    residuals,
+    simulation,
+    study,
+    track,
+    twin,
+)
+from studies.thesis.mixed_friction import PARTS, mixed
+from twin.effect import Kind
+from twin.log import AxisLog, Log
+from twin.model.machine import AxisModel, Fitted
+from twin.model.parameters import free_parameters
+
+TRACK, _, STAGE = study.machine("track")
+OLD, _, AGING = study.machine("aging")
+CURVE = StribeckCurve(0.285, 0.335, 0.01, 0.018)
+SPEEDS = np.array([0.001, 0.003, 0.006, 0.01, 0.015, 0.03, 0.06, 0.1, 0.2])
+
+
+def of_cable(x):
+    return -(0.05 + 1.5 * x - 2.0 * x**2 + 8.0 * x**3)
+
+
+def test_what_was_found_is_measured_in_parts_of_what_was_planted() -> None:
+    r = study.recovered(-4.0, [-4.4, -4.0, -3.2], "N", -3.9)
+    assert r["mean"] == pytest.approx(-3.8666667)
+    assert r["error"] == pytest.approx(-1.0 / 30.0)
+    assert r["rms_error"] == pytest.approx(np.sqrt((0.1**2 + 0.2**2) / 3.0))
+    assert r["largest_error"] == pytest.approx(0.2)
+    assert r["sd"] == pytest.approx(np.sqrt((0.5333333**2 + 0.1333333**2 + 0.6666667**2) / 2.0))
+    assert (r["true"], r["unit"], r["printed"]) == (-4.0, "N", -3.9)
+    assert study.recovered(1.0, [3.0], "N")["sd"] == 0.0
+
+
+# --- the cable ------------------------------------------------------------------------------
+
+
+def test_smooth_forces_of_position_neither_repeat_nor_remember() -> None:
+    others = (fitted("constant_force"), fitted("cogging"), fitted("cable_hysteresis"))
+    axis = replace(STAGE, effects=(*STAGE.effects, *others))
+    assert [f.effect.name for f in study.of_position(axis)] == ["cable_slab", "constant_force"]
+
+
+def test_what_was_planted_is_read_from_the_log_at_the_positions_of_what_was_found() -> None:
+    axis = AxisModel(2.0, HARDWARE, (fitted("cable_slab"), fitted("constant_force"),
+                                     fitted("cogging", p=0.031), *axis_of().effects))  # fmt: skip
+    x = 0.1 * np.cos(np.linspace(0.0, 9.0, 4001))  # neither rising nor falling
+    truth = {"position": x, "cable_slab": 2.0 * x, "constant_force": np.full_like(x, 0.3),
+             "cogging": np.sin(900.0 * x), "coulomb_viscous": 7.0 * x}  # fmt: skip
+    log = Log(1e3, {"x": AxisLog({"position": x, "force": x})}, truth={"x": truth})
+    at = np.array([-0.05, 0.0, 0.08])
+    np.testing.assert_allclose(cable.planted(axis, log, "x", at), 2.0 * at + 0.3, atol=1e-4)
+
+
+def test_the_sine_carries_the_cable_at_its_place_without_feedback() -> None:
+    quiet = TRACK.with_axis("x", study.with_hardware(STAGE, current_noise=0.0))
+    log = dynamic.sine(quiet, "x", 0.07, 6.0, np.random.default_rng(0))
+    t = np.arange(len(log)) / 1e3
+    assert len(log) == round((6.0 + 0.75) * 1e3)
+    expected = -of_cable(0.07) + 0.21 * np.sin(2.0 * np.pi * t / 3.0)
+    np.testing.assert_allclose(log.axes["x"].force, expected, atol=1e-9)
+    assert log.axes["x"].position[0] == pytest.approx(0.07, abs=1e-6)
+    late = dynamic.late(log, "x").axes["x"]
+    np.testing.assert_array_equal(late.force, log.axes["x"].force[750:])
+    np.testing.assert_array_equal(late.position, log.axes["x"].position[750:])
+
+
+# --- motions --------------------------------------------------------------------------------
+
+
+def test_a_motion_from_turn_to_turn_rests_in_each() -> None:
+    turns = np.array([0.0, 2.0, -1.0, 0.5])
+    x = behaviours.turning(turns)
+    leg = round(behaviours.LEG * behaviours.RATE)
+    assert len(x) == 3 * leg
+    np.testing.assert_allclose(x[::leg], turns[:-1])
+    np.testing.assert_allclose(x[leg // 2 :: leg], (turns[1:] + turns[:-1]) / 2.0)
+    np.testing.assert_allclose(x[leg - 1 :: leg], turns[1:], atol=1e-4)
+    assert np.all(np.sign(np.diff(x[:leg])) == 1.0)
+
+
+def test_the_speed_swings_about_its_mean_without_a_reversal() -> None:
+    mean, amplitude, hertz = behaviours.SWING
+    v = np.diff(behaviours.swing()) * behaviours.RATE
+    assert v.min() > 0.0
+    half, second = round(0.5 * behaviours.RATE), round(2.0 * behaviours.RATE)
+    np.testing.assert_allclose(v[: half - 1], np.linspace(0.0, mean, half, endpoint=False)[1:])
+    for i, f in enumerate(hertz):
+        part = v[half - 1 + i * second :][:second]
+        t = np.arange(second) / behaviours.RATE
+        np.testing.assert_allclose(part, mean + amplitude * np.sin(2 * np.pi * f * t), atol=1e-9)
+
+
+def test_each_triangle_of_force_begins_at_nothing_and_reaches_both_heights() -> None:
+    force, begin = behaviours.pushes(), 0
+    for period in behaviours.PUSHES:
+        part = force[begin : begin + round(period * behaviours.RATE)]
+        quarter = len(part) // 4
+        height = behaviours.PUSH * np.array([0.0, 1.0, 0.0, -1.0])
+        np.testing.assert_allclose(part[::quarter][:4], height, atol=1e-12)
+        np.testing.assert_allclose(np.abs(np.diff(part)), behaviours.PUSH / quarter)
+        begin += len(part)
+    assert begin == len(force)
+
+
+def test_the_steady_force_and_its_oscillation_rise_within_a_second() -> None:
+    steady, amplitude, hertz = behaviours.DRIFT
+    t = np.arange(round(4.0 * behaviours.RATE)) / behaviours.RATE
+    whole = steady + amplitude * np.sin(2.0 * np.pi * hertz * t)
+    force = behaviours.oscillation(4.0)
+    np.testing.assert_allclose(force[1000:], whole[1000:])
+    np.testing.assert_allclose(force[:1000], (t * whole)[:1000])
+
+
+def test_a_setpoint_along_positions_has_their_rates_and_one_of_force_none() -> None:
+    t = np.arange(400) / behaviours.RATE
+    found = behaviours.along(0.01 * np.sin(9.0 * t))
+    inner = slice(5, -5)
+    np.testing.assert_allclose(found.velocity[inner, 0], 0.09 * np.cos(9 * t)[inner], atol=1e-4)
+    np.testing.assert_allclose(
+        found.acceleration[inner, 0], -0.81 * np.sin(9 * t)[inner], atol=1e-3
+    )
+    assert not found.force.any()
+    pushed = behaviours.pushed(t)
+    np.testing.assert_allclose(pushed.force[:, 0], t)
+    assert not any(x.any() for x in (pushed.position, pushed.velocity, pushed.acceleration))
+
+
+def test_the_behaviours_are_what_they_say_and_lugre_has_its_traits() -> None:
+    """Loops turn where they should; the small oscillation never reaches the break-away force.
+
+    Under it LuGre creeps; it lags, and pushed fast it breaks away earlier (Al-Bender, Lampaert,
+    Swevers 2005).
+    """
+    model, name, axis = study.machine("simulation")
+    stage, rng = models.noisy(model, name, axis), np.random.default_rng(0)
+    logs = behaviours.behaviours(stage, rng)
+    static = study.friction_of(axis).values["Fs"]
+    assert np.abs(logs["drift"].axes["x"].force).max() < static
+    assert np.abs(logs["break-away"].axes["x"].force).max() > static
+    reached = logs["pre-sliding loops"].axes["x"].position
+    assert reached.max() == pytest.approx(behaviours.LOOP.max(), rel=0.1)
+    assert np.diff(logs["frictional lag"].truth["x"]["position"][600:]).min() > 0.0
+    found = behaviours.traits(stage, logs, rng)
+    assert found["drift"] > 5e-5
+    assert found["lag"] > 3e-3
+    assert found["fall"] == pytest.approx(0.018, rel=0.05)
+    assert found["fast_push"] < 0.7 * found["slow_push"]
+
+
+# --- laws, loops, starts --------------------------------------------------------------------
+
+
+def friction(fitted: Fitted) -> np.ndarray:
+    position = behaviours.turning(behaviours.LOOP)
+    velocity = np.diff(position, append=position[-1]) * behaviours.RATE
+    axis = AxisModel(mass=1.0, effects=(fitted,))
+    return force_along(axis, position, velocity, 1.0 / behaviours.RATE, Kind.FRICTION)
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.3, 1.0])
+def test_a_mixture_is_the_weighted_sum_of_both(weight: float) -> None:
+    forgets = {"Fc": 0.3, "Fs": 0.4, "v0": 0.02, "sigma2": 0.5, "sigma0": 900.0, "sigma1": 0.3}
+    remembers = {**forgets, "sigma0": 400.0, "sigma1": 0.7, "spread": 5.0}
+    first, second = (
+        friction(Fitted.at_start(effect, values))
+        for effect, values in zip(PARTS, (forgets, remembers), strict=True)
+    )
+    found = friction(mixed(remembers, forgets, weight))
+    np.testing.assert_allclose(found, weight * first + (1.0 - weight) * second, atol=1e-12)
+    assert np.abs(first - second).max() > 0.01
+
+
+def test_a_law_that_remembers_closes_its_inner_loop_and_dahls_does_not() -> None:
+    """The gap is between two passes of one turn: of 0.4 in the loop, of 0.6 in the nested ones."""
+    known, leg = study.friction_of(AGING).values, round(behaviours.LEG * behaviours.RATE)
+    gaps = {}
+    for name in ("gms", "dahl"):
+        axis = AxisModel(1.0, HARDWARE, (models.like(CATALOGUE[name], known),))
+        found = models.loop(axis, behaviours.LOOP)
+        gaps[name] = found.gap
+        assert found.gap == abs(found.friction[3 * leg - 1] - found.friction[5 * leg - 1])
+    assert gaps["gms"] < 1e-4 < 1e-3 < gaps["dahl"]
+    nested = models.loop(axis, models.NESTED)
+    assert nested.gap == abs(nested.friction[3 * leg - 1] - nested.friction[8 * leg - 1])
+
+
+def test_a_friction_like_another_has_its_free_values_by_name() -> None:
+    known = {"Fc": 0.2, "Fs": 0.7, "n": 9.0, "other": 1.0}
+    values = models.like(CATALOGUE["stribeck"], known).values
+    start = Fitted.at_start(CATALOGUE["stribeck"]).values
+    assert {k: v for k, v in values.items() if v != start[k]} == {"Fc": 0.2, "Fs": 0.7}
+
+
+def test_random_starts_are_drawn_within_three_times_and_the_bounds() -> None:
+    start, rng = study.friction_of(STAGE), np.random.default_rng(3)
+    drawn = [models.drawn(start, rng).values for _ in range(60)]
+    for p in start.effect.parameters:
+        values, first = np.array([d[p.name] for d in drawn]), start.values[p.name]
+        if p.name in start.fixed or p.fixed:
+            assert np.all(values == first)
+        else:
+            assert np.all((values >= p.lower) & (values <= p.upper))
+            assert np.all(values <= 3.0 * first * (1 + 1e-12))
+            assert np.ptp(values) > 0.5 * first
+            if not p.at_least:  # as often less as more
+                assert np.median(values) == pytest.approx(first, rel=0.5)
+    assert all(d["Fs"] >= d["Fc"] for d in drawn)
+
+
+def test_a_behaviour_in_which_the_machine_stands_still_does_not_count() -> None:
+    assert models.overall({"a": 1.25, "b": 3.0, "c": np.nan}) == pytest.approx(
+        np.sqrt((1.25**2 + 9.0) / 2.0)
+    )
+
+
+def test_free_values_of_the_planted_friction_stand_beside_those_found() -> None:
+    planted = replace(fitted("lugre", Fc=0.2, sigma2=0.1), fixed=frozenset({"n", "sigma1"}))
+    found = axis_of().with_effect(fitted("lugre", Fc=0.3, Fs=0.4))
+    told = residuals.beside_planted(planted, found)
+    assert not {"n", "sigma1"} & set(told)
+    assert (told["Fc"]["true"], told["Fc"]["mean"], told["Fc"]["unit"]) == (0.2, 0.3, "N")
+    assert told["Fs"]["mean"] == 0.4
+    assert residuals.beside_planted(planted, axis_of()) == {}
+
+
+def test_the_dry_part_of_the_drawn_friction_is_scaled_by_one_factor() -> None:
+    model, name, axis = study.machine("proton_xy")
+    drawn = twin.drawn(model, name, np.random.default_rng(5)).axes[name]
+    before, after = (study.friction_of(a) for a in (axis, drawn))
+    dry = {p.name for p in before.effect.parameters if p.dry}
+    ratios = {k: after.values[k] / v for k, v in before.values.items() if v}
+    factor = np.random.default_rng(5).uniform(0.8, 1.25)
+    assert ratios == pytest.approx({k: factor if k in dry else 1.0 for k in ratios})
+    assert drawn.mass == axis.mass
+    others = [f for f in drawn.effects if f.effect.kind is not Kind.FRICTION]
+    assert others == [f for f in axis.effects if f.effect.kind is not Kind.FRICTION]
+
+
+# --- simulation, track, future --------------------------------------------------------------
+
+
+def test_noise_is_a_part_of_each_signals_own_size() -> None:
+    rng, n = np.random.default_rng(6), np.arange(40_000)
+    x, force, felt = (size * np.sin(n * w) + 3.0 for size, w in ((2.0, 0.1), (50.0, 0.13),
+                                                                 (7.0, 0.17)))  # fmt: skip
+    log = Log(1e3, {"x": AxisLog({"position": x, "force": force})})
+    found = simulation.noisy(log, felt, 0.01, rng).axes["x"]
+    off = found.position - x, found.force - force
+    assert np.std(off[0]) == pytest.approx(0.01 * 2.0 / 2**0.5, rel=0.02)
+    assert np.std(off[1]) == pytest.approx(0.01 * 7.0 / 2**0.5, rel=0.02)
+    assert abs(np.corrcoef(*off)[0, 1]) < 0.03
+    still = simulation.noisy(log, felt, 0.0, rng).axes["x"]
+    np.testing.assert_array_equal([still.position, still.force], [x, force])
+
+
+def test_a_trial_averages_both_directions_under_the_noise_of_a_plateau() -> None:
+    """White noise of a part of the friction, averaged over 100 samples, is a tenth of it."""
+    double = replace(CURVE, Fc=0.485, Fs=0.535)
+    both = np.r_[SPEEDS, -SPEEDS]
+    friction = np.r_[CURVE(SPEEDS), double(SPEEDS)]
+    found = VelocityMap(both, friction, 0.0 * both, np.full(len(both), 100.0))
+    assert simulation.static_of(found) == pytest.approx([0.385, 0.435, 0.01, 0.018], rel=1e-5)
+    many = [simulation.noisy_map(found, 0.2, np.random.default_rng(i)).friction for i in range(400)]
+    np.testing.assert_allclose(np.std(many, axis=0), 0.02 * friction, rtol=0.15)
+    np.testing.assert_allclose(np.mean(many, axis=0), friction, rtol=4e-3)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_the_curve_planted_at_a_place_is_that_of_its_level(way: float) -> None:
+    along = np.pi * (0.05 + 0.17) / 0.34
+    level = 1.0 + 0.06 * np.cos(along) - 0.015 * np.cos(2 * along) + 0.008 * np.cos(3 * along)
+    level *= 1.0 + 0.02 * way
+    expected = [0.285 * level, 0.335 * level, 0.01, 0.018]
+    values = track.curve_at(STAGE, 0.05, way * SPEEDS)
+    assert np.all(np.abs(values / expected - 1.0) < [5e-3, 5e-3, 2e-2, 0.05])
+
+
+def test_at_one_place_friction_and_its_direction_are_fitted_and_the_rest_is_known() -> None:
+    """What varies along the track is a slope there; spikes repeat and are not at the places.
+
+    Brisk moves are repeated, and those that are too fast left out.
+    """
+    logs = track.moves(TRACK, "x", 0.0, True, np.random.default_rng(0))
+    assert list(logs) == [f"{v:g} m/s" for v in track.FEW]
+    motions = [motion_of(log, "x", label, ripples=()) for label, log in logs.items()]
+    found = VelocityMap.joined([velocity_map(STAGE, motion) for motion in motions])
+    assert len(found) == 2 * (2 * 1 + 4 * 2)
+    assert found.position == pytest.approx(0.0, abs=0.006)
+    axis = track.local_fit(TRACK, "x", logs, found).axis
+    assert set(axis.names) == {"lugre", "cable_slab", "position_dependent_friction",
+                               "asymmetric_friction"}  # fmt: skip
+    free = {c.label for c in free_parameters(axis)}
+    dynamic_part = {f"lugre.{n}" for n in ("Fc", "Fs", "v0", "sigma2", "sigma0", "sigma1")}
+    assert free == dynamic_part | {"position_dependent_friction.c1", "asymmetric_friction.coulomb",
+                                   "asymmetric_friction.viscous"}  # fmt: skip
+    assert axis["cable_slab"].values == STAGE["cable_slab"].values
+    own, true = (track.curve_at(a, 0.0, np.array(track.FEW)) for a in (axis, STAGE))
+    assert own[:2] == pytest.approx(true[:2], rel=3e-3)
+    slower = replace(STAGE, hardware=replace(STAGE.hardware, velocity=0.05 / track.FASTEST))
+    few = track.moves(TRACK.with_axis("x", slower), "x", 0.0, True, np.random.default_rng(0))
+    assert list(few) == list(logs)[:-1]
+
+
+def test_a_trend_is_more_than_the_scatter_along_the_track() -> None:
+    where, scatter = np.linspace(-0.1, 0.1, 9), 1e-3 * np.array([1, -1, 1, -1, 1, -1, 1, -1, 1])
+    assert track.has_trend(where, 0.3 + 0.1 * where + scatter)
+    assert not track.has_trend(where, 0.3 + scatter)
+    assert not track.has_trend(where[:3], where[:3])  # too few to tell
+
+
+def test_the_level_that_a_machine_had_is_that_of_its_states() -> None:
+    """Wear multiplies by 1 + 0.002 s, heat by exp(-0.05 E); a state is read every 100 samples."""
+    assert [f.effect.name for f in AGING.effects if future.ages(f)] == ["wear", "thermal_drift"]
+    assert not future.ages(fitted("asymmetric_friction"))
+    states = {"position": np.zeros(400), "wear_distance": np.linspace(0.0, 40.0, 400),
+              "thermal_drift_heat": np.linspace(0.0, 3.0, 400)}  # fmt: skip
+    at = np.repeat(np.arange(0, 400, future.THINNED), future.THINNED)
+    s, heat = states["wear_distance"][at], states["thermal_drift_heat"][at]
+    expected = 0.335 * np.mean((1.0 + 0.002 * s) * np.exp(-0.05 * heat))
+    assert future.true_level(AGING, states, "Fs") == pytest.approx(expected)
+
+
+def test_a_drift_is_the_slope_of_the_second_half_over_the_distance() -> None:
+    """A short run of the machine without what ages it: its level is found, and stays."""
+    young = replace(AGING, effects=tuple(f for f in AGING.effects if not future.ages(f)))
+    machine = OLD.with_axis("x", young)
+    log = study.recorded(machine, "tracking", np.random.default_rng(2), 60.0)
+    found = future.drift(machine, young, log)
+    assert len(found["found"]) == 6
+    np.testing.assert_allclose(found["true"], 0.285)
+    assert np.all(np.abs(found["found"] - 0.285) < 2.0 * found["half_width_90"])
+    assert np.all(np.diff(found["distance"]) > 0.0)
+    late = slice(3, None)
+    slope, _ = np.polyfit(found["distance"][late], found["found"][late], 1,
+                          w=1.0 / found["half_width_90"][late])  # fmt: skip
+    assert found["slope"] == pytest.approx(slope)
+    assert not found["detected"]
+    assert "does not drift in its second half" in future.drift_in_words(found)
+    aged = {**found, "slope": 0.01, "slope_standard_error": 0.001, "detected": True}
+    assert future.drift_in_words(aged) == (
+        "drifts in its second half: 0.01 +- 0.001 N/m (standard error)"
+    )
