@@ -33,7 +33,6 @@ Array = NDArray[np.float64]
 SAME_ERROR = 1.01  # relative error that simpler values of an effect may have
 HEAD_EVALUATIONS = 4  # of a friction fitted on the heads; more do not change their order
 OTHER_BENDS = (0.6, 1.5)  # times what a law holds by design, at which its exponent is tried
-HOPELESS = 10.0  # times the squared error of the present friction, after another's linear step
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +97,6 @@ class Added:
         """Another friction, which no linear step puts in the place of one: a fit on the heads."""
         fit, heads = judged.fit, judged.dataset.heads
         old = _on_heads(fit, judged.dataset)
-        if np.mean(found[0].left ** 2) > HOPELESS * old.error**2:
-            return Look(self, -np.inf, tuple(fit.axis.with_effect(s.fitted) for s in found))
         fits = [fit_roughly(fit.axis.with_effect(s.fitted), heads, HEAD_EVALUATIONS) for s in found]
         best = sorted(fits, key=lambda f: f.error)
         both = moving(heads, sticks(old.axis) or sticks(best[0].axis))

@@ -55,7 +55,6 @@ from twin.progress import Progress, silent, within
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
 AS_MUCH = 0.66  # of the part of a free curve, whose ten numbers are any law's: it goes first
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
-MAY_HELP = 1.0  # t from which a change that is refused alone is followed one round further
 OUTSIDE = 0.1  # of the square of a law's force, below which a free curve can make it as well
 SETTLED = 0.999  # of the error, below which another refit is a better optimum
 
@@ -394,7 +393,7 @@ def _together(
         found = t.candidate
         return bool(
             found.score and not found.doubt
-            and found.part > RULE.promise * RULE.least_part and found.score.t > MAY_HELP
+            and found.part > RULE.promise * RULE.least_part and found.score.t > 0.0
         )  # fmt: skip
 
     ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[:LEADERS]

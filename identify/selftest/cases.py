@@ -37,6 +37,7 @@ TRAINING, SELECTION, TEST = ("tracking", "moves"), "tracking", "moves"  # what i
 HIDDEN = 0.9  # part of an effect's force, absorbed by a fit, from which the mass is held fixed
 ROUNDS = 2  # corrections of a friction's level
 LEVELS = (0.1, 10.0)  # times the machine's own friction, within which the level is sought
+OWN = 0.999  # of an effect's force, absorbed by a fit, from which the model has it by itself
 REACHED = 0.7  # part of the wanted force that an effect must reach within its bounds
 TRIES = 6  # draws of an effect's values until it shows
 
@@ -238,7 +239,8 @@ def _with_planted(
             held = trial
         reached = visible_force(fitted, held.base, trial.dataset)
         own = effect.is_itself is None or effect.is_itself(fitted.values, trial.dataset.excitation)
-        if own and reached >= REACHED * strength * trial.floor:
+        told = hidden_part(fitted, held.base, trial.dataset) < OWN
+        if own and told and reached >= REACHED * strength * trial.floor:
             break
     else:
         raise NotShown(effect.name)
