@@ -35,9 +35,12 @@ def simulate(
     out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")] = Path("log.mcap"),
     seed: Annotated[int, typer.Option(help="Same seed, same log.")] = 0,
     duration: Annotated[
-        float | None, typer.Option(help="s, 20 if left out; a file has its own.")
+        float | None, typer.Option(help="Length in s, 20 if left out; a file has its own.")
     ] = None,
     axis: Annotated[str | None, typer.Option(help="Axis that moves, where one does.")] = None,
+    setpoints: Annotated[
+        Path | None, typer.Option(help="Setpoints to write as CSV, to be run on a machine.")
+    ] = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
@@ -45,10 +48,14 @@ def simulate(
     from functools import partial
 
     from twin.experiments.file import SUFFIX, load_experiment
-    from twin.experiments.named import Reach, simulate_parts
+    from twin.experiments.lasting import missed
+    from twin.experiments.named import DURATION, Reach, find_experiment, simulate_parts
+    from twin.experiments.setpoint_csv import write_setpoints
     from twin.log import record_log
 
-    require_folder(out)
+    for file in (out, setpoints):
+        if file is not None:
+            require_folder(file)
     stage = machine_model(model, catalogue_with(effects))
     chosen = load_experiment(experiment) if experiment.endswith(SUFFIX) else experiment
     reach = Reach(stage)
@@ -58,9 +65,16 @@ def simulate(
             progress=partial(progress, "simulating"),
         )  # fmt: skip
         samples = record_log(map(reach.take, parts), out)
+    if setpoints is not None:
+        if isinstance(chosen, str):
+            chosen = find_experiment(chosen, stage, axis, duration or DURATION)
+        write_setpoints(chosen, stage, seed, setpoints)
     rate = stage.sample_rate
     result = {"log": str(out), "samples": samples, "sample_rate": rate, "unit": "Hz"}
-    say(f"{out}: {samples} samples at {rate:g} Hz", result, as_json_, reach.warnings())
+    result |= {"setpoints": str(setpoints)} if setpoints else {}
+    asked = None if duration is None else missed(duration, samples / rate)
+    warnings = [*reach.warnings(), *([asked] if asked else [])]
+    say(f"{out}: {samples} samples at {rate:g} Hz", result, as_json_, warnings)
 
 
 @app.command("import")

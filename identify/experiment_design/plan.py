@@ -100,7 +100,7 @@ def plan(
     between: effects, each added to the model, or models; refitted where there are logs. Where it is
     empty, the logs are diagnosed, and the plan is for the effects that the diagnosis cannot
     separate, or for the best and the runner-up; without logs or a missing effect, it is for the
-    model's own parameters. duration: of the experiment, s, roughly. Raises InputError for an
+    model's own parameters. duration: of the experiment, s. Raises InputError for an
     unknown axis, an axis whose travel is not known, and explanations that are the same.
     """
     catalogue = load_catalogue() if catalogue is None else catalogue
