@@ -15,7 +15,7 @@ def example(
     name: Annotated[
         str | None, typer.Argument(help="Which example; all are listed if left out.")
     ] = None,
-    folder: Annotated[
+    out: Annotated[
         Path | None, typer.Option("--out", "-o", help="New folder; NAME if left out.")
     ] = None,
     as_json_: Json = False,
@@ -31,7 +31,7 @@ def example(
         lines = [f"{key:{width}s}  {one.summary}" for key, one in EXAMPLES.items()]
         say("\n".join(lines), {"examples": {k: e.summary for k, e in EXAMPLES.items()}}, as_json_)
         return
-    into = folder or Path(name)
+    into = out or Path(name)
     chosen, files = write_example(name, into)
     lines = [f"{into}: {', '.join(file.name for file in files)}"]
     lines += [f"data: {chosen.data}"] if chosen.data else []

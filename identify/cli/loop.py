@@ -58,7 +58,10 @@ def fit(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Identify the parameters of the model's effects."""
+    """Identify the parameters of the model's effects.
+
+    Example: twin fit proton_xy fit.mcap --holdout held.mcap -o fitted.toml
+    """
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
@@ -95,7 +98,10 @@ def compare(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Print the errors of the model, and where it fails."""
+    """Print the errors of the model, and where it fails.
+
+    Example: twin compare fitted.toml test.mcap -o report.html
+    """
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
@@ -134,7 +140,10 @@ def diagnose(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Find which physical effect is missing, with the evidence for it."""
+    """Find which physical effect is missing, with the evidence for it.
+
+    Example: twin diagnose fitted.toml fit.mcap --holdout held.mcap -o diagnosis.html
+    """
     from identify import workflow
     from identify.output import diagnosis_json
     from identify.output import text as as_text
@@ -180,7 +189,10 @@ def add(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Add an effect, or the shape of one, refit, and record the error before and after."""
+    """Add an effect, or the shape of one, refit, and record the error before and after.
+
+    Example: twin add cogging fitted.toml fit.mcap --holdout held.mcap -o better.toml
+    """
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
@@ -208,7 +220,10 @@ def demo(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Run the whole loop on a machine with a hidden effect."""
+    """Run the whole loop on a machine with a hidden effect.
+
+    Example: twin demo -o demo
+    """
     from identify.demo import BETTER
     from identify.demo import demo as run
     from identify.output import as_json, diagnosis_json

@@ -44,7 +44,10 @@ def simulate(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Run an experiment on the twin in MuJoCo and log it as MCAP."""
+    """Run an experiment on the twin in MuJoCo and log it as MCAP.
+
+    Example: twin simulate moves --model example_machine --duration 10 -o fit.mcap
+    """
     from functools import partial
 
     from twin.experiments.file import SUFFIX, load_experiment
@@ -94,7 +97,10 @@ def import_(
     ] = False,
     as_json_: Json = False,
 ) -> None:
-    """Turn a machine's recording into an MCAP log."""
+    """Turn a machine's recording into an MCAP log.
+
+    Example: twin import recording.csv --map map.toml -o run.mcap
+    """
     from twin.log import write_log
     from twin.log.importers import import_log, load_mapping
 
@@ -135,7 +141,10 @@ def new(
     out: Annotated[Path, typer.Option("--out", "-o", help="Machine model (.toml) to write.")],
     as_json_: Json = False,
 ) -> None:
-    """Propose a first model from logs: mass, friction, constant force, and their hardware."""
+    """Propose a first model from logs: mass, friction, constant force, and their hardware.
+
+    Example: twin new run.mcap -o model.toml
+    """
     from identify.analysis.first_model import first_model, not_determined
     from twin.effects import load_catalogue
     from twin.model.file import save_model
@@ -158,7 +167,10 @@ def new(
 
 @app.command()
 def check(logs: Logs, as_json_: Json = False) -> None:
-    """Say whether logs are fit for identification, and what is wrong with them."""
+    """Say whether logs are fit for identification, and what is wrong with them.
+
+    Example: twin check run.mcap
+    """
     from identify.output import machine_json, machine_text
     from twin.log.long import check_file
 
@@ -177,7 +189,10 @@ def recover(
     ] = False,
     as_json_: Json = False,
 ) -> None:
-    """Keep the intact parts of a damaged log: the longest at OUT, the others beside it."""
+    """Keep the intact parts of a damaged log: the longest at OUT, the others beside it.
+
+    Example: twin recover bad.mcap -o good.mcap
+    """
     from twin.log import recover_file
 
     require_folder(out)
@@ -203,7 +218,10 @@ def effects(
     ] = False,
     as_json_: Json = False,
 ) -> None:
-    """Print the catalogue, or one effect with its equation, units and source; or check it."""
+    """Print the catalogue, or one effect with its equation, units and source; or check it.
+
+    Example: twin effects cogging --plot cogging.png
+    """
     from identify.output import machine_json, machine_text
 
     catalogue = catalogue_with(files)

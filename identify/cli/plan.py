@@ -50,7 +50,10 @@ def plan(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Choose the experiment that decides between explanations; `twin simulate` runs it."""
+    """Choose the experiment that decides between explanations; `twin simulate` runs it.
+
+    Example: twin plan fitted.toml --between cogging wear --duration 8 -o next.toml
+    """
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text

@@ -26,15 +26,22 @@ MEASURED = ("position", "velocity", "setpoint_position", "current", "force")
 
 
 class Commands(typer.Typer):
-    """The commands, none of which overwrites what it reads."""
+    """The commands, none of which overwrites what it reads.
+
+    In the list of commands each has the first sentence of its help, whole.
+    """
 
     def command(self, name: str | None = None, **options: Any) -> Any:
-        return super().command(name, cls=Command, **options)
+        def register(job: Callable[..., None]) -> Callable[..., None]:
+            first = (job.__doc__ or "").split("\n\n")[0]
+            given = {"short_help": " ".join(first.split()), **options}
+            return super(Commands, self).command(name, cls=Command, **given)(job)
+
+        return register
 
 
 app = Commands(
     help="Find out why the model and the machine disagree.",
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
