@@ -29,6 +29,7 @@ from identify.cli.shared import (
     require_folder,
     require_report,
     say,
+    unconfirmed,
     with_roles,
 )
 
@@ -119,7 +120,7 @@ def compare(
 
         write_report(
             out, title=f"{machine.name}: model against measurement", diagnosis=None,
-            comparison=result, history=machine.history,
+            comparison=result, history=machine.history, assumed=unconfirmed(findings),
         )  # fmt: skip
     if mcap:
         from identify.output.side_by_side import write_side_by_side
@@ -165,6 +166,7 @@ def diagnose(
         write_report(
             out, title=f"{machine.name}: what the model lacks", diagnosis=result,
             comparison=result.comparison, history=result.model.history,
+            assumed=unconfirmed(findings),
         )  # fmt: skip
     told = {**diagnosis_json.diagnose_json(result, findings), "left_out": silent}
     say(as_text.diagnose_text(result), told, as_json_, [*findings, *silent])

@@ -102,6 +102,7 @@ def import_(
     Example: twin import recording.csv --map map.toml -o run.mcap
     """
     from twin.log import write_log
+    from twin.log.check import assumed
     from twin.log.importers import import_log, load_mapping
 
     if out is not None:
@@ -115,7 +116,9 @@ def import_(
     write_log(log, out)
     result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
     resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
-    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, resampled)
+    unsure = [str(f) for axis in log.axes for f in assumed.check(axis, log.metadata)]
+    said = [*resampled, *(f"{out}: warning: {finding}" for finding in unsure)]
+    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, said)
 
 
 def _guess(sources: list[Path], out: Path | None, as_json_: bool) -> None:

@@ -234,6 +234,11 @@ def sentences(name: str, report: CheckReport) -> list[str]:
     return [f"{name}: {finding.severity.value}: {finding}" for finding in report.findings]
 
 
+def unconfirmed(findings: Sequence[str]) -> list[str]:
+    """Of the findings those that tell what an import map assumes."""
+    return [line for line in findings if "the import map assumes" in line]
+
+
 def require_report(path: Path) -> None:
     """Raise InputError where a report could not be written, or its name is that of another kind."""
     if path.suffix.lower() not in (".html", ".htm"):

@@ -192,6 +192,7 @@ def test_import_and_recover(monkeypatch, cli):
     class Recording(list):
         sample_rate = 125.0
         metadata: ClassVar[dict[str, str]] = {"resampled": "steps of 1 ms"}
+        axes: ClassVar[dict[str, str]] = {}
 
     log = Recording([0] * 9)
     load = stub(monkeypatch, twin.log.importers, "load_mapping", "the map")
