@@ -4,8 +4,10 @@ PYTHON ?= python3
 VENV := .venv
 ifeq ($(OS),Windows_NT)
 BIN := $(VENV)/Scripts
+ACTIVATE := $(VENV)\Scripts\activate
 else
 BIN := $(VENV)/bin
+ACTIVATE := source $(BIN)/activate
 endif
 
 # What Python compiles is kept for its next start: the tests start it fifty times.
@@ -15,6 +17,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 demo: $(VENV)/runtime
 	$(BIN)/twin demo --out demo
+	@echo "to use twin in this shell: $(ACTIVATE)"
 
 # Types are one of the tests (tests/test_types.py), so that they take no time of their own.
 test: $(VENV)/tests

@@ -1,6 +1,11 @@
 """The model against measurements: fit, compare, diagnose, add, plan, agree.
 
 And what logs show by themselves: friction by speed and place, its dynamic part, the cable's force.
+Logs are given as a Log, the path of one, a list of them or a dict by name; a model as a
+MachineModel, the path of its file or a name of the package.
+
+    >>> import identify
+    >>> print(identify.fit("proton_xy", "run.mcap"))
 """
 
 from __future__ import annotations
@@ -9,6 +14,9 @@ TYPE_CHECKING = False  # without the 10 ms of typing, in which `twin` does not h
 if TYPE_CHECKING:
     from typing import Any
 
+    from identify.results.addition import Addition
+    from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
+    from identify.validation.agreement import Agreement
     from identify.workflow import (
         add,
         add_shape,
@@ -25,7 +33,14 @@ if TYPE_CHECKING:
         velocity_map,
     )
 
+CLASSES = ("Addition", "Agreement", "Comparison", "Diagnosis", "FitResult", "SimulationFit")
 __all__ = [
+    "Addition",
+    "Agreement",
+    "Comparison",
+    "Diagnosis",
+    "FitResult",
+    "SimulationFit",
     "add",
     "add_shape",
     "agree",
@@ -52,4 +67,10 @@ def __getattr__(name: str) -> Any:
     from identify import workflow
     from twin.threads import one_for_matrices
 
-    return one_for_matrices(getattr(workflow, name))
+    found = getattr(workflow, name)
+    return found if name in CLASSES else one_for_matrices(found)
+
+
+def __dir__() -> list[str]:
+    """What is offered; the rest of the package may change."""
+    return sorted([*__all__, "__all__", "__doc__", "__file__", "__name__", "__path__"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 from identify.analysis.dynamic_friction import dynamic_friction
 from identify.analysis.maps import along_track, cable_force, friction_map, velocity_map
@@ -38,22 +39,24 @@ from identify.validation.side_by_side import SideBySide, side_by_side
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
-from twin.log import Log
+from twin.log import GivenLogs, Log, logs_by_name
 from twin.memory import give_back
+from twin.model.file import as_model
 from twin.model.machine import MachineModel
 from twin.parallel import parallel
 from twin.progress import Progress, silent, within
 
 Logs = Mapping[str, Log]
+Model = MachineModel | str | Path
 READING = "reading and preparing the logs"
 
 
 @parallel()
 def fit(
-    model: MachineModel,
-    logs: Logs,
-    holdout: Logs | None = None,
-    test: Logs | None = None,
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
     *,
     catalogue: Catalogue | None = None,
     test_function: float | None = None,
@@ -68,7 +71,8 @@ def fit(
     that is not a number.
     """
     progress(READING, 0, 1)
-    found, given = datasets(model, logs, holdout or {}, test_function, test), model
+    model, logs, holdout, test = _given(model, logs, holdout, test, catalogue)
+    found, given = datasets(model, logs, holdout, test_function, test), model
     fits: dict[str, Fit] = {}
     for i, (axis, dataset) in enumerate(list(found.items())):
         progress("fitting", i, len(found))
@@ -113,11 +117,12 @@ def fit_simulation(found: FitResult, *, progress: Progress = silent) -> Simulati
 
 @parallel()
 def compare(
-    model: MachineModel, logs: Logs, *, test_function: float | None = None,
+    model: Model, logs: GivenLogs, *, test_function: float | None = None,
     progress: Progress = silent,
 ) -> Comparison:  # fmt: skip
     """The errors of a model with its present values, and where it fails. Raises InputError."""
     progress(READING, 0, 1)
+    model, logs, *_ = _given(model, logs)
     found = {
         axis: telling(dataset, sticks(model.axes[axis]))
         for axis, dataset in datasets(model, logs, {}, test_function).items()
@@ -127,6 +132,19 @@ def compare(
     given = model.axes
     found = {axis: noise_known(given[axis], aligned(given[axis], d)) for axis, d in found.items()}
     return _compared(model, found, {}, progress)
+
+
+def _given(
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
+    catalogue: Catalogue | None = None,
+) -> tuple[MachineModel, Logs, Logs, Logs]:
+    """A model and the logs of each role by name, of whatever the caller has. Raises InputError."""
+    roles = (Role.TRAINING, logs), (Role.SELECTION, holdout), (Role.TEST, test)
+    training, selection, tests = (logs_by_name(given, role.value) for role, given in roles)
+    return as_model(model, catalogue), training, selection, tests
 
 
 def _compared(
@@ -156,12 +174,12 @@ def side_by_side_of(found: Comparison) -> SideBySide:
 
 @parallel()
 def diagnose(
-    model: MachineModel,
-    logs: Logs,
-    holdout: Logs | None = None,
-    test: Logs | None = None,
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
     *,
-    catalogue: Catalogue,
+    catalogue: Catalogue | None = None,
     test_function: float | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
@@ -170,6 +188,8 @@ def diagnose(
     Nonparametric effects of the model are removed first, so that their force can be explained. The
     test logs decide nothing; the errors that are reported are theirs.
     """
+    catalogue = load_catalogue() if catalogue is None else catalogue
+    model = as_model(model, catalogue)
     known = usable(catalogue, model)
     result = fit(
         physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress
@@ -214,11 +234,11 @@ def _begun(
 
 @parallel()
 def add(
-    effect: Effect,
-    model: MachineModel,
-    logs: Logs,
-    holdout: Logs | None = None,
-    test: Logs | None = None,
+    effect: Effect | str,
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
     *,
     axis: str | None = None,
     test_function: float | None = None,
@@ -229,6 +249,8 @@ def add(
     Nonparametric effects of the model are removed before a physical effect is added. Raises
     InputError where the axis has the effect already.
     """
+    model = as_model(model)
+    effect = load_catalogue()[effect] if isinstance(effect, str) else effect
     model.require_usable(effect, axis or next(iter(model.axes)))
     given, model = model, model if effect.is_nonparametric else physics_alone(model)
     before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
@@ -260,11 +282,11 @@ def _with_notes(made: Addition, why_axis: str | None = None) -> Addition:
 
 @parallel()
 def add_shape(
-    effect: Effect,
-    model: MachineModel,
-    logs: Logs,
-    holdout: Logs | None = None,
-    test: Logs | None = None,
+    effect: Effect | str,
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
     *,
     axis: str | None = None,
     test_function: float | None = None,
@@ -277,6 +299,8 @@ def add_shape(
     its law assumes no curve, where the axis has a free curve already, and where the logs ask for
     none.
     """
+    model = as_model(model)
+    effect = load_catalogue()[effect] if isinstance(effect, str) else effect
     names = having_shape(effect, model, axis)
     before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
     fits = {n: before.fits[n] for n in names if n in before.fits}
@@ -299,8 +323,8 @@ def add_named(found: Diagnosis) -> Addition | None:
 
 @parallel()
 def agree(
-    fit_a: FitResult | MachineModel,
-    fit_b: FitResult | MachineModel,
+    fit_a: FitResult | Model,
+    fit_b: FitResult | Model,
     *,
     catalogue: Catalogue | None = None,
 ) -> Agreement:
@@ -310,8 +334,10 @@ def agree(
     catalogue: effects that may be the cause; the package's own where None. Raises InputError where
     no parameter has an interval in both.
     """
-    a, b = (f.model if isinstance(f, FitResult) else f for f in (fit_a, fit_b))
-    return agreement(a, b, load_catalogue() if catalogue is None else catalogue)
+    known = load_catalogue() if catalogue is None else catalogue
+    models = (f.model if isinstance(f, FitResult) else f for f in (fit_a, fit_b))
+    a, b = (as_model(model, known) for model in models)
+    return agreement(a, b, known)
 
 
 __all__ = [

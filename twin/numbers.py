@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from typing import Any
 
@@ -22,3 +23,11 @@ def require_seed(seed: int) -> None:
     """Raise InputError for a seed from which nothing can be drawn."""
     if seed < 0:
         raise InputError(f"seed {seed}: is not allowed; give a whole number of 0 or more")
+
+
+def neat(value: float) -> float:
+    """The value cut to three digits, so that a file reads well and no limit is passed."""
+    if value == 0.0:
+        return 0.0
+    digits = 2 - math.floor(math.log10(value))
+    return float(f"{math.floor(value * 10.0**digits * (1.0 + 1e-12)) / 10.0**digits:.3g}")

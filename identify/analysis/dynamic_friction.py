@@ -8,7 +8,7 @@ misses the bend that the bristles have there.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from identify.estimation.presliding import Presliding
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
 from twin.effect import Kind
 from twin.errors import InputError
-from twin.log import Log
+from twin.log import GivenLogs, logs_by_name
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters
 
@@ -31,7 +31,7 @@ TEST_FUNCTION = 0.1  # s
 
 def dynamic_friction(
     model: MachineModel,
-    logs: Mapping[str, Log],
+    logs: GivenLogs,
     *,
     axis: str | None = None,
     test_function: float = TEST_FUNCTION,
@@ -42,7 +42,7 @@ def dynamic_friction(
     axis: the only one that moves where None. seed: draws the damping to start from. Raises
     InputError where the friction has no bristles.
     """
-    name, dataset = only_axis(datasets(model, logs, {}, test_function), axis)
+    name, dataset = only_axis(datasets(model, logs_by_name(logs), {}, test_function), axis)
     known = dynamic_part_free(model.axes[name])
     return fit_dynamic_part(known, dataset.fit, np.random.default_rng(seed))
 

@@ -18,7 +18,7 @@ from identify.estimation.cable_force import cable_force as of_cable
 from identify.estimation.velocity_map import VelocityMap
 from identify.estimation.velocity_map import velocity_map as of_velocity
 from twin.errors import InputError
-from twin.log import Log
+from twin.log import GivenLogs, logs_by_name
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import AxisUnits
 
@@ -59,9 +59,7 @@ class FrictionMap:
         return [n for n, value in apart.items() if value > ahead.half[n] + back.half[n]]
 
 
-def velocity_map(
-    model: MachineModel, logs: Mapping[str, Log], *, axis: str | None = None
-) -> VelocityMap:
+def velocity_map(model: MachineModel, logs: GivenLogs, *, axis: str | None = None) -> VelocityMap:
     """Friction against velocity, from logs with stretches of constant speed (L. Jia 2023).
 
     The forces of the model's other effects are taken off. axis: the only one that moves where None.
@@ -70,16 +68,14 @@ def velocity_map(
     return VelocityMap.joined(_maps(model, logs, axis)[1])
 
 
-def friction_map(
-    model: MachineModel, logs: Mapping[str, Log], *, axis: str | None = None
-) -> FrictionMap:
+def friction_map(model: MachineModel, logs: GivenLogs, *, axis: str | None = None) -> FrictionMap:
     """The map of all logs with its curves; raises InputError where they hold none both ways."""
     own, found = _maps(model, logs, axis)
     return _with_curves(own, VelocityMap.joined(found))
 
 
 def along_track(
-    model: MachineModel, logs: Mapping[str, Log], *, axis: str | None = None
+    model: MachineModel, logs: GivenLogs, *, axis: str | None = None
 ) -> list[FrictionMap]:
     """A map for each place of the track that logs of moves visit, from one end to the other.
 
@@ -97,7 +93,7 @@ def along_track(
 
 def cable_force(
     model: MachineModel,
-    logs: Mapping[str, Log],
+    logs: GivenLogs,
     *,
     axis: str | None = None,
     test_function: float = TEST_FUNCTION,
@@ -107,7 +103,7 @@ def cable_force(
     Only the mass of the model is used. test_function: s, the finest detail. Raises InputError where
     the logs hold fewer than two passes each way.
     """
-    name, dataset = only_axis(datasets(model, logs, {}, test_function), axis)
+    name, dataset = only_axis(datasets(model, logs_by_name(logs), {}, test_function), axis)
     return of_cable(model.axes[name], dataset.fit)
 
 
@@ -122,10 +118,10 @@ def only_axis(found: Mapping[str, Dataset], axis: str | None) -> tuple[str, Data
 
 
 def _maps(
-    model: MachineModel, logs: Mapping[str, Log], axis: str | None
+    model: MachineModel, logs: GivenLogs, axis: str | None
 ) -> tuple[AxisModel, list[VelocityMap]]:
     """The axis, and the map of each log."""
-    name, dataset = only_axis(datasets(model, logs, {}), axis)
+    name, dataset = only_axis(datasets(model, logs_by_name(logs), {}), axis)
     return model.axes[name], [of_velocity(model.axes[name], log.motion) for log in dataset.fit]
 
 

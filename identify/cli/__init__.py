@@ -9,12 +9,12 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from identify.cli import agree, loop, machine, plan, selftest
+from identify.cli import agree, doctor, example, logs, loop, machine, plan, selftest
 from identify.cli.shared import app
 from twin.errors import InputError
 from twin.threads import VARIABLES
 
-__all__ = ["agree", "loop", "machine", "main", "plan", "selftest"]
+__all__ = ["agree", "doctor", "example", "logs", "loop", "machine", "main", "plan", "selftest"]
 
 OBJECTS = 100_000  # that may be made before cycles among them are sought
 INTERRUPTED = 130  # exit code that typer makes of Ctrl-C, without a word

@@ -17,7 +17,10 @@ def agree(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Say whether two fits agree within their uncertainties; exit code 1 where they do not."""
+    """Say whether two fits agree within their uncertainties; exit code 1 where they do not.
+
+    Example: twin agree monday.toml friday.toml
+    """
     from identify import workflow
     from identify.output.agreement import agree_json, agree_text
 

@@ -29,6 +29,7 @@ from identify.cli.shared import (
     require_folder,
     require_report,
     say,
+    unconfirmed,
     with_roles,
 )
 
@@ -58,7 +59,10 @@ def fit(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Identify the parameters of the model's effects."""
+    """Identify the parameters of the model's effects.
+
+    Example: twin fit proton_xy fit.mcap --holdout held.mcap -o fitted.toml
+    """
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
@@ -95,7 +99,10 @@ def compare(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Print the errors of the model, and where it fails."""
+    """Print the errors of the model, and where it fails.
+
+    Example: twin compare fitted.toml test.mcap -o report.html
+    """
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
@@ -113,7 +120,7 @@ def compare(
 
         write_report(
             out, title=f"{machine.name}: model against measurement", diagnosis=None,
-            comparison=result, history=machine.history,
+            comparison=result, history=machine.history, assumed=unconfirmed(findings),
         )  # fmt: skip
     if mcap:
         from identify.output.side_by_side import write_side_by_side
@@ -134,7 +141,10 @@ def diagnose(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Find which physical effect is missing, with the evidence for it."""
+    """Find which physical effect is missing, with the evidence for it.
+
+    Example: twin diagnose fitted.toml fit.mcap --holdout held.mcap -o diagnosis.html
+    """
     from identify import workflow
     from identify.output import diagnosis_json
     from identify.output import text as as_text
@@ -156,6 +166,7 @@ def diagnose(
         write_report(
             out, title=f"{machine.name}: what the model lacks", diagnosis=result,
             comparison=result.comparison, history=result.model.history,
+            assumed=unconfirmed(findings),
         )  # fmt: skip
     told = {**diagnosis_json.diagnose_json(result, findings), "left_out": silent}
     say(as_text.diagnose_text(result), told, as_json_, [*findings, *silent])
@@ -180,7 +191,10 @@ def add(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Add an effect, or the shape of one, refit, and record the error before and after."""
+    """Add an effect, or the shape of one, refit, and record the error before and after.
+
+    Example: twin add cogging fitted.toml fit.mcap --holdout held.mcap -o better.toml
+    """
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
@@ -208,7 +222,10 @@ def demo(
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Run the whole loop on a machine with a hidden effect."""
+    """Run the whole loop on a machine with a hidden effect.
+
+    Example: twin demo -o demo
+    """
     from identify.demo import BETTER
     from identify.demo import demo as run
     from identify.output import as_json, diagnosis_json

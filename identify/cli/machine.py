@@ -35,20 +35,30 @@ def simulate(
     out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")] = Path("log.mcap"),
     seed: Annotated[int, typer.Option(help="Same seed, same log.")] = 0,
     duration: Annotated[
-        float | None, typer.Option(help="s, 20 if left out; a file has its own.")
+        float | None, typer.Option(help="Length in s, 20 if left out; a file has its own.")
     ] = None,
     axis: Annotated[str | None, typer.Option(help="Axis that moves, where one does.")] = None,
+    setpoints: Annotated[
+        Path | None, typer.Option(help="Setpoints to write as CSV, to be run on a machine.")
+    ] = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Run an experiment on the twin in MuJoCo and log it as MCAP."""
+    """Run an experiment on the twin in MuJoCo and log it as MCAP.
+
+    Example: twin simulate moves --model example_machine --duration 10 -o fit.mcap
+    """
     from functools import partial
 
     from twin.experiments.file import SUFFIX, load_experiment
-    from twin.experiments.named import Reach, simulate_parts
+    from twin.experiments.lasting import missed
+    from twin.experiments.named import DURATION, Reach, find_experiment, simulate_parts
+    from twin.experiments.setpoint_csv import write_setpoints
     from twin.log import record_log
 
-    require_folder(out)
+    for file in (out, setpoints):
+        if file is not None:
+            require_folder(file)
     stage = machine_model(model, catalogue_with(effects))
     chosen = load_experiment(experiment) if experiment.endswith(SUFFIX) else experiment
     reach = Reach(stage)
@@ -58,9 +68,16 @@ def simulate(
             progress=partial(progress, "simulating"),
         )  # fmt: skip
         samples = record_log(map(reach.take, parts), out)
+    if setpoints is not None:
+        if isinstance(chosen, str):
+            chosen = find_experiment(chosen, stage, axis, duration or DURATION)
+        write_setpoints(chosen, stage, seed, setpoints)
     rate = stage.sample_rate
     result = {"log": str(out), "samples": samples, "sample_rate": rate, "unit": "Hz"}
-    say(f"{out}: {samples} samples at {rate:g} Hz", result, as_json_, reach.warnings())
+    result |= {"setpoints": str(setpoints)} if setpoints else {}
+    asked = None if duration is None else missed(duration, samples / rate)
+    warnings = [*reach.warnings(), *([asked] if asked else [])]
+    say(f"{out}: {samples} samples at {rate:g} Hz", result, as_json_, warnings)
 
 
 @app.command("import")
@@ -80,8 +97,12 @@ def import_(
     ] = False,
     as_json_: Json = False,
 ) -> None:
-    """Turn a machine's recording into an MCAP log."""
+    """Turn a machine's recording into an MCAP log.
+
+    Example: twin import recording.csv --map map.toml -o run.mcap
+    """
     from twin.log import write_log
+    from twin.log.check import assumed
     from twin.log.importers import import_log, load_mapping
 
     if out is not None:
@@ -95,7 +116,9 @@ def import_(
     write_log(log, out)
     result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
     resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
-    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, resampled)
+    unsure = [str(f) for axis in log.axes for f in assumed.check(axis, log.metadata)]
+    said = [*resampled, *(f"{out}: warning: {finding}" for finding in unsure)]
+    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, said)
 
 
 def _guess(sources: list[Path], out: Path | None, as_json_: bool) -> None:
@@ -121,7 +144,10 @@ def new(
     out: Annotated[Path, typer.Option("--out", "-o", help="Machine model (.toml) to write.")],
     as_json_: Json = False,
 ) -> None:
-    """Propose a first model from logs: mass, friction, constant force, and their hardware."""
+    """Propose a first model from logs: mass, friction, constant force, and their hardware.
+
+    Example: twin new run.mcap -o model.toml
+    """
     from identify.analysis.first_model import first_model, not_determined
     from twin.effects import load_catalogue
     from twin.model.file import save_model
@@ -144,7 +170,10 @@ def new(
 
 @app.command()
 def check(logs: Logs, as_json_: Json = False) -> None:
-    """Say whether logs are fit for identification, and what is wrong with them."""
+    """Say whether logs are fit for identification, and what is wrong with them.
+
+    Example: twin check run.mcap
+    """
     from identify.output import machine_json, machine_text
     from twin.log.long import check_file
 
@@ -163,7 +192,10 @@ def recover(
     ] = False,
     as_json_: Json = False,
 ) -> None:
-    """Keep the intact parts of a damaged log: the longest at OUT, the others beside it."""
+    """Keep the intact parts of a damaged log: the longest at OUT, the others beside it.
+
+    Example: twin recover bad.mcap -o good.mcap
+    """
     from twin.log import recover_file
 
     require_folder(out)
@@ -189,7 +221,10 @@ def effects(
     ] = False,
     as_json_: Json = False,
 ) -> None:
-    """Print the catalogue, or one effect with its equation, units and source; or check it."""
+    """Print the catalogue, or one effect with its equation, units and source; or check it.
+
+    Example: twin effects cogging --plot cogging.png
+    """
     from identify.output import machine_json, machine_text
 
     catalogue = catalogue_with(files)

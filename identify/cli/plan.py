@@ -43,20 +43,22 @@ def plan(
         typer.Option(help="Two effects to add to the model, or two fitted models (.toml)."),
     ] = None,
     axis: Annotated[str | None, typer.Option(help="Axis to be explained.")] = None,
-    duration: Annotated[
-        float, typer.Option(help="Duration of the experiment in s, roughly.")
-    ] = 20.0,
+    duration: Annotated[float, typer.Option(help="Length of the experiment in s.")] = 20.0,
     out: Out = Path("experiment.toml"),
     holdout: Holdout = None,
     test_function: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
-    """Choose the experiment that decides between explanations; `twin simulate` runs it."""
+    """Choose the experiment that decides between explanations; `twin simulate` runs it.
+
+    Example: twin plan fitted.toml --between cogging wear --duration 8 -o next.toml
+    """
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
     from twin.experiments.file import SUFFIX, save_experiment
+    from twin.experiments.setpoint_csv import ENDING, write_setpoints
 
     if out.suffix != SUFFIX:
         raise InputError(f"{out}: an experiment is a {SUFFIX} file; give such a name")
@@ -71,14 +73,19 @@ def plan(
             catalogue=catalogue, axis=axis, duration=duration, test_function=test_function,
             progress=progress,
         )  # fmt: skip
-    text, file = as_text.plan_text(result), None
+    text, file, table = as_text.plan_text(result), None, out.with_suffix(ENDING)
     if result.decides:
         file = str(out)
         save_experiment(
             result.chosen.experiment, out, *text.splitlines()[:3], units=result.chosen.units
         )
-        text += f"\n{out}: run it on the machine, or `twin simulate {out} --model MODEL -o LOG`"
-    say(text, {**as_json.plan_json(result), "file": file}, as_json_, findings)
+        write_setpoints(result.chosen.experiment, machine, 0, table)
+        text += (
+            f"\n{table}: the setpoints, to be run on the machine"
+            f"\n{out}: the experiment; `twin simulate {out} --model MODEL -o LOG` simulates it"
+        )
+    made = {"file": file, "setpoints": file and str(table)}
+    say(text, {**as_json.plan_json(result), **made}, as_json_, findings)
     if not result.decides:
         raise typer.Exit(1)
 

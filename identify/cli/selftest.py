@@ -40,7 +40,10 @@ def selftest(
     reliability: Reliability = None,
     as_json_: Json = False,
 ) -> None:
-    """Plant effects in machines drawn at random, and count how often they are named."""
+    """Plant effects in machines drawn at random, and count how often they are named.
+
+    Example: twin selftest --only cogging
+    """
     from identify.output.selftest import selftest_json, selftest_text
     from identify.output.words.selftest import trial_in_words
     from identify.selftest import (

@@ -26,15 +26,22 @@ MEASURED = ("position", "velocity", "setpoint_position", "current", "force")
 
 
 class Commands(typer.Typer):
-    """The commands, none of which overwrites what it reads."""
+    """The commands, none of which overwrites what it reads.
+
+    In the list of commands each has the first sentence of its help, whole.
+    """
 
     def command(self, name: str | None = None, **options: Any) -> Any:
-        return super().command(name, cls=Command, **options)
+        def register(job: Callable[..., None]) -> Callable[..., None]:
+            first = (job.__doc__ or "").split("\n\n")[0]
+            given = {"short_help": " ".join(first.split()), **options}
+            return super(Commands, self).command(name, cls=Command, **given)(job)
+
+        return register
 
 
 app = Commands(
     help="Find out why the model and the machine disagree.",
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -225,6 +232,11 @@ def said(path: Path, log: Log, every: int) -> Log:
 def sentences(name: str, report: CheckReport) -> list[str]:
     """The findings of the log check, one sentence each."""
     return [f"{name}: {finding.severity.value}: {finding}" for finding in report.findings]
+
+
+def unconfirmed(findings: Sequence[str]) -> list[str]:
+    """Of the findings those that tell what an import map assumes."""
+    return [line for line in findings if "the import map assumes" in line]
 
 
 def require_report(path: Path) -> None:

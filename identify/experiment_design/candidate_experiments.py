@@ -20,9 +20,11 @@ from twin.experiments.kinds import (
     Sweep,
     Tracking,
 )
+from twin.experiments.lasting import ALLOWED, lasting
 from twin.experiments.trajectory import Limits
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import LINEAR, AxisUnits
+from twin.numbers import neat
 
 USED = 0.9  # part of the travel that passes cover
 SLOWEST = 5e-4  # m/s, of a velocity map,
@@ -59,7 +61,7 @@ class NotRun:
 def proposals(
     model: MachineModel, axis: str, duration: float
 ) -> tuple[list[Experiment], tuple[NotRun, ...]]:
-    """Experiments of about that duration (s) for one axis, all within the machine's limits.
+    """Experiments of that duration (s) for one axis, all within the machine's limits.
 
     Also those of the family that are not among them, with the reason. Raises CannotRun where the
     travel is not known, and where none fits.
@@ -76,7 +78,7 @@ def proposals(
         *_swept(model, limits, axis, duration),
     )
     found, not_run = [], []
-    for experiment in (_eased(draft, effort) for draft in drafts):
+    for experiment in (lasting(_eased(draft, effort), model, duration) for draft in drafts):
         try:
             _require_fit(experiment, model, duration)
         except CannotRun as why:
@@ -104,22 +106,19 @@ def _eased(draft: Experiment, effort: float) -> Experiment:
 
 
 def _require_fit(experiment: Experiment, model: MachineModel, duration: float) -> None:
-    """Raise CannotRun unless the machine can run it, in not much more than that time (s)."""
+    """Raise CannotRun unless the machine can run it, in not more than that time (s)."""
     setpoint = experiment.setpoint(model, np.random.default_rng(0))
-    if setpoint.duration >= TOLERANCE * duration:
+    if setpoint.duration > (1.0 + ALLOWED) * duration:
         raise CannotRun(
             f"takes {setpoint.duration:.3g} s, more than the {duration:g} s planned; give a longer "
             "--duration (s)"
         )
 
 
-TOLERANCE = 1.3  # an experiment may take this times the planned duration
-
-
 def _random(duration: float) -> Iterator[Experiment]:
     yield Tracking(duration)
-    yield Moves(count=max(int(duration / 0.9), 2))
-    yield Moves(count=max(int(duration / 1.8), 2), dwell=1.0)
+    for dwell in (0.1, 1.0):
+        yield Moves(count=max(int(duration / dwell), 2), dwell=dwell, duration=duration)
 
 
 def _other_span(limits: dict[str, Limits], axis: str) -> float:
@@ -222,9 +221,3 @@ def _swept(
         speed = neat(min(2.4 * span / duration, limit.fastest_plateau(span)))
         weak = Sweep(axis, span, speed, 1, 1.0, LOWEST, highest, effort=GENTLE)
         yield replace(weak, amplitude=neat(MARGIN * weak.most_force(model.axes[axis])))
-
-
-def neat(value: float) -> float:
-    """The value cut to three digits, so that a file reads well and no limit is passed."""
-    digits = 2 - math.floor(math.log10(value))
-    return float(f"{math.floor(value * 10.0**digits * (1.0 + 1e-12)) / 10.0**digits:.3g}")

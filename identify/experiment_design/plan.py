@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.given_logs import Role
 from identify.dataset.test_function import require_test_function
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.decision import RULE
@@ -31,16 +33,15 @@ from identify.selection.changes import Added
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.trying import try_effect
 from twin.effect import Effect
-from twin.effects import Catalogue
+from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.file import in_short
 from twin.experiments.trajectory.setpoint import require_length
-from twin.log import Log
+from twin.log import GivenLogs, logs_by_name
+from twin.model.file import as_model
 from twin.model.machine import MachineModel
 from twin.parallel import parallel
 from twin.progress import Progress, silent, within
-
-Logs = Mapping[str, Log]
 
 DURATION = 20.0  # s of a planned experiment
 NEXT_DURATION = 10.0  # s of the one that a diagnosis proposes
@@ -83,11 +84,11 @@ class Plan:
 
 @parallel()
 def plan(
-    model: MachineModel,
-    logs: Logs | None = None,
-    holdout: Logs | None = None,
+    model: MachineModel | str | Path,
+    logs: GivenLogs | None = None,
+    holdout: GivenLogs | None = None,
     *,
-    catalogue: Catalogue,
+    catalogue: Catalogue | None = None,
     between: Sequence[Rival] = (),
     axis: str | None = None,
     duration: float = DURATION,
@@ -99,9 +100,11 @@ def plan(
     between: effects, each added to the model, or models; refitted where there are logs. Where it is
     empty, the logs are diagnosed, and the plan is for the effects that the diagnosis cannot
     separate, or for the best and the runner-up; without logs or a missing effect, it is for the
-    model's own parameters. duration: of the experiment, s, roughly. Raises InputError for an
+    model's own parameters. duration: of the experiment, s. Raises InputError for an
     unknown axis, an axis whose travel is not known, and explanations that are the same.
     """
+    catalogue = load_catalogue() if catalogue is None else catalogue
+    model = as_model(model, catalogue)
     if axis is not None:
         model.axis(axis)
     require_length(duration, model.sample_rate)
@@ -221,8 +224,8 @@ def _named(between: Sequence[Rival], catalogue: Catalogue) -> dict[str, Effect]:
 
 def _dataset(
     model: MachineModel,
-    logs: Logs,
-    holdout: Logs,
+    logs: GivenLogs,
+    holdout: GivenLogs,
     between: Sequence[Rival],
     axis: str | None,
     test_function: float | None,
@@ -230,7 +233,11 @@ def _dataset(
     """The dataset of the axis to be explained; of a simulated log where there are no logs."""
     if not logs:
         return simulated_dataset(model, axis or differing_axis(between, model))
-    found = datasets(model, logs, holdout, test_function)
+    training, selection = (
+        logs_by_name(given, role.value)
+        for given, role in ((logs, Role.TRAINING), (holdout, Role.SELECTION))
+    )
+    found = datasets(model, training, selection, test_function)
     name = axis or differing_axis(between, model)
     if name in found:
         return found[name]

@@ -26,13 +26,15 @@ from identify.selftest.laws import NOISE
 from identify.selftest.variations import MASS_OFF, VARIATIONS, Drawn
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
+from twin.experiments.kinds import Moves, Tracking
 from twin.experiments.named import simulate
 from twin.log import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import FineSimulator, ReducedSimulator
 
 AXIS = "x"
-DURATION = 12.0  # s of each log
+DURATION = 12.0  # s of random moves
+MOVES = 8  # places of a log of fastest moves
 TRAINING, SELECTION, TEST = ("tracking", "moves"), "tracking", "moves"  # what is run for each role
 HIDDEN = 0.9  # part of an effect's force, absorbed by a fit, from which the mass is held fixed
 ROUNDS = 2  # corrections of a friction's level
@@ -142,7 +144,8 @@ def _logged(true: MachineModel, run: str, seed: int, simulator: type[ReducedSimu
     if NOISE.name in axis.names:
         noise = Fitted.at_start(NOISE, {**axis[NOISE.name].values, "seed": float(seed - 1 or 1)})
         true = true.with_axis(AXIS, axis.with_effect(noise))
-    return simulate(true, run, seed=seed, duration=DURATION, simulator=simulator)
+    experiment = Tracking(DURATION) if run == "tracking" else Moves(MOVES)
+    return simulate(true, experiment, seed=seed, simulator=simulator)
 
 
 def _quiet(true: AxisModel) -> AxisModel:

@@ -17,6 +17,7 @@ import identify.output.signature
 import identify.selftest
 import twin.experiments.file
 import twin.experiments.named
+import twin.experiments.setpoint_csv
 import twin.log
 import twin.log.check
 import twin.log.importers
@@ -126,6 +127,7 @@ def test_plan(monkeypatch, cli, decides, code):
     chosen = SimpleNamespace(experiment="the experiment", units=LINEAR)
     call = stub(monkeypatch, workflow, "plan", SimpleNamespace(decides=decides, chosen=chosen))
     save = stub(monkeypatch, twin.experiments.file, "save_experiment")
+    table = stub(monkeypatch, twin.experiments.setpoint_csv, "write_setpoints")
     monkeypatch.setattr(as_text, "plan_text", lambda r: "one\ntwo\nthree\nfour")
     command = ("plan", "m.toml", "a.mcap", "b.mcap", "--between", "wear", "other.toml", "--axis",
                "y", "--duration", "7.5", "-o", "next.toml")  # fmt: skip
@@ -140,10 +142,14 @@ def test_plan(monkeypatch, cli, decides, code):
     saved = ("the experiment", Path("next.toml"), "one", "two", "three")
     assert save.calls == ([(saved, {"units": LINEAR})] if decides else [])
     assert ("twin simulate next.toml" in text) is decides
+    assert [given[0][-1] for given in table.calls] == [Path("next.setpoints.csv")] * decides
     assert len(warned.splitlines()) == 2
     found, text, _ = cli(*command[:2], "--json")
     assert (found, json.loads(text)) == (
-        code, {"json of": "plan", "bad": None, "file": "experiment.toml" if decides else None},
+        code, {
+            "json of": "plan", "bad": None, "file": "experiment.toml" if decides else None,
+            "setpoints": "experiment.setpoints.csv" if decides else None,
+        },
     )  # fmt: skip
     assert call.calls[-1][1] | {"catalogue": 0} == {
         "between": [], "catalogue": 0, "axis": None, "duration": 20.0, "test_function": None,
@@ -157,14 +163,14 @@ def test_simulate(monkeypatch, cli):
         warnings = staticmethod(lambda: ("axis x went",))
 
     call = stub(monkeypatch, twin.experiments.named, "simulate_parts", ["one", "two"])
-    record = stub(monkeypatch, twin.log, "record_log", 7)
+    record = stub(monkeypatch, twin.log, "record_log", 35_000)
     monkeypatch.setattr(twin.experiments.named, "Reach", lambda stage: Reach)
     monkeypatch.setattr(twin.experiments.file, "load_experiment", lambda path: f"file {path}")
     command = ("simulate", "moves", "--model", "m.toml", "-o", "r.mcap", "--seed", "5",
                "--duration", "3.5", "--axis", "y", *COMMON[2:])  # fmt: skip
     code, text, warned = cli(*command)
     assert (code, text.strip(), warned.strip()) == (
-        0, "r.mcap: 7 samples at 10000 Hz", "twin: axis x went",
+        0, "r.mcap: 35000 samples at 10000 Hz", "twin: axis x went",
     )  # fmt: skip
     given, named = call.only
     assert (given[0].name, given[1]) == (NAME, "moves")
@@ -172,7 +178,12 @@ def test_simulate(monkeypatch, cli):
     parts, path = record.only[0]
     assert (list(parts), path) == (["one seen", "two seen"], Path("r.mcap"))
     code, text, _ = cli("simulate", "e.toml", "--json")
-    assert json.loads(text) == {"log": "log.mcap", "samples": 7, "sample_rate": 1e4, "unit": "Hz"}
+    assert json.loads(text) == {
+        "log": "log.mcap",
+        "samples": 35_000,
+        "sample_rate": 1e4,
+        "unit": "Hz",
+    }
     assert call.calls[-1][0][1] == "file e.toml"
     assert call.calls[-1][1] == {"seed": 0, "duration": None, "axis": None}
 
@@ -181,6 +192,7 @@ def test_import_and_recover(monkeypatch, cli):
     class Recording(list):
         sample_rate = 125.0
         metadata: ClassVar[dict[str, str]] = {"resampled": "steps of 1 ms"}
+        axes: ClassVar[dict[str, str]] = {}
 
     log = Recording([0] * 9)
     load = stub(monkeypatch, twin.log.importers, "load_mapping", "the map")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -47,15 +48,27 @@ class Moves(Experiment):
 
     count: int = counted("places")
     dwell: float = given("s", "rest at each place", 0.1, zero=True)
+    duration: float = given("s", "length, for as many places as fit; 0: of all", 0.0, zero=True)
 
     def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
         """See Experiment."""
         limits = machine_limits(model)
         low, high = np.array([limit.travel for limit in limits]).T
         places = low + (high - low) * rng.uniform(*RANDOM_ENDS, (self.count, len(limits)))
+        count, dwell = self._in_time(limits, places) if self.duration else (len(places), self.dwell)
         return trajectory.point_to_point(
-            limits, places, dwell=self.dwell, sample_rate=model.sample_rate
+            limits, places[:count], dwell=dwell, sample_rate=model.sample_rate
         )
+
+    def _in_time(self, limits: Sequence[Limits], places: np.ndarray) -> tuple[int, float]:
+        """How many of the places fit into the time, two at least, and the rest at each, s."""
+        total, count = self.dwell, 1
+        for start, target in pairwise(places):
+            longer = total + trajectory.move(limits, start, target).total + self.dwell
+            if longer > self.duration and count > 1:
+                break
+            total, count = longer, count + 1
+        return count, max(self.dwell + (self.duration - total) / count, 0.0)
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,8 @@ from twin.experiments.kinds import (
     Tracking,
     kind_of,
 )
+from twin.experiments.lasting import lasting
+from twin.experiments.setpoint_csv import setpoint_of
 from twin.experiments.trajectory import Limits
 from twin.experiments.trajectory.setpoint import require_length
 from twin.log import Log
@@ -39,6 +41,7 @@ MAP_SPAN = 0.02  # m
 PASS_SPEED = 0.1  # m/s
 PASS_PART = 0.88  # of the travel
 DURATION = 20.0  # s
+REST = 0.1  # s between moves
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ def _limit(model: MachineModel, axis: str) -> Limits:
 
 
 def _moves(model: MachineModel, axis: str, duration: float) -> Experiment:
-    return Moves(count=max(int(duration / 1.5), 2))
+    return Moves(count=max(int(duration / REST), 2), duration=duration)
 
 
 def _cable_pass(model: MachineModel, axis: str, duration: float) -> Experiment:
@@ -62,19 +65,19 @@ def _cable_pass(model: MachineModel, axis: str, duration: float) -> Experiment:
     low, high = limit.travel
     span = PASS_PART * (high - low)
     speed = min(PASS_SPEED, limit.fastest_plateau(span))
-    repeats = max(int(duration * speed / span / 2), 1)
-    return Passes(axis, span=span, speed=speed, repeats=repeats)
+    return lasting(Passes(axis, span=span, speed=speed, repeats=1), model, duration)
 
 
 def _velocity_map(model: MachineModel, axis: str, duration: float) -> Experiment:
     fastest = _limit(model, axis).fastest_plateau(MAP_SPAN)
     speeds = tuple(s for s in MAP_SPEEDS if s <= fastest)
     longest = duration / 4.0 / len(speeds)
-    return Staircase(axis, speeds=speeds, span=MAP_SPAN, longest_plateau=longest)
+    draft = Staircase(axis, speeds=speeds, span=MAP_SPAN, longest_plateau=longest)
+    return lasting(draft, model, duration)
 
 
 def _reversals(model: MachineModel, axis: str, duration: float) -> Experiment:
-    return Reversals(axis, repeats=max(int(duration / 0.25), 1))
+    return lasting(Reversals(axis, repeats=1), model, duration)
 
 
 EXPERIMENTS: Mapping[str, Named] = {
@@ -122,7 +125,7 @@ def simulate(
     """Run an experiment on the twin and return its log, with the truth topics.
 
     experiment: a name, or an experiment with its own parameters. Of a named one: duration in s (20
-    where None), exact for tracking and open_loop_sine, about right for the others; axis, the one
+    where None), kept by all but those whose moves take longer; axis, the one
     that moves where the experiment moves one, the first where None. The same seed gives the same
     log. Raises InputError for an unknown experiment or axis, and for a setpoint outside the travel.
     """
@@ -146,7 +149,7 @@ def simulate_parts(
 ) -> Iterator[Log]:
     """``simulate`` in parts of two seconds or so, to be recorded while the twin runs."""
     require_seed(seed)
-    motion_rng, noise_rng, current_rng = np.random.default_rng(seed).spawn(3)
+    _, noise_rng, current_rng = np.random.default_rng(seed).spawn(3)
     if isinstance(experiment, str):
         name = experiment
         attached: dict[str, bytes] = {}
@@ -161,7 +164,7 @@ def simulate_parts(
                 experiment, units=driven_units(experiment, model)
             ).encode()
         }
-    setpoint = chosen.setpoint(model, motion_rng)
+    setpoint = setpoint_of(chosen, model, seed)
     controllers = None if chosen.closed_loop else {a: Controller() for a in model.axes}
     for part in follow_parts(
         model, setpoint, (noise_rng, current_rng), name=name, seed=seed, simulator=simulator,

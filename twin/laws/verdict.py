@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.effect import RUBBING, Effect, Kind
-from twin.laws import checks, physics
+from twin.laws import checks, physics, stated
 from twin.laws.checks import LawBroken
 
 EVERY = frozenset(Kind)
@@ -39,6 +39,17 @@ LAWS = (
     Law(
         "leaves no work around a loop, where it depends on position alone",
         physics.check_of_position_alone,
+        frozenset({Kind.FORCE}),
+    ),
+    Law("is the same in other units of force, length and time", stated.check_units),
+    Law(
+        "is its equation, where that is a formula of x, v, t and its parameters",
+        stated.check_equation,
+        frozenset({Kind.FORCE}),
+    ),
+    Law(
+        "gives no energy, where it is a force of speed with one sign",
+        stated.check_takes_speed,
         frozenset({Kind.FORCE}),
     ),
 )

@@ -1,5 +1,6 @@
 """Logs: columns with units, the MCAP codec, importers and checks."""
 
+from twin.log.by_name import GivenLogs, logs_by_name
 from twin.log.decode import read_log
 from twin.log.encode import record_log, write_log, write_topics
 from twin.log.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, AxisLog, Log
@@ -10,8 +11,10 @@ __all__ = [
     "LINEAR_UNITS",
     "ROTARY_UNITS",
     "AxisLog",
+    "GivenLogs",
     "Log",
     "Recovery",
+    "logs_by_name",
     "read_log",
     "record_log",
     "recover_file",

@@ -219,7 +219,13 @@ class Run:
             if wanted not in names:
                 self._refuse_axis(wanted)
         if not axes:
-            topics = ", ".join(sorted(c.topic for c in self._topics.channels.values())) or "none"
+            every = sorted(c.topic for c in self._topics.channels.values())
+            if any(topic.startswith("/measured/") for topic in every):
+                raise InputError(
+                    "is a comparison for viewers (`twin compare --mcap`), not a log: its force is "
+                    "averaged; give the log that was compared"
+                )
+            topics = ", ".join(every) or "none"
             raise InputError(
                 f"no samples on a topic {AXIS_PREFIX}<name>; topics in the file: {topics}; "
                 "rename them, or convert the log with: twin import"

@@ -41,7 +41,11 @@ class AxisLog:
     force_constant: float | None = None
 
     def __len__(self) -> int:
-        return len(next(iter(self.columns.values())))
+        return len(next(iter(self.columns.values()), ()))
+
+    def __repr__(self) -> str:
+        signals = ", ".join(f"{n} ({self.units.get(n, '?')})" for n in self.columns)
+        return f"<AxisLog of {len(self)} samples: {signals or 'no signals'}>"
 
     @property
     def kind(self) -> AxisUnits:
@@ -84,7 +88,12 @@ class Log:
     attachments: Mapping[str, bytes] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        return len(next(iter(self.axes.values())))
+        return len(next(iter(self.axes.values()), ()))
+
+    def __repr__(self) -> str:
+        axes = "; ".join(f"{name}: {', '.join(a.columns)}" for name, a in self.axes.items())
+        seconds = len(self) * self.period
+        return f"<Log of {seconds:.4g} s at {self.sample_rate:g} Hz, {axes or 'no axes'}>"
 
     def part(self, first: int, stop: int) -> Log:
         """Its samples from number ``first`` to before ``stop``."""

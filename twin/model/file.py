@@ -11,7 +11,7 @@ from typing import Any
 import tomlkit
 
 from twin.effect import Effect
-from twin.effects import Catalogue
+from twin.effects import Catalogue, load_catalogue
 from twin.entries import read_entries, read_toml
 from twin.errors import InputError, at
 from twin.files import write_atomically
@@ -72,12 +72,28 @@ def model_files(name: str | Path) -> list[Path]:
     return [file for file in known if file.is_file()]
 
 
-def load_model(name: str | Path, catalogue: Catalogue) -> MachineModel:
-    """Read a machine model. Raises InputError naming the file, the entry and what is allowed."""
+def load_model(name: str | Path, catalogue: Catalogue | None = None) -> MachineModel:
+    """Read a machine model, with the effects of the package where None are given.
+
+    Raises InputError naming the file, the entry and what is allowed.
+    """
     path = find_model(name)
+    catalogue = load_catalogue() if catalogue is None else catalogue
     entries = _checked(read_toml(path), str(path))
     mjcf = _read_beside(path, entries.mujoco) if entries.mujoco else None
     return _model(entries, catalogue, mjcf, str(path))
+
+
+def as_model(given: MachineModel | str | Path, catalogue: Catalogue | None = None) -> MachineModel:
+    """The model itself, or that of a file. Raises InputError for anything else."""
+    if isinstance(given, MachineModel):
+        return given
+    if not isinstance(given, str | Path):
+        raise InputError(
+            f"model: a {type(given).__name__} is no machine model; give a MachineModel, the path "
+            "of its file or the name of one of the package, such as 'proton_xy'"
+        )
+    return load_model(given, catalogue)
 
 
 def _read_beside(path: Path, name: str) -> str:

@@ -139,6 +139,10 @@ class AxisModel:
                     f"{unit} says that the motion is imposed; remove it, or give the {name}"
                 )
 
+    def __repr__(self) -> str:
+        effects = ", ".join(self.names) or "no effects"
+        return f"<AxisModel of {self.mass:.6g} {self.units.mass}: {effects}>"
+
     @property
     def is_imposed(self) -> bool:
         """Whether the motion is imposed, so that there is no mass to move."""
@@ -225,6 +229,10 @@ class MachineModel:
         for name, axis in self.axes.items():
             for f in axis.effects:
                 self.require_usable(f.effect, name)
+
+    def __repr__(self) -> str:
+        axes = "; ".join(f"{name}: {', '.join(a.names)}" for name, a in self.axes.items())
+        return f"<MachineModel {self.name} at {self.sample_rate:g} Hz, {axes or 'no axes'}>"
 
     def can_use(self, effect: Effect) -> bool:
         """Whether "the other axis" that the effect may depend on is one axis of this machine."""

@@ -56,14 +56,19 @@ def write_report(
     comparison: Comparison,
     history: Sequence[HistoryStep],
     additions: Sequence[Addition] = (),
+    assumed: Sequence[str] = (),
 ) -> None:
     """Write the report of a comparison, and of a diagnosis or additions where there are any.
+
+    assumed: findings of the log check on what import maps assume, said first.
 
     One HTML file without outside references: styles and pictures are inside. It appears whole or
     not at all. Raises InputError where the folder does not exist.
     """
     require_writable(path)
-    subject = Subject(title, diagnosis, comparison, tuple(history), tuple(additions))
+    subject = Subject(
+        title, diagnosis, comparison, tuple(history), tuple(additions), tuple(assumed)
+    )
     with drawing_style():
         text = render(subject, sections(subject))
     write_atomically(path, text.encode("utf-8"))
@@ -85,7 +90,8 @@ def _facts(subject: Subject) -> list[tuple[str, str]]:
     axes = subject.comparison.axes.values()
     logs = list(dict.fromkeys(log.motion.name for a in axes for log in a.logs))
     lengths = list(dict.fromkeys(quantity(a.logs[0].test_function.length, "s") for a in axes))
-    facts = [("Model", subject.comparison.model.name), ("Logs", ", ".join(logs))]
+    facts = [("Not confirmed", line) for line in subject.assumed]
+    facts += [("Model", subject.comparison.model.name), ("Logs", ", ".join(logs))]
     for name, role in (("Held out", Role.SELECTION), ("Test", Role.TEST)):
         if others := _names(role, subject.diagnosis):
             facts.append((name, ", ".join(others)))

@@ -34,6 +34,7 @@ class Subject:
     comparison: Comparison
     history: Sequence[HistoryStep]
     additions: Sequence[Addition]
+    assumed: Sequence[str] = ()
 
     @property
     def axes(self) -> list[AxisComparison]:

@@ -228,11 +228,11 @@ def test_the_dataset_is_that_of_the_axis_in_question(monkeypatch):
     monkeypatch.setattr(plans, "simulated_dataset", lambda stage, axis: f"trial {axis}")
     other = replace(STAGE, name="o", axes={"x": PLAIN, "y": PLAIN})
     differ = [STAGE, other]  # on y
-    assert plans._dataset(STAGE, {"a": 1}, {}, [], "x", None) == "dataset x"
-    assert plans._dataset(STAGE, {"a": 1}, {}, differ, None, None) == "dataset y"
+    assert plans._dataset(STAGE, {"a": "a.mcap"}, {}, [], "x", None) == "dataset x"
+    assert plans._dataset(STAGE, {"a": "a.mcap"}, {}, differ, None, None) == "dataset y"
     assert plans._dataset(STAGE, {}, {}, differ, None, None) == "trial y"
     assert plans._dataset(STAGE, {}, {}, differ, "x", None) == "trial x"
     every.pop("x")
-    assert plans._dataset(STAGE, {"a": 1}, {}, [], None, None) == "dataset y"
+    assert plans._dataset(STAGE, {"a": "a.mcap"}, {}, [], None, None) == "dataset y"
     with pytest.raises(InputError, match="does not move"):
-        plans._dataset(STAGE, {"a": 1}, {}, [], "x", None)
+        plans._dataset(STAGE, {"a": "a.mcap"}, {}, [], "x", None)

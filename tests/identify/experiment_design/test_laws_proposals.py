@@ -21,7 +21,6 @@ from identify.experiment_design.candidate_experiments import (
     _require_fit,
     _reversing,
     _swept,
-    neat,
     proposals,
 )
 from identify.experiment_design.discrimination import (
@@ -32,6 +31,7 @@ from twin.errors import CannotRun
 from twin.experiments.experiment import gentle, machine_limits
 from twin.experiments.kinds import Moves, Passes, Rests, Staircase, Steps, Sweep, Tracking
 from twin.model.machine import AxisModel, Hardware, MachineModel
+from twin.numbers import neat
 
 plans = importlib.import_module("identify.experiment_design.plan")
 STAGE = MachineModel("s", {"x": PLAIN, "y": replace(PLAIN, mass=3.1)}, 2000.0)
@@ -74,7 +74,7 @@ def test_a_weak_motor_is_asked_for_a_part_of_its_force():
         assert _affordable(MachineModel("s", {"x": axis}), "x") == pytest.approx(effort)
 
 
-def test_proposals_cover_the_sorts_and_last_about_as_long_as_asked():
+def test_proposals_cover_the_sorts_and_last_as_long_as_asked():
     found, _ = proposals(STAGE, "x", 8.0)
     kinds = {type(e) for e in found}
     assert {Tracking, Moves, Passes, Staircase, Steps, Sweep} <= kinds
@@ -85,12 +85,15 @@ def test_proposals_cover_the_sorts_and_last_about_as_long_as_asked():
     assert any(getattr(e, "other", 0.0) > 0.0 for e in found)
     alone, _ = proposals(MachineModel("s", {"x": PLAIN}, 2000.0), "x", 8.0)
     assert not any(getattr(e, "other", 0.0) for e in alone)
-    rounds = [Moves(count=8), Moves(count=4, dwell=1.0)]  # 8 s in moves of 0.9 s, of 1.8 s
+    rounds = [Moves(80, duration=8.0), Moves(8, dwell=1.0, duration=8.0)]
     assert all(m in found for m in rounds)
+    for e in found:
+        lasts = e.setpoint(STAGE, np.random.default_rng(7)).duration
+        assert lasts == pytest.approx(8.0, rel=0.05)
 
 
-def test_a_proposal_may_take_three_tenths_more_than_asked():
-    lasting = SimpleNamespace(setpoint=lambda model, rng: SimpleNamespace(duration=12.99))
+def test_a_proposal_may_take_a_twentieth_more_than_asked():
+    lasting = SimpleNamespace(setpoint=lambda model, rng: SimpleNamespace(duration=10.49))
     _require_fit(lasting, STAGE, 10.0)
     with pytest.raises(CannotRun, match="longer"):
         _require_fit(lasting, STAGE, 9.99)

@@ -9,7 +9,7 @@ import pytest
 from machines import one_axis
 
 from identify import plan
-from identify.experiment_design.candidate_experiments import TOLERANCE, proposals
+from identify.experiment_design.candidate_experiments import proposals
 from identify.experiment_design.discrimination import (
     Arena,
     Explanation,
@@ -23,6 +23,7 @@ from twin.effects import load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, Passes, Sweep, Tracking
+from twin.experiments.lasting import ALLOWED
 from twin.experiments.named import simulate
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
@@ -58,7 +59,7 @@ def test_every_proposal_stays_within_the_limits_of_the_stage(name):
 def assert_within_limits(stage: MachineModel, experiment: Experiment) -> None:
     """Position, speed, acceleration and jerk asked for, the force of a sweep included."""
     setpoint = experiment.setpoint(stage, np.random.default_rng(0))
-    assert setpoint.duration < TOLERANCE * 5.0
+    assert setpoint.duration < (1.0 + ALLOWED) * 5.0
     for i, axis in enumerate(stage.axes.values()):
         h = axis.hardware
         low, high = h.travel

@@ -17,6 +17,7 @@ from identify.selftest.cases import NotShown, machine, plain_friction
 from identify.selftest.variations import Drawn
 from twin.effect import Excitation, Kind
 from twin.errors import InputError
+from twin.experiments.kinds import Moves, Tracking
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import FineSimulator
 
@@ -37,8 +38,8 @@ def test_the_plain_friction_is_the_simplest_at_the_level_of_the_stages_own():
 def test_a_machine_is_logged_for_training_selection_and_test(monkeypatch):
     ran, order = [], []
 
-    def simulate(true, run, seed, duration, simulator):
-        ran.append((true, run, seed, duration, simulator))
+    def simulate(true, run, seed, simulator):
+        ran.append((true, run, seed, simulator))
         return f"log of seed {seed}"
 
     def planted(drawn, effect, *rest):
@@ -59,8 +60,8 @@ def test_a_machine_is_logged_for_training_selection_and_test(monkeypatch):
     assert found.true.axes["x"].names == ("gms", "wear", "cogging")
     assert found.model.axes["x"].mass == found.true.axes["x"].mass  # held, so it was weighed
     assert found.true.axes["y"] != STAGE.axes["y"]  # drawn
-    assert [(r[1], r[3], r[4]) for r in ran] == [
-        (run, 12.0, FineSimulator) for run in ("tracking", "moves", "tracking", "moves")
+    assert [(r[1], r[3]) for r in ran] == [
+        (run, FineSimulator) for run in (Tracking(12.0), Moves(8), Tracking(12.0), Moves(8))
     ]
     assert all(r[0] is found.true for r in ran)
     seeds = [r[2] for r in ran]

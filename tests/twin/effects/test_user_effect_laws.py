@@ -25,6 +25,20 @@ FAULTS = {
     "a write to what is not its own": (
         LAW_END, f"{LAW_END}\n    io[X] += 1e-9", "writes only its result", "writes io[X]",
     ),
+    "a wrong unit": (
+        '"k", "N/m",', '"k", "N",', "is the same in other units",
+        "check the units of its parameters",
+    ),
+    "a unit of its own": (
+        "distance = io[X] - p[1]", "distance = io[X] - p[1] + 0.01", "is the same in other units",
+        "numbers in the law that have a unit of their own",
+    ),
+    "a wrong sign": (
+        "io[OUT] = -p[0]", "io[OUT] = p[0]", "is its equation", "the sign is the other one",
+    ),
+    "a power forgotten": (
+        "exp(-ratio * ratio)", "exp(-ratio)", "is its equation", "correct the law or the equation",
+    ),
     "never acts": (
         '"N/m", 0.0, -1e5, 1e5,', '"N/m", 0.0, -1e-5, 1e-5,', "acts within its bounds", "N rms",
     ),
@@ -94,3 +108,38 @@ def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
     assert "NAME" in refusal("effects", "--check", folder=tmp_path)
     assert "own" in refusal("effects", "cogging", "--check", "--plot", "c.png", folder=tmp_path)
     assert "'cogging'" in refusal("effects", "coging", "--check", folder=tmp_path)
+
+
+DRAG = """
+from twin.effect import OUT, Effect, Kind, Parameter, V
+
+
+def law(p, s, io):
+    io[OUT] = {sign}p[0] * io[V]
+
+
+EFFECT = Effect(
+    kind=Kind.FORCE, summary="eddy current brake", equation="{equation}", source="a test",
+    parameters=(Parameter("c", "{unit}", 0.0, 0.0, 1e6, "braking", strength=True),),
+    law=law, fingerprint="grows with speed", excited_by="fast passes",
+)
+"""
+SPEED = {
+    "as it should be": ("-", "F = -c v", "N s/m", None),
+    "equation in words": ("-", "a brake in proportion to speed", "N s/m", None),
+    "sign, equation in words": ("", "a brake in proportion to speed", "N s/m", "gives no energy"),
+    "sign in both": ("", "F = c v", "N s/m", "gives no energy"),
+    "unit": ("-", "F = -c v", "N/m", "is the same in other units"),
+    "unit of a mass": ("-", "F = -c v", "kg", "is the same in other units"),
+}
+
+
+@pytest.mark.parametrize("case", SPEED)
+def test_a_brake_that_drives_or_has_another_unit_is_found(case: str, tmp_path: Path) -> None:
+    sign, equation, unit, law = SPEED[case]
+    path = tmp_path / "brake.py"
+    path.write_text(DRAG.format(sign=sign, equation=equation, unit=unit), encoding="utf-8")
+    done = twin("effects", "brake", "--effects", path, "--check", folder=tmp_path)
+    failed = [line for line in done.stdout.splitlines() if "FAILED" in line]
+    assert done.returncode == (law is not None), done.stdout + done.stderr
+    assert [law in line for line in failed] == [True] * (law is not None)

@@ -239,8 +239,8 @@ def test_a_map_runs_the_speeds_that_the_axis_reaches() -> None:
         name: [find_experiment(name, STAGE, "x", s) for s in (0.1, 4.5)]
         for name in ("moves", "reversals", "cable_pass")
     }  # at least two places, one reversal, one pass; then by the time that each takes
-    assert [e.count for e in counts["moves"]] == [2, 3]
-    assert [e.repeats for e in counts["reversals"]] == [1, 18]
+    assert [e.count for e in counts["moves"]] == [2, 45]
+    assert [e.repeats for e in counts["reversals"]] == [1, 20]
     assert counts["cable_pass"][0].repeats == 1
     passes = find_experiment("cable_pass", STAGE, "y", 60.0)
     assert passes.span == pytest.approx(0.88 * 0.14)

@@ -188,7 +188,7 @@ def test_a_matrix_is_split_along_its_shorter_side(shape):
     names = ["m"] if 1 in shape else ["m[1]", "m[2]"]
     assert {n: c.tolist() for n, c in found.items()} == dict(zip(names, long.tolist(), strict=True))
     assert split_columns("m", np.zeros((2, 3, 4))) == {}
-    assert split_columns("m", np.array(3.0)) == {}
+    assert split_columns("m", np.array(3.0)) == {"m": np.array([3.0])}  # one row
 
 
 def test_dates_are_seconds_since_the_first_and_text_names_its_row():

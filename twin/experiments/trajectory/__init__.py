@@ -11,6 +11,7 @@ from twin.experiments.trajectory.generators import (
     point_to_point,
     velocity_staircase,
 )
+from twin.experiments.trajectory.jerk_limited import move
 from twin.experiments.trajectory.limits import Limits
 from twin.experiments.trajectory.random_tracking import random_tracking
 from twin.experiments.trajectory.setpoint import Setpoint, concatenate
@@ -21,6 +22,7 @@ __all__ = [
     "concatenate",
     "constant_speed_passes",
     "micro_reversals",
+    "move",
     "open_loop_sine",
     "point_to_point",
     "random_tracking",

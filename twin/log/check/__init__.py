@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from twin.log.check import (
+    assumed,
     breaks,
     command,
     content,
@@ -35,7 +36,7 @@ def check_log(log: Log) -> CheckReport:
     for name, columns in log.axes.items():
         axis = Axis(name, log.sample_rate, columns)
         basic = list(content.check(axis))
-        findings += basic
+        findings += [*basic, *assumed.check(name, log.metadata)]
         if not basic:
             sound.append(axis)
             for part in (units, timing, breaks, command, outliers, saturation, excitation):

@@ -20,6 +20,7 @@ class Fault(Enum):
     NOT_FINITE = "a sample is no number"
     TOO_SHORT = "the log is too short"
     FLAT = "a signal never changes"
+    ASSUMED = "the import map assumes something"
     UNIT = "a signal is in another unit"
     SIGN = "a signal is reversed"
     LAG = "one channel is late"

@@ -64,6 +64,7 @@ def guess_map(path: Path) -> Guess:
         *clock,
     ]
     missing: list[str] = []
+    used = {time} if time else set()
     for axis, names in _axes(moving).items():
         found = signals_of(names, moving, step)
         rotary = turns(found)
@@ -78,10 +79,26 @@ def guess_map(path: Path) -> Guess:
         if "current" in found and "force" not in found:
             unit = "N m/A" if rotary else "N/A"
             lines.append(f"# force_constant = 1.0 # {unit}: NOT KNOWN, see the motor's data sheet")
-        used = {signal.name for signal in found.values()}
+        used |= {signal.name for signal in found.values()}
         unused = [n for n in names if n not in used]
         lines += [f"# not used: {', '.join(unused)}"] if unused else []
+        used |= set(unused)
+    others = [_about(n, c) for n, c in table.columns.items() if n not in used]
+    lines += ["", *(f"# not used: {other}" for other in others)] if others else []
     return Guess("\n".join(lines) + "\n", tuple(missing))
+
+
+def _about(name: str, raw: np.ndarray) -> str:
+    """A column, or a single value, of no axis: its name and what it holds."""
+    try:
+        column = numbers(name, raw)
+    except InputError:
+        return f"{name} (no numbers)"
+    if not len(column) or not np.isfinite(column).all():
+        return f"{name} (not finite)"
+    if np.ptp(column) == 0.0:
+        return f"{name} = {column[0]:g}" + (" throughout" if len(column) > 1 else "")
+    return f"{name} ({len(column)} rows, {column.min():.4g} to {column.max():.4g})"
 
 
 def _distinct(raw: Mapping[str, np.ndarray]) -> dict[str, Array]:

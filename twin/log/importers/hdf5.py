@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from twin.log.importers.mapping import ImportMap
@@ -59,9 +60,9 @@ def read_named(path: Path, mapping: ImportMap, separator: str) -> Table:
 
 
 def _columns(name: str, dataset: Any, separator: str) -> dict[str, NDArray]:
-    if dataset.ndim not in (1, 2):
+    if dataset.ndim not in (0, 1, 2):
         return {}
-    values = dataset[()]
+    values = np.asarray(dataset[()])
     if values.dtype.names is None:
         return split_columns(name, values)
     parts = [split_columns(f"{name}{separator}{f}", values[f]) for f in values.dtype.names]

@@ -40,6 +40,8 @@ def _columns(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:
             split = split_columns(name, _numeric(value))
             named = len(names) == len(split) > 1
             columns |= dict(zip(names, split.values(), strict=True)) if named else split
+        elif isinstance(value, int | float | str):
+            columns[name] = np.array([value])
     return columns
 
 

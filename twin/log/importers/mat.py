@@ -97,6 +97,6 @@ def _columns(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:
         name = f"{prefix}{key}"
         if isinstance(value, Mapping):
             columns |= _columns(f"{name}.", value)
-        elif isinstance(value, np.ndarray):
-            columns |= split_columns(name, value)
+        elif isinstance(value, np.ndarray | np.generic | int | float | str):
+            columns |= split_columns(name, np.asarray(value))
     return columns

@@ -62,9 +62,9 @@ def chosen(wanted: Iterable[str], there: Collection[str]) -> tuple[str, ...]:
 def split_columns(name: str, values: NDArray) -> dict[str, NDArray]:
     """A vector as it is; a matrix as ``name[1]``, ``name[2]``, ... along its shorter side.
 
-    Nothing where ``values`` is a single number or has more than two sides.
+    A single value is a column of one row. Nothing where ``values`` has more than two sides.
     """
-    array = np.squeeze(values)
+    array = np.atleast_1d(np.squeeze(values))
     if array.ndim == 1:
         return {name: array}
     if array.ndim != 2:

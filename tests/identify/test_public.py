@@ -1,0 +1,105 @@
+"""What Python users are offered: a short list of names, and logs and models as they have them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import identify
+import twin
+from twin.errors import InputError
+from twin.log import Log, logs_by_name
+
+
+@pytest.fixture(scope="module")
+def log() -> Log:
+    return twin.simulate(twin.load_model("proton_xy"), "tracking", seed=1, duration=2.0)
+
+
+@pytest.fixture(scope="module")
+def file(log, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("public") / "run.mcap"
+    twin.write_log(log, path)
+    return path
+
+
+@pytest.mark.parametrize("package", [identify, twin])
+def test_a_package_offers_ten_to_forty_names_and_lists_them(package) -> None:
+    assert 10 <= len(package.__all__) <= 40
+    assert sorted(package.__all__) == sorted(n for n in dir(package) if not n.startswith("_"))
+    for name in package.__all__:
+        assert getattr(package, name).__doc__
+    assert (Path(package.__file__).parent / "py.typed").is_file()
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = package.nothing
+
+
+def test_to_import_the_packages_loads_neither_numpy_nor_more() -> None:
+    script = (
+        "import sys, twin, identify; print([m for m in sys.modules if m in ('numpy', 'typer')])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_fit_takes_a_log_a_path_a_list_and_a_dict_and_a_model_by_name(log, file) -> None:
+    given = [log, file, str(file), [log], (file,), {"a": log}, {"a": file}]
+    found = [identify.fit("proton_xy", one) for one in given[:2]]
+    assert found[0].model.axes["x"].mass == pytest.approx(found[1].model.axes["x"].mass, rel=1e-6)
+    names = [list(logs_by_name(one, "training")) for one in given]
+    alone, there = "training 1", str(file)
+    assert names == [[alone], [there], [there], [alone], [there], ["a"], ["a"]]
+    assert all(
+        len(logs_by_name(one, "training")[n]) == len(log)
+        for one, (n,) in zip(given, names, strict=True)
+    )
+
+
+def test_logs_of_two_roles_need_no_names(log) -> None:
+    other = twin.simulate(twin.load_model("proton_xy"), "tracking", seed=2, duration=2.0)
+    found = identify.fit(twin.load_model("proton_xy"), log, other)
+    assert found.datasets["x"].holdout
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (3, "training: a int is no log; give a Log"),
+        ([3.0], "training: a float is no log; give a Log"),
+        ({"a": None}, "training 'a': a NoneType is no log; give a Log"),
+        (["none.mcap", "none.mcap"], "training: none.mcap is given twice"),
+        ("none.mcap", "none.mcap: cannot be read: No such file"),
+    ],
+)
+def test_what_is_no_log_is_one_line(given, said) -> None:
+    with pytest.raises(InputError) as error:
+        identify.fit("proton_xy", given)
+    assert str(error.value).startswith(said)
+    assert "\n" not in str(error.value)
+
+
+def test_what_is_no_model_is_one_line(log) -> None:
+    for call in (identify.fit, identify.compare, identify.diagnose, identify.plan):
+        with pytest.raises(InputError, match="model: a Log is no machine model; give a Machine"):
+            call(log, "proton_xy")
+
+
+def test_logs_and_models_print_themselves_in_a_line(log) -> None:
+    assert repr(log).startswith("<Log of 2 s at 10000 Hz, x: setpoint_position, ")
+    assert repr(log.axes["x"]).startswith("<AxisLog of 20000 samples: setpoint_position (m), ")
+    model = twin.load_model("proton_xy")
+    assert repr(model).startswith("<MachineModel Proton Motion Stage at 10000 Hz, ")
+    assert repr(model.axes["x"]).startswith(f"<AxisModel of {model.axes['x'].mass:g} kg: ")
+    assert max(len(repr(one)) for one in (log, log.axes["x"], model, model.axes["x"])) < 300
+
+
+def test_a_comparison_for_viewers_is_told_from_a_log(log, tmp_path) -> None:
+    from identify.output.side_by_side import write_side_by_side
+    from identify.workflow import side_by_side_of
+
+    write_side_by_side(side_by_side_of(identify.compare("proton_xy", log)), tmp_path / "side.mcap")
+    with pytest.raises(InputError, match=r"side.mcap: is a comparison for viewers .*, not a log"):
+        twin.read_log(tmp_path / "side.mcap")
