@@ -13,7 +13,7 @@ endif
 # What Python compiles is kept for its next start: the tests start it fifty times.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo check test bench thesis clean
+.PHONY: demo check test bench thesis docs clean
 
 demo: $(VENV)/runtime
 	$(BIN)/twin demo --out demo
@@ -39,6 +39,10 @@ bench: $(VENV)/benchmarks
 thesis: $(VENV)/runtime
 	$(BIN)/python -m studies.thesis --out thesis
 
+# The site, into docs/_build/html; a warning is an error.
+docs: $(VENV)/docs
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
 $(VENV)/runtime: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
@@ -52,6 +56,10 @@ $(VENV)/benchmarks: $(VENV)/tests
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[test,import,bench]"
 	@touch $@
 
+$(VENV)/docs: $(VENV)/runtime
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[docs]"
+	@touch $@
+
 clean:
-	rm -rf $(VENV) demo thesis build dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) docs/_build docs/_generated docs/gallery/effects demo thesis build dist .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,12 +1,18 @@
-"""The README is true: its shell commands and its Python run as printed, in an empty folder."""
+"""README and tutorial are true: their commands and their Python run as printed, in an empty folder.
+
+What they answer is written below them by docs/outputs.py; the long version compares it.
+"""
 
 import json
 import os
 import re
+import runpy
+import shlex
 import shutil
 import subprocess
 import sys
-from contextlib import redirect_stdout
+from collections.abc import Iterator
+from contextlib import chdir, redirect_stdout
 from io import StringIO
 from pathlib import Path
 
@@ -16,6 +22,8 @@ from report_cases import without_drawing
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+TUTORIAL = (ROOT / "docs" / "start" / "tutorial.md").read_text(encoding="utf-8")
+MOST_LINES = 100
 
 
 def blocks(language: str) -> list[str]:
@@ -30,13 +38,32 @@ def run(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-COMMANDS = [line for line in blocks("sh")[1].splitlines() if line.startswith("twin ")]
+def commands_of(text: str) -> Iterator[list[str]]:
+    """The commands of a block, the loops written out."""
+    loop = re.compile(r"for (\w+) in ([^;]*); do (.*); done")
+    for line in text.splitlines():
+        found = loop.fullmatch(line)
+        if found is None:
+            yield shlex.split(line, comments=True)
+            continue
+        name, values, command = found.groups()
+        for value in values.split():
+            yield shlex.split(command.replace(f"${name}", value))
+
+
+def test_it_is_short():
+    assert len(TEXT.splitlines()) <= MOST_LINES
+
+
+# The loop of the tutorial.
+
+CELLS = re.findall(r"^```\{code-cell\}.*?\n%%sh\n(.*?)^```", TUTORIAL, flags=re.S | re.M)
+COMMANDS = [line for cell in CELLS for line in cell.splitlines() if line.startswith("twin ")]
 
 
 @pytest.mark.slow
 def test_the_loop_runs_as_printed_and_the_error_falls(tmp_path):
-    if shutil.which("twin", path=str(Path(sys.executable).parent)) is None:
-        pytest.skip("the package is not installed, so there is no `twin` command")
+    require_installed()
     assert_the_error_falls(lambda command: run(command, tmp_path), tmp_path)
 
 
@@ -45,6 +72,11 @@ def test_the_loop_runs_in_small_and_the_error_falls(tmp_path):
     rivals = ("cogging", "force_constant_ripple")
     with in_small(*rivals, duration=5.0), without_drawing():
         assert_the_error_falls(lambda command: twin(*command[1:], folder=tmp_path), tmp_path)
+
+
+def require_installed():
+    if shutil.which("twin", path=str(Path(sys.executable).parent)) is None:
+        pytest.skip("the package is not installed, so there is no `twin` command")
 
 
 def assert_the_error_falls(answer, folder):
@@ -70,35 +102,51 @@ def assert_the_error_falls(answer, folder):
         assert (folder / name).stat().st_size > 10_000
 
 
+# The README's own recordings, by commands and in Python.
+
+
+def test_the_recordings_are_diagnosed_in_small(tmp_path):
+    """The five commands and the example in Python, with two effects to choose from."""
+    own = next(block for block in blocks("sh") if "import" in block)
+    own_effects = ("coulomb_viscous", "constant_force")  # of the drive, and of a first model
+    with in_small("cogging", "spring", *own_effects), without_drawing(), chdir(tmp_path):
+        script, *commands = commands_of(own)
+        recordings = runpy.run_path(str(ROOT / script[1]), run_name="recordings")
+        recordings["main"](tmp_path)
+        assert len(own.splitlines()) - 1 == 5
+        for command in commands:
+            result = twin(*command[1:], folder=tmp_path)
+            assert result.returncode == 0, f"{command}\n{result.stderr}"
+        assert "Missing: cogging." in result.stdout
+        assert (tmp_path / "report.html").stat().st_size > 10_000
+        with redirect_stdout(StringIO()) as out:
+            exec(compile(blocks("python")[0], "README.md", "exec"), {})
+        assert "(('cogging',),)" in out.getvalue()
+
+
 @pytest.mark.slow
-def test_the_python_example_runs_and_names_the_effect(tmp_path):
-    (tmp_path / "example.py").write_text(blocks("python")[0])
-    result = run([sys.executable, "example.py"], tmp_path)
-    assert result.returncode == 0, result.stderr
-    assert_cogging_found(result.stdout)
+def test_the_answers_are_those_of_the_commands(tmp_path):
+    """Word for word, but for figures, which another processor may round otherwise."""
+    require_installed()
+    outputs = runpy.run_path(str(ROOT / "docs" / "outputs.py"), run_name="outputs")
+    assert without_figures(outputs["answered"](TEXT, tmp_path)) == without_figures(TEXT)
 
 
-def test_the_python_example_runs_in_small():
-    with in_small("cogging", "quadratic_drag"), redirect_stdout(StringIO()) as out:
-        exec(compile(blocks("python")[0], "README.md", "exec"), {})
-    assert_cogging_found(out.getvalue())
+def without_figures(text: str) -> str:
+    return re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", text)
 
 
-def assert_cogging_found(printed):
-    first, *answer = printed.splitlines()
-    name, before, after = first.split()
-    assert name == "cogging"
-    assert float(after) < float(before) / 3.0
-    assert any("cogging" in line for line in answer)  # a result prints itself
-
-
-def test_the_two_commands_are_targets_of_the_makefile():
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    for target in re.findall(r"^make (\w+)", blocks("sh")[0], flags=re.M):
-        assert re.search(rf"^{target}:", makefile, flags=re.M)
-
-
-def test_the_files_it_names_exist():
-    folders = "examples|models|tests|twin|identify|studies|benchmarks"
-    for name in re.findall(rf"`((?:{folders})/[\w./]*)`", TEXT):
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
+def test_the_files_it_names_exist(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    folders = "examples|models|tests|twin|identify|studies|benchmarks|docs"
+    named = re.findall(rf"`((?:{folders})/[\w./]*)`", text)
+    linked = re.findall(r"\]\(([\w./-]+)\)", text)
+    for name in [*named, *linked]:
         assert (ROOT / name).exists(), name
+
+
+def test_the_targets_that_it_names_are_in_the_makefile():
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for target in re.findall(r"`make (\w+)`", TEXT):
+        assert re.search(rf"^{target}:", makefile, flags=re.M), target
