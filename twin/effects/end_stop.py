@@ -11,11 +11,10 @@ from collections.abc import Mapping
 
 from twin.effect import DT, MASS, MOST, OUT, Effect, Excitation, Kind, Parameter, V, X
 
-# Places tried, parts of the travel from its ends; soft stops a tenth off pass for a cable.
-STOPS = (0.005, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4)
+STOPS = (0.005, 0.01, 0.02, 0.035, 0.05)  # places tried, parts of the travel from its ends
 
 # What is less than that imitates any force of position: a stop ends a travel, and stops what moves.
-LEAST_FREE = 0.5  # part of the travel between the stops
+LEAST_FREE = 0.9  # part of the travel between the stops; what yields further is a cable or a spring
 LEAST_PUSH = 0.25  # of the dry friction, where the travel reaches deepest
 
 

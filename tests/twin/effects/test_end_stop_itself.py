@@ -7,7 +7,7 @@ from constructed import CATALOGUE, COVERED
 
 EFFECT = CATALOGUE["end_stop"]
 TRAVEL, DRY = COVERED.travel, COVERED.dry_level
-DEPTH = 0.1 * TRAVEL
+DEPTH = 0.04 * TRAVEL
 
 
 def stops(low: float, high: float, stiffness: float) -> bool:
@@ -25,6 +25,6 @@ def test_a_stop_pushes(sides: tuple[int, int]) -> None:
 
 
 def test_stops_leave_the_travel_free() -> None:
-    assert stops(0.24 * TRAVEL, 0.24 * TRAVEL, 1e3)
-    assert not stops(0.26 * TRAVEL, 0.26 * TRAVEL, 1e3)
-    assert not stops(0.0, 0.51 * TRAVEL, 1e3)
+    assert stops(0.04 * TRAVEL, 0.04 * TRAVEL, 1e3)
+    assert not stops(0.06 * TRAVEL, 0.06 * TRAVEL, 1e3)
+    assert not stops(0.0, 0.11 * TRAVEL, 1e3)
