@@ -19,13 +19,11 @@ from identify.dataset.drive import (
     actual_force,
     forces_lessened,
     is_noise,
-    parts_of,
     reading_error,
     true_motion,
 )
 from identify.dataset.motion import motion_of
 from identify.estimation.force_balance import averaged_force, residual
-from twin.effect import Kind
 from twin.model.machine import AxisModel
 
 
@@ -53,14 +51,6 @@ def test_an_actuation_adds_the_mean_of_what_it_makes_of_the_command_to_the_resid
     np.testing.assert_allclose(
         averaged_force(pushed, [log]), 0.4 + averaged_force(AxisModel(1.0, effects=(LAG,)), [log])
     )
-
-
-def test_a_force_ripple_acts_at_the_middle_of_the_sample():
-    found = actual_force(AxisModel(1.0, effects=(RIPPLE,)), SHORT)
-    x, _, command = SHORT.at_samples(0.5)
-    turn = 2.0 * np.pi * x / 0.013
-    gain = 1.0 + 0.05 * np.sin(turn) + 0.03 * np.cos(turn)
-    np.testing.assert_allclose(found, gain * command, atol=1e-9)
 
 
 def test_a_motor_counts_as_weaker_from_less_than_half_its_force():
@@ -141,10 +131,3 @@ def test_rounding_moves_no_motion_and_is_noise_alone():
     beside_delay, _ = true_motion(AxisModel(1.0, effects=(step, SENSING[0])), SHORT)
     alone, _ = true_motion(AxisModel(1.0, effects=(SENSING[0],)), SHORT)
     np.testing.assert_array_equal(beside_delay.signals, alone.signals)
-
-
-def test_parts_are_those_of_the_kinds_asked_in_their_order():
-    axis = AxisModel(2.0, effects=(SENSING[1], STICKY, LAG, SENSING[0]))
-    found = parts_of(axis, Kind.ACTUATION, Kind.SENSING)
-    assert found.names == ("encoder_ripple", "actuator_lag", "encoder_delay")
-    assert found.mass == 2.0

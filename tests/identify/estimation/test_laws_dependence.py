@@ -1,21 +1,17 @@
 """Laws of what a residual depends on, and of its whiteness; each against a plain loop."""
 
-from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from constructed import SHORT, dataset_of, log_of, moved, windowed
+from constructed import dataset_of, log_of, moved, windowed
 from scipy.stats import norm
 
 from identify.dataset.coordinates import coordinates_of
 from identify.dataset.motion import _follows, motion_of
 from identify.estimation.decision import RULE
-from identify.estimation.evidence import effective_samples
 from identify.estimation.residual_dependence import (
     BINS,
-    _foremost,
-    _share,
     _shares,
     dependences,
     find_dependence,
@@ -25,27 +21,10 @@ from identify.estimation.residual_dependence import (
 from identify.output.words.validation import correlation_in_words
 from identify.validation.whiteness import Correlation, Loop, correlation, loop_of, residual_tests
 
-LOG = windowed(SHORT)
 RNG = np.random.default_rng(51)
 
 
 # --- dependence ---------------------------------------------------------------------------------
-
-
-def test_a_share_is_what_the_means_over_quantile_bins_explain():
-    x, r = RNG.normal(size=1000), RNG.normal(size=1000)
-    r += np.sin(3.0 * x)
-    levels = np.quantile(x, np.linspace(0.0, 1.0, 25))
-    left, groups = r.copy(), 0
-    for a, b in pairwise(levels):
-        inside = (x >= a) & ((x < b) | (b == levels[-1]))
-        left[inside] -= r[inside].mean()
-        groups += 1
-    n = effective_samples(left)
-    wanted = 1.0 - np.sum(left**2) / np.sum(r**2) * n / (n - groups)
-    assert _share(r, x, 24) == pytest.approx(wanted)
-    assert _share(r, np.full(1000, 2.0), 24) == 0.0
-    assert _share(r, np.where(x > 0.0, 1.0, 2.0), 24) < 0.2
 
 
 def test_the_share_of_noise_is_none_and_of_a_function_all():
@@ -58,13 +37,6 @@ def test_the_share_of_noise_is_none_and_of_a_function_all():
     assert share(fine, x) > 0.4  # the finest bins see it
     few = slice(0, 5 * BINS[1])
     assert share(fine[few], x[few]) < 0.3  # too few for them
-
-
-def test_the_foremost_is_the_largest_and_time_only_where_no_other_comes_near():
-    assert _foremost({"position": 0.5, "velocity": 0.6, "time": 0.3}) == "velocity"
-    near, far = 1.01 * RULE.rather, 0.99 * RULE.rather
-    assert _foremost({"position": near * 0.9, "velocity": 0.1, "time": 0.9}) == "position"
-    assert _foremost({"position": far * 0.9, "velocity": 0.1, "time": 0.9}) == "time"
 
 
 @pytest.mark.parametrize("period", [0.0043, 0.021])
@@ -80,16 +52,6 @@ def test_a_line_of_the_residual_has_its_period_and_share(period):
     assert line(RNG.normal(size=3000), x) is None
     assert line(r, 0.0 * x) is None
     assert RULE.line_share < 0.5
-
-
-def test_a_line_in_several_runs_keeps_its_period_but_not_its_phase():
-    t = np.tile(np.arange(1000) * 0.01, 2)
-    r = np.sin(2.0 * np.pi * 3.3 * t + np.repeat([0.0, np.pi], 1000))
-    found, strength = line(r, t, [1000])
-    assert found == pytest.approx(1.0 / 3.3, rel=0.01)
-    assert strength > 0.8
-    together = line(r, t)  # the two cancel where they are taken for one
-    assert together is None or abs(together[0] * 3.3 - 1.0) > 0.01
 
 
 def where_of(log) -> dict:
@@ -137,22 +99,6 @@ def test_a_residual_that_repeats_has_a_period_in_position_or_time():
     assert shares["time"] > 0.9
 
 
-def test_logs_are_told_apart_even_where_one_begins_later_than_the_other_ends():
-    """The second is at rest until the first has ended, so that time does not fall between them."""
-    kept = np.concatenate([WHERE["time"][: len(LONG[0])] < 2.7, LONG[1].time > 3.0])
-    time = WHERE["time"][kept]
-    assert (np.diff(time) > 0.0).all()
-    second = np.arange(len(KEPT))[kept] >= len(LONG[0])
-    noise = np.random.default_rng(4).normal(0.0, 0.1, len(time))
-    pump = np.sin(2.0 * np.pi * time / 0.113 + 2.5 * second) + noise
-    fit = SimpleNamespace(residual=pump, kept=kept)
-    assert find_dependence(fit, DATASET).shares["time"] > 0.9
-    still = SimpleNamespace(
-        residual=pump[second], kept=kept & (np.arange(len(kept)) >= len(LONG[0]))
-    )
-    assert find_dependence(still, DATASET).shares["time"] > 0.9
-
-
 # --- whiteness ----------------------------------------------------------------------------------
 
 
@@ -179,21 +125,6 @@ def test_correlations_are_the_plain_sums_at_their_lags():
         "command", [*logs, logs[0][:40]], [*signals, signals[0][:40]], 1.0, Loop.OPEN
     )
     assert np.abs(short.lag).max() == 10
-
-
-@pytest.mark.parametrize("loop", list(Loop))
-def test_bounds_are_those_of_a_white_residual_over_the_lags_tested(loop):
-    r = RNG.normal(size=400)
-    r[:23] = np.nan
-    for name, count in (("residual", 40), ("velocity", 81 if loop is Loop.OPEN else 40)):
-        found = correlation(name, [r], [r], 0.5, loop)
-        assert found.tested.sum() == count
-        assert found.bound == pytest.approx(norm.ppf(0.95) / np.sqrt(377))
-        # both tails of all tested lags together have one in a hundred
-        tail = 2.0 * norm.sf(found.limit * np.sqrt(377))
-        assert tail * count == pytest.approx(0.01)
-        own_instant = found.lag[found.tested] <= 0.0
-        assert own_instant.any() == (name != "residual" and loop is Loop.OPEN)
 
 
 def test_what_is_outside_and_passes_counts_the_tested_lags_alone():

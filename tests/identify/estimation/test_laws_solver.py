@@ -1,18 +1,15 @@
 """Laws of the solver, the scaling and subspaces: SciPy's solutions, a bijection, a projection."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from constructed import CATALOGUE, effect
+from constructed import effect
 from scipy.optimize import least_squares
 
 from identify.estimation.levenberg_marquardt import minimise
 from identify.estimation.scaling import Scaling
 from identify.estimation.subspace import orthonormal, unabsorbed
-from twin.effect import Parameter
 from twin.model.machine import AxisModel
-from twin.model.parameters import ParameterReference, free_parameters, read
+from twin.model.parameters import free_parameters, read
 
 WIDE = np.full(3, -1e9), np.full(3, 1e9)
 TIGHT = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
@@ -201,31 +198,6 @@ def test_inside_and_outside_undo_each_other():
         else:
             wanted = np.log([p.lower, p.upper]) if log else [p.lower, p.upper]
             np.testing.assert_allclose([a, b], wanted)
-
-
-def test_a_held_floor_is_counted_from():
-    held = replace(ODD["lugre"], fixed=ODD["lugre"].fixed | {"Fc"})
-    axis = AxisModel(1.7, effects=(held,))
-    where = free_parameters(axis)
-    scaling = Scaling(where)
-    at = [c.label for c in where].index("lugre.Fs")
-    inside = scaling.inside(axis)
-    assert inside[at] == pytest.approx(0.16)
-    inside[at] = 0.05
-    assert scaling.outside(axis, inside)["lugre"].values["Fs"] == pytest.approx(0.36)
-    columns = np.random.default_rng(4).normal(size=(5, len(where)))
-    np.testing.assert_array_equal(scaling.chain(axis, columns)[:, at], columns[:, at])
-
-
-def test_outside_keeps_values_within_their_bounds():
-    p = Parameter("a", "N", 1.0, 0.5, 2.0, "")
-    bounded = replace(CATALOGUE["constant_force"], parameters=(p,))
-    fitted = replace(effect("constant_force"), effect=bounded, values={"a": 1.0})
-    axis = AxisModel(1.0, effects=(fitted,))
-    scaling = Scaling((ParameterReference("constant_force", p),))
-    for inside, wanted in ((np.log(0.4), 0.5), (np.log(1.3), 1.3), (np.log(3.0), 2.0)):
-        found = scaling.outside(axis, np.array([inside]))
-        assert found["constant_force"].values["a"] == pytest.approx(wanted)
 
 
 def test_the_chain_rule_is_the_difference_by_the_internal_variables():

@@ -21,8 +21,6 @@ from identify.validation.misfit_maps import (
     compare_axis,
     misfit_by_frequency,
     misfit_map,
-    periods,
-    phase_name,
     worst_regions,
 )
 from identify.validation.whiteness import Loop
@@ -194,15 +192,6 @@ def test_standstill_is_where_the_speed_is_below_a_thousandth_of_the_highest():
     assert found.coordinates["standstill"][: len(LOG)].mean() < 0.2
     told = next(m for m in found.maps if m.coordinate == "standstill")
     assert len(told.rms) == 2
-
-
-def test_a_phase_is_shown_of_every_effect_that_repeats_along_the_track():
-    spikes = effect("roller_spikes", {"pitch": 0.021})
-    axis = AxisModel(1.0, effects=(effect("coulomb_viscous"), spikes, effect("cogging")))
-    wanted = {"roller_spikes": 0.021, "cogging": axis["cogging"].values["p"]}
-    assert periods(axis) == wanted
-    assert phase_name("cogging") == "cogging_phase"
-    assert periods(AxisModel(1.0, effects=(effect("periodic_disturbance"),))) == {}
 
 
 def test_the_map_by_frequency_is_that_of_the_bands():

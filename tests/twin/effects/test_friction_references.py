@@ -7,14 +7,9 @@ import mujoco
 import numpy as np
 import pytest
 from friction_runs import (
-    ALL,
     ELEMENTS,
-    MEMORY,
-    PAPER,
-    STRIBECK,
     along,
     at_turns,
-    dragged,
     error_of,
     friction,
     level,
@@ -29,22 +24,6 @@ from scipy.optimize import brentq
 from twin.laws.motion import Array
 
 # --- Dahl -----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("dt", [1e-5, 1e-3])
-@pytest.mark.parametrize("n", [0.0, 0.5, 1.0, 1.5, 3.0])
-def test_dahl_builds_up_as_its_equation_integrates(n: float, dt: float) -> None:
-    """From rest: |r|^(1-n) = 1 - (1-n) sigma0 x/Fc; exact at every step size."""
-    leg = round(0.3 / dt)
-    _, force = dragged(friction("dahl", n=n, Fc=1.0, sigma2=0.0), (3e-5,), 1e-4, leg)
-    ends = (np.arange(1, leg + 1)) * 3e-5 / leg
-    travel = PAPER["sigma0"] * ends
-    if n == 1.0:
-        left = np.exp(-travel)
-    else:
-        left = np.maximum(1.0 - (1.0 - n) * travel, 0.0) ** (1.0 / (1.0 - n))
-    middle = 1.0 - 0.5 * (left + np.r_[1.0, left[:-1]])
-    np.testing.assert_allclose(force[:leg], middle, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("n", [1.0, 2.0])
@@ -72,20 +51,6 @@ def test_dahl_agrees_with_a_stiff_solver(n: float) -> None:
     errors = [error_of(friction("dahl", **p), wanted, dt) for dt in (1e-3, 5e-4, 2.5e-4)]
     assert errors[-1] < 3e-4
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.35)
-
-
-# --- Stribeck curve -------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("speed", [1e-4, -5e-4, 1e-3, 3e-3, -0.05])
-@pytest.mark.parametrize("name", ALL)
-def test_steady_sliding_is_on_the_curve(name: str, speed: float) -> None:
-    """Far from the last reversal: g(v) sgn v + sigma2 v, with g = Fc where there is no Stribeck."""
-    slides = level(speed) if name in ("stribeck", *STRIBECK) else 1.0
-    v = np.full(4000, speed)
-    settle = max(2e-3 / abs(speed), 2.0)  # 200 pre-sliding lengths, 50 times g/C
-    force = along(friction(name), v, settle / len(v))[-1]
-    assert force == pytest.approx(slides * np.sign(speed) + 0.4 * speed, rel=1e-6)
 
 
 # --- generalized Maxwell-slip ---------------------------------------------------------------------
@@ -173,18 +138,6 @@ def test_gms_converges_to_its_equations() -> None:
     assert errors[0] / errors[1] > 8.0
 
 
-def test_many_gms_elements_tend_to_the_logarithmic_curve() -> None:
-    """They yield evenly in log z from z1 to zN = S z1: F/g = (ln(z/z1) + 1 - z/zN)/ln S."""
-    spread, count = 100.0, 400
-    z1 = (1.0 - 1.0 / spread) / np.log(spread) / 1e5  # stiffness sum a_i g/z_i = 1e5 N/m
-    x = z1 * np.array([0.5, 2.0, 10.0, 50.0, 200.0])
-    inside = np.clip(x / z1, 1.0, spread)
-    elastic = np.clip(x / z1, None, spread) / inside  # below z1 all elements stick
-    curve = (np.log(inside) + 1.0 - inside / spread) / np.log(spread) * elastic
-    many = friction("gms", elements=count, spread=spread, Fc=1.0, Fs=1.0)
-    np.testing.assert_allclose(at_turns(many, x), curve, atol=4e-3)
-
-
 @pytest.mark.parametrize("name", ["gms", "modified_leuven"])
 def test_elements_given_one_by_one(name: str) -> None:
     """Published a_i and k_i: with spread 1, share_i = a_i and stiff_i = k_i."""
@@ -198,11 +151,3 @@ def test_elements_given_one_by_one(name: str) -> None:
     x = np.array([5e-6, 1.2e-5, 1.5e-5])
     wanted = np.minimum(np.outer(x, k), 1.5 * a).sum(axis=1)
     np.testing.assert_allclose(at_turns(given, x), wanted, rtol=2e-4)
-
-
-@pytest.mark.parametrize("name", [*MEMORY, "dahl", "lugre"])
-def test_presliding_does_not_depend_on_the_speed_where_the_curve_is_flat(name: str) -> None:
-    turns = (2e-5, -1e-5, 1.5e-5)
-    flat = friction(name, Fc=1.0, **({} if name == "dahl" else {"Fs": 1.0}))
-    slow, fast = (at_turns(flat, turns, speed=speed) for speed in (1e-5, 1e-3))
-    np.testing.assert_allclose(fast, slow, rtol=1e-9, atol=1e-9)
