@@ -25,7 +25,6 @@ from identify.dataset.noise_floor import (
 from identify.dataset.prepared_log import on_blocks, total_force
 from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
-from identify.dataset.whittle import _underneath, fitted_levels
 from identify.estimation.force_balance import residual
 from twin.effect import LEAST
 from twin.log.check import moves
@@ -108,18 +107,6 @@ def test_a_log_whose_reading_hides_the_force_leaves_room_for_so_much_noise_of_it
     assert found.force == own.most
 
 
-def test_logs_of_unlike_rates_have_noise_of_their_own():
-    """As large a noise of each sample has more power below half the rate where that is lower."""
-    axis = AxisModel(MASS)
-    t = np.arange(2000) / (0.25 * RATE)
-    u = MASS * PUSH(t + 2.0 / RATE) + np.random.default_rng(8).normal(0.0, 0.02, len(t))
-    slow = windowed(motion_of(log_of(0.25 * RATE, PLACE(t), u), "x", "", ripples=()), 0.04)
-    fast = noisy(4, 0.02)
-    apart = [noise_of(axis, log.motion).force for log in (slow, fast)]
-    assert apart[0] > 3.0 * apart[1]
-    assert [n.force for n in noises_of(axis, [slow.motion, fast.motion])] == apart
-
-
 def test_what_the_model_explains_is_no_noise():
     """A force that follows a wildly moving other axis, in the command with the other sign."""
     rng = np.random.default_rng(6)
@@ -139,20 +126,6 @@ def test_what_the_model_explains_is_no_noise():
     assert unknown > 20.0 * known
     lagging = AxisModel(MASS, effects=(effect("actuator_lag", {"tau": 2e-3}),))
     assert noise_of(lagging, noisy(6, 0.04, duration=2.0).motion).force < 0.5 * 2.0 / RATE * 0.04**2
-
-
-def test_rounding_of_the_readings_adds_what_it_pretends():
-    step, t = 4e-5, np.arange(24_000) / RATE
-    exact = 0.05 * PLACE(t)
-    rng = np.random.default_rng(7)
-    u = MASS * 0.05 * PUSH(t + 0.5 / RATE) + rng.normal(0.0, 1e-3, len(t))
-    log = windowed(motion_of(log_of(RATE, step * np.rint(exact / step), u), "x", ""), 0.2)
-    rounding = log.motion.rounding
-    pretended = MASS * log.fine.acceleration(np.diff(rounding) * RATE)
-    blind = AxisModel(MASS)
-    knowing = AxisModel(MASS, effects=(effect("encoder_quantization"),))
-    added = floor_of(knowing, [log]) ** 2 - floor_of(blind, [log]) ** 2
-    assert np.sqrt(added) == pytest.approx(np.sqrt(np.mean(pretended**2)), rel=0.3)
 
 
 # --- its spectra --------------------------------------------------------------------------------
@@ -176,21 +149,6 @@ def test_segments_of_rest_are_left_out_but_a_quarter_is_kept():
     assert np.mean(power) == pytest.approx(2e-3, rel=0.2)
     _, blind = median_spectrum(signal, 256, 1e-3, ~loud)
     assert np.mean(blind) == pytest.approx(900.0 * 2e-3, rel=0.2)
-
-
-def test_levels_are_found_beneath_what_stands_out():
-    k = np.linspace(0.02, 1.0, 400)
-    shapes = np.stack([np.cos(0.3 * np.pi * k) ** 2, 1e3 * k**4], axis=1)
-    flat = shapes @ [0.7, 0.02]
-    np.testing.assert_allclose(fitted_levels(shapes, flat), [0.7, 0.02], rtol=1e-6)
-    peak = flat * (1.0 + 300.0 * np.exp(-(((k - 0.3) / 0.02) ** 2)))
-    np.testing.assert_allclose(fitted_levels(shapes, peak), [0.7, 0.02], rtol=0.05)
-    only = fitted_levels(shapes, 5.0 * shapes[:, 1])
-    np.testing.assert_allclose(only, [0.0, 5.0], atol=1e-3)
-    under = _underneath(np.concatenate([np.full(50, 9.0), np.full(50, 2.0), np.full(50, 5.0)]))
-    assert (under[:90] == 2.0).all()
-    assert (np.diff(under) >= 0.0).all()
-    assert under[-1] == 5.0
 
 
 # --- choosing logs and windows ------------------------------------------------------------------

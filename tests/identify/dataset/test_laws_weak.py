@@ -147,15 +147,6 @@ def test_smoothing_keeps_parabolas_and_averages_noise():
     assert np.std(left) == pytest.approx(1e-6 * np.sqrt(shrunk), rel=0.1)
 
 
-def test_a_head_is_the_beginning():
-    head = SMOOTH.head(0.4)
-    np.testing.assert_array_equal(head.signals, SMOOTH.signals[:, :400])
-    np.testing.assert_array_equal(head.others, SMOOTH.others[:, :400])
-    np.testing.assert_array_equal(head.raw, SMOOTH.raw[:, :1600])
-    assert SMOOTH.head(99.0).signals.shape == SMOOTH.signals.shape
-    assert SMOOTH.head(0.0).signals.shape[1] == 1
-
-
 def test_a_force_moved_ahead_is_that_of_later():
     shift = 3.0 / RATE
     found = SMOOTH.with_force_ahead(shift)

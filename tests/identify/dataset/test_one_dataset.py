@@ -13,11 +13,8 @@ from machines import one_axis
 
 from identify.analysis.first_model import first_model
 from identify.dataset.dataset import by_log, datasets
-from identify.dataset.noise_floor import floor_of
 from identify.dataset.shared_samples import share_samples
 from identify.estimation.channel_delay import aligned
-from identify.estimation.evidence import rms
-from identify.estimation.force_balance import residual
 from identify.output.as_json import fit_json
 from identify.output.text import fit_text
 from identify.validation.free_run import HORIZON, free_run, rms_error
@@ -167,31 +164,9 @@ def test_the_position_error_of_the_true_model_is_what_noise_makes_of_it():
 # --- the residual ---------------------------------------------------------------------------------
 
 
-def test_a_friction_behind_a_lag_sees_the_force_that_acts():
-    """Loaded by the motor, it is no farther from the floor than the lag alone is."""
-    fast = replace(STAGE, sample_rate=4000.0)
-    lagged = with_effect(fast, "actuator_lag", tau=1e-3)
-    ratios = []
-    for model in (lagged, with_effect(lagged, "load_dependent_friction", motor=0.3)):
-        logs = datasets(model, {"log": logged(model, run="moves")}, {})["x"].fit
-        axis = model.axes["x"]
-        ratios.append(rms(residual(axis, logs)) / floor_of(axis, logs))
-    assert ratios[1] < 1.3 * ratios[0]
-    assert ratios[0] < 1.5
-
-
 def test_no_region_of_the_true_model_is_bad():
     told = [r for seed in range(8) for r in compared(STAGE, logged(STAGE, 10 + seed, 3.0)).worst]
     assert told == []
-
-
-def test_what_a_saturation_leaves_is_shown_along_the_command():
-    machine = with_effect(STAGE, "actuator_saturation", limit=20.0, loss=0.3)
-    worst = compared(STAGE, logged(machine, 2, 8.0, "moves")).worst
-    commands = [r for r in worst if r.coordinate == "command"]
-    assert commands
-    assert commands[0].share > 0.95 * worst[0].share
-    assert min(abs(commands[0].low), abs(commands[0].high)) > 20.0
 
 
 # --- what cannot be fitted -----------------------------------------------------------------------

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from constructed import dataset_of, log_of, moved, windowed
-from scipy.stats import norm
 
 from identify.dataset.coordinates import coordinates_of
 from identify.dataset.motion import _follows, motion_of
@@ -18,8 +17,7 @@ from identify.estimation.residual_dependence import (
     line,
     share,
 )
-from identify.output.words.validation import correlation_in_words
-from identify.validation.whiteness import Correlation, Loop, correlation, loop_of, residual_tests
+from identify.validation.whiteness import Loop, correlation, loop_of
 
 RNG = np.random.default_rng(51)
 
@@ -125,58 +123,6 @@ def test_correlations_are_the_plain_sums_at_their_lags():
         "command", [*logs, logs[0][:40]], [*signals, signals[0][:40]], 1.0, Loop.OPEN
     )
     assert np.abs(short.lag).max() == 10
-
-
-def test_what_is_outside_and_passes_counts_the_tested_lags_alone():
-    value = np.array([0.5, 0.09, -0.11, 0.21, -0.05])
-    tested = np.array([False, True, True, True, True])
-    found = Correlation("command", np.arange(-1.0, 4.0), value, tested, 0.1, 0.22)
-    assert found.outside == 0.5
-    assert found.passes
-    assert not Correlation("command", found.lag, value, tested, 0.1, 0.205).passes
-    assert not Correlation("command", found.lag, -value, tested, 0.1, 0.205).passes
-    assert (
-        "against command: 50 % of the lags beyond the 90 % bounds of ±0.1, none beyond the ±0.22"
-        in correlation_in_words(found)
-    )
-    own = Correlation("residual", found.lag, value, tested, 0.1, 1)
-    assert "its own past" in correlation_in_words(own)
-
-
-def test_residual_tests_take_windows_that_do_not_overlap():
-    logs = LONG
-    force = np.random.default_rng(6).normal(0.0, 0.2, len(KEPT))
-    kept = KEPT.copy()
-    kept[10:60] = False
-    found = residual_tests(logs, force, kept, 0.2, Loop.OPEN)
-    apart, begin = [], 0
-    w = logs[0].test_function
-    step = next(k for k in range(1, 99) if k * w.stride >= len(w.weights))
-    for log in logs:
-        own = np.arange(begin, begin + len(log))[::step]
-        apart.append(np.where(kept[own], force[own], np.nan))
-        begin += len(log)
-    left = np.concatenate(apart)
-    left = left[np.isfinite(left)]
-    assert found.samples == len(left)
-    assert found.within == pytest.approx(np.mean(np.abs(left) < norm.ppf(0.95) * 0.2))
-    spacing = step * w.stride * w.period
-    own = correlation("residual", apart, apart, spacing, Loop.OPEN)
-    np.testing.assert_allclose(found.correlations[0].value, own.value)
-    np.testing.assert_allclose(found.correlations[0].lag, own.lag)
-    commands = [log.command[::step] for log in logs]
-    speeds = [log.test_function.mean(log.motion.velocity)[::step] for log in logs]
-    for k, signal in ((1, commands), (2, speeds)):
-        wanted = correlation("", apart, signal, spacing, Loop.OPEN)
-        np.testing.assert_allclose(found.correlations[k].value, wanted.value)
-    assert [c.signal for c in found.correlations] == ["residual", "command", "velocity"]
-    width = np.diff(found.edges)
-    assert np.sum(found.density * width) == pytest.approx(1.0)
-    assert found.edges[-1] == -found.edges[0] == pytest.approx(1.0)  # five floors
-    wide = residual_tests(logs, 4.0 * force, kept, 0.2, Loop.OPEN)
-    assert wide.edges[-1] == pytest.approx(np.quantile(4.0 * np.abs(left), 0.995))
-    assert (found.floor, found.loop) == (0.2, Loop.OPEN)
-    assert found.passes == all(c.passes for c in found.correlations)
 
 
 def test_a_loop_is_closed_where_the_position_follows_its_setpoint():

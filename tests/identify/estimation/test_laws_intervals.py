@@ -15,7 +15,6 @@ from identify.estimation.intervals import (
     INSEPARABLE,
     LARGEST_RATIO,
     ModelWrong,
-    _by_influence,
     estimates,
     half_widths,
     inseparable,
@@ -81,17 +80,6 @@ def test_a_law_that_bends_is_seen_over_influence_though_not_over_time():
     (narrow,) = jackknife(columns, force, at)
     assert abs(1.0 - at[0]) > 8.0 * narrow
     assert wide > 3.0 * narrow
-
-
-def test_what_few_test_functions_tell_has_a_finite_interval():
-    """One that the last group tells alone, and one of no parameter."""
-    rng = np.random.default_rng(13)
-    column = np.where(np.arange(400) == 7, 1.0, 1e-9)[:, None]
-    influence = np.hstack([column, np.zeros((400, 1)), 1e-12 * rng.normal(size=(400, 1))])
-    found = _by_influence(influence, rng.normal(size=400))
-    assert np.isfinite(found).all()
-    assert found[1] == 0.0
-    assert found[2] == pytest.approx(1.83 * 1e-12 * 20.0, rel=0.5)
 
 
 def test_what_a_prior_or_bound_shifts_is_in_the_interval():

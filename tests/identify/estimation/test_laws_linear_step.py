@@ -66,16 +66,6 @@ def test_a_strength_alone_stops_at_either_bound(wanted):
     assert found[0] == pytest.approx(0.0 if wanted < 0.0 else highest, rel=1e-9, abs=1e-4)
 
 
-def test_a_ridge_decides_where_the_base_explains_a_strength_already():
-    n = 200
-    column = RNG.standard_normal((n, 1))
-    basis = column / np.linalg.norm(column)
-    effect = CATALOGUE["constant_force"]
-    where = [ParameterReference(effect.name, effect.parameters[0])]
-    found = _bounded_step(basis, RNG.standard_normal(n), column, where, Fitted.at_start(effect))
-    assert abs(found[0]) < 1e-3
-
-
 @pytest.mark.parametrize("name", ["axis_coupling", "cogging", "coulomb_viscous"])
 def test_a_try_of_a_linear_effect_is_the_joint_least_squares(dataset, base, name):
     effect = CATALOGUE[name]

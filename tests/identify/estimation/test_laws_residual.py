@@ -15,7 +15,6 @@ from constructed import (
     effect,
     held,
     log_of,
-    moved,
     waves,
     windowed,
 )
@@ -32,7 +31,6 @@ from identify.dataset.test_function import TestFunction
 from identify.estimation.force_balance import (
     averaged_force,
     difference_step,
-    group_of,
     jacobian,
     residual,
 )
@@ -106,23 +104,6 @@ def test_the_jacobian_is_the_difference_of_the_residual_beside_every_sensing_eff
     assert_derived(axis, [c for c in free_parameters(axis) if not c.effect] + where)
 
 
-def test_a_friction_that_follows_the_actual_force_is_in_one_group_with_its_drive():
-    load = effect("load_dependent_friction", {"motor": 0.07})
-    axis = AxisModel(1.3, effects=(STICKY, load, LAG, RIPPLE, PAYLOAD, SENSING[0]))
-    chain = {"actuator_lag", "force_constant_ripple"}
-    joint = {"lugre", "load_dependent_friction", *chain, SENSING[0].effect.name}
-    for name in ("lugre", "load_dependent_friction", *chain):
-        assert set(group_of(axis, name).names) == joint
-    where = [c for c in free_parameters(axis) if c.effect in joint]
-    columns = jacobian(axis, LOGS, where)
-    base = residual(axis, LOGS)
-    for c, column in zip(where, columns.T, strict=True):
-        value = read(axis, [c])[0]
-        step = difference_step(c, value, scale_of(LOGS))
-        whole = (residual(write(axis, [c], [value + step]), LOGS) - base) / step
-        np.testing.assert_allclose(column, whole, atol=2e-3 * np.abs(whole).max())
-
-
 # --- the residual -------------------------------------------------------------------------------
 
 
@@ -175,18 +156,6 @@ def test_the_residual_is_additive_over_effects_that_act_alone():
     np.testing.assert_allclose(whole, sum(alone), atol=1e-12)
     bare = residual(AxisModel(1.3), LOGS)
     np.testing.assert_allclose(residual(AxisModel(1.3, effects=parts), LOGS), bare + whole)
-
-
-def test_the_residual_of_logs_in_a_row_is_theirs_in_a_row():
-    other = windowed(moved(np.random.default_rng(5), 1.3, 1000.0), 0.04)
-    axis = AxisModel(1.3, effects=(STICKY, LAG, PAYLOAD, *SENSING))
-    both, apart = (*LOGS, other), [residual(axis, [log]) for log in (*LOGS, other)]
-    np.testing.assert_array_equal(residual(axis, both), np.concatenate(apart))
-    where = free_parameters(axis)[::4]
-    columns = [jacobian(axis, [log], where) for log in both]
-    together, alone = jacobian(axis, both, where), np.vstack(columns)
-    # The steps are those of each log's own motion.
-    np.testing.assert_allclose(together, alone, atol=1e-4 * np.abs(alone).max(axis=0).min())
 
 
 # --- standstill ---------------------------------------------------------------------------------

@@ -10,13 +10,11 @@ import pytest
 from constructed import effect, held, log_of, waves, windowed
 
 from identify.dataset.motion import motion_of
-from identify.dataset.noise_floor import noise_of
 from identify.estimation.force_balance import residual
 from identify.estimation.open_loop import START_FIT
 from identify.validation.free_run import (
     HORIZON,
     FreeRun,
-    _signals,
     free_run,
     rms_error,
 )
@@ -83,21 +81,6 @@ def test_the_error_is_the_root_of_its_mean_square_where_it_ran():
     run = FreeRun({"x": np.array([np.nan, 3.0, -4.0])}, HORIZON)
     assert rms_error(run, "x") == pytest.approx(12.5**0.5)
     assert rms_error(FreeRun({"x": np.array([1e200, 1e300])}, HORIZON), "x") == np.inf
-
-
-def test_noise_of_the_logs_own_level_is_added_to_readings_and_commands():
-    rng = np.random.default_rng(3)
-    noisy = prepared(X + 1e-9 * rng.standard_normal(N), FORCE + 0.05 * rng.standard_normal(N))
-    model = stage()
-    position, command = _signals(model, {"x": noisy}, None)
-    np.testing.assert_allclose(position[:, 0], noisy.motion.at_samples(0.0)[0])
-    np.testing.assert_allclose(command[:, 0], noisy.motion.raw[1])
-    more, louder = _signals(model, {"x": noisy}, np.random.default_rng(1))
-    found = noise_of(model.axes["x"], noisy.motion)
-    for one, other, power in ((position, more, found.reading), (command, louder, found.force)):
-        added = np.std(other - one)
-        assert added == pytest.approx(np.sqrt(0.5 * power * RATE), rel=0.1)
-    assert np.std(louder - command) == pytest.approx(0.05, rel=0.3)
 
 
 def test_measured_is_the_model_and_what_is_left_on_one_clock():

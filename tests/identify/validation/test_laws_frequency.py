@@ -35,6 +35,18 @@ def test_the_error_by_frequency_is_the_residual_in_its_band():
     assert low == pytest.approx(MASS * np.std(pushes), rel=0.1)
 
 
+def test_the_power_of_logs_is_weighed_by_their_lengths():
+    axis = AxisModel(MASS)
+    logs = [noisy(15, 0.02, duration=5.0), noisy(16, 0.025, duration=9.0)]
+    one, two, both = (bands(axis, part) for part in (logs[:1], logs[1:], logs))
+    ends = [log.motion.time[-1] for log in logs]
+    wide = one.low > 10.0
+    wanted = (ends[0] * one.error**2 + ends[1] * two.error**2) / sum(ends)
+    np.testing.assert_allclose(both.error[wide] ** 2, wanted[wide], rtol=0.02)
+    noise = (ends[0] * one.noise**2 + ends[1] * two.noise**2) / sum(ends)
+    np.testing.assert_allclose(both.noise[wide] ** 2, noise[wide], rtol=0.02)
+
+
 def test_bands_cover_all_frequencies_once_in_half_octaves():
     frequency = 0.25 * np.arange(1, 700)
     edges = _edges(frequency)

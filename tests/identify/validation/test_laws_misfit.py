@@ -184,16 +184,6 @@ def test_a_comparison_gathers_what_the_residual_says():
     assert found.tests.loop is Loop.UNKNOWN
 
 
-def test_standstill_is_where_the_speed_is_below_a_thousandth_of_the_highest():
-    slow = replace(SHORT, signals=SHORT.signals * np.array([[1.0], [0.0], [1.0]]))
-    logs = [LOG, windowed(slow)]
-    found = compare_axis(MachineModel("s", {"x": AxisModel(1.7)}), dataset_of(*logs), {}, {})
-    np.testing.assert_array_equal(found.coordinates["standstill"][len(LOG) :], 1.0)
-    assert found.coordinates["standstill"][: len(LOG)].mean() < 0.2
-    told = next(m for m in found.maps if m.coordinate == "standstill")
-    assert len(told.rms) == 2
-
-
 def test_the_map_by_frequency_is_that_of_the_bands():
     log = windowed(moved(np.random.default_rng(43), 3.0, 1000.0))
     axis = AxisModel(1.7, effects=(effect("cable_slab", {"k1": 9.0}),))

@@ -9,13 +9,10 @@ from friction_runs import (
     STRIBECK,
     along,
     friction,
-    level,
     pushed,
     time,
 )
 
-from twin.effect import DRY, DT, HOLD, INDEX, IO_SIZE, OUT, VISCOUS, V
-from twin.effect import STATIC as STATIC_LEVEL
 from twin.laws.motion import Array
 from twin.model.machine import Fitted
 from twin.simulator import MujocoSimulator, ReducedSimulator
@@ -50,20 +47,6 @@ def test_stribeck_is_the_curve_of_modelicas_friction_example() -> None:
     np.testing.assert_allclose(along(fitted, -v, 1e-4), -expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", STATIC)
-def test_friction_stops_the_mass_with_all_it_has(name: str) -> None:
-    """Level and viscosity together: what stops the axis within the sample is exactly what acts."""
-    fitted, io, state = friction(name), [0.0] * IO_SIZE, [0.0]
-    io[V], io[DT], io[INDEX] = 0.5, 1e-4, 7.0
-    io[DRY] = io[STATIC_LEVEL] = io[VISCOUS] = 1.0
-    for needed, acts, rests in ((1.1, 1.1, 1.0), (1.3, 1.2, 0.0)):  # Fc + sigma2 v = 1.2 N
-        io[HOLD] = needed
-        fitted.effect.law(fitted.vector(), state, io)
-        assert io[OUT] == pytest.approx(acts)
-        assert state[0] == rests
-        state[0] = 0.0
-
-
 def breakaway(name: str, rate: float) -> float:
     """Highest friction before the mass runs away under a force growing at that rate (N/s)."""
     _, v, held = pushed([friction(name)], rate * time(2.0 / rate + 0.05))
@@ -78,45 +61,6 @@ def test_breakaway_force_falls_with_the_rate_of_force(name: str) -> None:
     assert 1.45 < found[0] < 1.5  # slowly: nearly Fs
     assert found[-1] < 0.9 * found[0]
     assert found[-1] > 0.99  # never below Fc
-
-
-# --- frictional lag -------------------------------------------------------------------------------
-
-MEAN = 1.2e-3  # m/s, where the curve falls steeply
-
-
-def response(fitted: Fitted, omega: float) -> complex:
-    """Amplitude and phase of the friction over those of a small swing of the speed, N s/m."""
-    per_cycle, cycles, swing = 2000, 12, 1e-5
-    phase = 2.0 * np.pi * (np.arange(per_cycle * cycles) + 0.5) / per_cycle
-    dt = 2.0 * np.pi / omega / per_cycle
-    settle = np.full(200_000, MEAN)
-    force = along(fitted, np.r_[settle, MEAN + swing * np.sin(phase)], dt)[-4 * per_cycle :]
-    carrier = np.exp(-1j * phase[-4 * per_cycle :])
-    return complex(2j * np.mean(force * carrier) / swing)
-
-
-def corner(name: str) -> float:
-    """Rate at which each model follows the curve: its linearisation about steady sliding, rad/s."""
-    g = float(level(MEAN))
-    bristle = 1e5 * MEAN / g
-    return {
-        "gms": 30.0 / g,  # C/g
-        "lugre": bristle,  # sigma0 v/g
-        "leuven": 16.0 * bristle * np.exp(-1.5 * g / 1.5),  # m v dF_d/dz / g
-        "modified_leuven": 16.0 * bristle,  # m v sigma0/g
-    }[name]
-
-
-@pytest.mark.parametrize("ratio", [0.2, 1.0, 5.0])
-@pytest.mark.parametrize("name", STRIBECK)
-def test_friction_lags_the_stribeck_curve(name: str, ratio: float) -> None:
-    """A first-order lag: g'(v)/(1 + i omega/corner)."""
-    damped = {} if name == "gms" else {"sigma1": 1e-6}
-    found = response(friction(name, sigma2=0.0, **damped), ratio * corner(name))
-    slope = -2.0 * MEAN / 1e-3**2 * (level(MEAN) - 1.0)
-    wanted = slope / (1.0 + 1j * ratio)
-    assert abs(found - wanted) < 0.02 * abs(wanted)
 
 
 # --- stick-slip -----------------------------------------------------------------------------------

@@ -1,6 +1,5 @@
 """Frictions against closed forms, SciPy's solvers and MuJoCo's plastic springs."""
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import mujoco
@@ -12,14 +11,12 @@ from friction_runs import (
     at_turns,
     error_of,
     friction,
-    level,
     reversals,
     shares_and_springs,
     travelled,
     wavy,
 )
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from twin.laws.motion import Array
 
@@ -85,57 +82,6 @@ def test_gms_with_a_constant_level_is_mujocos_bundle_of_plastic_springs(dt: floa
     for k in range(len(v) - 1):
         ours[k + 1] = 2.0 * middle[k] - ours[k]
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-9)
-
-
-def slipping(a: float, k: float, C: float, duration: float) -> Callable[[Array], Array]:
-    """One GMS element on the wavy velocity, N at times s: stick in closed form, slip by SciPy."""
-    spans: list[tuple[float, Callable[[Array], Array]]] = []
-    force = 0.0
-    instants = [0.0, *reversals(duration), duration]
-    for begin, end in pairwise(instants):
-        way = np.sign(wavy(0.5 * (begin + end)))
-
-        def stuck(t: Array, begin: float = begin, force: float = force) -> Array:
-            return force + k * (travelled(t) - travelled(begin))
-
-        def short(t: float, stuck: Callable = stuck, way: float = way) -> float:
-            return a * level(wavy(t)) - way * stuck(t)
-
-        spans.append((begin, stuck))
-        force = stuck(end)
-        grid = np.linspace(begin, end, 500)
-        out = np.flatnonzero([short(t) <= 0.0 for t in grid])
-        if len(out):
-            first = brentq(short, grid[out[0] - 1], grid[out[0]], xtol=1e-15)
-
-            def rate(t: float, f: Array, way: float = way) -> float:
-                return way * min(C * (a - way * f[0] / level(wavy(t))), k * abs(wavy(t)))
-
-            solved = solve_ivp(
-                rate, (first, end), [stuck(first)], method="LSODA", rtol=1e-11, atol=1e-13,
-                dense_output=True,
-            )  # fmt: skip
-            spans.append((first, lambda t, solved=solved: solved.sol(t)[0]))
-            force = solved.y[0, -1]
-
-    def at(t: Array) -> Array:
-        starts = [begin for begin, _ in spans]
-        where = np.searchsorted(starts, t, side="right") - 1
-        return np.array([spans[i][1](one) for i, one in zip(where, t, strict=True)])
-
-    return at
-
-
-def test_gms_converges_to_its_equations() -> None:
-    shares, springs = shares_and_springs(5, 40.0, 1e5)
-    parts = [slipping(a, k, 20.0, 1.0) for a, k in zip(shares, springs, strict=True)]
-
-    def wanted(t: Array) -> Array:
-        return sum(part(t) for part in parts) + 0.4 * wavy(t)
-
-    errors = [error_of(friction("gms", **ELEMENTS, C=20.0), wanted, dt) for dt in (1e-3, 1e-4)]
-    assert errors[1] < 1e-4
-    assert errors[0] / errors[1] > 8.0
 
 
 @pytest.mark.parametrize("name", ["gms", "modified_leuven"])

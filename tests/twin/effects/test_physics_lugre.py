@@ -208,15 +208,3 @@ def test_agrees_with_mujocos_lugre_on_a_given_velocity(p: Lugre) -> None:
         return rms(force - theirs)
 
     require_first_order(difference, 4e-4, halvings=2)
-
-
-@SETS
-@pytest.mark.parametrize("speed", [1e-4, -1e-3, 0.01, -0.3])
-def test_steady_sliding_is_on_the_stribeck_curve(p: Lugre, speed: float) -> None:
-    settled = 40.0 * p["Fs"] / p["sigma0"] / abs(speed)  # s; 40 bristle deflections of travel
-    v, dt = np.full(2000, speed), settled / 2000
-    wanted = level(p, speed) * np.sign(speed) + p["sigma2"] * speed
-    force, deflection = simulated(p, v, dt)
-    assert force[-1] == pytest.approx(wanted, rel=1e-12)
-    assert measured(p, v, dt)[-1] == pytest.approx(wanted, rel=1e-12)
-    assert deflection[-1] == pytest.approx(level(p, speed) * np.sign(speed) / p["sigma0"])
