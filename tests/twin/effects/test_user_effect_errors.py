@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from cli_runs import refusal, twin
+from cli_runs import twin
 
 from twin.effects import load_catalogue
 from twin.errors import InputError
@@ -57,7 +57,9 @@ def test_a_mistake_is_said_in_one_line(
     path.write_text(text, encoding="utf-8")
     if fault.startswith("loop"):
         monkeypatch.setattr("twin.effects.LONGEST_TRIAL", 0.5)
-    told = refusal("effects", "bad", "--effects", path, folder=tmp_path)
+    done = twin("effects", "bad", "--effects", path, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    (told,) = done.stderr.splitlines()
     assert re.search(message.replace("[", r"\["), told), told
     assert "bad" in told
     assert told.count(str(path)) <= 1
