@@ -11,7 +11,6 @@ from twin.model.machine import Fitted, MachineModel
 
 CATALOGUE = load_catalogue()
 FRICTIONS = tuple(e for e in CATALOGUE.values() if e.kind is Kind.FRICTION)
-MODIFIERS = tuple(e for e in CATALOGUE.values() if e.kind is Kind.MODIFIER)
 
 
 def with_all(model: MachineModel, rng: np.random.Generator) -> MachineModel:

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
-from types import SimpleNamespace
 from typing import get_type_hints
 
 import numpy as np
 import pytest
-from stubbed_cli import stubbed
+from cli_runs import twin
 
-from identify import workflow
 from identify.cli import machine, main
 from identify.cli.apart import OUTPUTS, Command
 from identify.cli.shared import (
     app,
-    catalogue_with,
-    machine_model,
     read_checked,
     read_measured,
     require_folder,
@@ -31,9 +26,14 @@ from twin.log.check import check_log
 
 
 @pytest.fixture
-def cli(monkeypatch, capsys, tmp_path):
-    """Runs `twin` with all input stubbed: exit code, standard output and standard error."""
-    return stubbed(monkeypatch, capsys, tmp_path)
+def cli(tmp_path):
+    """Runs `twin` in an empty folder: exit code, standard output and standard error."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        done = twin(*arguments, folder=tmp_path)
+        return done.returncode, done.stdout, done.stderr
+
+    return run
 
 
 # --- errors ---------------------------------------------------------------------------------
@@ -53,8 +53,8 @@ def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, sai
         raise error
 
     monkeypatch.delenv("TWIN_TRACEBACK", raising=False)
-    monkeypatch.setattr(workflow, "compare", fails)
-    code, out, err = cli("compare", "m.toml", "a.mcap", "--json")
+    monkeypatch.setattr(machine, "catalogue_with", fails)
+    code, out, err = cli("effects", "--json")
     interrupted = isinstance(error, KeyboardInterrupt)
     assert code == (130 if interrupted else 2)
     assert err.startswith(said)
@@ -150,16 +150,6 @@ def test_every_path_of_a_command_is_known_as_read_or_written():
     assert paths == {*read, *OUTPUTS}
 
 
-def test_a_model_may_be_updated_in_its_place(monkeypatch, cli, tmp_path):
-    (tmp_path / "m.toml").write_text("old")
-    monkeypatch.setattr(workflow, "fit", lambda *_, **__: SimpleNamespace(model="new"))
-    monkeypatch.setattr("identify.output.text.fit_text", lambda r: "fitted")
-    monkeypatch.setattr("identify.output.as_json.fit_json", lambda r: {})
-    monkeypatch.setattr("twin.model.file.save_model", lambda m, path: path.write_text(m))
-    assert cli("fit", "m.toml", "a.mcap", "-o", "m.toml")[0] == 0
-    assert (tmp_path / "m.toml").read_text() == "new"
-
-
 def test_wrong_use_names_the_help_of_its_command(cli):
     assert cli("fit")[2] == "twin: Missing argument 'MODEL'. See `twin fit --help`.\n"
     assert cli("simulat")[2].endswith("See `twin --help`.\n")
@@ -186,15 +176,6 @@ def test_what_is_said_goes_to_its_own_stream(capsys, tmp_path):
     require_folder(tmp_path / "new.toml")
     with pytest.raises(InputError):
         require_folder(tmp_path / "no" / "new.toml")
-
-
-def test_files_are_read_by_the_names_they_were_given(monkeypatch):
-    monkeypatch.setattr("twin.effects.load_catalogue", lambda files: files)
-    monkeypatch.setattr("twin.model.file.load_model", lambda *given: given)
-    paths = [Path("b.mcap"), Path("a.mcap")]
-    assert (read_measured(None), read_checked(None)) == ({}, ({}, []))
-    assert (catalogue_with(paths), catalogue_with(None)) == (paths, ())
-    assert machine_model("name", "catalogue") == ("name", "catalogue")
 
 
 def test_identification_holds_no_more_of_a_log_than_it_reads(tmp_path):

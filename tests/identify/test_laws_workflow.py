@@ -5,17 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import built_results as made
-import numpy as np
 import pytest
-from built_fits import CATALOGUE, axis_of, built, built_fit, fitted
+from built_fits import CATALOGUE, built, built_fit
 from report_cases import Case, cogging_case
 
 from identify import workflow
 from identify.dataset.given_logs import Role
 from identify.output.text import diagnose_text
-from identify.output.words.selection import moved_in_words
-from identify.selection import confounded
-from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import Verdict
 
 # --- the axis of the answer -----------------------------------------------------------------
@@ -52,42 +48,6 @@ def test_of_like_verdicts_evidence_or_else_the_error_decides(verdict):
     b = axis_with(verdict, bic=80.0, ratio=3.0)
     assert leading(a=a, b=b) == ("a" if named else "b")
     assert leading(a=a, b=replace(b, ranking=())) == ("a" if named else "b")
-
-
-# --- parameters that moved ------------------------------------------------------------------
-
-
-def moved(monkeypatch, old: dict, new: dict, width: float = 0.03):
-    before = built_fit(1.0, axis=axis_of(fitted("constant_force", **old)))
-    after = built_fit(1.0, axis=axis_of(fitted("wear"), fitted("constant_force", **new)))
-    widths = {before: 0.04, after: width}
-    monkeypatch.setattr(
-        confounded, "half_widths", lambda fit: np.full(len(fit.scaling.where), widths[fit])
-    )
-    return moved_parameters(before, after)
-
-
-@pytest.mark.parametrize(("f0", "told"), [(1.049, False), (1.051, True), (0.949, True)])
-def test_a_parameter_moved_where_it_leaves_both_intervals(monkeypatch, f0, told):
-    found = moved(monkeypatch, {"F0": 1.0}, {"F0": f0})
-    assert bool(found) is told
-    if told:
-        (only,) = found
-        assert moved_in_words(only) == (
-            f"constant_force.F0 moved from 1 to {f0:.4g} N: more than it scatters between "
-            "blocks of the logs"
-        )
-
-
-@pytest.mark.parametrize(("f0", "said"), [(0.29, "collapsed"), (0.31, "moved")])
-def test_a_strength_collapsed_where_less_than_a_third_is_left(monkeypatch, f0, said):
-    (found,) = moved(monkeypatch, {"F0": 1.0}, {"F0": f0})
-    words = moved_in_words(found)
-    assert words.startswith(f"constant_force.F0 {said} from 1 to {f0} N")
-    assert ("had taken over" in words) is found.collapsed is (said == "collapsed")
-    wide = moved(monkeypatch, {"F0": 1.0}, {"F0": f0}, width=5.0)
-    assert bool(wide) is (said == "collapsed")
-    assert moved(monkeypatch, {"F0": 0.039}, {"F0": 0.0}) == ()
 
 
 # --- what a diagnosis and an addition hand on ------------------------------------------------

@@ -72,12 +72,6 @@ def test_lines_come_while_a_part_says_nothing_and_its_time_left_grows() -> None:
     assert left[-1] >= 3
 
 
-def test_a_command_that_ends_before_the_first_line_says_nothing(tmp_path: Path) -> None:
-    assert run(PLANTED.format(first=60.0)).stderr == ""
-    done = process("simulate", "tracking", "--duration", 0.5, folder=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
 @pytest.mark.slow
 def test_a_long_command_says_a_line_in_ten_seconds(tmp_path: Path) -> None:
     arguments = ("plan", "proton_xy", "--between", "cogging", "wear", "--duration", 40, "--json")

@@ -3,9 +3,7 @@
 import os
 import threading
 import time
-import warnings
 
-import numpy as np
 import pytest
 
 from twin.parallel import cores, parallel, spread
@@ -34,17 +32,6 @@ def test_jobs_go_side_by_side_within_parallel_and_one_after_another_outside():
     assert spread(lambda _: threading.get_ident(), range(3)) == [here] * 3
 
 
-def test_what_a_job_spreads_stays_in_its_own_thread():
-    def job(_):
-        time.sleep(0.01)
-        return threading.get_ident(), spread(lambda _: threading.get_ident(), range(3))
-
-    with parallel(2):
-        found = spread(job, range(4))
-    assert len({own for own, _ in found}) == 2
-    assert all(set(parts) == {own} for own, parts in found)
-
-
 def test_the_outermost_decides_how_many_threads_there_are():
     def running(_):
         time.sleep(0.01)
@@ -52,19 +39,6 @@ def test_the_outermost_decides_how_many_threads_there_are():
 
     with parallel(1), parallel(3):
         assert len({*spread(running, range(6))}) == 1
-
-
-def test_what_a_job_makes_parallel_stays_in_its_own_thread_too():
-    def job(_):
-        with parallel(3):
-            return {threading.get_ident(), *spread(running, range(6))}
-
-    def running(_):
-        time.sleep(0.001)
-        return threading.get_ident()
-
-    with parallel(2):
-        assert [len(used) for used in spread(job, range(2))] == [1, 1]
 
 
 def test_no_job_is_begun_after_one_failed_while_an_earlier_goes_on():
@@ -133,15 +107,6 @@ def test_how_many_jobs_have_ended_is_told_one_at_a_time_and_counts_up():
     told.clear()
     spread(abs, range(12), tell)
     assert told == expected
-
-
-def test_which_warnings_are_given_goes_with_the_job():
-    def job(_):
-        return np.array([1.0]) / 0.0
-
-    with warnings.catch_warnings(), parallel(2), np.errstate(all="ignore"):
-        warnings.simplefilter("error")
-        assert np.isinf(spread(job, range(4))).all()
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no affinity on this system")

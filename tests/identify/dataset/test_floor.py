@@ -56,14 +56,6 @@ def test_the_floor_is_what_the_true_model_leaves(drive, length):
         assert floor.parts["aliasing"] == 0.0
 
 
-def test_a_ripple_of_the_readings_is_no_noise():
-    plain, rippled = (
-        workflow.fit(STAGE, {"log": log_of("white", ripple=r)}, test_function=0.1).fits["x"]
-        for r in (0.0, 3e-7)
-    )
-    assert rippled.floor == pytest.approx(plain.floor, rel=0.1)
-
-
 def test_steps_of_the_readings_are_a_part_where_the_axis_has_them():
     machine = drawn(np.random.default_rng(3), 10e3, resolution=5e-7, encoder_noise=0.0)
     fit = workflow.fit(STAGE, {"log": run(machine, 3, 8.0)}, test_function=0.1).fits["x"]

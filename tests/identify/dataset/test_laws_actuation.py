@@ -18,14 +18,11 @@ from constructed import (
 from identify.dataset.drive import (
     actual_force,
     forces_lessened,
-    is_noise,
-    parts_of,
     reading_error,
     true_motion,
 )
 from identify.dataset.motion import motion_of
-from identify.estimation.force_balance import averaged_force, residual
-from twin.effect import Kind
+from identify.estimation.force_balance import averaged_force
 from twin.model.machine import AxisModel
 
 
@@ -53,14 +50,6 @@ def test_an_actuation_adds_the_mean_of_what_it_makes_of_the_command_to_the_resid
     np.testing.assert_allclose(
         averaged_force(pushed, [log]), 0.4 + averaged_force(AxisModel(1.0, effects=(LAG,)), [log])
     )
-
-
-def test_a_force_ripple_acts_at_the_middle_of_the_sample():
-    found = actual_force(AxisModel(1.0, effects=(RIPPLE,)), SHORT)
-    x, _, command = SHORT.at_samples(0.5)
-    turn = 2.0 * np.pi * x / 0.013
-    gain = 1.0 + 0.05 * np.sin(turn) + 0.03 * np.cos(turn)
-    np.testing.assert_allclose(found, gain * command, atol=1e-9)
 
 
 def test_a_motor_counts_as_weaker_from_less_than_half_its_force():
@@ -98,18 +87,6 @@ def test_a_late_reading_is_undone():
     np.testing.assert_array_equal(true.command, SHORT.command)
 
 
-def test_the_residual_of_late_readings_is_none_with_the_delay_and_not_without():
-    """The force that a reading's error pretends, mass x its acceleration, is given back."""
-    rate, mass, tau = 2000.0, 1.7, 7.3e-4
-    x = waves((0.03, 1.3, 0.4), (0.006, 5.1, 1.0))
-    t = np.arange(3000) / rate
-    middle = t + 0.5 / rate
-    push = mass * (x(middle + 1e-4) - 2.0 * x(middle) + x(middle - 1e-4)) / 1e-8
-    log = windowed(motion_of(log_of(rate, x(t - tau), push), "x", ""))
-    bare, knowing = (residual(AxisModel(mass, effects=e), [log]) for e in ((), SENSING[:1]))
-    assert np.std(knowing) < 0.1 * np.std(bare)
-
-
 @pytest.mark.parametrize("samples", [60.0, 12.0])  # in a period at the highest speed
 def test_a_ripple_of_the_encoder_is_undone(samples):
     """reading = x + e(x) of a known x gives e(x) back, also where smoothing takes a ripple off."""
@@ -128,23 +105,3 @@ def test_a_ripple_of_the_encoder_is_undone(samples):
     found, _ = reading_error(AxisModel(1.0, effects=(ripple,)), motion)
     inner = slice(30, len(found) - 30)
     np.testing.assert_allclose(found[inner], error[inner], atol=0.03 * np.abs(error).max())
-
-
-def test_rounding_moves_no_motion_and_is_noise_alone():
-    step = effect("encoder_quantization")
-    assert is_noise(step.effect)
-    assert not any(is_noise(f.effect) for f in (*SENSING, PAYLOAD, effect("roller_spikes")))
-    same, rate = true_motion(AxisModel(1.0, effects=(step, PAYLOAD)), SHORT)
-    assert same is SHORT
-    assert rate.shape == (SHORT.raw.shape[1],)
-    assert not rate.any()
-    beside_delay, _ = true_motion(AxisModel(1.0, effects=(step, SENSING[0])), SHORT)
-    alone, _ = true_motion(AxisModel(1.0, effects=(SENSING[0],)), SHORT)
-    np.testing.assert_array_equal(beside_delay.signals, alone.signals)
-
-
-def test_parts_are_those_of_the_kinds_asked_in_their_order():
-    axis = AxisModel(2.0, effects=(SENSING[1], STICKY, LAG, SENSING[0]))
-    found = parts_of(axis, Kind.ACTUATION, Kind.SENSING)
-    assert found.names == ("encoder_ripple", "actuator_lag", "encoder_delay")
-    assert found.mass == 2.0

@@ -8,32 +8,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from constructed import STICKY, effect, log_of, moved, windowed
+from constructed import effect, log_of, moved, windowed
 from noisy_motion import MASS, PLACE, PUSH, RATE, noisy
 from scipy.signal import welch
 
-from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.dataset import Dataset
 from identify.dataset.floor import noise_beside
 from identify.dataset.motion import motion_of
 from identify.dataset.noise_floor import (
-    _at_rest,
-    _between_samples,
     floor_of,
     median_spectrum,
     noise_floor,
     noise_of,
     noises_of,
-    together,
 )
-from identify.dataset.prepared_log import REST_SPEED, PreparedLog, on_blocks, total_force
+from identify.dataset.prepared_log import on_blocks, total_force
 from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
-from identify.dataset.whittle import _underneath, fitted_levels
 from identify.estimation.force_balance import residual
 from twin.effect import LEAST
-from twin.errors import InputError
 from twin.log.check import moves
-from twin.model.machine import AxisModel, MachineModel
+from twin.model.machine import AxisModel
 
 
 def passed(window: TestFunction, force: float, reading: float) -> float:
@@ -59,18 +54,6 @@ def test_the_floor_is_what_the_window_passes_of_the_noise(force, reading):
     assert floor_of(axis, [log]) == pytest.approx(passed(log.fine, force, reading), rel=0.12)
 
 
-def test_the_floor_is_in_proportion_to_the_noise_and_falls_with_the_window():
-    """Of the force by the square root of its length, of the reading by its power 5/2."""
-    axis = AxisModel(MASS)
-    quiet, loud = noisy(2, 0.02), noisy(2, 0.04)
-    assert floor_of(axis, [loud]) == pytest.approx(2.0 * floor_of(axis, [quiet]), rel=0.02)
-    longer = PreparedLog.of(quiet.motion, 0.08)
-    ratio = floor_of(axis, [quiet]) / floor_of(axis, [longer])
-    assert ratio == pytest.approx(np.sqrt(2.0), rel=0.02)
-    short, long = (noisy(3, 1e-5, 4e-7, length=n) for n in (0.1, 0.2))
-    assert floor_of(axis, [short]) / floor_of(axis, [long]) == pytest.approx(2.0**2.5, rel=0.05)
-
-
 def test_a_floor_that_what_is_left_refutes_is_that_of_the_residual():
     """As where readings that the log does not hold made the command."""
     axis, log = AxisModel(MASS), noisy(6, 0.02, duration=20.0)
@@ -89,14 +72,6 @@ def test_a_floor_that_what_is_left_refutes_is_that_of_the_residual():
     # What a model lacks is slower than the noise, and stays above the floor.
     slow = 2.0 * floor.value * np.sin(2.0 * np.pi * np.arange(len(left)) / 64.0)
     assert noise_beside(axis, [loud], [left + slow]).value == pytest.approx(floor.value, rel=0.15)
-
-
-def test_logs_weigh_by_how_long_they_last_not_by_their_blocks():
-    short, long = noisy(7, 0.02, duration=3.0), noisy(8, 0.04, duration=9.0)
-    coarse = replace(long.motion, period=10.0 * long.motion.period)
-    assert together([1.0, 4.0], [short.motion, coarse]) ** 2 == pytest.approx(
-        (1.0 * 3.0 + 4.0 * 90.0) / 93.0, rel=1e-2
-    )
 
 
 def test_the_square_of_a_floor_of_logs_is_the_mean_of_theirs_weighed_by_their_lengths():
@@ -132,18 +107,6 @@ def test_a_log_whose_reading_hides_the_force_leaves_room_for_so_much_noise_of_it
     assert found.force == own.most
 
 
-def test_logs_of_unlike_rates_have_noise_of_their_own():
-    """As large a noise of each sample has more power below half the rate where that is lower."""
-    axis = AxisModel(MASS)
-    t = np.arange(2000) / (0.25 * RATE)
-    u = MASS * PUSH(t + 2.0 / RATE) + np.random.default_rng(8).normal(0.0, 0.02, len(t))
-    slow = windowed(motion_of(log_of(0.25 * RATE, PLACE(t), u), "x", "", ripples=()), 0.04)
-    fast = noisy(4, 0.02)
-    apart = [noise_of(axis, log.motion).force for log in (slow, fast)]
-    assert apart[0] > 3.0 * apart[1]
-    assert [n.force for n in noises_of(axis, [slow.motion, fast.motion])] == apart
-
-
 def test_what_the_model_explains_is_no_noise():
     """A force that follows a wildly moving other axis, in the command with the other sign."""
     rng = np.random.default_rng(6)
@@ -163,20 +126,6 @@ def test_what_the_model_explains_is_no_noise():
     assert unknown > 20.0 * known
     lagging = AxisModel(MASS, effects=(effect("actuator_lag", {"tau": 2e-3}),))
     assert noise_of(lagging, noisy(6, 0.04, duration=2.0).motion).force < 0.5 * 2.0 / RATE * 0.04**2
-
-
-def test_rounding_of_the_readings_adds_what_it_pretends():
-    step, t = 4e-5, np.arange(24_000) / RATE
-    exact = 0.05 * PLACE(t)
-    rng = np.random.default_rng(7)
-    u = MASS * 0.05 * PUSH(t + 0.5 / RATE) + rng.normal(0.0, 1e-3, len(t))
-    log = windowed(motion_of(log_of(RATE, step * np.rint(exact / step), u), "x", ""), 0.2)
-    rounding = log.motion.rounding
-    pretended = MASS * log.fine.acceleration(np.diff(rounding) * RATE)
-    blind = AxisModel(MASS)
-    knowing = AxisModel(MASS, effects=(effect("encoder_quantization"),))
-    added = floor_of(knowing, [log]) ** 2 - floor_of(blind, [log]) ** 2
-    assert np.sqrt(added) == pytest.approx(np.sqrt(np.mean(pretended**2)), rel=0.3)
 
 
 # --- its spectra --------------------------------------------------------------------------------
@@ -200,36 +149,6 @@ def test_segments_of_rest_are_left_out_but_a_quarter_is_kept():
     assert np.mean(power) == pytest.approx(2e-3, rel=0.2)
     _, blind = median_spectrum(signal, 256, 1e-3, ~loud)
     assert np.mean(blind) == pytest.approx(900.0 * 2e-3, rel=0.2)
-
-
-def test_levels_are_found_beneath_what_stands_out():
-    k = np.linspace(0.02, 1.0, 400)
-    shapes = np.stack([np.cos(0.3 * np.pi * k) ** 2, 1e3 * k**4], axis=1)
-    flat = shapes @ [0.7, 0.02]
-    np.testing.assert_allclose(fitted_levels(shapes, flat), [0.7, 0.02], rtol=1e-6)
-    peak = flat * (1.0 + 300.0 * np.exp(-(((k - 0.3) / 0.02) ** 2)))
-    np.testing.assert_allclose(fitted_levels(shapes, peak), [0.7, 0.02], rtol=0.05)
-    only = fitted_levels(shapes, 5.0 * shapes[:, 1])
-    np.testing.assert_allclose(only, [0.0, 5.0], atol=1e-3)
-    under = _underneath(np.concatenate([np.full(50, 9.0), np.full(50, 2.0), np.full(50, 5.0)]))
-    assert (under[:90] == 2.0).all()
-    assert (np.diff(under) >= 0.0).all()
-    assert under[-1] == 5.0
-
-
-def test_between_blocks_a_force_goes_straight_and_rest_is_that_of_the_block():
-    motion = noisy(10, 0.01, duration=1.0).motion
-    line = 3.0 * motion.time + 0.2
-    found = _between_samples(line, motion)
-    samples = np.arange(1, motion.raw.shape[1]) / RATE
-    inner = (samples > motion.time[0]) & (samples < motion.time[-1])
-    np.testing.assert_allclose(found[inner], 3.0 * samples[inner] + 0.2)
-    velocity = np.where(np.arange(len(motion.time)) < 300, 0.99 * REST_SPEED, 1.0) * -0.7
-    velocity[500] = 1.01 * REST_SPEED * 0.7
-    still = replace(motion, signals=np.stack([motion.position, velocity, motion.command]))
-    held = _at_rest(AxisModel(1.0, effects=(effect("coulomb_viscous"),)), still)
-    np.testing.assert_array_equal(np.flatnonzero(held), np.arange(300 * 4 - 1))
-    assert not _at_rest(AxisModel(1.0, effects=(STICKY,)), still).any()
 
 
 # --- choosing logs and windows ------------------------------------------------------------------
@@ -278,20 +197,6 @@ def test_an_axis_moves_where_its_noise_does_not_cover_its_travel():
         (0.0 * t, False),
     ):
         assert moves(log_of(1000.0, x, x), "x") is wanted
-
-
-def test_studies_are_of_the_axes_that_move():
-    stage = MachineModel("s", {"x": AxisModel(1.0), "y": AxisModel(1.0)}, RATE)
-    t = np.arange(8000) / RATE
-    log = log_of(RATE, PLACE(t), PUSH(t), 0.0 * t)
-    other = log_of(RATE, PLACE(t[:5000] + 1.0), PUSH(t[:5000]))
-    found = datasets(stage, {"a": log}, {"b": other}, 0.05)
-    assert list(found) == ["x"]
-    assert [w.motion.name for w in (*found["x"].fit, *found["x"].holdout)] == ["a", "b"]
-    assert found["x"].test_function_length == pytest.approx(0.05)
-    assert found["x"].excitation.position_high == found["x"].fit[0].motion.position.max()
-    with pytest.raises(InputError, match=r"no axis of the model \(x, y\) moves"):
-        datasets(stage, {"a": log_of(RATE, 0.0 * t, t)}, {})
 
 
 def test_heads_are_the_first_seconds_of_each_log():

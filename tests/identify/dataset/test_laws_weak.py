@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from constructed import SHORT, log_of, moved, waves
-from scipy.integrate import quad
 
 from identify.dataset.excitation import excitation
-from identify.dataset.motion import LONGEST_BLOCK, SMOOTHED, Motion, _block_samples, motion_of
+from identify.dataset.motion import SMOOTHED, Motion, motion_of
 from identify.dataset.test_function import LEAST_BLOCKS, TestFunction
 from twin.errors import InputError
 from twin.signals import white_noise
@@ -18,10 +17,6 @@ PLACE = waves((0.03, 2.3, 0.4), (0.004, 7.1, 1.0))
 FORCE = waves((3.0, 3.7, 0.2), (1.1, 17.0, 1.9))
 T = np.arange(round(1.3 * RATE) + 1) / RATE
 SMOOTH = motion_of(log_of(RATE, PLACE(T), FORCE(T), 2.0 * PLACE(T + 0.1)), "x", "smooth")
-
-
-def bell(r):
-    return (1.0 - r**2) ** 2
 
 
 # --- windows ------------------------------------------------------------------------------------
@@ -44,15 +39,6 @@ def test_windows_have_unit_sum_their_length_and_a_quarters_stride(length, period
     assert every[1].stride == 3 * window.stride
     assert every[1].length == pytest.approx(window.length)
     assert (every[2].period, every[2].stride) == (period, window.stride)
-
-
-def test_weights_and_slope_are_those_of_the_bell():
-    window = TestFunction.of_length(0.04, 1e-3)
-    total = quad(bell, -1.0, 1.0)[0] * 0.02
-    middle = (np.arange(40) + 0.5) / 20.0 - 1.0
-    np.testing.assert_allclose(window.weights, bell(middle) * 1e-3 / total, atol=2e-4)
-    derivative = -4.0 * middle * (1.0 - middle**2) / 0.02
-    np.testing.assert_allclose(window.slope, derivative * 1e-3 / total, atol=1e-2)
 
 
 def test_a_window_of_too_few_blocks_is_refused():
@@ -80,21 +66,6 @@ def test_the_mean_of_a_constant_and_the_acceleration_of_a_line_are_exact():
         np.testing.assert_array_equal(window.mean(rows)[0], window.mean(line))
         count = (300 - len(window.weights)) // window.stride + 1
         assert len(window.mean(line)) == count
-
-
-def test_the_acceleration_is_the_mean_of_the_derivative():
-    """Integration by parts; the error falls with the square of the block."""
-    errors = []
-    for period in (2e-3, 1e-3):
-        window = TestFunction.of_length(0.08, period)
-        t = period * (np.arange(round(0.8 / period)) + 0.5)
-        found = window.acceleration(np.sin(40.0 * t))
-        fine = TestFunction.of_length(0.08, period / 16.0)
-        s = period / 16.0 * (np.arange(len(t) * 16) + 0.5)
-        exact = replace(fine, stride=window.stride * 16).mean(40.0 * np.cos(40.0 * s))
-        errors.append(np.abs(found - exact).max())
-    assert 3.4 < errors[0] / errors[1] < 4.6
-    assert errors[1] < 0.05
 
 
 @pytest.mark.parametrize("parts", [1, 2, 5])
@@ -162,15 +133,6 @@ def test_a_motion_has_the_means_of_its_blocks():
     assert not alone.others.any()
 
 
-@pytest.mark.parametrize("instant", [0.0, 0.5, 1.0])
-def test_the_position_at_the_samples_is_that_read(instant):
-    found = SMOOTH.at_samples(instant)
-    n = found.shape[1]
-    wanted = PLACE(T[:n]) * (1.0 - instant) + PLACE(T[1 : n + 1]) * instant
-    np.testing.assert_allclose(found[0], wanted, atol=1e-12)
-    np.testing.assert_array_equal(found[1:], SMOOTH.raw)
-
-
 def test_smoothing_keeps_parabolas_and_averages_noise():
     bent = motion_of(log_of(1000.0, np.linspace(0, 1, 1501) ** 2, np.zeros(1501)), "x", "")
     np.testing.assert_allclose(
@@ -183,15 +145,6 @@ def test_smoothing_keeps_parabolas_and_averages_noise():
     m = SMOOTHED // 2  # variance of a parabola's value in the middle of 2 m + 1 points
     shrunk = 3.0 * (3 * m**2 + 3 * m - 1) / ((2 * m + 3) * (2 * m + 1) * (2 * m - 1))
     assert np.std(left) == pytest.approx(1e-6 * np.sqrt(shrunk), rel=0.1)
-
-
-def test_a_head_is_the_beginning():
-    head = SMOOTH.head(0.4)
-    np.testing.assert_array_equal(head.signals, SMOOTH.signals[:, :400])
-    np.testing.assert_array_equal(head.others, SMOOTH.others[:, :400])
-    np.testing.assert_array_equal(head.raw, SMOOTH.raw[:, :1600])
-    assert SMOOTH.head(99.0).signals.shape == SMOOTH.signals.shape
-    assert SMOOTH.head(0.0).signals.shape[1] == 1
 
 
 def test_a_force_moved_ahead_is_that_of_later():
@@ -215,19 +168,6 @@ def test_logs_that_tell_nothing_are_refused():
     with pytest.raises(InputError, match=r"lasts 0.999 s; identification needs 1 s"):
         motion_of(log_of(1000.0, x[:999], u[:999]), "x", "n")
     assert motion_of(log_of(1000.0, x[:1000], u[:1000]), "x", "n").period == 1e-3
-
-
-def test_blocks_are_a_millisecond_and_longer_where_the_encoder_is_noisy():
-    """sqrt(2) noise over the block is a thousandth of the highest speed."""
-    ramp = 0.5 * np.arange(8001) / 8000.0  # 0.5 m/s
-    assert _block_samples(ramp, 0.0, 1.0 / 8000.0, LONGEST_BLOCK) == 8
-    noisy = round(np.sqrt(2) * 2e-6 / 5e-4 * 8000)
-    assert _block_samples(ramp, 2e-6, 1.0 / 8000.0, LONGEST_BLOCK) == noisy
-    assert _block_samples(ramp, 2e-5, 1.0 / 8000.0, LONGEST_BLOCK) == round(LONGEST_BLOCK * 8000)
-    assert _block_samples(ramp, 0.0, 3e-3, LONGEST_BLOCK) == 1
-    assert _block_samples(ramp, 2e-5, 1.0 / 8000.0, 2.49e-3) == 19  # no longer than asked
-    backwards = _block_samples(-ramp, 2e-6, 1.0 / 8000.0, LONGEST_BLOCK)
-    assert backwards == _block_samples(ramp, 2e-6, 1.0 / 8000.0, LONGEST_BLOCK)
 
 
 def test_white_noise_is_found_beside_a_smooth_signal():

@@ -13,16 +13,12 @@ from machines import one_axis
 
 from identify.analysis.first_model import first_model
 from identify.dataset.dataset import by_log, datasets
-from identify.dataset.noise_floor import floor_of
 from identify.dataset.shared_samples import share_samples
 from identify.estimation.channel_delay import aligned
-from identify.estimation.evidence import rms
-from identify.estimation.force_balance import residual
 from identify.output.as_json import fit_json
 from identify.output.text import fit_text
 from identify.validation.free_run import HORIZON, free_run, rms_error
 from identify.validation.misfit_maps import AxisComparison
-from identify.validation.whiteness import Loop, correlation
 from identify.workflow import compare, diagnose, fit
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -88,13 +84,6 @@ def test_a_force_one_sample_early_is_the_same_to_fit_compare_and_diagnose():
     told = diagnose(STAGE, {"log": early}, catalogue=Catalogue([])).comparison.axes["x"]
     assert told.ratio == pytest.approx(fitted.fits["x"].ratio, rel=1e-6)
     assert told.position_error["log"] == pytest.approx(found.position_error["log"], rel=0.1)
-
-
-def test_a_log_fitted_cannot_judge_the_fit():
-    log = logged(STAGE, seconds=2.0)
-    with pytest.raises(InputError, match=r"b: held out, but has samples of a, which") as told:
-        fit(STAGE, {"a": log}, {"b": cut(log, 0)})
-    assert "\n" not in str(told.value)
 
 
 @pytest.mark.parametrize("other", [(1, 8000), (0, 7999), (2000, 6000), (5000, 8000)])
@@ -175,42 +164,9 @@ def test_the_position_error_of_the_true_model_is_what_noise_makes_of_it():
 # --- the residual ---------------------------------------------------------------------------------
 
 
-def test_a_friction_behind_a_lag_sees_the_force_that_acts():
-    """Loaded by the motor, it is no farther from the floor than the lag alone is."""
-    fast = replace(STAGE, sample_rate=4000.0)
-    lagged = with_effect(fast, "actuator_lag", tau=1e-3)
-    ratios = []
-    for model in (lagged, with_effect(lagged, "load_dependent_friction", motor=0.3)):
-        logs = datasets(model, {"log": logged(model, run="moves")}, {})["x"].fit
-        axis = model.axes["x"]
-        ratios.append(rms(residual(axis, logs)) / floor_of(axis, logs))
-    assert ratios[1] < 1.3 * ratios[0]
-    assert ratios[0] < 1.5
-
-
-def test_under_feedback_the_command_of_the_same_instant_is_not_tested():
-    """It answers the very noise that the residual holds."""
-    white = np.random.default_rng(7).normal(size=1500)
-    command = np.random.default_rng(8).normal(size=1500) - 0.5 * white
-    tests = {loop: correlation("command", [white], [command], 0.02, loop) for loop in Loop}
-    for loop in (Loop.CLOSED, Loop.UNKNOWN):
-        assert (tests[loop].lag[tests[loop].tested] > 0.0).all()
-        assert tests[loop].passes
-    assert not tests[Loop.OPEN].passes
-
-
 def test_no_region_of_the_true_model_is_bad():
     told = [r for seed in range(8) for r in compared(STAGE, logged(STAGE, 10 + seed, 3.0)).worst]
     assert told == []
-
-
-def test_what_a_saturation_leaves_is_shown_along_the_command():
-    machine = with_effect(STAGE, "actuator_saturation", limit=20.0, loss=0.3)
-    worst = compared(STAGE, logged(machine, 2, 8.0, "moves")).worst
-    commands = [r for r in worst if r.coordinate == "command"]
-    assert commands
-    assert commands[0].share > 0.95 * worst[0].share
-    assert min(abs(commands[0].low), abs(commands[0].high)) > 20.0
 
 
 # --- what cannot be fitted -----------------------------------------------------------------------
@@ -285,14 +241,6 @@ def test_what_is_not_a_number_is_refused_in_one_line():
 
 
 # --- standstill -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("frequency", [5.0, 20.0, 50.0])
-def test_a_sine_moves_at_any_rate(frequency):
-    t = np.arange(4000) / 1000.0
-    x = 0.01 * np.sin(2.0 * np.pi * frequency * t)
-    assert moves(log_of(1000.0, x, x), "x")
-    assert moves(log_of(1000.0, x + np.random.default_rng(1).normal(0.0, 1e-6, len(t)), x), "x")
 
 
 def still(kind: str) -> np.ndarray:

@@ -9,9 +9,9 @@ from machines import one_axis
 
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.motion import Motion
-from identify.dataset.noise_floor import floor_of, noise_of, unrounded_floor_of
+from identify.dataset.noise_floor import noise_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.fit import finished, fit_axis
+from identify.estimation.fit import fit_axis
 from identify.selection.diagnosis import Verdict, diagnose_axis
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
@@ -87,25 +87,6 @@ def coarse() -> Dataset:
     return dataset_of(STEP)
 
 
-def test_a_floor_with_the_resolution_is_the_error_it_makes(coarse):
-    base = fit_axis(STAGE.axes["x"], coarse.fit)
-    known = Fitted.at_start(CATALOGUE["encoder_quantization"], {"step": STEP})
-    told = finished(base.axis.with_effect(known), base.begun, coarse.fit, base.outcome)
-    assert told.error == pytest.approx(base.error)  # what is read once cannot be read finer
-    assert not base.at_floor
-    assert told.at_floor
-    assert 0.8 < told.ratio < 1.2
-
-
-def test_the_floor_without_rounding_is_that_of_exact_readings(coarse):
-    axis = STAGE.axes["x"]
-    exact = floor_of(axis, dataset_of(0.0).fit)
-    assert unrounded_floor_of(axis, coarse.fit) == pytest.approx(exact, rel=0.15)
-    assert floor_of(axis, coarse.fit) == unrounded_floor_of(axis, coarse.fit)
-    known = Fitted.at_start(CATALOGUE["encoder_quantization"], {"step": STEP})
-    assert floor_of(axis.with_effect(known), coarse.fit) > 1.3 * exact
-
-
 @pytest.mark.parametrize("step", [0.0, STEP, 2e-6])
 def test_the_noise_of_the_force_is_seen_behind_any_rounding(step):
     """What the controller makes of the steps is not noise: it reads them off the same log."""
@@ -114,12 +95,6 @@ def test_the_noise_of_the_force_is_seen_behind_any_rounding(step):
     for log in dataset_of(step).fit:
         assert log.motion.command_noise == pytest.approx(planted, rel=0.1)
         assert noise_of(STAGE.axes["x"], log.motion).force == pytest.approx(planted, rel=0.25)
-
-
-def test_a_command_without_noise_has_none():
-    motion = dataset_of(STEP).fit[0].motion
-    still = replace(motion, raw=np.stack([motion.raw[0], np.full_like(motion.raw[1], 2.0)]))
-    assert still.command_noise == 0.0
 
 
 FEW = Catalogue(

@@ -11,7 +11,7 @@ from planted_logs import RATE, SLIDE, Ride, logged
 from identify import workflow
 from identify.dataset.floor import noise_beside
 from identify.dataset.motion import motion_of
-from identify.dataset.noise_floor import floor_of, noise_of, rounding_in, unrounded_floor_of
+from identify.dataset.noise_floor import floor_of, noise_of, rounding_in
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.rounding import white_rounding
 from identify.estimation.force_balance import residual
@@ -55,22 +55,6 @@ def rms(values):
 def test_the_floor_with_the_step_is_what_rounding_and_noise_leave(motion, reading):
     log = rounded(*MOTIONS[motion], reading=reading * MOTIONS[motion][0])
     assert floor_of(KNOWING, [log]) == pytest.approx(rms(residual(PLAIN, [log])), rel=0.2)
-
-
-@pytest.mark.parametrize("motion", ["slow", "a step a sample", "fast"])
-def test_the_floor_beside_noise_of_the_force(motion):
-    """Without the step it is that of the other noise; rounding is then what the model lacks."""
-    noise = 0.01
-    log = rounded(*MOTIONS[motion], force=noise)
-    own = noise * np.linalg.norm(log.fine.weights)
-    assert floor_of(PLAIN, [log]) == unrounded_floor_of(PLAIN, [log])
-    assert floor_of(PLAIN, [log]) == pytest.approx(own, rel=0.2)
-    assert noise_beside(PLAIN, [log]).value == pytest.approx(floor_of(PLAIN, [log]))
-    error = rms(residual(PLAIN, [log]))
-    told = noise_beside(KNOWING, [log])
-    assert told.value == pytest.approx(error, rel=0.2)
-    assert told.parts["rounding"] == pytest.approx(rounding_in(PLAIN, [log]))
-    assert noise_beside(PLAIN, [log]).high > told.value
 
 
 def test_moves_of_even_speed_have_rounding_where_their_speed_puts_it():

@@ -8,11 +8,9 @@ import pytest
 from machines import machine, one_axis
 
 from identify.dataset.dataset import datasets
-from identify.dataset.test_function import TestFunction
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
-from identify.estimation.intervals import OpenSided, Side, estimates, refusal
-from identify.estimation.levenberg_marquardt import minimise
+from identify.estimation.intervals import OpenSided, Side, estimates
 from identify.selection.trying import try_effect
 from identify.workflow import diagnose
 from twin.effects import Catalogue, load_catalogue
@@ -70,12 +68,6 @@ def test_most_intervals_cover_the_truth_and_are_narrow(fitted):
     assert alone < mass.high - mass.low < 5.0 * alone
 
 
-def test_intervals_are_refused_on_a_wrong_model(dataset):
-    wrong = fit_axis(AXIS.without("cable_slab"), dataset.fit)
-    assert refusal(wrong) is not None
-    assert all(e.low is None for e in estimates(wrong))
-
-
 def test_a_value_that_fits_as_well_farther_off_has_no_interval():
     """An end stop that the motion does not reach could be anywhere beyond."""
     lowest, highest = -0.3, 0.0  # m; the motion goes from about -0.163 m to 0.033 m
@@ -97,43 +89,6 @@ def test_the_twin_has_no_delay(fitted, dataset):
     delayed = try_effect(fitted, dataset, CATALOGUE["actuator_delay"])
     assert not delayed.supported
     assert delayed.fit.axis["actuator_delay"].values["tau"] < 0.05 * STAGE.period
-
-
-def test_the_noise_floor_is_that_of_the_noise_put_in(fitted):
-    hardware = AXIS.hardware
-    current = hardware.force_constant * hardware.current_noise
-    window = fitted_window()
-    expected = current * np.sqrt(np.sum(window.weights**2))
-    assert fitted.floor == pytest.approx(expected, rel=0.25)
-    assert fitted.error == pytest.approx(expected, rel=0.25)
-
-
-def fitted_window():
-    return TestFunction.of_length(0.02, STAGE.period)
-
-
-@pytest.mark.parametrize("samples", [4, 10])
-def test_means_over_blocks_pass_a_window_as_the_samples_do(samples):
-    """A force of 60 Hz, over blocks of 1 ms; without sharpening 2 % are lost."""
-    blocks = TestFunction.of_length(0.02, 1e-3)
-    edges = 1e-3 / samples * np.arange(1000 * samples + 1)
-    means = -np.diff(np.cos(2.0 * np.pi * 60.0 * edges)) * samples
-    expected = blocks.refined(samples).mean(means)
-    found = blocks.sharpened(samples).mean(means.reshape(-1, samples).mean(axis=1))
-    assert np.abs(found - expected).max() < 4e-3 * np.abs(expected).max()
-
-
-def test_twice_the_noise_is_twice_the_floor():
-    loud = replace(
-        AXIS.hardware, current_noise=4.0 * AXIS.hardware.current_noise, encoder_noise=4e-9
-    )
-    stage = STAGE.with_axis("x", replace(AXIS, hardware=loud))
-    logs = [simulate(s, "tracking", seed=5, duration=8.0) for s in (STAGE, stage)]
-    floors = [
-        fit_axis(AXIS, datasets(STAGE, {"log": log}, {}, test_function=0.05)["x"].fit).floor
-        for log in logs
-    ]
-    assert floors[1] == pytest.approx(4.0 * floors[0], rel=0.3)
 
 
 def test_a_users_effect_is_fitted_and_named():
@@ -163,32 +118,3 @@ def test_a_hidden_effect_of_a_planted_fault_is_not_explained_by_others():
     found = diagnose(STAGE, hidden.logs, hidden.holdout, catalogue=without)
     assert found.effect is None
     assert found.leading.unexplained is not None
-
-
-def test_levenberg_marquardt_solves_rosenbrock_within_bounds():
-    def residual(x):
-        return np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
-
-    def jacobian(x):
-        return np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]])
-
-    wide = np.array([-5.0, -5.0]), np.array([5.0, 5.0])
-    start = np.array([-1.2, 1.0])
-    free = minimise(residual, jacobian, start, wide, tolerance=1e-12, most_evaluations=200)
-    np.testing.assert_allclose(free.x, [1.0, 1.0], rtol=1e-6)
-    tight = np.array([-5.0, -5.0]), np.array([0.5, 5.0])
-    held = minimise(residual, jacobian, start, tight, tolerance=1e-12, most_evaluations=200)
-    np.testing.assert_allclose(held.x, [0.5, 0.25], rtol=1e-5)
-    assert free.converged
-    assert held.converged
-
-
-def test_the_noise_floor_passes_by_rest_where_the_friction_sticks():
-    """Held by static friction, the loop's own noise moves nothing and would pass for more noise."""
-    friction = Fitted.at_start(
-        CATALOGUE["coulomb_viscous"], {"Fc": 30.0, "Fs": 30.0, "sigma2": 1.0}
-    )
-    axis = AXIS.with_effect(friction)
-    logs = {"log": simulate(STAGE.with_axis("x", axis), "moves", seed=3, duration=10.0)}
-    found = fit_axis(axis, datasets(STAGE, logs, {})["x"].fit)
-    assert 0.85 < found.ratio < 1.15

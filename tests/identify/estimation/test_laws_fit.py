@@ -11,7 +11,6 @@ from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import (
     Outcome,
-    _weighed_again,
     error_on,
     finished,
     fit_axis,
@@ -19,11 +18,9 @@ from identify.estimation.fit import (
 )
 from identify.estimation.fit_problem import PRIOR_SPREAD, FitProblem
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.smoothing import has_nonparametric, part_rows, smoothing
-from twin.curve import Part
-from twin.effect import Parameter
+from identify.estimation.smoothing import has_nonparametric
 from twin.model.machine import AxisModel
-from twin.model.parameters import ParameterReference, free_parameters, read
+from twin.model.parameters import free_parameters, read
 
 ODD = AxisModel(
     1.7,
@@ -103,28 +100,6 @@ def test_a_strength_that_the_motion_hardly_reaches_stays_where_it_starts():
     assert fit_axis(axis, logs).axis["roller_spikes"].values["behind"] == pytest.approx(0.04)
 
 
-def test_priors_are_weighed_again_while_the_error_falls_far(monkeypatch):
-    """Weighed by the error of a fit that they hold back, they would hold back the next as well."""
-    errors, weighed = iter([1.0, 0.5, 0.5, 0.4, 0.4, 0.39]), []
-
-    class Problem:
-        def force(self, _):
-            return np.full(3, next(errors))
-
-        def set_priors(self, internal):
-            weighed.append(internal)
-            return 100.0
-
-        def solve(self, internal, tolerance):
-            assert tolerance == pytest.approx(1e-5)
-            return internal + 1, True
-
-    assert _weighed_again(Problem(), 0) == (3, True)
-    assert weighed == [0, 1, 2]
-    errors = iter(0.5**k for k in range(20))
-    assert _weighed_again(Problem(), 0)[0] == 4
-
-
 MAPPED = AxisModel(1.7, effects=(*ODD.effects[:2], effect("empirical_map")))
 
 
@@ -147,17 +122,6 @@ def test_a_description_is_smoothed_and_its_columns_are_those_of_the_jacobian():
         strengths = np.array([own.get(n, 0.0) for n in part.strengths])
         bends.append(fitted.values[part.stiffness] * part.rows(len(strengths)) @ strengths)
     assert np.sum(rows**2) / problem.kept.sum() == pytest.approx(np.sum(np.concatenate(bends) ** 2))
-
-
-def test_rows_of_a_part_stand_at_its_own_strengths():
-    part = Part("p", ("c", "a", "b"), "s", lambda n: np.array([[1.0, 2.0, 4.0], [0.5, 0.0, 8.0]]))
-    p = Parameter("", "N", 0.0, -1.0, 1.0, "", strength=True)
-    names = (("e", "b"), ("other", "c"), ("e", "c"), ("", "mass"))
-    where = [ParameterReference(e, replace(p, name=n)) for e, n in names]
-    np.testing.assert_array_equal(
-        part_rows(part, "e", where), [[4.0, 0.0, 1.0, 0.0], [8.0, 0.0, 0.5, 0.0]]
-    )
-    assert smoothing(ODD, free_parameters(ODD), 9).shape == (0, len(free_parameters(ODD)))
 
 
 # --- fits ---------------------------------------------------------------------------------------

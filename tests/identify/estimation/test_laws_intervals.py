@@ -5,24 +5,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from built_fits import PLAIN, built_fit, known_floor
+from built_fits import known_floor
 from constructed import effect, fit_of, moved, windowed
 from linear_cases import cut, linear, without
 from scipy.stats import t as student
 
-from identify.estimation import intervals as uncertainty
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import (
     INSEPARABLE,
     LARGEST_RATIO,
-    Inseparable,
     ModelWrong,
-    Side,
-    _by_influence,
     estimates,
     half_widths,
     inseparable,
-    open_sides,
     refusal,
 )
 from identify.estimation.scaling import Scaling
@@ -72,21 +67,6 @@ def test_intervals_are_those_of_the_jackknife_over_time_or_influence(seed):
     np.testing.assert_allclose(half_widths(fit), np.maximum(*both), rtol=1e-6)
 
 
-def test_noise_scatters_as_much_over_influence_as_over_time():
-    """White noise: both estimate the same; nothing is widened for a wrong model that is right."""
-    rng = np.random.default_rng(11)
-    columns = rng.normal(size=(900, 4)) * np.exp(rng.normal(size=(900, 1)))
-    inverse, wider = np.linalg.inv(columns.T @ columns), []
-    for _ in range(40):
-        data = rng.normal(size=900)
-        at = np.linalg.lstsq(columns, data, rcond=None)[0]
-        true = student.ppf(0.95, 9) * np.sqrt(np.diag(inverse))
-        wider.append(
-            _by_influence(columns @ np.linalg.inv(columns.T @ columns), data - columns @ at) / true
-        )
-    assert np.sqrt(np.mean(np.square(wider))) == pytest.approx(1.0, abs=0.07)
-
-
 def test_a_law_that_bends_is_seen_over_influence_though_not_over_time():
     """A mass from a force that saturates: each second is like the next, weak pushes unlike strong.
 
@@ -100,17 +80,6 @@ def test_a_law_that_bends_is_seen_over_influence_though_not_over_time():
     (narrow,) = jackknife(columns, force, at)
     assert abs(1.0 - at[0]) > 8.0 * narrow
     assert wide > 3.0 * narrow
-
-
-def test_what_few_test_functions_tell_has_a_finite_interval():
-    """One that the last group tells alone, and one of no parameter."""
-    rng = np.random.default_rng(13)
-    column = np.where(np.arange(400) == 7, 1.0, 1e-9)[:, None]
-    influence = np.hstack([column, np.zeros((400, 1)), 1e-12 * rng.normal(size=(400, 1))])
-    found = _by_influence(influence, rng.normal(size=400))
-    assert np.isfinite(found).all()
-    assert found[1] == 0.0
-    assert found[2] == pytest.approx(1.83 * 1e-12 * 20.0, rel=0.5)
 
 
 def test_what_a_prior_or_bound_shifts_is_in_the_interval():
@@ -159,77 +128,6 @@ def test_a_wrong_model_has_no_intervals():
     assert "comes to rest within every test function" in no_interval_in_words(refusal(fit))
 
 
-@pytest.mark.parametrize(
-    ("rises", "wanted"),
-    [
-        ((1.0, 1.0), None),
-        ((0.02, 1.0), Side.SMALLER),
-        ((1.0, 0.02), Side.LARGER),
-        ((0.2, 0.2), None),
-    ],
-)
-def test_a_side_is_open_where_the_error_hardly_rises(monkeypatch, rises, wanted):
-    """The error is a parabola of which each side rises by a part of what the slope says."""
-    p = Parameter("a", "N", 0.0, -9.0, 9.0, "")
-    c = ParameterReference("constant_force", p)
-    axis = AxisModel(1.0, effects=(replace(effect("constant_force"), values={"a": 2.0}),))
-    fit = Stub(
-        axis=axis, logs=None, scaling=Scaling((c,)), kept=np.array([True, True, False]),
-        residual=np.array([3.0, 0.0]), jacobian=np.array([[0.0], [1.0]]),
-    )  # fmt: skip
-
-    def made(rises):
-        def change(axis, logs, where, steps):
-            assert len(where) == len(steps)
-            return np.array(
-                [[0.0, d * np.sqrt(rises[0] if d < 0 else rises[1]), 55.0] for d in steps]
-            ).reshape(-1, 3)
-
-        return change
-
-    monkeypatch.setattr(uncertainty, "changes", made(rises))
-    assert side_of(fit, c) == wanted
-    # where a bound is in the way nothing can be said
-    monkeypatch.setattr(uncertainty, "changes", made((0.02, 0.02)))
-    for low, high, side in (
-        (1.01, 9.0, Side.LARGER),
-        (-9.0, 2.99, Side.SMALLER),
-        (1.01, 2.99, None),
-    ):
-        near = ParameterReference("constant_force", replace(p, lower=low, upper=high))
-        fit.scaling = Scaling((near,))
-        assert side_of(fit, near) == side
-    lower = ParameterReference("constant_force", replace(p, lower=0.99))
-    fit.scaling = Scaling((lower,))
-    assert side_of(fit, lower) is Side.SMALLER
-
-
-def side_of(fit, c, half=0.5):
-    return open_sides(fit, [c], np.array([half])).get(c.label)
-
-
-def test_the_rise_foreseen_counts_what_a_bound_or_prior_left_of_the_slope(monkeypatch):
-    """With a slope of 0.8 at the end, a step d is foreseen to raise the square by 0.8 d + d^2."""
-    c = ParameterReference("constant_force", Parameter("a", "N", 0.0, -9.0, 9.0, ""))
-    axis = AxisModel(1.0, effects=(replace(effect("constant_force"), values={"a": 2.0}),))
-    fit = Stub(
-        axis=axis, logs=None, scaling=Scaling((c,)), kept=np.array([True, True]),
-        residual=np.array([3.0, 0.4]), jacobian=np.array([[0.0], [1.0]]),
-    )  # fmt: skip
-    for rises, wanted in (
-        ((0.13, 0.11), None),
-        ((0.13, 0.09), Side.LARGER),
-        ((0.09, 0.5), Side.SMALLER),
-    ):
-
-        def change(axis, logs, where, steps, rises=rises):
-            after = [np.sqrt(0.16 + rises[int(d > 0)] * (0.8 * d + d * d)) for d in steps]
-            return np.array([[0.0, a - 0.4] for a in after])
-
-        monkeypatch.setattr(uncertainty, "changes", change)
-        assert side_of(fit, c) == wanted
-
-
 def test_estimates_are_the_values_with_their_intervals_within_the_bounds():
     friction = effect("coulomb_viscous", {"Fc": 0.41, "Fs": 0.41, "sigma2": 0.01})
     cable = effect("cable_slab", {"offset": -0.3, "k1": 4.0})
@@ -258,12 +156,3 @@ def test_estimates_are_the_values_with_their_intervals_within_the_bounds():
     assert all(e.low is None and e.high is None for e in estimates(fit))
     unmoved = fit_of(replace(axis, mass_fixed=True), log)
     assert next(e.label for e in estimates(unmoved) if not e.free) == "mass"
-
-
-def test_parameters_that_cannot_be_told_apart_name_each_other(monkeypatch):
-    fit = built_fit(0.1, axis=PLAIN)
-    labels = [c.label for c in fit.scaling.where]
-    monkeypatch.setattr(uncertainty, "inseparable", lambda _: {labels[0]: labels[1]})
-    monkeypatch.setattr(uncertainty, "open_sides", lambda *_: {})
-    found = uncertainty._undetermined(fit, np.ones(len(labels)))
-    assert found == {labels[0]: Inseparable(labels[1])}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, built_dataset
+from built_fits import CATALOGUE
 
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import (
@@ -66,16 +66,6 @@ def test_a_strength_alone_stops_at_either_bound(wanted):
     assert found[0] == pytest.approx(0.0 if wanted < 0.0 else highest, rel=1e-9, abs=1e-4)
 
 
-def test_a_ridge_decides_where_the_base_explains_a_strength_already():
-    n = 200
-    column = RNG.standard_normal((n, 1))
-    basis = column / np.linalg.norm(column)
-    effect = CATALOGUE["constant_force"]
-    where = [ParameterReference(effect.name, effect.parameters[0])]
-    found = _bounded_step(basis, RNG.standard_normal(n), column, where, Fitted.at_start(effect))
-    assert abs(found[0]) < 1e-3
-
-
 @pytest.mark.parametrize("name", ["axis_coupling", "cogging", "coulomb_viscous"])
 def test_a_try_of_a_linear_effect_is_the_joint_least_squares(dataset, base, name):
     effect = CATALOGUE[name]
@@ -111,21 +101,3 @@ def test_a_friction_is_tried_in_the_place_of_the_old_one(dataset, base):
     assert other.rest.names == base.axis.names
     assert other.basis.shape[1] == len(base.scaling.where)
     assert ground.basis.shape[1] == len(base.scaling.where) - 2  # Fc, sigma2
-
-
-def test_a_ground_on_the_heads_is_that_part_of_the_whole(base, monkeypatch):
-    dataset = built_dataset("one", "two")
-    heads = tuple(type(w).of(w.motion.head(1.1), w.test_function.length) for w in dataset.fit)
-    dataset.__dict__["heads"] = heads
-    head = _Ground.of(base, dataset, CATALOGUE["cogging"], SEEN, on_heads=True)
-    whole = _Ground.of(base, dataset, CATALOGUE["cogging"], SEEN, on_heads=False)
-    assert (head.logs, whole.logs) == (heads, dataset.fit)
-    rows = dataset.in_heads[base.kept]
-    assert 0 < rows.sum() < len(rows)
-    np.testing.assert_array_equal(head.unchanged, base.residual[rows])
-    np.testing.assert_array_equal(whole.unchanged, base.residual)
-    assert len(head.kept) == sum(map(len, heads))
-    assert head.kept.sum() == rows.sum()
-    np.testing.assert_allclose(head.basis.T @ head.basis, np.eye(head.basis.shape[1]), atol=1e-9)
-    columns = base.jacobian[rows]
-    np.testing.assert_allclose(head.basis @ (head.basis.T @ columns), columns, atol=1e-6)

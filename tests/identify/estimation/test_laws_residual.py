@@ -15,7 +15,6 @@ from constructed import (
     effect,
     held,
     log_of,
-    moved,
     waves,
     windowed,
 )
@@ -25,24 +24,20 @@ from identify.dataset.prepared_log import (
     REST_SPEED,
     PreparedLog,
     moving,
-    on_blocks,
     scale_of,
     sticks,
-    total_force,
 )
 from identify.dataset.test_function import TestFunction
 from identify.estimation.force_balance import (
     averaged_force,
     difference_step,
-    group_of,
     jacobian,
     residual,
 )
-from twin.dimension import Scale
-from twin.effect import Kind, Parameter
+from twin.effect import Kind
 from twin.laws.values import legal
 from twin.model.machine import AxisModel, Fitted
-from twin.model.parameters import ParameterReference, free_parameters, read, write
+from twin.model.parameters import free_parameters, read, write
 
 H = np.array([[-1e-4], [0.0], [1e-4]])  # s
 LOGS = [windowed(SHORT)]
@@ -109,49 +104,6 @@ def test_the_jacobian_is_the_difference_of_the_residual_beside_every_sensing_eff
     assert_derived(axis, [c for c in free_parameters(axis) if not c.effect] + where)
 
 
-def test_the_jacobian_of_a_whole_axis_has_each_column_at_its_coordinate():
-    """Friction, its modifiers, actuation without memory and what they read of one another."""
-    loaded = effect("load_dependent_friction", {"motor": 0.11, "corner": 0.27, "offset": 0.4})
-    friction = effect("coulomb_viscous", {"Fc": 0.7, "Fs": 0.7, "sigma2": 1.3})
-    cable = effect("cable_slab", {"k1": 3.0})
-    for chain in (RIPPLE, LAG):
-        axis = AxisModel(1.3, effects=(friction, loaded, cable, chain, *SENSING[1:]))
-        where = free_parameters(axis)[::-1]
-        assert_derived(axis, where, 1e-3)
-        few = [where[k] for k in (7, 2, 4)]
-        np.testing.assert_array_equal(
-            jacobian(axis, LOGS, few), jacobian(axis, LOGS, where)[:, [7, 2, 4]]
-        )
-
-
-def test_what_does_not_act_on_an_effect_is_left_out_of_its_group():
-    axis = AxisModel(1.3, effects=(STICKY, RIPPLE, PAYLOAD, *SENSING))
-    sensing = {f.effect.name for f in SENSING}
-    assert set(group_of(axis, "payload_mass").names) == {"payload_mass", *sensing}
-    assert set(group_of(axis, "lugre").names) == {"lugre", *sensing}
-    late = AxisModel(1.3, effects=(STICKY, LAG, PAYLOAD, *SENSING))
-    assert set(group_of(late, "lugre").names) == {"lugre", *sensing}
-    assert set(group_of(late, "actuator_lag").names) == {"actuator_lag", *sensing}
-    assert group_of(late, "encoder_delay") == late
-
-
-def test_a_friction_that_follows_the_actual_force_is_in_one_group_with_its_drive():
-    load = effect("load_dependent_friction", {"motor": 0.07})
-    axis = AxisModel(1.3, effects=(STICKY, load, LAG, RIPPLE, PAYLOAD, SENSING[0]))
-    chain = {"actuator_lag", "force_constant_ripple"}
-    joint = {"lugre", "load_dependent_friction", *chain, SENSING[0].effect.name}
-    for name in ("lugre", "load_dependent_friction", *chain):
-        assert set(group_of(axis, name).names) == joint
-    where = [c for c in free_parameters(axis) if c.effect in joint]
-    columns = jacobian(axis, LOGS, where)
-    base = residual(axis, LOGS)
-    for c, column in zip(where, columns.T, strict=True):
-        value = read(axis, [c])[0]
-        step = difference_step(c, value, scale_of(LOGS))
-        whole = (residual(write(axis, [c], [value + step]), LOGS) - base) / step
-        np.testing.assert_allclose(column, whole, atol=2e-3 * np.abs(whole).max())
-
-
 # --- the residual -------------------------------------------------------------------------------
 
 
@@ -204,52 +156,6 @@ def test_the_residual_is_additive_over_effects_that_act_alone():
     np.testing.assert_allclose(whole, sum(alone), atol=1e-12)
     bare = residual(AxisModel(1.3), LOGS)
     np.testing.assert_allclose(residual(AxisModel(1.3, effects=parts), LOGS), bare + whole)
-
-
-def test_the_residual_of_logs_in_a_row_is_theirs_in_a_row():
-    other = windowed(moved(np.random.default_rng(5), 1.3, 1000.0), 0.04)
-    axis = AxisModel(1.3, effects=(STICKY, LAG, PAYLOAD, *SENSING))
-    both, apart = (*LOGS, other), [residual(axis, [log]) for log in (*LOGS, other)]
-    np.testing.assert_array_equal(residual(axis, both), np.concatenate(apart))
-    where = free_parameters(axis)[::4]
-    columns = [jacobian(axis, [log], where) for log in both]
-    together, alone = jacobian(axis, both, where), np.vstack(columns)
-    # The steps are those of each log's own motion.
-    np.testing.assert_allclose(together, alone, atol=1e-4 * np.abs(alone).max(axis=0).min())
-
-
-def test_blocks_take_what_acts_between_actuator_and_encoder():
-    axis = AxisModel(1.3, effects=(STICKY, RIPPLE, PAYLOAD, effect("wear"), *SENSING))
-    names = {name for _, name in on_blocks(axis).labels}
-    assert names == {"lugre", "payload_mass", "wear"}
-    assert not total_force(on_blocks(AxisModel(1.0)), SHORT).any()
-    assert len(total_force(on_blocks(AxisModel(1.0)), SHORT)) == len(SHORT.time)
-
-
-def test_a_log_in_windows_has_the_time_of_their_middles():
-    log = LOGS[0]
-    step = log.test_function.stride * log.test_function.period
-    first = SHORT.time[0] + 0.5 * (len(log.test_function.weights) - 1) * SHORT.period
-    np.testing.assert_allclose(log.time, first + step * np.arange(len(log)))
-    assert len(log) == len(log.time) == len(log.acceleration)
-
-
-def test_a_step_of_a_difference_stays_in_the_bounds_and_is_small():
-    def step(p: Parameter, value: float) -> float:
-        return difference_step(ParameterReference("e", p), value, Scale(7.0, 0.2, 0.5))
-
-    p = Parameter("a", "N", 2.0, 0.0, 5.0, "", strength=True)
-    assert step(p, 3.0) == pytest.approx(3e-5)
-    assert step(p, -3.0) == pytest.approx(3e-5)
-    assert step(p, 5.0) == pytest.approx(-5e-5)
-    assert step(p, 0.0) == pytest.approx(7e-8), "of the largest force"
-    assert step(replace(p, unit="N s/m"), 0.0) == pytest.approx(1e-8 * 7.0 * 0.5 / 0.2)
-    # Of a dead time of some ms, far beyond the rounding of a position over a sample.
-    assert step(replace(p, unit="s", upper=6e-3), 0.0) == pytest.approx(6e-11)
-    assert step(replace(p, unit="s", lower=-1e4, upper=1e4), 0.0) == pytest.approx(1e-8)
-    assert step(replace(p, lower=1e-9), 1e-7) == pytest.approx(1e-12), "a scale by itself"
-    own = step(p, 2.5)
-    assert step(replace(p, upper=2.5 + own), 2.5) == own
 
 
 # --- standstill ---------------------------------------------------------------------------------

@@ -19,12 +19,10 @@ from built_fits import (
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation import variable_projection as search
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.variable_projection import (
     Start,
-    _best,
     _beyond_chance,
     _clipped,
     starts,
@@ -66,17 +64,6 @@ def of_size(squared: float, shape=None, fitted=None) -> Start:
     """A start that leaves one test function of that squared error, N^2."""
     left = np.array([np.sqrt(squared)])
     return Start(shape or {}, fitted, left, left)
-
-
-def test_the_best_tries_come_first_and_no_more_than_asked(monkeypatch):
-    errors = [5.0, 1.0, 4.0, 2.0, 3.0]
-    tried = [of_size(0.0, {"i": i}) for i in range(5)]
-    monkeypatch.setattr(
-        search, "_try", lambda g, shape, s: of_size(errors[int(shape["i"])], {**shape, "s": s})
-    )
-    found = _best(None, tried, "all", 3)
-    assert [(s.shape["i"], s.shape["s"]) for s in found] == [(1, "all"), (3, "all"), (4, "all")]
-    assert [s.squared_error for s in found] == pytest.approx([1.0, 2.0, 3.0])
 
 
 def planted(effect: str, **values: float) -> Dataset:
@@ -123,26 +110,6 @@ def test_a_wave_longer_than_the_logs_can_show_is_no_start():
     seen = with_what_repeats(base, dataset)
     assert any(s["p"] > 2.0 * longest for s in tried_shapes(CATALOGUE["cogging"], seen))
     assert all(s.shape["p"] <= longest for s in starts(base, dataset, CATALOGUE["cogging"]))
-
-
-@pytest.mark.parametrize(("rows", "tries"), [(11, 80), (9, 99)])
-def test_of_many_shapes_every_other_is_tried_and_those_beside_the_best(monkeypatch, rows, tries):
-    """Unlike powers of two, so that the best lies between the values that are tried first."""
-    plays, tones = 1.5 ** np.arange(11.0), 1.25 ** np.arange(float(rows))
-    shapes = [{"play": p, "frequency": f} for p in plays for f in tones]
-    tried = [of_size(0.0, shape, fitted("backlash")) for shape in shapes]
-    asked = []
-
-    def score(ground, shape, strengths):
-        asked.append(shape)
-        off = np.log(shape["play"] / plays[5]), np.log(shape["frequency"] / tones[3])
-        return of_size(float(np.hypot(*off)), shape, fitted("backlash"))
-
-    monkeypatch.setattr(search, "_try", score)
-    found = search._scanned(None, tried, ())
-    assert found[0].shape == {"play": plays[5], "frequency": tones[3]}
-    assert len(asked) == len(found) <= tries
-    assert sorted(found, key=lambda s: s.squared_error) == found
 
 
 def test_more_than_one_shape_deserves_a_try_where_the_gain_is_no_chance():

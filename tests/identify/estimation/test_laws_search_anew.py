@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,14 +12,13 @@ from built_fits import (
     PLAIN,
     axis_of,
     built_dataset,
-    built_fit,
+    built_machine,
     built_motion,
     fitted,
     pushed,
 )
 
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation import thorough_fit
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.thorough_fit import (
@@ -34,61 +32,10 @@ from twin.effect import Excitation
 
 # The rules as they were decided.
 BETTER = 0.99
-RNG = np.random.default_rng(3)
-NOTHING = np.zeros(0)
 SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
 
 
 # --- fitted thoroughly ----------------------------------------------------------------------
-
-
-def thorough(monkeypatch, again, first=4.0, floor=1.0, promises=True, nearest=True):
-    """fit_thoroughly of an axis with two effects, one with a shape; the axes fitted."""
-    axes, errors = [], [first, first * again]
-    shape = fitted("cogging", p=0.02, a1=0.4)
-    held = replace(shape, fixed=frozenset({"b1"}), values={**shape.values, "b1": 0.77})
-    axis = axis_of(fitted("constant_force"), held)
-
-    def fit_axis(axis, logs):
-        axes.append(axis)
-        return built_fit(errors.pop(0), floor, axis=axis)
-
-    def started(rest, dataset, effect):
-        assert "cogging" not in rest.axis.names
-        return [Start({}, fitted("cogging", p=0.03, a1=0.9, b1=0.5), NOTHING, NOTHING), None]
-
-    monkeypatch.setattr(thorough_fit, "fit_axis", fit_axis)
-    monkeypatch.setattr(thorough_fit, "with_what_repeats", lambda rest, dataset: SEEN)
-    monkeypatch.setattr(thorough_fit, "_promises", lambda start, fit, dataset: promises)
-    monkeypatch.setattr(thorough_fit, "_is_nearest", lambda shape, present, known: nearest)
-    monkeypatch.setattr(thorough_fit, "starts", started)
-    monkeypatch.setattr(
-        thorough_fit,
-        "fit_without",
-        lambda fit, dataset, name: built_fit(9.0, axis=axis.without(name)),
-    )
-    return fit_thoroughly(axis, SimpleNamespace(fit=())), axes, axis
-
-
-@pytest.mark.parametrize(("again", "taken"), [(BETTER - 0.001, True), (BETTER + 0.001, False)])
-def test_a_shape_found_anew_is_taken_where_it_is_better(monkeypatch, again, taken):
-    found, axes, axis = thorough(monkeypatch, again)
-    assert len(axes) == 2
-    values = axes[1]["cogging"].values
-    assert (values["p"], values["a1"], values["b1"]) == (0.03, 0.9, 0.77)
-    assert axes[1]["cogging"].fixed == {"b1"}
-    assert found.error == pytest.approx(4.0 * again if taken else 4.0)
-    assert found.begun is axis
-
-
-@pytest.mark.parametrize(
-    ("promises", "nearest", "refits"), [(True, True, 1), (False, False, 1), (False, True, 0)]
-)
-def test_a_shape_that_is_there_already_is_not_refitted_in_vain(
-    monkeypatch, promises, nearest, refits
-):
-    _, axes, _ = thorough(monkeypatch, 0.5, promises=promises, nearest=nearest)
-    assert len(axes) == 1 + refits
 
 
 def test_a_start_promises_what_it_leaves_less_of(dataset, base):
@@ -115,10 +62,6 @@ def test_present_values_are_nearest_to_one_of_the_shapes():
     assert _is_nearest({"v0": fast, "sigma0": soft}, lugre, SEEN)
     assert not _is_nearest({"v0": slow, "sigma0": soft}, lugre, SEEN)
     assert not _is_nearest({"v0": fast, "sigma0": stiff}, lugre, SEEN)
-
-
-def test_at_the_floor_no_shape_is_sought_anew(monkeypatch):
-    assert len(thorough(monkeypatch, 0.1, first=1.2)[1]) == 1
 
 
 def test_without_an_effect_the_rest_stays_where_it_was(dataset, base):
@@ -178,3 +121,20 @@ def test_a_stop_that_only_a_late_move_reaches_is_the_first_start():
     assert first["high"] > head.motion.position.max()
     assert not found[0].is_silent
     assert (first["low"], first["high"]) == pytest.approx((low, high), abs=0.03 * np.ptp(x))
+
+
+def test_a_shape_is_sought_anew_where_error_is_left_and_nowhere_else():
+    """From a wrong pitch a fit ends beside the right one; what is held stays held."""
+    right = fitted("cogging", p=0.02, a1=0.4, b1=0.1)
+    right = replace(right, fixed=right.fixed | {"b1"})
+    dataset = built_machine(built_dataset("one", "two"), axis_of(right))
+    begun = axis_of(replace(right, values={**right.values, "p": 0.031, "a1": 0.01}))
+    stuck, found = fit_axis(begun, dataset.fit), fit_thoroughly(begun, dataset)
+    assert found.error < 0.1 * stuck.error
+    values = found.axis["cogging"].values
+    assert (values["p"], values["a1"]) == pytest.approx((0.02, 0.4), rel=0.01)
+    assert (values["b1"], found.axis["cogging"].fixed) == (0.1, right.fixed)
+    assert found.begun is begun
+    quiet = fit_thoroughly(found.axis, dataset, begun=begun)
+    assert quiet.error == pytest.approx(found.error, rel=1e-3)
+    assert quiet.begun is begun

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -157,31 +156,3 @@ def test_emps_as_diagnosed_simulates_the_pulses_better_than_published(shared_dat
     assert after < 6.63e-3 < before
     assert found.axes["x"].error < found.axes["x"].error_begun
     assert "x" not in found.model.intervals
-
-
-def test_each_axis_is_fitted_from_its_own_force_fit_and_judged_before_and_after(monkeypatch):
-    """Masses tell the axes and what was fitted; the held-out error is that of the mass."""
-    from identify import workflow
-    from twin.model.machine import AxisModel, MachineModel
-
-    given = {"x": AxisModel(2.0), "y": AxisModel(3.0)}
-
-    def fitted(axis, logs):
-        assert logs == f"fit of {axis.mass:g}"
-        return SimpleNamespace(begun=axis, axis=replace(axis, mass=10.0 * axis.mass))
-
-    monkeypatch.setattr(workflow, "fit_simulated_motion", fitted)
-    monkeypatch.setattr(workflow, "simulated_error", lambda axis, logs: axis.mass + len(logs))
-    force = SimpleNamespace(
-        model=MachineModel("m", given, 1000.0),
-        datasets={"x": SimpleNamespace(fit="fit of 2", holdout=("one",), test=()),
-                  "y": SimpleNamespace(fit="fit of 3", holdout=(), test=())},
-        fits={a: SimpleNamespace(axis=m) for a, m in given.items()},
-    )  # fmt: skip
-    found = workflow.fit_simulation(force)
-    assert {a: m.mass for a, m in found.model.axes.items()} == {"x": 20.0, "y": 30.0}
-    assert {a: f.axis.mass for a, f in found.axes.items()} == {"x": 20.0, "y": 30.0}
-    assert found.holdout_error == {"x": (3.0, 21.0), "y": None}
-    assert found.force is force
-    force.datasets["x"].test = ("two", "three")
-    assert workflow.fit_simulation(force).holdout_error["x"] == (4.0, 22.0)

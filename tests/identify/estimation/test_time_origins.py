@@ -7,7 +7,6 @@ import pytest
 from machines import one_axis
 
 from identify.dataset.dataset import Dataset, datasets
-from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import fit_axis
 from identify.estimation.time_origin import time_origins, with_time_origins
 from identify.selection.diagnosis import Verdict, diagnose_axis
@@ -57,14 +56,6 @@ def test_clocks_are_when_the_logs_began(dataset):
     np.testing.assert_allclose(found, late - np.rint(late), atol=0.02)
 
 
-def test_without_a_line_in_time_no_clock_is_set():
-    logs = {str(i): simulate(STAGE, "tracking", seed=i, duration=8.0) for i in (1, 2)}
-    still = datasets(STAGE, logs, {})["x"]
-    assert not time_origins(
-        with_time_origins(fit_axis(STAGE.axes["x"], still.fit).axis, still)
-    ).any()
-
-
 def test_a_pump_is_named_whatever_its_phase_in_each_log(dataset):
     known = with_time_origins(STAGE.axes["x"], dataset)
     found = diagnose_axis(fit_axis(STAGE.axes["x"], known.fit), known, FEW)
@@ -81,13 +72,6 @@ def test_with_one_clock_for_all_logs_it_is_not(dataset):
     assert not try_effect(base, dataset, pump).fit.at_floor
 
 
-def test_a_phase_counts_as_a_parameter(dataset):
-    known = with_time_origins(STAGE.axes["x"], dataset)
-    base = fit_axis(STAGE.axes["x"], known.fit)
-    found = try_effect(base, known, CATALOGUE["periodic_disturbance"])
-    assert found.evidence.parameters == 3 + 1  # f, a, b; the second log's phase
-
-
 WITH_PUMP = replace(STAGE, axes={"x": STAGE.axes["x"].with_effect(PUMP)})
 
 
@@ -98,10 +82,3 @@ def test_a_model_with_the_pump_meets_each_log_at_its_phase(logs):
     assert alone.fits["x"].ratio < 1.2
     found = compare(WITH_PUMP, {"b": logs[1], "c": logs[2]}).axes["x"]
     assert found.ratio < 1.2
-
-
-def test_moving_a_log_keeps_its_clock(dataset):
-    known = with_time_origins(STAGE.axes["x"], dataset)
-    log = known.fit[1]
-    again = PreparedLog.of(log.motion.with_force_ahead(1e-5).head(5.0), log.test_function.length)
-    assert again.motion.time_origin == log.motion.time_origin != 0.0

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import built_results as made
 import numpy as np
 import pytest
-from built_fits import HARDWARE, PLAIN, axis_of, built_fit, built_motion, fitted
+from built_fits import CATALOGUE, HARDWARE, PLAIN, axis_of, built_motion, fitted
 
 from identify.dataset.prepared_log import PreparedLog, moving
 from identify.estimation.evidence import effective_samples, evidence
+from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import jacobian, residual
-from identify.experiment_design import discrimination as module
 from identify.experiment_design.discrimination import (
     Arena,
     Explanation,
@@ -26,13 +24,13 @@ from identify.experiment_design.discrimination import (
     refitted,
     require_within_limits,
 )
+from identify.experiment_design.plan import _planned
 from twin.errors import CannotRun
-from twin.experiments.kinds import Tracking
+from twin.experiments.kinds import Passes, Tracking
 from twin.log import AxisLog, Log
 from twin.model.machine import MachineModel
 from twin.model.parameters import free_parameters, read
 
-plans = importlib.import_module("identify.experiment_design.plan")
 STAGE = MachineModel("s", {"x": PLAIN, "y": replace(PLAIN, mass=3.1)}, 2000.0)
 ONE = axis_of(fitted("quadratic_drag", c=0.9)).with_effect(fitted("lugre", Fc=0.3, Fs=0.3))
 TWO = axis_of(fitted("constant_force", F0=0.2)).with_effect(fitted("lugre", Fc=0.3, Fs=0.3))
@@ -125,82 +123,6 @@ def test_the_logs_favour_the_explanation_with_the_least_error():
     assert favoured(arena(bad)) == ("bad", 0.0)
 
 
-def refitted_trial(monkeypatch, gains):
-    """refitted where the refits leave a residual whose size is that of the rival by the truth."""
-    rng = np.random.default_rng(1)
-    noise = rng.standard_normal(len(PreparedLog.of(MOTION, 0.04)) + len(OLD))
-
-    def record(self, truth, experiment):
-        return replace(MOTION, name=truth.name)
-
-    def fit(axis, logs):
-        rival = 1.0 if logs[-1].motion.name == ("one" if axis is ONE else "two") else None
-        made_fit = built_fit(1.0, axis=axis, residual=noise)
-        made_fit.__dict__["scale"] = rival or gains[logs[-1].motion.name]
-        scales[id(made_fit.axis), logs[-1].motion.name] = made_fit.__dict__["scale"]
-        return made_fit
-
-    scales = {}
-    monkeypatch.setattr(Arena, "record", record)
-    monkeypatch.setattr(module, "fit_axis", fit)
-    monkeypatch.setattr(
-        module, "residual", lambda axis, logs: noise * scales[id(axis), logs[-1].motion.name]
-    )
-    return refitted(arena(FIRST, SECOND), made.TRIALS[0]), noise
-
-
-@pytest.mark.parametrize("worst", ["one", "two"])
-def test_the_lesser_gain_of_both_truths_counts(monkeypatch, worst):
-    gains = {"one": 1.5, "two": 1.5, worst: 1.2}
-    found, noise = refitted_trial(monkeypatch, gains)
-    truth, rival = (ONE, TWO) if worst == "one" else (TWO, ONE)
-    added = len(free_parameters(truth)) - len(free_parameters(rival))
-    assert found.gain == pytest.approx(evidence(1.2 * noise, noise, added).delta_bic)
-    new = noise[-len(PreparedLog.of(MOTION, 0.04)) :]
-    assert found.difference == pytest.approx(np.sqrt((1.2**2 - 1.0) * np.mean(new**2)))
-
-
-def test_a_refit_of_one_model_or_of_what_cannot_run(monkeypatch):
-    trial = made.TRIALS[0]
-    assert refitted(arena(FIRST), trial) is trial
-
-    def refuse(self, truth, experiment):
-        raise CannotRun("beyond the travel")
-
-    monkeypatch.setattr(Arena, "record", refuse)
-    found = refitted(arena(FIRST, SECOND), trial)
-    assert (found.gain, found.difference) == (0.0, 0.0)
-    assert "beyond the travel" in found.not_run.reason
-    assert found.not_run.truth == "one"
-
-
-def test_trials_come_by_falling_gain_without_those_that_cannot_run(monkeypatch):
-    tried = [Tracking(float(i)) for i in (1, 2, 3, 4)]
-
-    def record(self, truth, e):
-        if e.duration == 2.0:
-            raise CannotRun("beyond the travel")
-        return truth.name, e
-
-    monkeypatch.setattr(Arena, "record", record)
-    bars = []
-    for kind, explanations in (("_informative", (FIRST,)), ("_discriminating", (FIRST, SECOND))):
-        monkeypatch.setattr(
-            module, kind,
-            lambda arena, e, new, k=kind: SimpleNamespace(
-                gain=-((e.duration - 3) ** 2), new=new, k=k
-            ),
-        )  # fmt: skip
-        found, not_run = contest(arena(*explanations), tried, lambda *done: bars.append(done[1:]))
-        assert len(not_run) == 1
-        assert "beyond the travel" in not_run[0].reason
-        assert found[0].new[1].duration == 3.0
-        assert [t.gain for t in found] == [0.0, -1.0, -4.0]
-        assert {(t.k, t.new[0]) for t in found} == {(kind, "one")}
-    tried, judged = [(k, 4) for k in range(4)], [(k, 3) for k in range(4)]
-    assert bars == (tried + judged) * 2
-
-
 def test_a_log_keeps_to_travel_and_force_limits():
     limited = replace(PLAIN, hardware=replace(HARDWARE, force_limit=2.0))
     stage = MachineModel("s", {"x": limited, "y": limited})
@@ -219,44 +141,78 @@ def test_a_log_keeps_to_travel_and_force_limits():
             require_within_limits(stage, bad)
 
 
-def test_what_cannot_run_or_is_too_slow_has_no_record(monkeypatch):
-    seen = []
-    log = Log(100.0, {"x": AxisLog({"position": np.zeros(300)})})
-    monkeypatch.setattr(
-        module, "simulate", lambda machine, e, **k: seen.append((machine, e, k)) or log
-    )
-    monkeypatch.setattr(module, "motion_of", lambda log, axis, name, axes, ripples: MOTION)
-    monkeypatch.setattr(module, "moves", lambda log, axis: True)
-    monkeypatch.setattr(module, "require_within_limits", lambda stage, log: None)
-    assert arena(FIRST).record(FIRST, "e") is MOTION
-    (stage, _, keywords), = seen  # fmt: skip
-    assert stage.axes["x"] is ONE
-    assert (keywords["seed"], stage.axes["y"]) == (0, STAGE.axes["y"])
-    assert arena(FIRST, test_function=0.0081).record(FIRST, "e") is MOTION
-    with pytest.raises(CannotRun, match="too slowly"):
-        arena(FIRST, test_function=0.0079).record(FIRST, "e")
-    assert arena(FIRST, test_function=None).record(FIRST, "e") is MOTION
-    monkeypatch.setattr(module, "moves", lambda log, axis: False)
-    with pytest.raises(CannotRun, match="hardly moves"):
-        arena(FIRST).record(FIRST, "e")
-
-
-@pytest.mark.parametrize(("effects", "sought"), [((), ()), (("encoder_ripple",), None)])
-def test_a_ripple_is_sought_where_the_simulated_encoder_may_have_one(monkeypatch, effects, sought):
-    asked = []
-    log = Log(100.0, {"x": AxisLog({"position": np.zeros(300)})})
-    monkeypatch.setattr(module, "simulate", lambda *_, **__: log)
-    monkeypatch.setattr(module, "moves", lambda log, axis: True)
-    monkeypatch.setattr(module, "require_within_limits", lambda stage, log: None)
-    monkeypatch.setattr(module, "motion_of", lambda *_, ripples: asked.append(ripples) or MOTION)
-    truth = Explanation("one", axis_of(*map(fitted, effects)))
-    arena(truth).record(truth, "e")
-    assert asked == [sought]
-
-
 def test_logs_are_windowed_alike():
     longer = arena(FIRST, test_function=0.08).logs_with(MOTION)
     assert [w.test_function.length for w in longer] == pytest.approx([0.08, 0.08])
     same = arena(FIRST).logs_with(MOTION)
     assert same[0] is OLD
     assert [w.motion.name for w in same] == ["old", "new"]
+
+
+def test_what_hardly_moves_or_is_too_slow_has_no_record():
+    moved = arena(FIRST).record(FIRST, Tracking(2.0))
+    assert moved.axis == "x"
+    assert arena(FIRST, test_function=0.0081).record(FIRST, Tracking(2.0)).period == moved.period
+    with pytest.raises(CannotRun, match="too slowly"):
+        arena(FIRST, test_function=0.0079).record(FIRST, Tracking(2.0))
+    with pytest.raises(CannotRun, match=r"hardly moves, or for less than 1 s"):
+        arena(FIRST).record(FIRST, Tracking(0.9))
+    resting = Passes("x", 1e-9, 1e-9, 1)
+    with pytest.raises(CannotRun, match="hardly moves"):
+        arena(FIRST).record(FIRST, resting)
+
+
+def test_trials_come_by_falling_gain_and_those_that_cannot_run_apart():
+    tried, bars = [Tracking(2.0), Tracking(0.9), Tracking(4.0)], []
+    found, not_run = contest(arena(FIRST, SECOND), tried, lambda *done: bars.append(done[1:]))
+    assert [t.experiment for t in not_run] == tried[1:2]
+    gains = {t.experiment: t.gain for t in found}
+    assert list(gains) == [Tracking(4.0), Tracking(2.0)]
+    assert gains[tried[2]] > gains[tried[0]]
+    assert bars[:3] == [(0, 3), (1, 3), (2, 3)]
+    wanted = _discriminating(arena(FIRST, SECOND), tried[0], arena(FIRST).record(FIRST, tried[0]))
+    assert gains[tried[0]] == pytest.approx(wanted.gain)
+    (informative,), _ = contest(arena(SECOND), tried[:1])
+    wanted = _informative(arena(SECOND), tried[0], arena(SECOND).record(SECOND, tried[0]))
+    assert informative.gain == pytest.approx(wanted.gain)
+
+
+def test_a_refit_judges_by_the_truth_that_is_told_worst():
+    (trial,), _ = contest(arena(FIRST, SECOND), [Tracking(2.0)])
+    found = refitted(arena(FIRST, SECOND), trial)
+    assert found.gain == pytest.approx(refitted(arena(SECOND, FIRST), trial).gain)
+    gains = []
+    for truth, rival in ((FIRST, SECOND), (SECOND, FIRST)):
+        logs = arena(truth).logs_with(arena(truth).record(truth, trial.experiment))
+        own, other = (fit_axis(e.axis, logs) for e in (truth, rival))
+        kept = own.kept & other.kept
+        left = [residual(f.axis, logs)[kept] for f in (other, own)]
+        gains.append(evidence(*left, len(own.scaling.where) - len(other.scaling.where)).delta_bic)
+    assert found.gain == pytest.approx(min(gains))
+    assert found.gain != pytest.approx(max(gains))
+    assert refitted(arena(FIRST), trial) is trial
+    short = refitted(arena(FIRST, SECOND), replace(trial, experiment=Tracking(0.9)))
+    assert (short.gain, short.difference, short.not_run.truth) == (0.0, 0.0, "one")
+    assert "hardly moves" in short.not_run.reason
+
+
+def test_a_plan_leaves_out_logs_that_refute_a_rival_and_begins_with_a_refitted_trial():
+    good, bad = Explanation("good", PLAIN), Explanation("wear", replace(PLAIN, mass=6.0))
+    told = {"wear": CATALOGUE["wear"], "gms": CATALOGUE["gms"]}
+    found = _planned(arena(good, bad), 3.0, 2, False, told)
+    assert (found.axis, found.between, found.favoured) == ("x", ("good", "wear"), "good")
+    assert (found.excited_by, found.supposed) == ({"wear": CATALOGUE["wear"].excited_by}, False)
+    without = _planned(arena(good, bad, logs=()), 3.0, 2, True, told)
+    assert (without.favoured, without.supposed) == (None, True)
+    assert [t.gain for t in found.ranking] == pytest.approx([t.gain for t in without.ranking])
+    gains = [t.gain for t in found.ranking]
+    assert max(gains) < 1.0  # a refit takes the mass over
+    assert found.gap.share is not None
+    assert without.gap.share is None
+
+
+@pytest.mark.parametrize(("gain", "decides"), [(10.0, False), (10.1, True)])
+def test_an_experiment_decides_by_more_evidence_than_separates(gain, decides):
+    trials = tuple(replace(made.TRIALS[0], gain=g) for g in (gain, 90.0))
+    assert made.plan_of("a", "b", ranking=trials).decides is decides
+    assert made.plan_of("a", ranking=trials[:1]).decides

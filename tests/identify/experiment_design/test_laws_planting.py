@@ -1,7 +1,5 @@
 """Laws of planted effects and of the free run: the strength asked, and a motion reproduced."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from constructed import (
@@ -10,10 +8,8 @@ from constructed import (
     dataset_of,
     effect,
     fit_of,
-    held,
     log_of,
     moved,
-    waves,
     windowed,
 )
 
@@ -22,11 +18,9 @@ from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
-from identify.estimation.open_loop import START_FIT, as_logged, states_along
+from identify.estimation.open_loop import START_FIT, states_along
 from identify.experiment_design.planting import (
-    SHAPE_SPREAD,
     SPREAD,
-    _drawn_shape,
     added_force,
     draw_effect,
     hidden_part,
@@ -34,10 +28,9 @@ from identify.experiment_design.planting import (
     strength_for,
     visible_force,
 )
-from identify.validation.free_run import HORIZON, FreeRun, free_run, rms_error
+from identify.validation.free_run import free_run
 from twin.core.walks import walk
-from twin.effect import Parameter
-from twin.model.machine import AxisModel, Hardware, MachineModel, axis_table
+from twin.model.machine import AxisModel, MachineModel, axis_table
 from twin.model.parameters import free_parameters, read
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
@@ -100,8 +93,9 @@ def test_strengths_are_scaled_in_their_direction_and_within_bounds():
     assert rms(drawn) == pytest.approx(3.0, rel=1e-6)
     assert (drawn < 0.0).any()
     assert (drawn > 0.0).any()
-    spread = np.abs(drawn) / np.abs(drawn).max()
-    assert 1.0 / 3.0 < spread.min() < 0.99
+    for seed in range(20):  # none is more than three times another
+        drawn = np.abs(norm(strength_for(cable, norm, 3.0, None, np.random.default_rng(seed))))
+        assert 1.0 / 3.0 < (drawn / drawn.max()).min() < 0.99
     held_ = strength_for(CATALOGUE["cogging"], lambda f: np.array([f.values["a1"]]), 0.4, {
         **CATALOGUE["cogging"].starts(), "p": 0.0371})  # fmt: skip
     assert held_.values["p"] == 0.0371
@@ -135,32 +129,10 @@ def test_another_machine_has_each_value_within_a_fifth_and_the_same_mass():
     assert max(taus) == 6e-3
 
 
-def test_shapes_are_drawn_between_the_ends_of_a_scan_or_about_their_start():
-    rng = np.random.default_rng(6)
-    p = Parameter("a", "m", 1.0, -9.0, 9.0, "")
-
-    def draws(p, start=2.0):
-        return np.array([_drawn_shape(p, start, COVERED, rng) for _ in range(800)])
-
-    positive = draws(replace(p, scan=lambda e: (3.0, 0.03, 0.3)))
-    assert positive.min() == pytest.approx(0.03, rel=0.1)
-    assert positive.max() == pytest.approx(3.0, rel=0.1)
-    assert np.median(positive) == pytest.approx(0.3, rel=0.3)  # as many in each decade
-    signed = draws(replace(p, scan=lambda e: (e.position_low, e.position_high)))
-    assert signed.min() == pytest.approx(COVERED.position_low, abs=2e-3)
-    assert np.mean(signed) == pytest.approx(0.5 * (-0.031 + 0.083), abs=5e-3)
-    plain = np.log(draws(p) / 2.0)
-    assert plain.min() == pytest.approx(-SHAPE_SPREAD, abs=0.01)
-    assert plain.max() == pytest.approx(SHAPE_SPREAD, abs=0.01)
-    bounded = draws(replace(p, lower=1.9, upper=2.1))
-    assert (bounded.min(), bounded.max()) == (1.9, 2.1)
-
-
 # --- the free run -------------------------------------------------------------------------------
 
 RATE = 2000.0
 T = np.arange(round(1.7 * RATE)) / RATE
-PUSH = waves((1.3, 1.7, 0.3), (0.7, 6.3, 1.0))(T)
 
 
 def prepared(x, force, other=None, pushes=None) -> dict[str, PreparedLog]:
@@ -172,44 +144,6 @@ def prepared(x, force, other=None, pushes=None) -> dict[str, PreparedLog]:
     if pushes is not None:
         log.axes["y"].columns["force"][:] = pushes
     return {a: windowed(motion_of(log, a, "log")) for a in log.axes if np.ptp(log.axes[a].position)}
-
-
-def test_the_exact_model_reproduces_the_motion_and_a_wrong_force_drifts_as_its_parabola():
-    x = held(PUSH, 1.7, 1.0 / RATE, 0.02, -0.1)
-    log = prepared(x, PUSH)
-    model = MachineModel("s", {"x": AxisModel(1.7)}, 999.0)
-    run = free_run(model, log)
-    assert run.horizon == HORIZON
-    assert rms_error(run, "x") < 1e-7
-    side = round(START_FIT * RATE)
-    known = np.isfinite(run.error["x"])
-    assert not known[:side].any()
-    assert known[side:-side].all()
-    n = side + 2 * 1000 + 7
-    short = prepared(x[:n], PUSH[:n])
-    # No room for another start, so the last one runs to the end.
-    assert np.abs(free_run(model, short).error["x"][-5:]).max() < 1e-7
-    pushed = MachineModel(
-        "s", {"x": AxisModel(1.7, effects=(effect("constant_force", {"F0": 0.34}),))}
-    )
-    error = free_run(pushed, log).error["x"]
-    count = round(HORIZON * RATE)
-    for start in (side, side + count, side + 2 * count):
-        t = np.arange(count) / RATE
-        np.testing.assert_allclose(error[start : start + count], 0.5 * 0.2 * t**2, atol=2e-6)
-    wanted = np.sqrt(np.nanmean(error**2))
-    assert rms_error(FreeRun({"x": error}, 0.5), "x") == pytest.approx(wanted)
-
-
-def test_two_axes_run_free_of_each_other():
-    x, y = held(PUSH, 1.7, 1.0 / RATE), held(2.0 * PUSH[::-1], 0.6, 1.0 / RATE)
-    log = prepared(x, PUSH, y, 2.0 * PUSH[::-1])
-    model = MachineModel("s", {"x": AxisModel(1.7), "y": AxisModel(0.6)})
-    run = free_run(model, log)
-    assert max(rms_error(run, "x"), rms_error(run, "y")) < 2e-6
-    alone = free_run(model, {"x": log["x"]})
-    assert list(alone.error) == ["x"]
-    assert rms_error(alone, "x") < 2e-6
 
 
 @pytest.mark.parametrize("simulator", [ReducedSimulator, MujocoSimulator])
@@ -228,15 +162,6 @@ def test_an_axis_that_stands_still_is_seen_where_it_stands(simulator):
     blind = free_run(MachineModel("s", {"x": axis}), log, simulator)
     first = round(START_FIT * RATE) + np.arange(round(0.3 * RATE))
     assert np.abs(run.error["x"][first]).max() < 0.1 * np.abs(blind.error["x"][first]).max()
-
-
-def test_the_log_has_the_sensors_and_limits_in_it_already():
-    hardware = Hardware(force_limit=2.0, encoder_resolution=1e-4, force_constant=7.0)
-    model = MachineModel("s", {"x": AxisModel(1.7, hardware)}, 999.0)
-    found = as_logged(model, prepared(T, T))
-    assert found.sample_rate == RATE
-    got = found.axes["x"].hardware
-    assert (got.force_limit, got.encoder_resolution, got.force_constant) == (np.inf, 0.0, 7.0)
 
 
 def test_states_at_a_restart_are_those_of_the_motion_before_it():

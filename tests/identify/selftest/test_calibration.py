@@ -23,11 +23,6 @@ def answers(count: int, seed: int) -> list[Answer]:
     ]
 
 
-def test_confidence_falls_with_the_part_that_is_taken(monkeypatch) -> None:
-    monkeypatch.setattr(stated, "LEVELS", (Level(0.75, 0.9), Level(0.0, 0.6)))
-    assert [confidence(part) for part in (1.0, 0.75, 0.74, 0.2, -0.1)] == [0.9, 0.9, 0.6, 0.6, 0.6]
-
-
 def test_the_table_that_is_shipped_falls_and_has_no_end() -> None:
     right = [level.right for level in stated.LEVELS]
     assert right == sorted(right, reverse=True)

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Future
-
 from built_fits import CATALOGUE
 
 from identify.selftest import design
-from identify.selftest.case import Case
 from identify.selftest.design import FULL, QUICK, STRONG, WEAK, Design, plantable, release_seed
 from identify.selftest.laws import OUTSIDE
-from identify.selftest.trial import TrialResult
 from identify.selftest.variations import VARIATIONS
 from twin.effect import Kind
 
@@ -49,38 +45,6 @@ def test_development_and_release_are_drawn_apart():
     assert release_seed() != design.DEVELOPMENT
     assert release_seed() >= design.FIRST_RELEASE > design.DEVELOPMENT
     assert not set(FULL.cases(release_seed())) & set(FULL.cases(design.DEVELOPMENT))
-
-
-class Inline:
-    """A pool that runs each job at once, in this process."""
-
-    def __init__(self, workers, mp_context) -> None:
-        self.workers = workers
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_) -> None:
-        pass
-
-    def submit(self, function, case):
-        future = Future()
-        future.set_result(function(case))
-        return future
-
-
-def test_outcomes_come_in_the_order_of_the_cases_with_their_progress(monkeypatch):
-    monkeypatch.setattr(design, "ProcessPoolExecutor", Inline)
-    monkeypatch.setattr(design, "as_completed", lambda jobs: reversed(list(jobs)))
-    monkeypatch.setattr(design, "run", lambda case: TrialResult(case, str(case.seed)))
-    wanted = [Case(("a",), 5.0, seed) for seed in (3, 1, 2)]
-    told = []
-    found = design.run_all(wanted, progress=lambda *given: told.append(given))
-    assert [o.case for o in found] == wanted
-    assert [(o.verdict, done, total) for o, done, total in told] == [
-        ("2", 1, 3), ("1", 2, 3), ("3", 3, 3),
-    ]  # fmt: skip
-    assert design.run_all(wanted) == found
 
 
 def test_two_frictions_are_never_planted_together():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identify.selftest.laws import BUMPS, CABLES, NOISE, OUTSIDE
-from twin.effect import OUT, Effect, Kind
+from twin.effect import OUT, Effect
 from twin.laws.motion import Array, Motion
 from twin.laws.stepping import trace
 
@@ -110,29 +110,3 @@ def test_noise_has_its_size_its_memory_and_four_uniform_numbers_a_sample() -> No
     assert found[0] == pytest.approx(0.4 * np.sqrt(3.0 * (1.0 - kept**2)) * total)
     other = trace(NOISE, {**values, "seed": 8.0}, still, law=NOISE.law).after[:, OUT]
     assert abs(np.corrcoef(found, other)[0, 1]) < 0.1
-
-
-@pytest.mark.parametrize("name", EFFECTS)
-def test_parameters_are_absent_at_the_start_with_round_bounds_of_one_sign_or_both(name) -> None:
-    for p in EFFECTS[name].parameters:
-        for bound in (p.lower, p.upper):
-            assert bound == float(f"{bound:.0e}") or bound == 2147483646.0
-        if p.strength:
-            assert p.start == 0.0
-            assert p.lower in (0.0, -p.upper)
-        elif p.lower < 0.0:
-            assert p.lower == -p.upper
-        else:
-            assert p.lower <= 0.25 * p.start or p.name == "seed"
-            assert p.upper >= 3.0 * p.start
-        assert p.fixed == (p.name in ("pitch", "seed"))
-    assert EFFECTS[name].kind is Kind.FORCE
-
-
-def test_bumps_and_cables_tell_the_curve_that_they_assume() -> None:
-    for effect in BUMPS:
-        (curve,) = effect.curves
-        assert (curve.period, curve.by_direction) == ("pitch", True)
-    for effect in CABLES:
-        (curve,) = effect.curves
-        assert (curve.period, curve.by_direction) == (None, False)

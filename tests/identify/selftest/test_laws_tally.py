@@ -171,13 +171,6 @@ def test_the_confusion_matrix_has_shares_of_each_row():
     assert confusion([one(5.0, SHAPE)]) == {"a": {"wrong shape": 1.0}}
 
 
-@pytest.mark.parametrize("answers", [(), (B,), (A, SHAPE), (TIED.answers[0],), (A, B)])
-def test_an_effect_is_named_where_an_answer_holds_it_as_missing(answers):
-    o = one(5.0, *answers)
-    assert o.named is any("a" in x.names for x in answers)
-    assert o.right is (o.named and B not in answers)
-
-
 def test_two_effects_need_an_answer_each():
     assert BOTH.right
     assert not HALF.named

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, fitted
+from built_fits import CATALOGUE
 
 from identify.selftest.case import Case, parse_case
-from identify.selftest.drawing import DAMPING, drawn_values, other_exponents
+from identify.selftest.drawing import DAMPING, drawn_values
 from identify.selftest.laws import BUMPS, CABLES, NOISE, OUTSIDE
 from identify.selftest.variations import VARIATIONS, Drawn
 from twin.effect import DT, IO_SIZE, OUT, Effect, Excitation, Kind, V, X
@@ -79,14 +79,6 @@ def test_damping_is_log_uniform_and_drawn_where_a_model_holds_it() -> None:
     assert np.abs(parts - 200).max() < 4.0 * np.sqrt(800 * 0.25 * 0.75)
 
 
-def test_exponents_are_not_those_of_the_law() -> None:
-    lugre = fitted("lugre", Fc=0.27)
-    source = rng()
-    drawn = [other_exponents(lugre, source) for _ in range(50)]
-    assert len({d.values["n"] for d in drawn}) == 50
-    assert all({**d.values, "n": 2.0} == {**lugre.values, "n": 2.0} for d in drawn)
-
-
 # --- laws that only the self-test knows ------------------------------------------------------
 
 
@@ -114,33 +106,6 @@ def test_a_law_of_the_self_test_is_in_no_catalogue_and_gone_at_no_strength(effec
     there = forces(effect, {p.name: 1.0 for p in effect.strengths}, *MOTION)
     assert np.isfinite(there).all()
     assert there.any()
-
-
-def test_bumps_of_one_form_let_go_at_standstill_and_brake_in_motion() -> None:
-    form, *_ = BUMPS
-    x = np.zeros(3)
-    force = forces(form, {"ahead": 0.06, "behind": 0.04, "phase": 0.0}, x, [0.0, 0.1, -0.1])
-    np.testing.assert_allclose(force, [0.0, -0.06, 0.04], atol=1e-9)
-
-
-@pytest.mark.parametrize("form", CABLES, ids=lambda e: e.name)
-def test_no_cubic_is_a_cable_of_another_form(form) -> None:
-    x = np.linspace(-0.15, 0.15, 301)
-    force = forces(form, {"offset": 0.05, "k1": 1.5}, x, np.ones_like(x))
-    left = force - np.polyval(np.polyfit(x, force, 3), x)
-    assert np.sqrt(np.mean(left**2)) > 1e-3  # N, the noise floor of the stage
-
-
-def test_force_noise_has_its_size_and_memory() -> None:
-    n, values = 40_000, {"size": 5e-3, "memory": 0.02}
-    noise, other = (
-        forces(NOISE, {**values, "seed": seed}, np.zeros(n), np.zeros(n)) for seed in (7.0, 8e6)
-    )
-    steps = n * 1e-3 / 0.04  # independent ones: twice the memory each
-    assert np.std(noise) == pytest.approx(5e-3, rel=4.0 / np.sqrt(2.0 * steps))
-    lagged = np.corrcoef(noise[:-20], noise[20:])[0, 1]
-    assert lagged == pytest.approx(np.exp(-1.0), abs=4.0 / np.sqrt(steps))
-    assert abs(np.corrcoef(noise, other)[0, 1]) < 4.0 / np.sqrt(steps)
 
 
 # --- variations ------------------------------------------------------------------------------

@@ -6,8 +6,8 @@ import json
 from dataclasses import replace
 
 import pytest
+from cli_runs import refusal
 
-from identify.cli import main
 from identify.output.plain import plain
 from identify.output.selftest import selftest_json, selftest_text
 from identify.selection.findings import FindingKind
@@ -120,11 +120,5 @@ def test_a_failing_machine_is_named():
         (["--case", "cogging@5/cabel/17"], "no variation 'cabel'; there are plain, bumps, cable,"),
     ],
 )
-def test_bad_input_is_one_line(given, said, capsys, monkeypatch):
-    monkeypatch.setattr("sys.argv", ["twin", "selftest", *given])
-    with pytest.raises(SystemExit) as stopped:
-        main()
-    assert stopped.value.code == 2
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1
+def test_bad_input_is_one_line(given, said, tmp_path):
+    assert said in refusal("selftest", *given, folder=tmp_path)

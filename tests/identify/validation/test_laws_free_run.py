@@ -7,26 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from constructed import dataset_of, effect, held, log_of, waves, windowed
+from constructed import effect, held, log_of, waves, windowed
 
 from identify.dataset.motion import motion_of
-from identify.dataset.noise_floor import noise_of
 from identify.estimation.force_balance import residual
 from identify.estimation.open_loop import START_FIT
-from identify.validation import free_run as module
 from identify.validation.free_run import (
     HORIZON,
     FreeRun,
-    _signals,
-    drift_of_noise,
-    errors_of_both,
     free_run,
     rms_error,
 )
-from identify.validation.misfit_maps import position_errors
 from identify.validation.side_by_side import side_by_side
 from twin.model.machine import AxisModel, Hardware, MachineModel
-from twin.parallel import parallel
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
 RATE, MASS = 1000.0, 1.7
@@ -90,65 +83,6 @@ def test_the_error_is_the_root_of_its_mean_square_where_it_ran():
     assert rms_error(FreeRun({"x": np.array([1e200, 1e300])}, HORIZON), "x") == np.inf
 
 
-def test_noise_of_the_logs_own_level_is_added_to_readings_and_commands():
-    rng = np.random.default_rng(3)
-    noisy = prepared(X + 1e-9 * rng.standard_normal(N), FORCE + 0.05 * rng.standard_normal(N))
-    model = stage()
-    position, command = _signals(model, {"x": noisy}, None)
-    np.testing.assert_allclose(position[:, 0], noisy.motion.at_samples(0.0)[0])
-    np.testing.assert_allclose(command[:, 0], noisy.motion.raw[1])
-    more, louder = _signals(model, {"x": noisy}, np.random.default_rng(1))
-    found = noise_of(model.axes["x"], noisy.motion)
-    for one, other, power in ((position, more, found.reading), (command, louder, found.force)):
-        added = np.std(other - one)
-        assert added == pytest.approx(np.sqrt(0.5 * power * RATE), rel=0.1)
-    assert np.std(louder - command) == pytest.approx(0.05, rel=0.3)
-
-
-def test_the_drift_of_noise_is_the_run_with_noise_less_the_run_without(monkeypatch):
-    monkeypatch.setattr(
-        module, "free_run", lambda model, logs, noise: FreeRun({"x": np.array([5.0, 9.0])}, HORIZON)
-    )
-    drift = drift_of_noise(stage(), {}, FreeRun({"x": np.array([2.0, 3.0])}, HORIZON))
-    np.testing.assert_array_equal(drift.error["x"], [3.0, 6.0])
-    assert drift.horizon == HORIZON
-
-
-def test_errors_of_both_are_before_after_and_in_mujoco(monkeypatch):
-    def run(model, log, simulator=None):
-        return FreeRun({"x": np.full(2, model.axes["x"].mass + 10.0 * bool(simulator))}, 1.0)
-
-    monkeypatch.setattr(module, "free_run", run)
-    dataset = {"x": dataset_of(prepared())}
-    assert errors_of_both(stage(1.0), stage(2.0), "x", dataset) == ((1.0, 2.0), 12.0)
-    imposed = MachineModel("imposed", {"x": AxisModel(0.0)}, RATE)
-    assert errors_of_both(imposed, imposed, "x", dataset) == (None, None)
-
-
-def test_each_log_has_its_own_error_and_that_of_its_noise(monkeypatch):
-    from identify.validation import misfit_maps
-
-    size = {"one": 1.0, "two": 2.0}
-
-    def name(parts):
-        return parts["x"].motion.name
-
-    monkeypatch.setattr(misfit_maps, "free_run", lambda model, parts: name(parts))
-    monkeypatch.setattr(misfit_maps, "drift_of_noise", lambda model, parts, run: 10 * size[run])
-    monkeypatch.setattr(misfit_maps, "rms_error", lambda run, axis: size.get(run, run))
-    dataset = dataset_of(
-        prepared(name="one"), prepared(name="two"), holdout=(prepared(name="three"),)
-    )
-    told = []
-    errors, floors = position_errors(stage(), {"x": dataset}, lambda *at: told.append(at))
-    assert errors["x"] == size
-    assert floors["x"] == {k: 10 * size[k] for k in size}
-    assert told == [(0, 2), (1, 2), (2, 2)]
-    with parallel(2):
-        position_errors(stage(), {"x": dataset}, lambda *at: told.append(at))
-    assert told[3:] == told[:3]
-
-
 def test_measured_is_the_model_and_what_is_left_on_one_clock():
     axis = AxisModel(1.02 * MASS, effects=(effect("constant_force", {"F0": 0.3}),))
     model, log = MachineModel("m", {"x": axis}, RATE), prepared()
@@ -180,10 +114,3 @@ def test_axes_in_blocks_of_another_length_are_told_as_long_as_the_shorter():
     topics = side_by_side(model, parts).topics
     shapes = {c.shape for columns in topics.values() for c in columns.values()}
     assert shapes == {(lengths["y"] - SIDE,)}
-
-
-def test_the_clock_of_a_log_is_that_of_any_of_its_axes():
-    one, other = prepared(), prepared()
-    later = replace(other, motion=replace(other.motion, time_origin=0.7))
-    assert module._time_origin({"x": one, "y": later}) == 0.7
-    assert module._time_origin({"x": one}) == 0.0

@@ -21,8 +21,6 @@ from identify.validation.misfit_maps import (
     compare_axis,
     misfit_by_frequency,
     misfit_map,
-    periods,
-    phase_name,
     worst_regions,
 )
 from identify.validation.whiteness import Loop
@@ -184,25 +182,6 @@ def test_a_comparison_gathers_what_the_residual_says():
     worst = worst_regions(found.maps, effective_samples(found.residual))
     assert [r.coordinate for r in found.worst] == [r.coordinate for r in worst]
     assert found.tests.loop is Loop.UNKNOWN
-
-
-def test_standstill_is_where_the_speed_is_below_a_thousandth_of_the_highest():
-    slow = replace(SHORT, signals=SHORT.signals * np.array([[1.0], [0.0], [1.0]]))
-    logs = [LOG, windowed(slow)]
-    found = compare_axis(MachineModel("s", {"x": AxisModel(1.7)}), dataset_of(*logs), {}, {})
-    np.testing.assert_array_equal(found.coordinates["standstill"][len(LOG) :], 1.0)
-    assert found.coordinates["standstill"][: len(LOG)].mean() < 0.2
-    told = next(m for m in found.maps if m.coordinate == "standstill")
-    assert len(told.rms) == 2
-
-
-def test_a_phase_is_shown_of_every_effect_that_repeats_along_the_track():
-    spikes = effect("roller_spikes", {"pitch": 0.021})
-    axis = AxisModel(1.0, effects=(effect("coulomb_viscous"), spikes, effect("cogging")))
-    wanted = {"roller_spikes": 0.021, "cogging": axis["cogging"].values["p"]}
-    assert periods(axis) == wanted
-    assert phase_name("cogging") == "cogging_phase"
-    assert periods(AxisModel(1.0, effects=(effect("periodic_disturbance"),))) == {}
 
 
 def test_the_map_by_frequency_is_that_of_the_bands():

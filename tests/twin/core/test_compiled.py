@@ -11,10 +11,8 @@ import sys
 from pathlib import Path
 from types import FunctionType
 
-import numba
 import numpy as np
 import pytest
-from numba.extending import intrinsic
 
 from twin.core import compiled
 from twin.core.compiled import digest
@@ -131,28 +129,6 @@ def test_digest_is_the_same_for_the_same_code() -> None:
     assert digest(one) == digest(two)
 
 
-def test_digest_reaches_through_native_functions_modules_and_intrinsics() -> None:
-    plain = [with_globals(shifted, SHIFT=s) for s in (1.0, 2.0)]
-    native = [with_globals(outer, shifted=numba.njit(f), SCALE=1.0, TABLE=None) for f in plain]
-    assert digest(native[0]) != digest(native[1])
-    lent = [with_globals(outer, shifted=intrinsic(f), SCALE=1.0, TABLE=None) for f in plain]
-    assert digest(lent[0]) != digest(lent[1])
-
-
-def test_digest_of_a_callback_knows_what_it_closes_over() -> None:
-    def closing(shift):
-        return lambda x: x + shift
-
-    assert digest(closing(1)) != digest(closing(2))
-
-
-def test_digest_of_a_function_that_calls_itself_ends() -> None:
-    names: dict[str, object] = {"SCALE": 1.0, "TABLE": None}
-    function = FunctionType(outer.__code__, names)
-    names["shifted"] = function
-    assert digest(function)
-
-
 # --- the plain functions that a law calls --------------------------------------------------------
 
 LAW = """
@@ -197,13 +173,3 @@ def test_a_law_may_call_functions_of_its_own_file(before, mark, tmp_path: Path) 
     assert effect.reads("OUT")
     assert effect.reads("copysign"), "by the function that its function calls"
     assert not effect.reads("U")
-
-
-def test_a_change_of_a_function_that_a_law_calls_changes_its_digest(tmp_path: Path) -> None:
-    digests = set()
-    for sign in ("1.0", "2.0"):  # a folder each: Python keeps a module by its second and size
-        path = tmp_path / sign / "steady.py"
-        path.parent.mkdir()
-        path.write_text(LAW.format(before="", mark="").replace("copysign(1.0", f"copysign({sign}"))
-        digests.add(digest(load_catalogue([path])["steady"].law))
-    assert len(digests) == 2

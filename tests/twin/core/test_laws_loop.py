@@ -13,14 +13,9 @@ from axis_runs import effect
 
 from twin.core.control import (
     INTEGRAL,
-    KD,
-    KI,
     KP,
     LIMIT,
-    MASS_FF,
     PREVIOUS,
-    RESOLUTION,
-    SMOOTHING,
     SPEED,
     Controller,
     command,
@@ -28,7 +23,6 @@ from twin.core.control import (
     measure,
 )
 from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
-from twin.errors import InputError
 from twin.experiments.trajectory import Setpoint
 from twin.laws.motion import Array
 from twin.model.machine import AxisModel, Hardware, MachineModel
@@ -91,18 +85,6 @@ def test_the_integral_waits_beyond_the_limit_and_goes_on_at_it(side: float) -> N
         force = command.py_func(gains, state, (side * error, 0.0, 0.0, 0.0), 0.0, H, False)
         assert force == side * 6.0
         assert state[INTEGRAL] == (0.0 if waits else side * error * H)
-
-
-def test_gains_are_those_of_the_controllers_and_the_hardware_by_name() -> None:
-    other = Controller(1.0, 2.0, 3.0, 4.0, 5.0)
-    both = {**axes(9.0, 1e-6), "y": AxisModel(2.9, Hardware(force_limit=7.0))}
-    table = gain_table({"y": other, "x": LOOP}, both, H)
-    for row, c, limit, step in ((table[0], LOOP, 9.0, 1e-6), (table[1], other, 7.0, 0.0)):
-        assert [row[KP], row[KI], row[KD], row[MASS_FF]] == [
-            c.proportional, c.integral, c.derivative, c.mass,
-        ]  # fmt: skip
-        assert [row[LIMIT], row[RESOLUTION]] == [limit, step]
-        assert 1.0 - row[SMOOTHING] == pytest.approx(np.exp(-2 * np.pi * c.filter_bandwidth * H))
 
 
 @pytest.mark.parametrize("bandwidth", [5.0, 30.0, 80.0])
@@ -256,9 +238,3 @@ def test_noise_of_the_encoder_is_that_of_each_axis_and_reported_progress_ends() 
     np.testing.assert_allclose(error.std(axis=0), [3e-6, 7e-6], rtol=0.06)
     assert abs(np.corrcoef(error.T)[0, 1]) < 0.06
     assert told == [(4000, 4000)]
-
-
-def test_a_setpoint_of_other_axes_is_refused() -> None:
-    one = MachineModel("one", {"x": AxisModel(1.0)}, sample_rate=1.0 / H)
-    with pytest.raises(InputError, match="2 axes"):
-        run(one, asked(10), np.random.default_rng(0), simulator=ReducedSimulator)

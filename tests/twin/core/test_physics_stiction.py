@@ -14,7 +14,6 @@ from twin.simulator import MujocoSimulator, ReducedSimulator, run
 RATE = 10_000.0
 BOTH = pytest.mark.parametrize("stage", [MujocoSimulator, ReducedSimulator])
 STICKING = Fitted.at_start(CATALOGUE["coulomb_viscous"], {"Fc": 0.8, "Fs": 1.0})
-BRISTLES = Fitted.at_start(CATALOGUE["lugre"], {"Fc": 1.0, "Fs": 1.0, "sigma0": 1e4, "sigma1": 200})
 
 
 def pushed(
@@ -72,35 +71,3 @@ def test_a_force_above_static_friction_breaks_it_away(
     acceleration = (force - STICKING.values["Fc"]) / 2.0  # once it slides
     t = time(1.0)
     np.testing.assert_allclose(moved[:, 0], acceleration * t**2 / 2, rtol=0, atol=1e-12)
-
-
-def test_a_sliding_mass_stops_and_stays_where_coulomb_friction_stops_it() -> None:
-    """Pushed for 0.1 s, then let go: it slides until the energy is gone, v^2 / (2 Fc/m)."""
-    force = np.where(time(1.0) < 0.1, 3.0, 0.0)
-    moved = pushed((STICKING,), force)
-    coulomb = STICKING.values["Fc"]
-    speed = 0.1 * (3.0 - coulomb) / 2.0
-    travel = 0.1 * speed / 2.0 + speed**2 / (2.0 * coulomb / 2.0)
-    assert moved[-1, 0] == pytest.approx(travel, rel=1e-3)
-    at_rest = moved[np.flatnonzero(moved[:, 1] > 1e-12)[-1] + 2 :, 0]
-    assert len(at_rest) > 1000
-    assert np.ptp(at_rest) < 1e-15
-
-
-def test_bristles_yield_elastically_under_a_held_force() -> None:
-    """A force below breakaway moves the mass by -Fc/sigma0 ln(1 - F/Fc), where it stops."""
-    force = 0.3 - 0.3 * np.cos(np.pi * np.minimum(time(3.0), 1.0))  # one way, without overshoot
-    moved = pushed((BRISTLES,), force)
-    yielded = -1.0 / 1e4 * np.log1p(-0.6)
-    assert moved[-1, 0] == pytest.approx(yielded, rel=5e-3)
-    assert np.ptp(moved[20_000:, 0]) < 1e-9
-
-
-def test_bristles_drift_under_a_small_vibration_and_sticking_friction_does_not() -> None:
-    """LuGre forgets where it turned: below breakaway, a biased vibration walks the mass away."""
-    t = time(4.0)
-    force = 0.4 * np.minimum(t, 1.0) + 0.3 * np.sin(2.0 * np.pi * 10.0 * t)
-    drifting = pushed((BRISTLES,), force)[::1000, 0]  # once a period
-    drifts = np.diff(drifting[20:])
-    assert np.all(drifts > 1e-7)  # m a period, without end
-    assert np.abs(pushed((STICKING,), force)[:, 0]).max() < 1e-15

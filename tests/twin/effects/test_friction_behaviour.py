@@ -4,20 +4,15 @@ import numpy as np
 import pytest
 from effect_runs import CATALOGUE
 from friction_runs import (
-    ALL,
     FORGETFUL,
-    MEMORY,
     STATIC,
     STRIBECK,
     along,
     friction,
-    level,
     pushed,
     time,
 )
 
-from twin.effect import DRY, DT, HOLD, INDEX, IO_SIZE, OUT, VISCOUS, V
-from twin.effect import STATIC as STATIC_LEVEL
 from twin.laws.motion import Array
 from twin.model.machine import Fitted
 from twin.simulator import MujocoSimulator, ReducedSimulator
@@ -40,15 +35,6 @@ def test_a_static_model_does_not_creep_below_breakaway(
     np.testing.assert_allclose(held, share * 1.5, rtol=1e-12)
 
 
-def test_stribeck_slides_down_its_curve_and_sticks_again() -> None:
-    """Pushed above Fs, then let go: it stops, and stays where it stopped."""
-    x, v, _ = pushed([friction("stribeck")], np.where(time(0.6) < 0.2, 2.0, 0.0))
-    stopped = np.flatnonzero(v > 1e-12)[-1] + 2
-    assert 3000 < stopped < 5000
-    assert x[-1] > 1e-3
-    assert np.ptp(x[stopped:]) < 1e-15
-
-
 def test_stribeck_is_the_curve_of_modelicas_friction_example() -> None:
     """Modelica Standard Library, MassWithStopAndFriction, with the values of Examples.Friction.
 
@@ -59,20 +45,6 @@ def test_stribeck_is_the_curve_of_modelicas_friction_example() -> None:
     expected = 1.0 * v + 5.0 + 10.0 * np.exp(-2.0 * v)
     np.testing.assert_allclose(along(fitted, v, 1e-4), expected, rtol=1e-12)
     np.testing.assert_allclose(along(fitted, -v, 1e-4), -expected, rtol=1e-12)
-
-
-@pytest.mark.parametrize("name", STATIC)
-def test_friction_stops_the_mass_with_all_it_has(name: str) -> None:
-    """Level and viscosity together: what stops the axis within the sample is exactly what acts."""
-    fitted, io, state = friction(name), [0.0] * IO_SIZE, [0.0]
-    io[V], io[DT], io[INDEX] = 0.5, 1e-4, 7.0
-    io[DRY] = io[STATIC_LEVEL] = io[VISCOUS] = 1.0
-    for needed, acts, rests in ((1.1, 1.1, 1.0), (1.3, 1.2, 0.0)):  # Fc + sigma2 v = 1.2 N
-        io[HOLD] = needed
-        fitted.effect.law(fitted.vector(), state, io)
-        assert io[OUT] == pytest.approx(acts)
-        assert state[0] == rests
-        state[0] = 0.0
 
 
 def breakaway(name: str, rate: float) -> float:
@@ -89,61 +61,6 @@ def test_breakaway_force_falls_with_the_rate_of_force(name: str) -> None:
     assert 1.45 < found[0] < 1.5  # slowly: nearly Fs
     assert found[-1] < 0.9 * found[0]
     assert found[-1] > 0.99  # never below Fc
-
-
-@pytest.mark.parametrize(("name", "force"), [("coulomb_viscous", 1.5), ("stribeck", 1.5)])
-def test_breakaway_of_a_static_model_does_not_depend_on_the_rate(name: str, force: float) -> None:
-    for rate in (1.0, 50.0):
-        assert breakaway(name, rate) == pytest.approx(force, abs=rate * 1.1e-4)
-
-
-def test_dahl_has_no_static_friction() -> None:
-    assert breakaway("dahl", 1.0) == pytest.approx(1.0, abs=3e-3)  # with sigma2 v
-
-
-# --- frictional lag -------------------------------------------------------------------------------
-
-MEAN = 1.2e-3  # m/s, where the curve falls steeply
-
-
-def response(fitted: Fitted, omega: float) -> complex:
-    """Amplitude and phase of the friction over those of a small swing of the speed, N s/m."""
-    per_cycle, cycles, swing = 2000, 12, 1e-5
-    phase = 2.0 * np.pi * (np.arange(per_cycle * cycles) + 0.5) / per_cycle
-    dt = 2.0 * np.pi / omega / per_cycle
-    settle = np.full(200_000, MEAN)
-    force = along(fitted, np.r_[settle, MEAN + swing * np.sin(phase)], dt)[-4 * per_cycle :]
-    carrier = np.exp(-1j * phase[-4 * per_cycle :])
-    return complex(2j * np.mean(force * carrier) / swing)
-
-
-def corner(name: str) -> float:
-    """Rate at which each model follows the curve: its linearisation about steady sliding, rad/s."""
-    g = float(level(MEAN))
-    bristle = 1e5 * MEAN / g
-    return {
-        "gms": 30.0 / g,  # C/g
-        "lugre": bristle,  # sigma0 v/g
-        "leuven": 16.0 * bristle * np.exp(-1.5 * g / 1.5),  # m v dF_d/dz / g
-        "modified_leuven": 16.0 * bristle,  # m v sigma0/g
-    }[name]
-
-
-@pytest.mark.parametrize("ratio", [0.2, 1.0, 5.0])
-@pytest.mark.parametrize("name", STRIBECK)
-def test_friction_lags_the_stribeck_curve(name: str, ratio: float) -> None:
-    """A first-order lag: g'(v)/(1 + i omega/corner)."""
-    damped = {} if name == "gms" else {"sigma1": 1e-6}
-    found = response(friction(name, sigma2=0.0, **damped), ratio * corner(name))
-    slope = -2.0 * MEAN / 1e-3**2 * (level(MEAN) - 1.0)
-    wanted = slope / (1.0 + 1j * ratio)
-    assert abs(found - wanted) < 0.02 * abs(wanted)
-
-
-def test_static_friction_does_not_lag() -> None:
-    slope = -2.0 * MEAN / 1e-3**2 * (level(MEAN) - 1.0)
-    found = response(friction("stribeck", sigma2=0.0), 100.0)
-    assert abs(found - slope) < 1e-3 * abs(slope)
 
 
 # --- stick-slip -----------------------------------------------------------------------------------
@@ -179,19 +96,6 @@ def test_stick_slip_of_a_pulled_mass_has_the_period_of_the_closed_form() -> None
     assert np.ptp(stuck) < 1e-15
 
 
-@pytest.mark.parametrize("name", ["stribeck", *STRIBECK])
-def test_a_slowly_pulled_mass_sticks_and_slips_and_a_fast_one_slides(name: str) -> None:
-    """Steady sliding is unstable where g'(v) + sigma2 < 0."""
-    damped = friction(name, sigma2=4.0)
-    x, v = pulled(damped, 1000.0, 2e-3, 4.0)
-    starts = slips(v)
-    assert len(starts) >= 5
-    between = x[starts[-1] - 2000 : starts[-1] - 300]
-    assert np.ptp(between) < 0.05 * 2e-3 * np.mean(np.diff(starts)) * 1e-4  # of a slip
-    _, v = pulled(damped, 1000.0, 0.05, 4.0)
-    np.testing.assert_allclose(v[-5000:], 0.05, rtol=0.02)
-
-
 # --- drift ----------------------------------------------------------------------------------------
 
 
@@ -207,40 +111,3 @@ def drift(name: str) -> tuple[float, float]:
 def test_a_model_that_forgets_drifts_without_end(name: str) -> None:
     walked, swing = drift(name)
     assert walked > 0.5 * swing
-
-
-@pytest.mark.parametrize("name", MEMORY)
-def test_a_model_with_memory_does_not_drift(name: str) -> None:
-    """What is left of the drift falls as r^m in the Leuven models; GMS only settles."""
-    walked, swing = drift(name)
-    assert abs(walked) < 3e-4 * swing
-
-
-@pytest.mark.parametrize("name", STATIC)
-def test_a_static_model_does_not_move_at_all(name: str) -> None:
-    assert drift(name) == (0.0, 0.0)
-
-
-def test_the_creep_of_modified_leuven_falls_with_its_exponent() -> None:
-    """About twice the mean of r^m over the swing, r = F_h/g below one."""
-    t = time(6.0)
-    force = np.minimum(t, 1.0) * (0.5 + 0.45 * np.sin(2.0 * np.pi * 10.0 * t))
-    walked = []
-    for m in (2.0, 4.0, 8.0):
-        x, _, _ = pushed([friction("modified_leuven", m=m)], force)
-        walked.append((x[-1] - x[len(x) // 2]) / 30.0)
-    assert walked[0] > 4.0 * walked[1] > 16.0 * walked[2] > 0.0
-
-
-# --- MuJoCo ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_mujoco_and_the_reduced_model_agree(name: str) -> None:
-    t = time(0.5)
-    force = 1.6 * np.sin(2.0 * np.pi * 4.0 * t) + 0.5 * np.sin(2.0 * np.pi * 11.0 * t)
-    one, other = (
-        pushed([friction(name)], force, simulator=s) for s in (MujocoSimulator, ReducedSimulator)
-    )
-    for found, wanted in zip(one, other, strict=True):
-        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())

@@ -10,7 +10,7 @@ from twin.effect import ELEMENTS, Effect
 from twin.errors import InputError
 from twin.experiments.named import simulate
 from twin.model.file import load_model, save_model
-from twin.model.machine import Fitted, MachineModel
+from twin.model.machine import MachineModel
 from twin.model.parameters import free_parameters
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
@@ -29,10 +29,6 @@ def loaded(folder: Path, name: str, lines: str) -> MachineModel:
     path = folder / "stage.toml"
     path.write_text(FILE.format(name=name, lines=lines))
     return load_model(path, CATALOGUE)
-
-
-def test_two_models_have_elements() -> None:
-    assert len(SIZED) == 2
 
 
 @EVERY
@@ -76,17 +72,6 @@ def test_few_numbers_are_fitted_unless_asked(effect: Effect) -> None:
 def test_a_bad_number_of_elements_is_refused(effect: Effect, count: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"whole number of elements from 1 to 1000"):
         loaded(tmp_path, effect.name, f"elements = {count}")
-
-
-@EVERY
-def test_values_of_an_element_that_is_not_there_are_refused(effect: Effect, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no parameter 'share_4'"):
-        loaded(tmp_path, effect.name, "elements = 3\nshare_4 = 1.0")
-
-
-def test_other_effects_know_no_elements() -> None:
-    with pytest.raises(InputError, match="no parameter 'elements'"):
-        Fitted.at_start(CATALOGUE["lugre"], {ELEMENTS: 3})
 
 
 @EVERY

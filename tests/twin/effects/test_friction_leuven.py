@@ -1,20 +1,17 @@
 """The Leuven models against their equations solved by SciPy, and against LuGre."""
 
 import numpy as np
-import pytest
 from friction_runs import (
     ELEMENTS,
     PAPER,
     along,
-    at_turns,
     friction,
     level,
     rms,
     shares_and_springs,
     wavy,
 )
-from scipy.integrate import quad, solve_ivp
-from scipy.optimize import brentq
+from scipy.integrate import solve_ivp
 
 from twin.laws.motion import Array
 
@@ -110,40 +107,3 @@ def test_leuven_converges_to_its_published_equations() -> None:
     coarse, fine = error(1e-3), error(1e-3 / 3)
     assert fine < 1e-4
     assert coarse / fine > 6.0
-
-
-ELASTIC = {"elements": 1, "m": 1.0, "reserve": 10.0}  # one spring that never slips
-
-
-@pytest.mark.parametrize(
-    ("name", "values"), [("modified_leuven", ELASTIC), ("leuven", {"m": 1.0, "b": 0.0})]
-)
-def test_with_a_linear_spring_and_exponent_one_the_first_branch_is_lugre(
-    name: str, values: dict[str, float]
-) -> None:
-    dt = 1e-4
-    v = np.abs(wavy(dt * np.arange(4000)))  # no reversal
-    np.testing.assert_allclose(
-        along(friction(name, **values), v, dt), along(friction("lugre"), v, dt), rtol=1e-9
-    )
-
-
-def test_with_a_linear_spring_and_exponent_one_modified_leuven_is_lugre() -> None:
-    dt = 1e-4
-    v = wavy(dt * np.arange(10_000))
-    np.testing.assert_allclose(
-        along(friction("modified_leuven", **ELASTIC), v, dt), along(friction("lugre"), v, dt),
-        rtol=0, atol=1e-9,
-    )  # fmt: skip
-
-
-def test_leuvens_first_branch_is_the_integral_of_its_stiffness() -> None:
-    p = {"Fc": 1.5, "b": 2.0, "m": 16.0}
-    x = 1.3e-5
-
-    def per_newton(f: float) -> float:
-        softened = 1e5 * np.exp(-p["b"] * f / 1.5)
-        return 1.0 / softened / (1.0 - (f / 1.5) ** p["m"])
-
-    wanted = brentq(lambda f: quad(per_newton, 0.0, f)[0] - x, 0.1, 1.49)
-    assert at_turns(friction("leuven", **p), (x,))[0] == pytest.approx(wanted, rel=1e-5)

@@ -1,50 +1,26 @@
 """Frictions against closed forms, SciPy's solvers and MuJoCo's plastic springs."""
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import mujoco
 import numpy as np
 import pytest
 from friction_runs import (
-    ALL,
     ELEMENTS,
-    MEMORY,
-    PAPER,
-    STRIBECK,
     along,
     at_turns,
-    dragged,
     error_of,
     friction,
-    level,
     reversals,
     shares_and_springs,
     travelled,
     wavy,
 )
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from twin.laws.motion import Array
 
 # --- Dahl -----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("dt", [1e-5, 1e-3])
-@pytest.mark.parametrize("n", [0.0, 0.5, 1.0, 1.5, 3.0])
-def test_dahl_builds_up_as_its_equation_integrates(n: float, dt: float) -> None:
-    """From rest: |r|^(1-n) = 1 - (1-n) sigma0 x/Fc; exact at every step size."""
-    leg = round(0.3 / dt)
-    _, force = dragged(friction("dahl", n=n, Fc=1.0, sigma2=0.0), (3e-5,), 1e-4, leg)
-    ends = (np.arange(1, leg + 1)) * 3e-5 / leg
-    travel = PAPER["sigma0"] * ends
-    if n == 1.0:
-        left = np.exp(-travel)
-    else:
-        left = np.maximum(1.0 - (1.0 - n) * travel, 0.0) ** (1.0 / (1.0 - n))
-    middle = 1.0 - 0.5 * (left + np.r_[1.0, left[:-1]])
-    np.testing.assert_allclose(force[:leg], middle, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("n", [1.0, 2.0])
@@ -72,20 +48,6 @@ def test_dahl_agrees_with_a_stiff_solver(n: float) -> None:
     errors = [error_of(friction("dahl", **p), wanted, dt) for dt in (1e-3, 5e-4, 2.5e-4)]
     assert errors[-1] < 3e-4
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.35)
-
-
-# --- Stribeck curve -------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("speed", [1e-4, -5e-4, 1e-3, 3e-3, -0.05])
-@pytest.mark.parametrize("name", ALL)
-def test_steady_sliding_is_on_the_curve(name: str, speed: float) -> None:
-    """Far from the last reversal: g(v) sgn v + sigma2 v, with g = Fc where there is no Stribeck."""
-    slides = level(speed) if name in ("stribeck", *STRIBECK) else 1.0
-    v = np.full(4000, speed)
-    settle = max(2e-3 / abs(speed), 2.0)  # 200 pre-sliding lengths, 50 times g/C
-    force = along(friction(name), v, settle / len(v))[-1]
-    assert force == pytest.approx(slides * np.sign(speed) + 0.4 * speed, rel=1e-6)
 
 
 # --- generalized Maxwell-slip ---------------------------------------------------------------------
@@ -122,69 +84,6 @@ def test_gms_with_a_constant_level_is_mujocos_bundle_of_plastic_springs(dt: floa
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-9)
 
 
-def slipping(a: float, k: float, C: float, duration: float) -> Callable[[Array], Array]:
-    """One GMS element on the wavy velocity, N at times s: stick in closed form, slip by SciPy."""
-    spans: list[tuple[float, Callable[[Array], Array]]] = []
-    force = 0.0
-    instants = [0.0, *reversals(duration), duration]
-    for begin, end in pairwise(instants):
-        way = np.sign(wavy(0.5 * (begin + end)))
-
-        def stuck(t: Array, begin: float = begin, force: float = force) -> Array:
-            return force + k * (travelled(t) - travelled(begin))
-
-        def short(t: float, stuck: Callable = stuck, way: float = way) -> float:
-            return a * level(wavy(t)) - way * stuck(t)
-
-        spans.append((begin, stuck))
-        force = stuck(end)
-        grid = np.linspace(begin, end, 500)
-        out = np.flatnonzero([short(t) <= 0.0 for t in grid])
-        if len(out):
-            first = brentq(short, grid[out[0] - 1], grid[out[0]], xtol=1e-15)
-
-            def rate(t: float, f: Array, way: float = way) -> float:
-                return way * min(C * (a - way * f[0] / level(wavy(t))), k * abs(wavy(t)))
-
-            solved = solve_ivp(
-                rate, (first, end), [stuck(first)], method="LSODA", rtol=1e-11, atol=1e-13,
-                dense_output=True,
-            )  # fmt: skip
-            spans.append((first, lambda t, solved=solved: solved.sol(t)[0]))
-            force = solved.y[0, -1]
-
-    def at(t: Array) -> Array:
-        starts = [begin for begin, _ in spans]
-        where = np.searchsorted(starts, t, side="right") - 1
-        return np.array([spans[i][1](one) for i, one in zip(where, t, strict=True)])
-
-    return at
-
-
-def test_gms_converges_to_its_equations() -> None:
-    shares, springs = shares_and_springs(5, 40.0, 1e5)
-    parts = [slipping(a, k, 20.0, 1.0) for a, k in zip(shares, springs, strict=True)]
-
-    def wanted(t: Array) -> Array:
-        return sum(part(t) for part in parts) + 0.4 * wavy(t)
-
-    errors = [error_of(friction("gms", **ELEMENTS, C=20.0), wanted, dt) for dt in (1e-3, 1e-4)]
-    assert errors[1] < 1e-4
-    assert errors[0] / errors[1] > 8.0
-
-
-def test_many_gms_elements_tend_to_the_logarithmic_curve() -> None:
-    """They yield evenly in log z from z1 to zN = S z1: F/g = (ln(z/z1) + 1 - z/zN)/ln S."""
-    spread, count = 100.0, 400
-    z1 = (1.0 - 1.0 / spread) / np.log(spread) / 1e5  # stiffness sum a_i g/z_i = 1e5 N/m
-    x = z1 * np.array([0.5, 2.0, 10.0, 50.0, 200.0])
-    inside = np.clip(x / z1, 1.0, spread)
-    elastic = np.clip(x / z1, None, spread) / inside  # below z1 all elements stick
-    curve = (np.log(inside) + 1.0 - inside / spread) / np.log(spread) * elastic
-    many = friction("gms", elements=count, spread=spread, Fc=1.0, Fs=1.0)
-    np.testing.assert_allclose(at_turns(many, x), curve, atol=4e-3)
-
-
 @pytest.mark.parametrize("name", ["gms", "modified_leuven"])
 def test_elements_given_one_by_one(name: str) -> None:
     """Published a_i and k_i: with spread 1, share_i = a_i and stiff_i = k_i."""
@@ -198,11 +97,3 @@ def test_elements_given_one_by_one(name: str) -> None:
     x = np.array([5e-6, 1.2e-5, 1.5e-5])
     wanted = np.minimum(np.outer(x, k), 1.5 * a).sum(axis=1)
     np.testing.assert_allclose(at_turns(given, x), wanted, rtol=2e-4)
-
-
-@pytest.mark.parametrize("name", [*MEMORY, "dahl", "lugre"])
-def test_presliding_does_not_depend_on_the_speed_where_the_curve_is_flat(name: str) -> None:
-    turns = (2e-5, -1e-5, 1.5e-5)
-    flat = friction(name, Fc=1.0, **({} if name == "dahl" else {"Fs": 1.0}))
-    slow, fast = (at_turns(flat, turns, speed=speed) for speed in (1e-5, 1e-3))
-    np.testing.assert_allclose(fast, slow, rtol=1e-9, atol=1e-9)

@@ -32,10 +32,6 @@ def test_only_a_friction_holds_an_axis_at_rest(effect: Effect) -> None:
     assert not effect.several or effect.numbered(2).name == f"{effect.name}_2"
 
 
-def test_some_friction_holds_an_axis_at_rest() -> None:
-    assert any(e.sticks for e in CATALOGUE.values())
-
-
 # --- bounds ---------------------------------------------------------------------------------------
 
 

@@ -152,21 +152,6 @@ def test_a_start_that_the_log_shows_is_that_of_the_log(effect: Effect, p: Parame
     assert replace(p, start_rule=None).start_from(LOG) == p.start
 
 
-def test_memories_of_a_reversal_are_short_beside_the_travel() -> None:
-    """The short one of both descriptions is one, a thousandth; the long one is 50 times that."""
-    short, other = (
-        CATALOGUE[e].parameter(n).start_rule(LOG) / LOG.travel
-        for e, n in (("empirical_map", "turn"), ("learned_residual", "reach1"))
-    )
-    assert short == other == pytest.approx(1e-3)
-    long = CATALOGUE["learned_residual"].parameter("reach2").start_rule(LOG)
-    assert long == pytest.approx(0.05 * LOG.travel)
-
-
-def test_a_description_without_lines_repeats_once_a_second() -> None:
-    assert CATALOGUE["empirical_map"].parameter("T").start_rule(replace(LOG, lines=())) == 1.0
-
-
 # --- scans with laws of their own -----------------------------------------------------------------
 
 
@@ -186,40 +171,6 @@ def test_pitches_are_half_a_cycle_apart_from_three_cycles_on(
     assert halves[-1] / 2.0 == pytest.approx(most, abs=0.01)
 
 
-@pytest.mark.parametrize("period", [1e-4, 2e-3, 0.05])
-def test_frequencies_of_a_mode_are_eighths_up_to_a_quarter_of_the_rate(period: float) -> None:
-    tried = scan("flexible_mode", "frequency", replace(LOG, period=period))
-    np.testing.assert_allclose(tried[1:] / tried[:-1], 1.125)
-    highest = np.clip(0.25 / period, 20.0, 400.0)
-    assert tried[0] == 10.0
-    assert tried[-1] <= highest < 1.125 * tried[-1]
-
-
-@pytest.mark.parametrize("duration", [0.05, 0.5, 4.0, 100.0])
-def test_frequencies_of_a_base_are_fifths_from_what_the_log_resolves(duration: float) -> None:
-    tried = scan("base_vibration", "frequency", replace(LOG, duration=duration))
-    assert tried[0] == max(2.0 / duration, 0.3)
-    np.testing.assert_allclose(tried[1:] / tried[:-1], 1.2)
-    if len(tried) > 1:
-        assert tried[-1] <= 20.0 / 1.2 * (1.0 + 1e-12) < 1.2 * tried[-1]
-    else:
-        assert tried[0] >= 20.0 / 1.2**2
-
-
-def test_periods_of_an_encoder_are_those_of_scales_and_those_seen() -> None:
-    scales = set(scan("encoder_ripple", "period", replace(LOG, ripples=())))
-    assert set(scan("encoder_ripple", "period")) == scales | set(LOG.ripples)
-    assert scan("encoder_ripple", "period")[-2:].tolist() == list(LOG.ripples)
-    digits = {f"{s:.1e}"[:3] for s in scales}
-    assert digits <= {"1.0", "1.6", "2.0", "4.0", "5.0", "8.0"}, "not periods of common scales"
-
-
-def test_reaches_of_a_hysteresis_are_half_decades_within_the_travel() -> None:
-    tried = scan("cable_hysteresis", "reach")
-    assert tried.max() < 0.2 * LOG.travel, "a reach that the motion passes several times"
-    np.testing.assert_allclose(np.diff(np.log10(tried)), 0.5, atol=0.03)
-
-
 def test_stops_are_tried_from_both_ends_alike_and_not_beyond_the_middle() -> None:
     low, high = scan("end_stop", "low"), scan("end_stop", "high")
     np.testing.assert_allclose(low - LOG.position_low, LOG.position_high - high)
@@ -234,14 +185,6 @@ def test_lines_of_the_log_are_tried_and_a_ladder_where_there_are_none() -> None:
     np.testing.assert_allclose(ladder[1:] / ladder[:-1], 1.1)
     assert ladder[0] == 0.5
     assert ladder[-1] > 50.0
-
-
-def test_rollers_are_tried_all_round_one_pitch() -> None:
-    effect = CATALOGUE["roller_spikes"]
-    phases = scan("roller_spikes", "phase")
-    pitch = effect.parameter("pitch").start_from(LOG)
-    np.testing.assert_allclose(phases, np.arange(len(phases)) * pitch / len(phases))
-    assert np.diff(phases).max() < scan("roller_spikes", "width").min(), "a bump between two tries"
 
 
 @pytest.mark.parametrize("k", [1, 2, 3])

@@ -105,18 +105,6 @@ def stiff_solution(p: Lugre, times: Array) -> Array:
 
 
 @SETS
-def test_simulation_converges_to_the_stiff_solver_on_a_given_velocity(p: Lugre) -> None:
-    times = np.arange(1000) * 1e-3
-    wanted = stiff_solution(p, times)
-
-    def error(dt: float) -> float:
-        every = round(1e-3 / dt)
-        return rms(simulated(p, wavy(dt * np.arange(1000 * every)), dt)[0][::every] - wanted)
-
-    require_first_order(error, 5e-4, halvings=2)
-
-
-@SETS
 def test_force_along_a_measured_motion_converges_with_the_square_of_the_step(p: Lugre) -> None:
     times = np.arange(1000) * 1e-3
     wanted = stiff_solution(p, times)
@@ -220,68 +208,3 @@ def test_agrees_with_mujocos_lugre_on_a_given_velocity(p: Lugre) -> None:
         return rms(force - theirs)
 
     require_first_order(difference, 4e-4, halvings=2)
-
-
-@pytest.mark.parametrize(
-    ("p", "spring", "speed", "duration"), [(STAGE, 5.0, 0.005, 3.0), (STIFF, 30.0, 0.05, 3.0)],
-    ids=["stage", "stiff"],
-)  # fmt: skip
-def test_agrees_with_mujocos_lugre_on_a_spring_pulled_mass(
-    p: Lugre, spring: float, speed: float, duration: float
-) -> None:
-    def difference(dt: float) -> float:
-        model = mujoco_lugre(p, dt, spring=spring)
-        data = mujoco.MjData(model)
-        theirs = np.empty(round(duration / dt))
-        for k in range(len(theirs)):
-            theirs[k] = data.qpos[0] - 0.5 * dt * data.qvel[0]  # as the twin logs it
-            data.actuator("pull").ctrl = spring * speed * k * dt
-            mujoco.mj_step(model, data)
-        return rms(pulled(p, 1.0, spring, speed, duration, dt, MujocoSimulator)[:, 0] - theirs)
-
-    require_first_order(difference, 4e-4, halvings=2)
-
-
-@SETS
-@pytest.mark.parametrize("speed", [1e-4, -1e-3, 0.01, -0.3])
-def test_steady_sliding_is_on_the_stribeck_curve(p: Lugre, speed: float) -> None:
-    settled = 40.0 * p["Fs"] / p["sigma0"] / abs(speed)  # s; 40 bristle deflections of travel
-    v, dt = np.full(2000, speed), settled / 2000
-    wanted = level(p, speed) * np.sign(speed) + p["sigma2"] * speed
-    force, deflection = simulated(p, v, dt)
-    assert force[-1] == pytest.approx(wanted, rel=1e-12)
-    assert measured(p, v, dt)[-1] == pytest.approx(wanted, rel=1e-12)
-    assert deflection[-1] == pytest.approx(level(p, speed) * np.sign(speed) / p["sigma0"])
-
-
-@pytest.mark.parametrize("dt", [1e-5, 1e-3])
-@pytest.mark.parametrize("speed", [1e-4, 0.02])
-def test_presliding_at_constant_speed_is_an_exponential_at_any_step(
-    dt: float, speed: float
-) -> None:
-    p = {**STAGE, "Fs": STAGE["Fc"]}
-    t, v = dt * np.arange(1, 2001), np.full(2000, speed)
-    force, deflection = simulated(p, v, dt)
-    rate = p["sigma0"] * speed / p["Fc"]
-    exact = -p["Fc"] / p["sigma0"] * np.expm1(-rate * t)
-    np.testing.assert_allclose(deflection, exact, rtol=1e-11)
-    mean_rate = np.diff(exact, prepend=0.0) / dt  # of the bristle over the sample
-    wanted = p["sigma0"] * exact + p["sigma1"] * mean_rate + p["sigma2"] * speed
-    np.testing.assert_allclose(force, wanted, rtol=1e-9)
-
-
-def test_without_stribeck_and_damping_it_is_dahls_hysteresis() -> None:
-    """dF/dx = sigma0 (1 - F/Fc sgn v): the loop depends on the path, not on the speed along it."""
-    p = {"Fc": 0.3, "Fs": 0.3, "v0": 0.01, "sigma2": 0.0, "sigma0": 260.0, "sigma1": 1e-6, "n": 2.0}
-    out, back, n = 2e-3, 3e-3, 4000  # m, m, samples each way
-    x = np.concatenate([np.arange(1, n + 1) * out / n, out - np.arange(1, n + 1) * back / n])
-    turned = -p["Fc"] * np.expm1(-p["sigma0"] * out / p["Fc"])
-    wanted = np.concatenate(
-        [
-            -p["Fc"] * np.expm1(-p["sigma0"] * x[:n] / p["Fc"]),
-            -p["Fc"] + (p["Fc"] + turned) * np.exp(-p["sigma0"] * (out - x[n:]) / p["Fc"]),
-        ]
-    )
-    for dt in (1e-4, 1e-3):
-        force, _ = simulated(p, np.diff(x, prepend=0.0) / dt, dt)
-        np.testing.assert_allclose(force, wanted, rtol=0, atol=1e-7)

@@ -1,13 +1,11 @@
 """Mistakes in a user's own effect: exit code 2, one line that says what to try, no traceback."""
 
 import re
-import sys
 from pathlib import Path
 
 import pytest
 from cli_runs import twin
 
-from identify.cli import main
 from twin.effects import load_catalogue
 from twin.errors import InputError
 
@@ -46,7 +44,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_mistake_is_said_in_one_line(
-    fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+    fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     good, bad, message = FAULTS[fault]
     text = SOURCE.read_text(encoding="utf-8")
@@ -59,28 +57,18 @@ def test_a_mistake_is_said_in_one_line(
     path.write_text(text, encoding="utf-8")
     if fault.startswith("loop"):
         monkeypatch.setattr("twin.effects.LONGEST_TRIAL", 0.5)
-    monkeypatch.setattr(sys, "argv", ["twin", "effects", "bad", "--effects", str(path)])
-    with pytest.raises(SystemExit) as stopped:
-        main()
-    told = capsys.readouterr()
-    assert stopped.value.code == 2
-    assert told.out == ""
-    assert told.err.count("\n") == 1, told.err
-    assert re.search(message.replace("[", r"\["), told.err), told.err
-    assert "bad" in told.err
-    assert "Traceback" not in told.err
-    assert told.err.count(str(path)) <= 1
+    done = twin("effects", "bad", "--effects", path, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    (told,) = done.stderr.splitlines()
+    assert re.search(message.replace("[", r"\["), told), told
+    assert "bad" in told
+    assert told.count(str(path)) <= 1
 
 
-def test_the_example_itself_is_sound(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
-) -> None:
-    command = ["twin", "effects", SOURCE.stem, "--effects", str(SOURCE)]
-    monkeypatch.setattr(sys, "argv", command)
-    with pytest.raises(SystemExit) as stopped:
-        main()
-    assert stopped.value.code in (0, None)
-    assert "magnetic detent" in capsys.readouterr().out
+def test_the_example_itself_is_sound() -> None:
+    done = twin("effects", SOURCE.stem, "--effects", SOURCE, folder=Path.cwd())
+    assert done.returncode == 0
+    assert "magnetic detent" in done.stdout
 
 
 def test_the_name_of_another_effect_is_refused(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 Times, speeds, spans and forces are read off the setpoint by counting samples.
 """
 
-import math
 from dataclasses import fields, replace
 
 import numpy as np
@@ -14,15 +13,10 @@ from twin.experiments.experiment import _require, gentle, machine_limits
 from twin.experiments.kinds import (
     KINDS,
     Moves,
-    OpenLoopSine,
     Passes,
     Rests,
-    Reversals,
-    Staircase,
     Steps,
     Sweep,
-    Tracking,
-    kind_of,
 )
 from twin.experiments.named import EXPERIMENTS, MAP_SPEEDS, find_experiment
 from twin.experiments.trajectory import Setpoint
@@ -41,33 +35,7 @@ def made(experiment, seed: int = 0) -> Setpoint:
     return experiment.setpoint(STAGE, np.random.default_rng(seed))
 
 
-def lasting(setpoint: Setpoint, axis: int, speed: float) -> float:
-    """Time at that speed, s."""
-    at = np.isclose(setpoint.velocity[:, axis], speed, rtol=1e-9, atol=0)
-    return np.count_nonzero(at) / setpoint.sample_rate
-
-
-def rested(speed: float, a: float, j: float) -> float:
-    """Time to a speed by a trapezoid of acceleration, whose area is the speed."""
-    peak = min(a, math.sqrt(speed * j))
-    return peak / j + speed / peak
-
-
 # --- experiments ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("axis", "index"), [("x", 0), ("y", 1)])
-def test_passes_run_on_their_axis_about_their_place(axis: str, index: int) -> None:
-    found = made(Passes(axis, span=0.08, speed=0.05, repeats=3, dwell=0.07, at=(0.04, 0.03)))
-    x = found.position[:, index]
-    assert (x.min() + x.max()) / 2.0 == pytest.approx((0.04, 0.03)[index])
-    assert np.ptp(x) == pytest.approx(0.08)
-    ramps = 0.05 * rested(0.05, (4.0, 3.0)[index], (300.0, 150.0)[index])
-    for way in (0.05, -0.05):
-        assert lasting(found, index, way) == pytest.approx(3 * (0.08 - ramps) / 0.05, abs=4 / RATE)
-    assert np.all(found.position[:, 1 - index] == (0.04, 0.03)[1 - index])
-    still = np.mean(found.velocity[:, index] == 0.0) * found.duration
-    assert still == pytest.approx(7 * 0.07, abs=14 / RATE)
 
 
 def test_an_experiment_without_a_place_is_in_the_middle_and_gentle_by_its_effort() -> None:
@@ -144,48 +112,6 @@ def test_a_sweep_rises_from_its_lowest_to_its_highest_frequency() -> None:
     for low, high in ((80.0, 80.0), (4.0, 0.5 * RATE)):
         with pytest.raises(InputError, match="highest"):
             made(replace(sweep, amplitude=1e-6, lowest=low, highest=high))
-
-
-@pytest.mark.parametrize(
-    ("highest", "effort"), [(3.0, 0.5), (80.0, 0.5), (80.0, 0.2), (1e-3, 0.01)]
-)
-def test_the_force_of_a_sweep_leaves_the_moves_their_part(highest: float, effort: float) -> None:
-    """Of the acceleration and the jerk; and half of the drive's force."""
-    sweep = Sweep("x", 0.1, 0.05, 2, amplitude=0.4, lowest=1e-4, highest=highest, effort=effort)
-    most = sweep.most_force(STAGE.axes["x"])
-    acceleration, jerk = most / 3.0, 2.0 * np.pi * highest * most / 3.0
-    used = (acceleration / 4.0, jerk / 300.0)
-    assert max(*used, most / 15.0 * (1.0 - effort)) == pytest.approx(1.0 - effort)
-    weak = replace(STAGE.axes["x"], hardware=replace(X, force_limit=0.1))
-    assert sweep.most_force(weak) == pytest.approx(0.05)
-
-
-def test_random_places_lie_within_the_travel_less_a_fiftieth() -> None:
-    found = made(Moves(count=300, dwell=0.0), seed=3)
-    for index, (low, high) in enumerate((X.travel, Y.travel)):
-        at, edge = found.position[:, index], 0.02 * (high - low)
-        assert low + edge <= at.min() < low + 3.0 * edge
-        assert high - 3.0 * edge < at.max() <= high - edge
-
-
-KINDS_HERE = (
-    *(Tracking(1.0), Moves(count=2), Passes("x", 0.1, 0.05, 1), Staircase("x", (0.01,), 0.02)),
-    *(Reversals("x", 1), OpenLoopSine("x", 1.0), Steps("x", 0.1, 0.05, (1.0,))),
-    *(Rests("x", 0.1, 0.05, (0.1,)), Sweep("x", 0.1, 0.05, 1, 0.1, 1.0, 9.0)),
-)
-
-
-def test_every_kind_has_one_name_and_one_summary() -> None:
-    assert [kind_of(e) for e in KINDS_HERE] == list(KINDS)
-    assert all(type(e) is KINDS[kind_of(e)] for e in KINDS_HERE)
-    assert len({kind.summary for kind in KINDS.values()}) == len(KINDS)
-    assert {k for k, kind in KINDS.items() if not kind.closed_loop} == {"open_loop_sine"}
-    with pytest.raises(InputError):
-        Moves(count=0)
-    with pytest.raises(InputError):
-        Tracking(0.0)
-    with pytest.raises(InputError):
-        Rests("x", 0.1, 0.05, ())
 
 
 UNITS = {"m", "s", "m/s", "N", "Hz", "1", ""}

@@ -10,8 +10,7 @@ import pytest
 from constructed import CATALOGUE, effect
 
 from twin import simulator
-from twin.experiments import follow as module
-from twin.experiments.follow import follow, follow_parts
+from twin.experiments.follow import follow
 from twin.experiments.trajectory import Setpoint
 from twin.log import LINEAR_UNITS, ROTARY_UNITS
 from twin.model.file import parse_model
@@ -91,20 +90,6 @@ def test_the_noise_of_a_current_is_its_own_and_rides_on_the_force():
         np.testing.assert_allclose(columns["force"], 13.0 * columns["current"])
     assert abs(np.corrcoef(*added)[0, 1]) < 0.25
     np.testing.assert_array_equal(log.axes["x"].position, still.axes["x"].position)
-
-
-def test_parts_are_the_whole_with_the_noise_of_every_current(monkeypatch):
-    model = model_of(replace(QUIET, current_noise=0.02, encoder_noise=1e-6))
-    monkeypatch.setattr(module, "DRAWN", 70)
-    given = {"name": "n", "seed": 0, "simulator": ReducedSimulator}
-    whole = follow(model, setpoint(), noise(), **given)
-    monkeypatch.setattr(simulator, "CHUNK", 100)
-    parts = list(follow_parts(model, setpoint(), noise(), **given))
-    assert [len(p) for p in parts] == [100, 100, 50]
-    for axis, log in whole.axes.items():
-        for name, column in log.columns.items():
-            joined = np.concatenate([p.axes[axis].columns[name] for p in parts])
-            np.testing.assert_array_equal(joined, column, err_msg=name)
 
 
 @pytest.mark.parametrize(("rotary", "units"), [(False, LINEAR_UNITS), (True, ROTARY_UNITS)])

@@ -5,7 +5,6 @@ doubled it is the same path at half the speed.
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ from twin.experiments.trajectory import (
     open_loop_sine,
     point_to_point,
 )
-from twin.experiments.trajectory.limits import inside_travel, require_plateau
+from twin.experiments.trajectory.limits import require_plateau
 from twin.experiments.trajectory.random_tracking import random_tracking
 from twin.experiments.trajectory.setpoint import require_length
 from twin.model.machine import AxisModel, Hardware, MachineModel
@@ -41,16 +40,6 @@ def rested(speed: float, a: float, j: float) -> float:
     return peak / j + speed / peak
 
 
-@pytest.mark.parametrize("speed", [1e-3, 0.05, 0.0533, 0.0534, 0.29])
-def test_a_ramp_takes_the_time_of_its_acceleration(speed: float) -> None:
-    limit = LIMITS[0]
-    assert limit.ramp_time(speed) == pytest.approx(rested(speed, 4.0, 300.0), rel=1e-12)
-    wide = replace(limit, travel=(-9.0, 9.0), velocity=speed)
-    way = point_to_point([wide], [[0.0], [4.0 * speed]], dwell=0.0, sample_rate=1e5)
-    first = np.argmax(way.velocity[:, 0] >= speed * (1.0 - 1e-9))
-    assert first / 1e5 == pytest.approx(limit.ramp_time(speed), abs=3e-5)
-
-
 @pytest.mark.parametrize("distance", [1e-4, 3e-3, 0.0142, 0.05, 0.2, 9.0])
 def test_the_fastest_plateau_is_just_allowed(distance: float) -> None:
     limit = LIMITS[0]
@@ -60,18 +49,6 @@ def test_the_fastest_plateau_is_just_allowed(distance: float) -> None:
         assert 2.0 * speed * rested(speed, 4.0, 300.0) == pytest.approx(distance, rel=1e-9)
     with pytest.raises(InputError):
         require_plateau(LIMITS, 0, 1.0001 * speed, distance)
-
-
-@pytest.mark.parametrize(
-    ("x", "wanted"), [(-0.11 - 9e-10, -0.11), (0.17 + 9e-10, 0.17), (0.1, 0.1)]
-)
-def test_what_lies_outside_by_rounding_is_put_on_the_end(x: float, wanted: float) -> None:
-    assert inside_travel(LIMITS, np.array([x, 0.0]))[0] == wanted
-    for beyond in (-0.11 - 1.1e-9, 0.17 + 1.1e-9):
-        with pytest.raises(InputError, match="axis x"):
-            inside_travel(LIMITS, np.array([beyond, 0.0]))
-        with pytest.raises(InputError, match="axis y"):
-            inside_travel(LIMITS[::-1], np.array([0.0, beyond]))
 
 
 # --- units ----------------------------------------------------------------------------------------

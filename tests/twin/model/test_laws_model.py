@@ -9,7 +9,7 @@ from twin.effect import Effect, Kind, Parameter
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.model.history import HistoryStep
-from twin.model.machine import MASS, AxisModel, Fitted, Hardware, MachineModel
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.parameters import free_parameters, read, write
 
 CATALOGUE = load_catalogue()
@@ -80,18 +80,6 @@ def test_what_is_no_finite_number_is_refused(value):
         Fitted.at_start(PAIR, {"low": value})
 
 
-def test_an_unknown_parameter_is_answered_with_those_there_are():
-    with pytest.raises(InputError, match=r"'pair' has no parameter 'Low'; it has low, high, held,"):
-        Fitted.at_start(PAIR, {"Low": 2.0})
-
-
-def test_values_not_given_are_start_values_in_the_effects_order():
-    fitted = Fitted.at_start(PAIR, {"held": 6.5, "low": 1.5})
-    assert fitted.vector() == [1.5, 4.0, 6.5, 3.0]
-    assert fitted.fixed == {"held"}
-    assert Fitted.at_start(PAIR).vector() == [2.0, 4.0, 5.0, 3.0]
-
-
 SIZED = next(n for n in CATALOGUE if CATALOGUE[n].of_size is not None)
 
 
@@ -109,13 +97,6 @@ def test_a_count_of_elements_is_whole_and_from_one_to_a_thousand(count):
         Fitted.at_start(CATALOGUE[SIZED], {"elements": count})
 
 
-def test_the_most_elements_are_allowed_and_one_more_is_not(monkeypatch):
-    monkeypatch.setattr("twin.model.machine.MOST_ELEMENTS", 3)
-    assert Fitted.at_start(CATALOGUE[SIZED], {"elements": 3}).values["elements"] == 3
-    with pytest.raises(InputError, match="from 1 to 3"):
-        Fitted.at_start(CATALOGUE[SIZED], {"elements": 4})
-
-
 @pytest.mark.parametrize("mass", [-5e-324, -1.0, math.nan, math.inf])
 def test_a_mass_is_finite_and_not_below_zero(mass):
     with pytest.raises(InputError, match="must be a positive number of kg"):
@@ -124,17 +105,6 @@ def test_a_mass_is_finite_and_not_below_zero(mass):
 
 
 # Effects of an axis
-
-
-def test_an_effect_is_added_behind_the_others_or_exchanged():
-    first = AxisModel(2.0).with_effect(Fitted.at_start(PAIR)).with_effect(Fitted.at_start(SPRING))
-    assert first.names == ("pair", "spring")
-    again = first.with_effect(Fitted.at_start(PAIR, {"low": 7.5}))
-    assert again.names == ("spring", "pair")
-    assert again["pair"].values["low"] == 7.5
-    assert again["spring"] is first["spring"]
-    assert (again.mass, again.hardware, again.mass_fixed) == (2.0, first.hardware, False)
-    assert first["pair"].values["low"] == 2.0
 
 
 def test_a_friction_takes_the_place_of_the_friction_that_was_there_and_of_nothing_else():
@@ -160,15 +130,6 @@ def test_without_takes_away_one_effect_and_undoes_with_effect(name):
 # Coordinates
 
 
-def test_coordinates_are_the_mass_and_what_is_free_in_order():
-    assert [c.label for c in free_parameters(axis())] == [
-        "mass", "pair.low", "pair.high", "slide.Fc", "spring.k", "spring.x0",
-    ]  # fmt: skip
-    assert free_parameters(axis())[0].parameter is MASS
-    held = AxisModel(6.25, effects=axis().effects, mass_fixed=True)
-    assert next(c.label for c in free_parameters(held)) == "pair.low"
-
-
 def test_reading_is_the_inverse_of_writing_in_any_order():
     rng = np.random.default_rng(3)
     where = free_parameters(axis())
@@ -185,20 +146,6 @@ def test_reading_is_the_inverse_of_writing_in_any_order():
     np.testing.assert_array_equal(read(axis(), where), [6.25, 2.0, 4.0, 1.5, 11.0, -0.25])
     same = write(axis(), where, read(axis(), where))
     assert same == axis()
-
-
-def test_writing_some_coordinates_leaves_the_others():
-    where = free_parameters(axis())
-    for k, c in enumerate(where):
-        start = read(axis(), where)
-        value = 0.5 * start[k] + 0.6 * (start[k] + 1.0)
-        if c.label == "pair.low":
-            value = 3.75
-        changed = read(write(axis(), [c], [value]), where)
-        start[k] = value
-        np.testing.assert_array_equal(changed, start)
-    with pytest.raises(ValueError, match=r"shorter|longer"):
-        write(axis(), where, [1.0])
 
 
 @pytest.mark.parametrize(

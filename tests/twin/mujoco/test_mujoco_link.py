@@ -1,8 +1,7 @@
 """The link to MuJoCo: what it must never disturb, and what it must survive."""
 
-import copy
 import ctypes
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache
 
 import mujoco
@@ -10,13 +9,11 @@ import numpy as np
 import pytest
 from effect_runs import CATALOGUE, with_all
 from mujoco.batch import Batch
-from mujoco.rollout import rollout
 
 from twin.experiments.named import simulate
 from twin.laws.motion import Array
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
-from twin.mujoco import callback as mujoco_link
 from twin.mujoco.callback import Offsets, offsets, passive_callback
 from twin.simulator import MujocoSimulator
 
@@ -96,17 +93,6 @@ def test_looking_at_the_forces_does_not_change_what_follows(looks: int) -> None:
             np.testing.assert_array_equal(after, step(undisturbed, begin, begin + 50))
 
 
-def test_the_two_halves_of_a_step_are_a_step() -> None:
-    with passive_callback():
-        whole, halves = (fresh() for _ in range(2))
-        wanted = step(whole, 0, 200)
-        for u, after in zip(controls(0, 200), wanted, strict=True):
-            halves.data.ctrl[:] = u
-            mujoco.mj_step1(halves.model, halves.data)
-            mujoco.mj_step2(halves.model, halves.data)
-            np.testing.assert_array_equal(physics(halves), after[: len(physics(halves))])
-
-
 # --- saved, restored, reset -----------------------------------------------------------------------
 
 
@@ -120,13 +106,6 @@ def test_a_restored_snapshot_continues_to_the_bit(stage: MujocoSimulator) -> Non
     mujoco.mj_setState(stage.model, other, snapshot, STATE)
     stage.data = other
     np.testing.assert_array_equal(step(stage, 120, 400), first)
-
-
-def test_a_copied_model_and_data_carry_their_effects(stage: MujocoSimulator) -> None:
-    step(stage, 0, 120)
-    copied = fresh()
-    copied.model, copied.data = copy.deepcopy(stage.model), copy.deepcopy(stage.data)
-    np.testing.assert_array_equal(step(copied, 120, 300), step(stage, 120, 300))
 
 
 def test_a_reset_starts_again(stage: MujocoSimulator) -> None:
@@ -179,15 +158,6 @@ def serially(stage: MujocoSimulator, initial: Array, n: int) -> Array:
     return np.array(runs)
 
 
-def test_rollout_on_two_threads_is_stepping_serially(stage: MujocoSimulator) -> None:
-    initial = starts(stage, 12)
-    wanted = serially(stage, initial, 150)
-    threads = [mujoco.MjData(stage.model) for _ in range(2)]
-    for _ in range(2):  # the second time on used data
-        found, _sensors = rollout(stage.model, threads, initial, controls(0, 150)[None])
-        np.testing.assert_array_equal(found, wanted)
-
-
 def test_batch_on_two_threads_is_stepping_serially(stage: MujocoSimulator) -> None:
     initial = starts(stage, 12)
     wanted = serially(stage, initial, 150)
@@ -219,21 +189,3 @@ def test_offsets_point_at_the_fields(stage: MujocoSimulator) -> None:
         at = word(data._address, getattr(found, name))
         assert at == getattr(data, name).ctypes.data, name
     assert len(set(found)) == len(Offsets._fields)
-
-
-@pytest.mark.parametrize("which", range(len(Offsets._fields)), ids=Offsets._fields)
-def test_a_field_in_another_place_is_refused(which: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A field found in the wrong place in the first object is seen in the second."""
-    right: Callable[..., int] = mujoco_link._find
-    calls = iter(range(100))
-
-    def wrong(address: int, wanted: int, *args: int) -> int:
-        return right(address, wanted, *args) + 8 * (next(calls) == which)
-
-    monkeypatch.setattr(mujoco_link, "_find", wrong)
-    offsets.cache_clear()
-    try:
-        with pytest.raises(RuntimeError, match="unknown way"):
-            offsets()
-    finally:
-        offsets.cache_clear()

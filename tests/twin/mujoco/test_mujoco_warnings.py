@@ -6,7 +6,6 @@ from concurrent.futures import ThreadPoolExecutor
 from math import nan, sqrt
 from pathlib import Path
 from threading import Barrier
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -76,16 +75,6 @@ def test_a_force_that_is_no_number_from_the_start(simulator: type) -> None:
         CannotRun, match=r"t = 0\.0000 s on axis y: effect test_mujoco_warnings gives nan N"
     ):
         run(machine({"a": nan}), ramp(), np.random.default_rng(0), simulator=simulator)
-
-
-def test_any_other_warning_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    def warn(*arguments: Any) -> None:
-        arguments[-3].fill(0.0)  # the signals
-        mujoco.get_mju_user_warning()("No room.")
-
-    monkeypatch.setattr("twin.simulator.run_mujoco", warn)
-    with pytest.raises(CannotRun, match=r"at t = 0\.0000 s: No room\. Change the model"):
-        run(machine({"b": 9.0}), ramp(), np.random.default_rng(0))
 
 
 def test_the_handler_of_warnings_is_given_back() -> None:

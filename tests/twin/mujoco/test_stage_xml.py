@@ -29,13 +29,6 @@ def test_two_slides_hang_on_a_fixed_base(model: mujoco.MjModel) -> None:
     np.testing.assert_array_equal(model.jnt_range, [[-TRAVEL, TRAVEL]] * 2)
 
 
-def test_masses_come_from_the_inertials_alone(model: mujoco.MjModel) -> None:
-    np.testing.assert_array_equal(model.body_mass, [0, 120, 9, 6])
-    spec = mujoco.MjSpec.from_file(str(STAGE_XML))
-    assert all(body.explicitinertial for body in spec.bodies[1:])
-    assert all(geom.mass == 0 for geom in spec.geoms)
-
-
 def test_motors_take_newtons_and_sensors_read_the_joints(model: mujoco.MjModel) -> None:
     assert [model.actuator(i).name for i in range(model.nu)] == ["motor_x", "motor_y"]
     np.testing.assert_array_equal(model.actuator_gear[:, 0], 1)
@@ -50,16 +43,6 @@ def test_motors_take_newtons_and_sensors_read_the_joints(model: mujoco.MjModel) 
     readings = {model.sensor(i).name: data.sensor(i).data.item() for i in range(model.nsensor)}
     expected = {"position_x": 0.01, "velocity_x": 0.3, "position_y": -0.02, "velocity_y": -0.4}
     assert readings == expected
-
-
-def test_no_effect_hides_in_the_model(model: mujoco.MjModel) -> None:
-    for number in (
-        "dof_damping", "dof_dampingpoly", "dof_frictionloss", "dof_armature",
-        "jnt_stiffness", "jnt_stiffnesspoly", "actuator_damping", "actuator_armature",
-    ):  # fmt: skip
-        assert not np.any(getattr(model, number)), number
-    assert model.ntendon == model.neq == model.na == 0
-    assert model.opt.viscosity == model.opt.density == 0
 
 
 def test_steps_at_the_control_rate_and_lets_passive_forces_in(model: mujoco.MjModel) -> None:
@@ -99,13 +82,6 @@ def test_force_moves_one_axis_by_newtons_law(
     assert data.joint(still).qvel.item() == 0.0
 
 
-def test_gravity_does_not_reach_the_axes(model: mujoco.MjModel) -> None:
-    data = mujoco.MjData(model)
-    data.qvel[:] = [0.2, -0.1]
-    mujoco.mj_step(model, data, nstep=1000)
-    np.testing.assert_array_equal(data.qvel, [0.2, -0.1])
-
-
 def test_force_limit_clamps_the_command(model: mujoco.MjModel) -> None:
     data = mujoco.MjData(model)
     data.ctrl[:] = [1e4, -1e4]
@@ -142,8 +118,3 @@ def test_moving_parts_clear_each_other_over_the_whole_travel(model: mujoco.MjMod
         for a, b in pairs:
             gap = mujoco.mj_geomDistance(model, data, a, b, margin, None)
             assert gap > 0, f"geoms {a} and {b} overlap at x, y = {pose}"
-
-
-def test_every_shape_is_modest_in_number_and_both_cameras_exist(model: mujoco.MjModel) -> None:
-    assert model.ngeom < 60  # each costs about 8 ns in every step
-    assert {model.camera(i).name for i in range(model.ncam)} == {"overview", "top"}
