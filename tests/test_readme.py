@@ -11,6 +11,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from contextlib import chdir, redirect_stdout
 from io import StringIO
@@ -144,6 +145,12 @@ def test_the_files_it_names_exist(page):
     linked = re.findall(r"\]\(([\w./-]+)\)", text)
     for name in [*named, *linked]:
         assert (ROOT / name).exists(), name
+
+
+def test_the_version_cited_is_this_one_and_has_a_place_in_the_changelog():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\n## {version} (" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 def test_the_targets_that_it_names_are_in_the_makefile():
