@@ -17,6 +17,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
 os.environ["TWIN_EXAMPLES"] = str(HERE.parent / "examples")
 
 import generate  # noqa: E402
+from myst_nb.core import render  # noqa: E402
 
 project = "Proton twin"
 author = "the maintainers"
@@ -34,13 +35,16 @@ nb_execution_in_temp = True
 nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
-nb_merge_streams = True
+nb_merge_streams = True  # by streams_in_one
 nb_output_stderr = "remove"  # progress
 
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 add_module_names = False
 
+html_sidebars = {
+    page: [] for page in ("theory", "validation", "changelog", "contributing", "architecture")
+}
 html_theme = "pydata_sphinx_theme"
 html_title = "Proton twin"
 html_static_path = ["_static"]
@@ -63,6 +67,22 @@ def setup(app):  # type: ignore[no-untyped-def]
     app.connect("doctree-read", shell_cells)
 
 
+def streams_in_one(outputs):  # type: ignore[no-untyped-def]
+    """What a cell prints, as it was printed: it comes in pieces that may end within a line."""
+    merged = {}
+    for output in outputs:
+        if output["output_type"] != "stream":
+            merged[len(merged)] = output
+        elif (first := merged.get(output["name"])) is not None:
+            first["text"] += output["text"]
+        else:
+            merged[output["name"]] = output
+    return list(merged.values())
+
+
+render.coalesce_streams = streams_in_one
+
+
 def shell_cells(_, doctree):  # type: ignore[no-untyped-def]
     """Cells that the shell runs are shown without the word that says so."""
     from docutils import nodes
@@ -70,5 +90,6 @@ def shell_cells(_, doctree):  # type: ignore[no-untyped-def]
     for block in doctree.findall(nodes.literal_block):
         head, _, rest = block.astext().partition("\n")
         if head == "%%sh":
+            rest = rest.replace(" || true", "")  # a negative result is an answer
             block.children = [nodes.Text(rest)]
             block.rawsource, block["language"] = rest, "console"

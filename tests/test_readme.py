@@ -11,14 +11,18 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from contextlib import chdir, redirect_stdout
 from io import StringIO
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 from cli_runs import in_small, twin
 from report_cases import without_drawing
+
+from twin import effects
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -119,7 +123,8 @@ def test_the_recordings_are_diagnosed_in_small(tmp_path):
             assert result.returncode == 0, f"{command}\n{result.stderr}"
         assert "Missing: cogging." in result.stdout
         assert (tmp_path / "report.html").stat().st_size > 10_000
-        with redirect_stdout(StringIO()) as out:
+        few = patch("identify.workflow.load_catalogue", effects.load_catalogue)
+        with few, redirect_stdout(StringIO()) as out:
             exec(compile(blocks("python")[0], "README.md", "exec"), {})
         assert "(('cogging',),)" in out.getvalue()
 
@@ -144,6 +149,12 @@ def test_the_files_it_names_exist(page):
     linked = re.findall(r"\]\(([\w./-]+)\)", text)
     for name in [*named, *linked]:
         assert (ROOT / name).exists(), name
+
+
+def test_the_version_cited_is_this_one_and_has_a_place_in_the_changelog():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\n## {version} (" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 def test_the_targets_that_it_names_are_in_the_makefile():
