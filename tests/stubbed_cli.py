@@ -51,7 +51,7 @@ def stubbed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, fold
             ("read_measured", lambda paths, beside=None: logs_of(paths)),
             (
                 "read_checked",
-                lambda paths, beside=None: (
+                lambda paths, beside=None, refused=(): (
                     logs_of(paths),
                     [f"warned of {p}" for p in paths or ()],
                 ),
