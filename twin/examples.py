@@ -110,6 +110,15 @@ EXAMPLES: Mapping[str, Example] = {
         ),
         make=_recording,
     ),
+    "drive": Example(
+        "a simulated drive with cogging, and a script that writes three recordings of it as CSV",
+        (
+            "python make_recordings.py .",
+            "twin import --guess run1.csv -o map.toml",
+            "twin simulate moves --model drive.toml -o moves.mcap",
+        ),
+        ("drive.toml", "make_recordings.py"),
+    ),
     "own_effect": Example(
         "an effect of your own, a magnetic detent, in one Python file",
         (

@@ -13,6 +13,7 @@ import typer
 from identify.cli.apart import require_apart
 from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
+    MEANINGLESS,
     Effects,
     FitLogs,
     Holdout,
@@ -67,6 +68,7 @@ def fit(
     from identify.output import as_json
     from identify.output import text as as_text
     from identify.output.simulation_fit import simulation_fit_json
+    from identify.output.words.objectives import objectives_in_words
     from twin.model.file import save_model
 
     if out:
@@ -74,16 +76,19 @@ def fit(
     catalogue = catalogue_with(effects)
     result, findings, silent = with_roles(
         partial(workflow.fit, catalogue=catalogue, test_function=test_function),
-        machine_model(model, catalogue), logs, holdout, test,
+        machine_model(model, catalogue), logs, holdout, test, MEANINGLESS,
     )  # fmt: skip
     fitted, text, found = result.model, as_text.fit_text(result), as_json.fit_json(result)
+    alarms: list[str] = []
     if objective is Objective.SIMULATION:
         with progress_on_stderr() as progress:
             refined = workflow.fit_simulation(result, progress=progress)
         fitted, text, found = refined.model, str(refined), simulation_fit_json(refined)
+        alarms = objectives_in_words(refined)
+        found |= {"objectives_disagree": alarms}
     if out:
         save_model(fitted, out)
-    say(text, {**found, "left_out": silent}, as_json_, [*findings, *silent])
+    say(text, {**found, "left_out": silent}, as_json_, [*findings, *silent, *alarms])
 
 
 @app.command()
@@ -205,7 +210,7 @@ def add(
     chosen, made = catalogue[effect], workflow.add_shape if shape else workflow.add
     result, findings, silent = with_roles(
         partial(made, chosen, axis=axis, test_function=test_function),
-        machine_model(model, catalogue), logs, holdout, test,
+        machine_model(model, catalogue), logs, holdout, test, MEANINGLESS,
     )  # fmt: skip
     save_model(result.model, out)
     told = {**as_json.add_json(result), "left_out": silent}

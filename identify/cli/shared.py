@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from twin.model.machine import MachineModel
 
 Result = TypeVar("Result")
+MEANINGLESS = ("SIGN", "UNIT", "SWAPPED")  # faults with which a fit gives numbers without a meaning
 MEASURED = ("position", "velocity", "setpoint_position", "current", "force")
 
 
@@ -146,16 +147,18 @@ def with_roles(
     logs: list[Path],
     holdout: list[Path] | None,
     test: list[Path] | None,
+    refused: Collection[str] = (),
 ) -> tuple[Result, list[str], list[str]]:
     """The result of a job on a model and the logs of each role; the findings on the first.
 
-    And which logs of any role were left out, and why.
+    And which logs of any role were left out, and why. refused: names of the faults with which a
+    training log is refused.
     """
     from twin.memory import share
 
     share()
     held, tests = holdout or [], test or []
-    recorded, findings = read_checked(logs, beside=[*held, *tests])
+    recorded, findings = read_checked(logs, beside=[*held, *tests], refused=refused)
     others = read_measured(held, beside=[*logs, *tests]), read_measured(tests, [*logs, *held])
     with progress_on_stderr() as progress, left_out() as silent:
         result = job(model, recorded, *others, progress=progress)
@@ -198,11 +201,14 @@ def read_measured(
 
 
 def read_checked(
-    paths: Sequence[Path] | None, beside: Sequence[Path] | None = None
+    paths: Sequence[Path] | None,
+    beside: Sequence[Path] | None = None,
+    refused: Collection[str] = (),
 ) -> tuple[Mapping[str, Log], list[str]]:
     """The same, and the findings of the log check on the whole logs, one sentence each.
 
-    They are there when the logs have been read.
+    They are there when the logs have been read. Raises InputError then for an error of a kind that
+    is refused.
     """
     from twin.log.long import read_checked as read
     from twin.log.long import step_of
@@ -212,6 +218,9 @@ def read_checked(
 
     def checked(path: Path) -> Log:
         log, report = read(path, MEASURED, every)
+        for finding in report.findings:
+            if finding.fault.name in refused and finding.severity.value == "error":
+                raise InputError(f"{path}: {finding}; nothing is fitted to it")
         findings.extend(sentences(str(path), report))
         return said(path, log, every)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from identify.dataset.dataset import Dataset
@@ -17,6 +17,7 @@ from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.misfit_maps import AxisComparison, Region
 from twin.effect import Effect
 from twin.model.machine import MachineModel
+from twin.model.parameters import ParameterReference, free_parameters, read
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,6 +51,14 @@ class FitResult(Printed):
         return f"<FitResult of {self.model.name}; print it to read it>"
 
 
+DISAGREE = 2.0  # times, by which the values of two objectives differ where one of them is wrong
+
+
+def _pairs(fit: MotionFit) -> Iterator[tuple[ParameterReference, float, float]]:
+    where = free_parameters(fit.axis)
+    return zip(where, read(fit.begun, where), read(fit.axis, where), strict=True)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class SimulationFit(Printed):
     """A machine fitted to the motion of whole logs, by axis, from a fit of the force residual.
@@ -62,6 +71,19 @@ class SimulationFit(Printed):
     force: FitResult
     axes: Mapping[str, MotionFit]
     holdout_error: Mapping[str, tuple[float, float] | None]
+
+    @property
+    def disagreeing(self) -> tuple[tuple[str, str, float, float], ...]:
+        """Axis, label, value of the force fit and of this one, where they are far apart.
+
+        Of parameters that cannot be negative: of others, such as a phase, a ratio says nothing.
+        """
+        return tuple(
+            (axis, c.label, float(before), float(after))
+            for axis, fit in self.axes.items()
+            for c, before, after in _pairs(fit)
+            if c.parameter.lower >= 0.0 and not before <= DISAGREE * after <= DISAGREE**2 * before
+        )
 
     def __repr__(self) -> str:
         return f"<SimulationFit of {self.model.name}; print it to read it>"
