@@ -11,7 +11,7 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built, built_fit, fitted
 
 from identify import workflow
 from identify.dataset.given_logs import Role
-from identify.output.words.selection import moved_in_words, notes_in_words
+from identify.output.words.diagnosis import moved_in_words, notes_in_words
 from identify.results import addition as adding
 from identify.results.addition import addition
 from identify.validation import free_run as free_runs

@@ -12,8 +12,8 @@ from stubbed_cli import stub, stubbed
 
 import identify.demo
 import identify.experiment_design.signature
+import identify.output.machine
 import identify.output.report
-import identify.output.signature
 import identify.selftest
 import twin.experiments.file
 import twin.experiments.named
@@ -25,7 +25,8 @@ import twin.log.long
 import twin.model.file
 from identify import workflow
 from identify.cli.shared import sentences
-from identify.output import as_json, diagnosis_json, machine_json, machine_text
+from identify.output import as_json
+from identify.output import machine as machine_output
 from identify.output import selftest as selftest_output
 from identify.output import text as as_text
 from identify.selftest.case import Case
@@ -43,9 +44,8 @@ def cli(monkeypatch, capsys, tmp_path):
 def printed(monkeypatch, name: str) -> None:
     """Both forms of a result are a mark of the form and the result."""
     monkeypatch.setattr(as_text, f"{name}_text", lambda r: f"text of {name}", raising=False)
-    told = diagnosis_json if name == "diagnose" else as_json
     monkeypatch.setattr(
-        told, f"{name}_json", lambda r, *findings: {"json of": name, "bad": float("nan")}
+        as_json, f"{name}_json", lambda r, *findings: {"json of": name, "bad": float("nan")}
     )
 
 
@@ -229,10 +229,10 @@ def test_check(monkeypatch, cli, severity, code):
 
 
 def test_effects(monkeypatch, cli):
-    monkeypatch.setattr(machine_text, "effects_text", lambda effects: f"all {len(effects)}")
-    monkeypatch.setattr(machine_text, "effect_text", lambda effect: f"one {effect}")
-    monkeypatch.setattr(machine_json, "effect_json", lambda effect: {"is": effect})
-    draw = stub(monkeypatch, identify.output.signature, "draw")
+    monkeypatch.setattr(machine_output, "effects_text", lambda effects: f"all {len(effects)}")
+    monkeypatch.setattr(machine_output, "effect_text", lambda effect: f"one {effect}")
+    monkeypatch.setattr(machine_output, "effect_json", lambda effect: {"is": effect})
+    draw = stub(monkeypatch, identify.output.machine, "draw")
     own = identify.experiment_design.signature
     monkeypatch.setattr(own, "signature", lambda effect, known: ("motion", f"force of {effect}"))
     assert cli("effects") == (0, "all 2\n", "")
@@ -246,7 +246,7 @@ def test_effects(monkeypatch, cli):
 
 @pytest.mark.parametrize(("named", "code"), [(True, 0), (False, 1)])
 def test_demo(monkeypatch, cli, named, code):
-    monkeypatch.setattr(diagnosis_json, "diagnose_json", lambda d: {"d": d})
+    monkeypatch.setattr(as_json, "diagnose_json", lambda d: {"d": d})
     monkeypatch.setattr(as_json, "add_json", lambda a: {"a": a})
     hidden = SimpleNamespace(effect=SimpleNamespace(name="wear"))
     result = SimpleNamespace(

@@ -12,8 +12,9 @@ from report_cases import Case, cogging_case
 
 from identify import workflow
 from identify.dataset.given_logs import Role
+from identify.output.numbers import number
 from identify.output.text import diagnose_text
-from identify.output.words.selection import moved_in_words
+from identify.output.words.diagnosis import moved_in_words
 from identify.selection import confounded
 from identify.selection.confounded import moved_parameters
 from identify.selection.diagnosis import Verdict
@@ -74,8 +75,7 @@ def test_a_parameter_moved_where_it_leaves_both_intervals(monkeypatch, f0, told)
     if told:
         (only,) = found
         assert moved_in_words(only) == (
-            f"constant_force.F0 moved from 1 to {f0:.4g} N: more than it scatters between "
-            "blocks of the logs"
+            f"constant_force.F0 moved from 1.00 to {number(f0)} N: more than its uncertainty"
         )
 
 
@@ -83,7 +83,7 @@ def test_a_parameter_moved_where_it_leaves_both_intervals(monkeypatch, f0, told)
 def test_a_strength_collapsed_where_less_than_a_third_is_left(monkeypatch, f0, said):
     (found,) = moved(monkeypatch, {"F0": 1.0}, {"F0": f0})
     words = moved_in_words(found)
-    assert words.startswith(f"constant_force.F0 {said} from 1 to {f0} N")
+    assert words.startswith(f"constant_force.F0 {said} from 1.00 to {number(f0)} N")
     assert ("had taken over" in words) is found.collapsed is (said == "collapsed")
     wide = moved(monkeypatch, {"F0": 1.0}, {"F0": f0}, width=5.0)
     assert bool(wide) is (said == "collapsed")

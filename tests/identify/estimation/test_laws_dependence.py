@@ -22,7 +22,7 @@ from identify.estimation.residual_dependence import (
     line,
     share,
 )
-from identify.output.words.validation import correlation_in_words
+from identify.output.words.fit import correlation_in_words
 from identify.validation.whiteness import Correlation, Loop, correlation, loop_of, residual_tests
 
 LOG = windowed(SHORT)
