@@ -275,6 +275,7 @@ def draw_maps(maps: Sequence[MisfitMap], units: AxisUnits) -> Figure:
     low = 0.5 * float(scale(np.min(seen[seen > 0.0], initial=np.inf)))
     for axes, one in zip(grid.ravel(), shown, strict=False):
         _draw_map(axes, one, scale, low, units.words("force error"))
+    grid[0, 0].set_ylim(bottom=low)  # of all, once all are drawn: before, it would cut the others
     for axes in grid.ravel()[len(shown) :]:
         axes.remove()
     for axes in grid[:, 0]:
@@ -292,7 +293,6 @@ def _draw_map(axes: Axes, one: MisfitMap, scale: Scale, low: float, label: str) 
     axes.stairs(error, edges, baseline=None, color=BLUE, linewidth=1.4, label=label)
     axes.set_yscale("log")
     plain_decades(axes.yaxis)
-    axes.set_ylim(bottom=low)
     name = NAMES.get(one.coordinate, title_case(one.coordinate))
     axes.set_xlabel(along.label(units_of(one.unit).words(name)))
     if one.coordinate == "standstill":
