@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.judgement import WRONG
-from identify.output.words.selftest import trial_in_words
+from identify.output.selftest import trial_in_words
 from identify.selection.confidence import Level
 from identify.selection.findings import FindingKind
 from identify.selftest import TrialResult, levels, run_all

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
-from identify.output.words.selftest import rate_in_words
+from identify.output.selftest import rate_in_words
 from identify.selftest import TrialResult
 from identify.selftest.design import Design
 from identify.selftest.tally import coverage

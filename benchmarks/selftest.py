@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.figures import Figure, Target
-from identify.output.words.selftest import trial_in_words
+from identify.output.selftest import trial_in_words
 from identify.selftest import (
     FULL,
     TrialResult,

@@ -14,7 +14,7 @@ import numpy as np
 
 from identify.dataset.motion import Motion
 from identify.experiment_design.signature import signature
-from identify.output.signature import draw
+from identify.output.machine import draw
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue, load_catalogue
 from twin.files import write_atomically

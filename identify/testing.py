@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from identify.output.agreement import agree_text
+from identify.output.text import agree_text
 from identify.results.results import FitResult
 from identify.workflow import agree
 from twin.effects import Catalogue, load_catalogue

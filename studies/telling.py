@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike
 
-from identify.output.report.blocks import Column, Picture, Row, Table
+from identify.output.numbers import NOTHING, number, pretty, spaced
 from identify.output.report.drawing import INK, new_figure, plain_tick
-from identify.output.report.units import NOTHING, number, pretty, spaced
+from identify.output.report.page import Column, Picture, Row, Table
 
 HEIGHT = 2.2  # inches of a row of panels
 

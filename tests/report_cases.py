@@ -15,9 +15,10 @@ from unittest.mock import patch
 from matplotlib.figure import Figure
 
 from identify import workflow
-from identify.output.report import answer, sections, write_report
-from identify.output.report.blocks import Answer, Picture, Section
+from identify.output.report import sections, write_report
+from identify.output.report.answer import cards
 from identify.output.report.drawing import drawing_style
+from identify.output.report.page import Answer, Picture, Section
 from identify.output.report.subject import Subject
 from identify.results.addition import Addition
 from identify.results.results import Diagnosis
@@ -107,7 +108,7 @@ BLANK = "data:image/svg+xml;base64," + base64.b64encode(b"<svg/>").decode()
 
 def without_drawing() -> AbstractContextManager[object]:
     """Inside, pictures are blank: drawing them takes most of a report's time."""
-    return patch("identify.output.report.html.data_uri", lambda figure: BLANK)
+    return patch("identify.output.report.page.data_uri", lambda figure: BLANK)
 
 
 def pictures_in(page: str) -> list[str]:
@@ -147,9 +148,7 @@ def figures(subject: Subject) -> Iterator[Figure]:
 
 
 def answers(subject: Subject) -> list[Answer]:
-    section = answer.section(subject)
-    assert section
-    return [b for b in section.blocks if isinstance(b, Answer)]
+    return [b for view in subject.views for b in cards(view) if isinstance(b, Answer)]
 
 
 def readable(figure: Figure) -> None:

@@ -2,7 +2,7 @@
 
 import json
 
-from identify.output.plain import plain
+from identify.output.machine import plain
 
 
 def strict(found):

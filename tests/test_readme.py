@@ -99,7 +99,7 @@ def assert_the_error_falls(answer, folder):
             assert "axis x" in result.stdout
             assert "cogging" in result.stdout
     after = answer(["twin", "fit", "better.toml", "fit.mcap", "--holdout", "held.mcap"])
-    assert "held out" in after.stdout
+    assert "on the selection logs" in after.stdout
     before, after = errors
     assert after < before / 3.0
     for name in ("before.html", "diagnosis.html", "after.html", "next.mcap"):

@@ -22,7 +22,8 @@ def agree(
     Example: twin agree monday.toml friday.toml
     """
     from identify import workflow
-    from identify.output.agreement import agree_json, agree_text
+    from identify.output.as_json import agree_json
+    from identify.output.text import agree_text
 
     catalogue = catalogue_with(effects)
     fits = [machine_model(name, catalogue) for name in (a, b)]

@@ -67,7 +67,7 @@ def fit(
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
-    from identify.output.simulation_fit import simulation_fit_json
+    from identify.output.as_json import simulation_fit_json
     from identify.output.words.objectives import objectives_in_words
     from twin.model.file import save_model
 
@@ -128,9 +128,7 @@ def compare(
             comparison=result, history=machine.history, assumed=unconfirmed(findings),
         )  # fmt: skip
     if mcap:
-        from identify.output.side_by_side import write_side_by_side
-
-        write_side_by_side(workflow.side_by_side_of(result), mcap)
+        workflow.side_by_side_of(result).write(mcap)
     told = {**as_json.compare_json(result), "left_out": silent}
     say(as_text.compare_text(result), told, as_json_, [*findings, *silent])
 
@@ -151,7 +149,7 @@ def diagnose(
     Example: twin diagnose fitted.toml fit.mcap --holdout held.mcap -o diagnosis.html
     """
     from identify import workflow
-    from identify.output import diagnosis_json
+    from identify.output import as_json
     from identify.output import text as as_text
 
     if out:
@@ -173,7 +171,7 @@ def diagnose(
             comparison=result.comparison, history=result.model.history,
             assumed=unconfirmed(findings),
         )  # fmt: skip
-    told = {**diagnosis_json.diagnose_json(result, findings), "left_out": silent}
+    told = {**as_json.diagnose_json(result, findings), "left_out": silent}
     say(as_text.diagnose_text(result), told, as_json_, [*findings, *silent])
 
 
@@ -233,7 +231,7 @@ def demo(
     """
     from identify.demo import BETTER
     from identify.demo import demo as run
-    from identify.output import as_json, diagnosis_json
+    from identify.output import as_json
 
     require_apart({"-o": out / BETTER}, {"--model": model})
     catalogue = catalogue_with(effects)
@@ -249,7 +247,7 @@ def demo(
         "hidden": hidden,
         "named": result.named,
         "report": str(result.report),
-        "diagnosis": diagnosis_json.diagnose_json(result.diagnosis),
+        "diagnosis": as_json.diagnose_json(result.diagnosis),
         "addition": result.addition and as_json.add_json(result.addition),
     }
     verdict = "the diagnosis is right" if result.named else "the diagnosis did not name it"

@@ -174,11 +174,11 @@ def check(logs: Logs, as_json_: Json = False) -> None:
 
     Example: twin check run.mcap
     """
-    from identify.output import machine_json, machine_text
+    from identify.output import machine as told
     from twin.log.long import check_file
 
     reports = {str(path): check_file(path) for path in logs}
-    say(machine_text.check_text(reports), machine_json.check_json(reports), as_json_)
+    say(told.check_text(reports), told.check_json(reports), as_json_)
     if not all(report.ok for report in reports.values()):
         raise typer.Exit(1)
 
@@ -225,7 +225,7 @@ def effects(
 
     Example: twin effects cogging --plot cogging.png
     """
-    from identify.output import machine_json, machine_text
+    from identify.output import machine as told
 
     catalogue = catalogue_with(files)
     if check_:
@@ -238,25 +238,25 @@ def effects(
         chosen = catalogue[name]
         if plot is not None:
             from identify.experiment_design.signature import signature
-            from identify.output.signature import draw
+            from identify.output.machine import draw
 
             require_folder(plot)
             draw(chosen, *signature(chosen, catalogue), plot)
-        say(machine_text.effect_text(chosen), machine_json.effect_json(chosen), as_json_)
+        say(told.effect_text(chosen), told.effect_json(chosen), as_json_)
         return
     if plot is not None:
         raise InputError(f"--plot {plot}: draws one effect; give its NAME")
     everything = list(catalogue.values())
     say(
-        machine_text.effects_text(everything),
-        {"effects": [machine_json.effect_json(e) for e in everything]},
+        told.effects_text(everything),
+        {"effects": [told.effect_json(e) for e in everything]},
         as_json_,
     )
 
 
 def _put_to_the_laws(catalogue: Catalogue, names: Sequence[str], as_json_: bool) -> None:
     """Check these effects; exit code 1 where a law does not hold."""
-    from identify.output.laws import laws_json, laws_text
+    from identify.output.machine import laws_json, laws_text
     from twin.laws.verdict import check_effect
 
     if not names:

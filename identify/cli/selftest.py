@@ -44,8 +44,7 @@ def selftest(
 
     Example: twin selftest --only cogging
     """
-    from identify.output.selftest import selftest_json, selftest_text
-    from identify.output.words.selftest import trial_in_words
+    from identify.output.selftest import selftest_json, selftest_text, trial_in_words
     from identify.selftest import (
         FULL,
         QUICK,

@@ -106,7 +106,7 @@ Effects = Annotated[
 
 def say(text: str, result: dict[str, Any], as_json: bool, warnings: Sequence[str] = ()) -> None:
     """Print the warnings on standard error, and the result as text or as one JSON object."""
-    from identify.output.plain import plain
+    from identify.output.machine import plain
 
     for warning in warnings:
         print(f"twin: {warning}", file=sys.stderr)

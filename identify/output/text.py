@@ -1,51 +1,45 @@
-"""Results as text for a terminal."""
+"""Results as text for a terminal: the sentences of ``words``, line by line."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from identify.dataset.given_logs import Role
-from identify.estimation.intervals import Estimate, NoInterval
+from identify.estimation.fit import Fit
 from identify.experiment_design.plan import Plan
-from identify.output.remarks import remarks_on
-from identify.output.simulation_fit import simulation_fit_text
-from identify.output.words.estimation import (
-    common_reason,
-    no_interval_in_words,
-    outcome_in_words,
-    prepared_in_words,
-)
-from identify.output.words.experiment_design import (
-    experiment_in_words,
-    gap_in_words,
-    in_order,
-    not_run_in_words,
-    supposed_in_words,
-)
-from identify.output.words.findings import (
-    advice,
-    also_seen_in_words,
-    finding_in_words,
-    next_command,
-    shape_in_words,
-    shares_in_words,
-    together_in_words,
-)
-from identify.output.words.selection import (
-    dependence_in_words,
+from identify.output.numbers import Scale, arrow, number, quantity
+from identify.output.words.diagnosis import (
+    all_found,
+    errors_of_step,
     named_errors_in_words,
     named_in_words,
     nonparametric_in_words,
+    proved_in_words,
     refit_in_words,
-    remainder_in_words,
+    said_of,
     step_in_words,
     tested_on,
-    ties_in_words,
-    verdict_in_words,
+    why_not,
 )
-from identify.output.words.steps import step_lines, why_not
-from identify.output.words.validation import (
+from identify.output.words.fit import (
+    agreement_in_words,
+    causes_in_words,
+    common_reason,
     correlation_in_words,
+    difference_in_words,
+    estimate_in_words,
+    experiment_in_words,
+    gap_in_words,
+    in_order,
     loop_in_words,
+    motion_fit_in_words,
+    no_interval_in_words,
+    not_run_in_words,
+    outcome_in_words,
+    prepared_in_words,
+    question_in_words,
     region_in_words,
+    supposed_in_words,
 )
 from identify.results.addition import Addition
 from identify.results.printed import text_of
@@ -54,62 +48,73 @@ from identify.results.told import Told
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.nonparametric import nonparametric_labels
+from identify.validation.agreement import Agreement
 from identify.validation.misfit_maps import AxisComparison
 from twin.experiments.file import in_short
+from twin.model.parameters import free_parameters, read
+
+SHOWN = 4  # candidates of a diagnosis, and experiments of a plan, that are printed
+
+
+def over_floor(error: float, floor: float, unit: str) -> str:
+    """E.g. "noise floor 12.7 mN (ratio 4.04)"."""
+    return f"noise floor {quantity(floor, unit)} (ratio {error / floor:.2f})"
 
 
 @text_of.register
 def fit_text(result: FitResult) -> str:
     """The fit of each axis, one parameter a line."""
-    lines = []
+    lines: list[str] = []
     for axis, fit in result.fits.items():
-        unit, words = fit.axis.units.force, fit.axis.units.words
-        others = {"held out": result.holdout_error[axis], "test": result.test_error[axis]}
-        tail = "".join(f", {on} {e:.4g} {unit}" for on, e in others.items() if e is not None)
-        lines.append(
-            f"axis {axis}: {words('force error')} {fit.error:.4g} {unit}{tail}, noise floor "
-            f"{fit.floor:.4g} {unit} (ratio {fit.ratio:.2f})"
-        )
-        lines.append(f"  {words(outcome_in_words(fit.ended))}")
-        lines += [f"  at its bound: {label}" for label in fit.at_bound]
-        lines += [f"  {said}" for said in prepared_in_words(result.datasets[axis])]
-        if result.left_out[axis]:
-            still = ", ".join(result.left_out[axis])
-            lines.append(f"  not fitted on {still}, where axis {axis} stands still")
-        if changed := refit_in_words(result.refits[axis]):
-            lines.append(f"  {changed}")
-        hidden = nonparametric_labels(fit.axis)
-        common = common_reason(result.estimates[axis])
-        if common is not None:
-            lines.append(f"  {no_interval_in_words(common)}")
-        lines += [
-            f"  {e.label:34s} {_with_interval(e, common)}"
-            for e in result.estimates[axis]
-            if e.label not in hidden
-        ]
-        lines += [
-            f"  {nonparametric_in_words(f)}" for f in fit.axis.effects if f.effect.is_nonparametric
-        ]
+        lines += _fitted(result, axis, fit)
     lines += [f"axis {axis}: not fitted, as it moves in no log" for axis in result.not_fitted]
     return "\n".join(lines)
 
 
-def _with_interval(e: Estimate, common: NoInterval | None) -> str:
-    """A value with its interval, or why it has none, unless the reason is common to all."""
-    text = f"{e.value:12.6g} {'' if e.unit == '1' else e.unit:10s}"
-    if not e.free:
-        return text + " fixed"
-    if e.low is None:
-        return text if e.reason in (None, common) else f"{text} {no_interval_in_words(e.reason)}"
-    return text + f" 90 % in [{e.low:.6g}, {e.high:.6g}]"
+def _fitted(result: FitResult, axis: str, fit: Fit) -> Iterator[str]:
+    unit, words = fit.axis.units.force, fit.axis.units.words
+    found, still = result.estimates[axis], result.left_out[axis]
+    others = {Role.SELECTION: result.holdout_error[axis], Role.TEST: result.test_error[axis]}
+    known = {role: e for role, e in {Role.TRAINING: fit.error, **others}.items() if e is not None}
+    errors = (f"on the {role.value} logs {quantity(e, unit)}" for role, e in known.items())
+    yield (
+        f"axis {axis}: {words('force error')} {', '.join(errors)}, "
+        f"{over_floor(fit.error, fit.floor, unit)}"
+    )
+    yield f"  {words(outcome_in_words(fit.ended))}"
+    yield from (f"  at its bound: {label}" for label in fit.at_bound)
+    yield from (f"  {said}" for said in prepared_in_words(result.datasets[axis]))
+    if still:
+        yield f"  not fitted on {', '.join(still)}, where axis {axis} stands still"
+    if changed := refit_in_words(result.refits[axis]):
+        yield f"  {changed}"
+    if common := common_reason(found):
+        yield f"  {no_interval_in_words(common)}"
+    hidden = nonparametric_labels(fit.axis)
+    for e in found:
+        if e.label not in hidden:
+            value, interval = estimate_in_words(e, common)
+            tail = f"90 % in {interval}" if e.low is not None else interval
+            yield f"  {e.label:34s} {value:>16s}  {tail}".rstrip()
+    curves = (f for f in fit.axis.effects if f.effect.is_nonparametric)
+    yield from (f"  {nonparametric_in_words(f)}" for f in curves)
 
 
-def _position_error(c: AxisComparison, log: str) -> str:
-    """The position error of a log, as the rest of a sentence; nothing of imposed motion."""
-    if log not in c.position_error:
-        return ""
-    error = f"{c.position_error[log]:.3g} {c.units.position}"
-    return f", {c.units.words('free-running position error')} {error}"
+@text_of.register
+def simulation_fit_text(result: SimulationFit) -> str:
+    """The fit of each axis, one parameter a line: the value, and that of the force fit."""
+    lines = []
+    for axis, fit in result.axes.items():
+        said = motion_fit_in_words(axis, fit, result.holdout_error[axis])
+        lines += [said[0], *(f"  {line}" for line in said[1:])]
+        where = free_parameters(fit.axis)
+        for c, now, before in zip(
+            where, read(fit.axis, where), read(fit.begun, where), strict=True
+        ):
+            scale = Scale.of(fit.axis.units(c.parameter.unit), [now])
+            value = f"{number(now / scale.size, 6)} {scale.unit}".rstrip()
+            lines.append(f"  {c.label:34s} {value} (force fit {number(before / scale.size, 6)})")
+    return "\n".join(lines)
 
 
 @text_of.register
@@ -120,8 +125,8 @@ def compare_text(result: Comparison) -> str:
         words = c.units.words
         for name, error in c.force_error.items():
             lines.append(
-                f"axis {axis}, {name}: {words('force error')} {error:.4g} {c.units.force} "
-                f"({error / c.floor:.1f} x noise floor){_position_error(c, name)}"
+                f"axis {axis}, {name}: {words('force error')} {quantity(error, c.units.force)} "
+                f"({error / c.floor:.1f} times the noise floor){_position_error(c, name)}"
             )
         lines += [f"  worst: {region_in_words(region)}" for region in c.worst]
         if not c.worst:
@@ -131,39 +136,37 @@ def compare_text(result: Comparison) -> str:
     return "\n".join(lines)
 
 
+def _position_error(c: AxisComparison, log: str) -> str:
+    """The position error of a log, as the rest of a sentence; nothing of imposed motion."""
+    if log not in c.position_error:
+        return ""
+    error = quantity(c.position_error[log], c.units.position)
+    return f", {c.units.words('free-running position error')} {error}"
+
+
 @text_of.register
 def diagnose_text(result: Diagnosis) -> str:
-    """The answer for each axis, and its best candidates."""
+    """The answer for each axis, its best candidates, and what else is said."""
     lines = []
     for axis, d in result.axes.items():
-        words = d.base.axis.units.words
+        said, words = said_of(result, axis), d.base.axis.units.words
         named = f" Missing: {named_in_words(d)}." if d.named else ""
-        lines.append(f"axis {axis}: {words(verdict_in_words(d))}{named}")
-        lines.append(f"  {words('force error')} {_errors(d, result.told[axis])}")
+        lines += [
+            f"axis {axis}: {said.verdict}{named}",
+            f"  {words('force error')} {_errors(d, result.told[axis])}",
+        ]
         if d.tested.on is not Role.TRAINING:
             lines.append(f"  {named_errors_in_words(d)}")
-        lines += [f"  {tie}" for tie in ties_in_words(d)]
+        lines += [f"  {tie}" for tie in said.ties]
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
-        for f in d.findings:
-            first, *others = finding_in_words(f)
-            lines += [f"  {words(first)}", *(f"    {words(other)}" for other in others)]
-        lines += [f"  {shares}" for shares in shares_in_words(d)]
-        lines += [f"  {told}" for told in (*together_in_words(d), *also_seen_in_words(d))]
-        shapes = [shape_in_words(f.effect, f.shape) for f in d.findings if f.shape]
-        lines += [f"  {words(text)}" for text in shapes]
-        if remains := remainder_in_words(d):
-            lines.append(f"  {remains}")
-        if d.unexplained:
-            lines.append(f"  {words(dependence_in_words(d.unexplained))}")
-            if axis in result.left_over:
-                lines.append(f"  it is largest at {words(region_in_words(result.left_over[axis]))}")
-        if d.unexplained or any(f.shape for f in d.findings):
-            lines.append(f"  {advice(d.findings)}")
-        lines += [f"  {command}" for command in next_command(d)]
-        lines += [_ranking_line(c, d) for c in d.ranking[:4]]
-        lines += [f"  {line}" for line in step_lines(d)]
-        lines += [f"  note: {remark}" for remark in remarks_on(result, axis)]
+        for first, *others in said.findings:
+            lines += [f"  {first}", *(f"    {other}" for other in others)]
+        rest = (said.beside, said.shapes, said.left, said.advice, said.following)
+        lines += [f"  {sentence}" for sentences in rest for sentence in sentences]
+        lines += _candidates(d)
+        lines += [f"  {line}" for line in said.steps]
+        lines += [f"  note: {note}" for note in said.notes]
     return "\n".join(lines)
 
 
@@ -171,79 +174,75 @@ def _errors(found: AxisDiagnosis, told: Told) -> str:
     """Errors on the training logs without and with what was found, and the noise floor."""
     unit, floor = found.base.axis.units.force, told.floor
     base, final = found.base.error, found.final.error
-    error, ratio = f"{base:.4g} {unit}", f"{base / floor:.2f}"
-    if found.final is not found.base:
-        error, ratio = f"{base:.4g} -> {final:.4g} {unit}", f"{ratio} -> {final / floor:.2f}"
-    return f"on the training logs {error}, noise floor {floor:.4g} {unit} (ratio {ratio})"
-
-
-def _ranking_line(c: Candidate, found: AxisDiagnosis) -> str:
-    unit = c.fit.axis.units.force
-    tail = f"   {why}" if (why := why_not(found, c)) else ""
-    if c.score is None:
-        return f"  {c.effect.name:28s} not refitted: {why}"
+    if found.final is found.base:
+        return f"on the training logs {quantity(base, unit)}, {over_floor(base, floor, unit)}"
+    ratio = f"ratio {base / floor:.2f} -> {final / floor:.2f}"
     return (
-        f"  {c.effect.name:28s} evidence {c.delta_bic:10.1f}   {tested_on(found)} error "
-        f"{c.gain.before:.4g} -> {c.gain.after:.4g} {unit}{tail}"
+        f"on the training logs {arrow(base, final, unit)} with {all_found(found)}, noise floor "
+        f"{quantity(floor, unit)} ({ratio})"
     )
 
 
-SHOWN = 4  # experiments of a plan that are printed
+def _candidates(found: AxisDiagnosis) -> Iterator[str]:
+    """The best candidates, a line each."""
+    shown = found.ranking[:SHOWN]
+    if any(c.score for c in shown):
+        yield (
+            f"  candidates with their evidence (difference of BIC) and the {tested_on(found)} error"
+        )
+    yield from (_candidate(c, found) for c in shown)
+
+
+def _candidate(c: Candidate, found: AxisDiagnosis) -> str:
+    why = why_not(found, c)
+    if c.score is None:
+        return f"  {c.effect.name:28s} not refitted: {why}"
+    errors = arrow(c.gain.before, c.gain.after, c.fit.axis.units.force)
+    return f"  {c.effect.name:28s} {c.delta_bic:10.1f}   {errors}   {why}".rstrip()
 
 
 def plan_text(result: Plan) -> str:
     """The question, the chosen experiment and what it is expected to show, and the next best."""
-    several = len(result.between) > 1
-    what, verdict = " or ".join(result.between), "decided by"
-    if not several:
-        what, verdict = f"the parameters of {what}", "best constrained by"
-    elif not result.decides:
-        verdict = "not decided by any experiment of this length; the nearest is"
+    supposed, chosen = supposed_in_words(result), result.chosen
     lines = [
-        f"axis {result.axis}: {what}, {verdict}",
-        f"  {in_short(result.chosen.experiment, result.chosen.units)}",
+        f"axis {result.axis}: {question_in_words(result)}",
+        f"  {in_short(chosen.experiment, chosen.units)}",
+        f"  {gap_in_words(result.gap)}",
+        *(f"  {name} is excited by {motion}" for name, motion in result.excited_by.items()),
+        *([f"  the existing logs already favour {result.favoured}"] if result.favoured else []),
+        *([f"  {supposed}"] if supposed else []),
+        *(f"  {experiment_in_words(t, result)}" for t in in_order(result)[:SHOWN]),
+        *(f"  not run: {not_run_in_words(n)}" for n in result.not_run),
     ]
-    lines += [f"  {gap_in_words(result.gap)}"]
-    lines += [f"  {name} is excited by {motion}" for name, motion in result.excited_by.items()]
-    if result.favoured:
-        lines.append(f"  the existing logs already favour {result.favoured}")
-    if supposed := supposed_in_words(result):
-        lines.append(f"  {supposed}")
-    lines += [f"  {experiment_in_words(t, result)}" for t in in_order(result)[:SHOWN]]
-    return "\n".join([*lines, *(f"  not run: {not_run_in_words(n)}" for n in result.not_run)])
+    return "\n".join(lines)
 
 
 @text_of.register
 def add_text(result: Addition) -> str:
     """The errors before and after adding the effect."""
-    s, words = result.step, result.units.words
-    lines = [
-        step_in_words(s),
-        f"  {words('force error on the fit logs'):33s} {s.fit_error_before:.4g} -> "
-        f"{s.fit_error_after:.4g} {s.unit}",
-    ]
-    others = {
-        "held-out logs": (s.holdout_error_before, s.holdout_error_after),
-        "test logs": (s.test_error_before, s.test_error_after),
-    }
-    for name, (before, after) in others.items():
-        if before is not None and after is not None:
-            what = words(f"force error on the {name}")
-            lines.append(f"  {what:33s} {before:.4g} -> {after:.4g} {s.unit}")
-    if result.position_error is not None:
-        (before, after), unit = result.position_error, result.units.position
+    step, words = result.step, result.units.words
+    lines = [step_in_words(step)]
+    for role, (before, after) in errors_of_step(step).items():
+        what = words(f"force error on the {role.value} logs")
+        lines.append(f"  {what:33s} {arrow(before, after, step.unit)}")
+    if result.position_error is not None and result.replayed is not None:
+        unit = result.units.position
         lines.append(
-            f"  {words('free-running position error'):33s} {before:.3g} -> {after:.3g} {unit} "
-            f"on {result.position_log} (MuJoCo: {result.replayed:.3g} {unit})"
+            f"  {words('free-running position error'):33s} {arrow(*result.position_error, unit)} "
+            f"on {result.position_log} (MuJoCo: {quantity(result.replayed, unit)})"
         )
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
-        lines.append(
-            f"  the logs do not prove it: {result.candidate.refused}. The model has it "
-            "nevertheless, as asked for; go on with the model before, or, if a diagnosis says that "
-            "it needs another beside it, add that to the new model and judge then"
-        )
+        lines.append(f"  {proved_in_words(result)}")
     return "\n".join(lines)
 
 
-text_of.register(SimulationFit, simulation_fit_text)
+def agree_text(result: Agreement) -> str:
+    """By axis whether the fits agree, what differs, and what would make the difference."""
+    lines = []
+    for axis, found in result.axes.items():
+        lines.append(agreement_in_words(axis, found))
+        lines += [f"  {difference_in_words(d)}" for d in found.differing]
+        lines += [f"  {cause}" for cause in causes_in_words(found)]
+    lines += [f"axis {axis}: not compared, as it has no intervals" for axis in result.not_compared]
+    return "\n".join(lines)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.force_balance import residual
 from identify.validation.free_run import free_run
+from twin.log import write_topics
 from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits
 from twin.signals import Array
@@ -26,6 +28,15 @@ class SideBySide:
     sample_rate: float
     topics: Mapping[str, Mapping[str, Array]]
     units: Mapping[str, AxisUnits]
+
+    def write(self, path: Path) -> None:
+        """As MCAP, for Foxglove, PlotJuggler or rerun; raises InputError."""
+        units = {
+            f"{topic}/{column}": getattr(self.units[topic.rpartition("/")[2]], column)
+            for topic, columns in self.topics.items()
+            for column in columns
+        }
+        write_topics(self.topics, units, self.sample_rate, path)
 
 
 def side_by_side(model: MachineModel, parts: Mapping[str, PreparedLog]) -> SideBySide:

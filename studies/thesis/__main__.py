@@ -10,7 +10,7 @@ from pathlib import Path
 
 from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import say
-from identify.output.plain import plain
+from identify.output.machine import plain
 from studies.thesis.reproduction import reproduce
 from twin.errors import InputError
 from twin.files import make_folder, write_atomically

@@ -23,9 +23,9 @@ from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.intervals import half_widths
 from identify.estimation.prescribed_motion import steady_friction
 from identify.estimation.velocity_map import velocity_map
-from identify.output.report.blocks import Picture
+from identify.output.numbers import spaced
 from identify.output.report.drawing import BLUE, GREY, ORANGE
-from identify.output.report.units import spaced
+from identify.output.report.page import Picture
 from identify.selection.nonparametric import fit_nonparametric
 from studies.telling import Line, Panel, picture
 from studies.thesis import study

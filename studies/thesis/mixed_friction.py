@@ -22,7 +22,7 @@ import numpy as np
 from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.intervals import half_widths
-from identify.output.report.units import spaced
+from identify.output.numbers import spaced
 from identify.selection.trying import try_effect
 from studies.thesis import study
 from studies.thesis.study import Numbers, friction_of

@@ -21,9 +21,9 @@ from identify.dataset.noise_floor import floor_of
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.prescribed_motion import force_along
-from identify.output.report.blocks import Block
+from identify.output.numbers import spaced
 from identify.output.report.drawing import BLUE
-from identify.output.report.units import spaced
+from identify.output.report.page import Block
 from studies.telling import Line, Panel, picture, table
 from studies.thesis import study
 from studies.thesis.behaviours import LEG, LOOP, RATE, behaviours, traits, turning

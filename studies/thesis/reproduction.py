@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from identify.output.report.blocks import Answer, Section, Tone
+from identify.output.numbers import capitalised
 from identify.output.report.drawing import drawing_style
-from identify.output.report.html import page
-from identify.output.words.numbers import capitalised
+from identify.output.report.page import Answer, Section, Tone, page
 from studies.telling import numbers, tables
 from studies.thesis import cable, dynamic, future, models, residuals, simulation, track, twin
 from studies.thesis.study import Chapter, Found

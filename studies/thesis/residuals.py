@@ -15,9 +15,9 @@ from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.channel_delay import fit_aligned, realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on
-from identify.output.report.blocks import Block, Heading
-from identify.output.report.units import spaced
-from identify.output.report.whiteness import residual_test_blocks
+from identify.output.numbers import spaced
+from identify.output.report.page import Block, Heading
+from identify.output.report.residual import residual_test_blocks
 from identify.selection.diagnosis import diagnose_axis
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
 from studies.thesis import study

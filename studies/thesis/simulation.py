@@ -23,8 +23,8 @@ from identify.estimation.force_balance import residual
 from identify.estimation.presliding import Presliding
 from identify.estimation.stribeck_curve import StribeckCurve, fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
-from identify.output.report.blocks import Picture
 from identify.output.report.drawing import BLUE, ORANGE
+from identify.output.report.page import Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import SIDES, Array, Found, Numbers, friction_of

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from identify.dataset.dataset import Dataset, datasets
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on
-from identify.output.report.blocks import Block
+from identify.output.report.page import Block
 from twin.core.control import Controller
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue

@@ -25,8 +25,8 @@ from identify.estimation.map_curve import NAMES, stribeck_through
 from identify.estimation.prescribed_motion import steady_friction
 from identify.estimation.stribeck_curve import fit_stribeck
 from identify.estimation.velocity_map import VelocityMap, velocity_map
-from identify.output.report.blocks import Picture
 from identify.output.report.drawing import BLUE, GREY, ORANGE
+from identify.output.report.page import Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import SIDES, Array, Found, Numbers

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from identify.analysis.following import closed_loop_errors, identified, twin_of
-from identify.output.agreement import agree_json
+from identify.output.as_json import agree_json
 from identify.output.report.drawing import BLUE, GREY
-from identify.output.words.agreement import (
+from identify.output.words.fit import (
     agreement_in_words,
     causes_in_words,
     difference_in_words,

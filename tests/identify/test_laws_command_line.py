@@ -12,9 +12,9 @@ from planted_logs import SLIDE, Ride, having, logged
 
 import identify.selftest
 from identify import workflow
-from identify.output import as_json, diagnosis_json
+from identify.output import as_json
 from identify.output import text as as_text
-from identify.output.plain import plain
+from identify.output.machine import plain
 from identify.selftest import FULL, QUICK, Case, TrialResult, release_seed
 from twin.effects import load_catalogue
 from twin.experiments.file import load_experiment
@@ -79,8 +79,7 @@ def test_a_command_tells_and_writes_what_its_call_gives(folder, name):
     out = OUT.get(name, f"{name}.html")
     done = twin(name, *ARGUMENTS[name], *COMMON, "-o", out, "--json", folder=folder)
     found = called(name, folder)
-    said = diagnosis_json if name == "diagnose" else as_json
-    wanted = json.loads(json.dumps(plain(getattr(said, f"{name}_json")(found))))
+    wanted = json.loads(json.dumps(plain(getattr(as_json, f"{name}_json")(found))))
     told = json.loads(done.stdout)
     assert {k: told[k] for k in wanted} == wanted
     assert done.returncode == 0, done.stderr

@@ -97,9 +97,8 @@ def test_logs_and_models_print_themselves_in_a_line(log) -> None:
 
 
 def test_a_comparison_for_viewers_is_told_from_a_log(log, tmp_path) -> None:
-    from identify.output.side_by_side import write_side_by_side
     from identify.workflow import side_by_side_of
 
-    write_side_by_side(side_by_side_of(identify.compare("proton_xy", log)), tmp_path / "side.mcap")
+    side_by_side_of(identify.compare("proton_xy", log)).write(tmp_path / "side.mcap")
     with pytest.raises(InputError, match=r"side.mcap: is a comparison for viewers .*, not a log"):
         twin.read_log(tmp_path / "side.mcap")

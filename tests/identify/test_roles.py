@@ -15,7 +15,7 @@ from identify.dataset.given_logs import Role
 from identify.estimation.channel_delay import realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import error_on
-from identify.output.diagnosis_json import diagnose_json
+from identify.output.as_json import diagnose_json
 from identify.results.results import Diagnosis
 from identify.workflow import add_named, diagnose
 from twin.effects import Catalogue

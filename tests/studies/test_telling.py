@@ -41,10 +41,10 @@ def test_alike_entries_are_a_table_each() -> None:
     parameters, spikes, white = tables(numbers(FOUND), "cable")
     assert [c.title for c in parameters.columns] == ["", "true", "mean", "unit"]
     assert [tuple(row.cells) for row in parameters.rows] == [
-        ("sigma0", "260", "260", "N/m"), ("sigma1", "0.600", "−0.0612", "N·s/m"),
+        ("sigma0", "260", "260", "N/m"), ("sigma1", "0.600", "-0.0612", "N·s/m"),
     ]  # fmt: skip
     assert [tuple(row.cells) for row in spikes.rows] == [
-        ("1", "0.0110", "0.00200"), ("2", "−0.0220", "0.00190")
+        ("1", "0.0110", "0.00200"), ("2", "-0.0220", "0.00190")
     ]  # fmt: skip
     assert (parameters.caption, spikes.caption) == ("Cable, parameters", "Cable, spikes")
     assert [tuple(row.cells) for row in white.rows] == [("first fit", "true")]

@@ -1,50 +1,35 @@
-"""The report: one HTML file that needs nothing else, one module for each of its sections."""
+"""The report: one HTML file that needs nothing else; its sections are in ``SECTIONS``, in order."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from identify.dataset.given_logs import Role
-from identify.output.report import (
-    answer,
-    equations,
-    growth,
-    law_shape,
-    logs,
-    notes,
-    overlay,
-    parameters,
-    ranking,
-    regions,
-    residuals,
-    shape,
-    whiteness,
-)
-from identify.output.report.blocks import Section
+from identify.output.numbers import quantity
+from identify.output.report import answer, effects, residual
 from identify.output.report.drawing import drawing_style
-from identify.output.report.html import page
+from identify.output.report.page import Answer, Block, Heading, Part, Section, page
 from identify.output.report.subject import Subject
-from identify.output.report.units import quantity
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis
 from twin.files import require_writable, write_atomically
 from twin.model.history import HistoryStep
 
-SECTIONS: tuple[Callable[[Subject], Section | None], ...] = (
-    answer.section,
-    law_shape.section,
-    overlay.section,
-    residuals.section,
-    regions.section,
-    whiteness.section,
-    shape.section,
-    ranking.section,
-    growth.section,
-    equations.section,
-    parameters.section,
-    logs.section,
-    notes.section,
+SECTIONS = (
+    Part("answer", "Answer", answer.cards),
+    Part("law-shape", "The shape of a law", effects.law_shapes),
+    Part("force", "Measured and modelled force", residual.forces),
+    Part("residual", "What the model leaves unexplained", residual.residuals),
+    Part("regions", "Where the error is", residual.regions),
+    Part("tests", "Is the residual noise?", residual.whiteness, residual.reasons),
+    Part("shape", "Fitted curves without physics", effects.curves),
+    Part("ranking", "Candidates, ranked", effects.ranking),
+    Part("growth", "The error, effect by effect", of_all=effects.growth),
+    Part("equations", "The laws of the named effects", effects.equations),
+    Part("parameters", "Parameters", effects.parameters),
+    Part("logs", "Errors log by log", residual.logs),
+    Part("notes", "Notes", of_all=answer.notes),
 )
 
 
@@ -70,39 +55,41 @@ def write_report(
         title, diagnosis, comparison, tuple(history), tuple(additions), tuple(assumed)
     )
     with drawing_style():
-        text = render(subject, sections(subject))
+        text = page(subject.title, facts(subject), sections(subject))
     write_atomically(path, text.encode("utf-8"))
 
 
-def sections(subject: Subject) -> list[Section]:
-    """The sections that have something to show."""
-    made = (section(subject) for section in SECTIONS)
-    return [s for s in made if s is not None]
+def sections(subject: Subject, parts: Sequence[Part] = SECTIONS) -> list[Section]:
+    """The sections that have something to show: of each axis, then of all."""
+    made = []
+    for part in parts:
+        blocks: list[Block] = []
+        for view in subject.views:
+            own = part.of_axis(view) if part.of_axis else []
+            if own and len(subject.views) > 1 and not isinstance(own[0], Answer | Heading):
+                blocks.append(Heading(f"Axis {view.name}"))
+            blocks += own
+        if part.of_all:
+            blocks += part.of_all(subject)
+        if blocks:
+            made.append(Section(part.anchor, part.title.replace("force", subject.forces), blocks))
+    return made
 
 
-def render(subject: Subject, shown: Sequence[Section]) -> str:
-    """The page as HTML text."""
-    return page(subject.title, _facts(subject), shown)
-
-
-def _facts(subject: Subject) -> list[tuple[str, str]]:
-    """The line under the title: model, logs, test functions."""
+def facts(subject: Subject) -> list[tuple[str, str]]:
+    """The line under the title: model, logs by role, test functions."""
     axes = subject.comparison.axes.values()
-    logs = list(dict.fromkeys(log.motion.name for a in axes for log in a.logs))
-    lengths = list(dict.fromkeys(quantity(a.logs[0].test_function.length, "s") for a in axes))
-    facts = [("Not confirmed", line) for line in subject.assumed]
-    facts += [("Model", subject.comparison.model.name), ("Logs", ", ".join(logs))]
-    for name, role in (("Held out", Role.SELECTION), ("Test", Role.TEST)):
-        if others := _names(role, subject.diagnosis):
-            facts.append((name, ", ".join(others)))
-    return [*facts, ("Test function", ", ".join(lengths))]
-
-
-def _names(role: Role, diagnosis: Diagnosis | None) -> list[str]:
-    if diagnosis is None:
-        return []
-    logs = (log for d in diagnosis.axes.values() for log in d.dataset.having(role))
-    return list(dict.fromkeys(log.motion.name for log in logs))
+    logs = dict.fromkeys(log.motion.name for a in axes for log in a.logs)
+    lengths = dict.fromkeys(quantity(a.logs[0].test_function.length, "s") for a in axes)
+    diagnosed = subject.diagnosis.axes.values() if subject.diagnosis else ()
+    shown = [("Not confirmed", line) for line in subject.assumed]
+    shown.append(("Model", subject.comparison.model.name))
+    shown.append(("Training logs" if diagnosed else "Logs", ", ".join(logs)))
+    for name, role in (("Selection logs", Role.SELECTION), ("Test logs", Role.TEST)):
+        others = (log.motion.name for d in diagnosed for log in d.dataset.having(role))
+        if text := ", ".join(dict.fromkeys(others)):
+            shown.append((name, text))
+    return [*shown, ("Test functions", ", ".join(lengths))]
 
 
 __all__ = ["write_report"]

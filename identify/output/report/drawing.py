@@ -7,15 +7,18 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.container import BarContainer
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -100,6 +103,24 @@ def settle(figure: Figure) -> None:
 def plain_tick(value: float, _: int) -> str:
     """Label of a logarithmic scale without mathematical notation, which is not parsed."""
     return f"{value:g}"
+
+
+def plain_decades(axis: Axis) -> None:
+    """A logarithmic axis with a plain number at each decade."""
+    axis.set_major_locator(LogLocator(subs=(1.0,)))
+    axis.set_major_formatter(FuncFormatter(plain_tick))
+    axis.set_minor_locator(NullLocator())
+
+
+def draw_bars(
+    axes: Axes, names: Sequence[str], lengths: Sequence[float], colors: Sequence[str]
+) -> BarContainer:
+    """Horizontal bars beside their names, the first at the top."""
+    bars = axes.barh(names, lengths, color=colors, height=0.62)
+    axes.invert_yaxis()
+    axes.grid(False, axis="y")
+    axes.tick_params(axis="y", length=0)
+    return bars
 
 
 def noise_band(axes: Axes, floor: float) -> None:

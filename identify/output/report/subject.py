@@ -1,26 +1,25 @@
-"""The results that a report shows, and the forces that its pictures are drawn from."""
+"""The results that a report shows, and what it shows of each axis."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.given_logs import Role
 from identify.estimation.fit import Fit
-from identify.experiment_design.plan import Plan
-from identify.output.report.units import spaced
+from identify.output.words.diagnosis import Said, all_found, said_of
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis
 from identify.results.told import Told
-from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.validation.misfit_maps import AxisComparison, Region
+from identify.validation.misfit_maps import AxisComparison
 from twin.model.history import HistoryStep
 from twin.model.machine import AxisModel
-from twin.model.units import LINEAR
+from twin.model.units import AxisUnits
 
 Array = NDArray[np.float64]
 
@@ -36,112 +35,91 @@ class Subject:
     additions: Sequence[Addition]
     assumed: Sequence[str] = ()
 
-    @property
-    def axes(self) -> list[AxisComparison]:
+    @cached_property
+    def views(self) -> list[AxisView]:
         """The axes in the order of the model, but the leading axis of the diagnosis first."""
         leading = self.diagnosis.leading if self.diagnosis else None
-        first = (
-            leading.dataset.axis
-            if leading and leading.verdict is not Verdict.NOTHING_MISSING
-            else None
-        )
-        return sorted(self.comparison.axes.values(), key=lambda a: a.axis != first)
-
-    def diagnosed(self, axis: str) -> AxisDiagnosis | None:
-        """The diagnosis of one axis, where there is one."""
-        return self.diagnosis.axes.get(axis) if self.diagnosis else None
-
-    def next_experiment(self, axis: str) -> Plan | None:
-        """The experiment that decides what the diagnosis of one axis could not."""
-        return self.diagnosis.next_experiments.get(axis) if self.diagnosis else None
-
-    def left_over(self, axis: str) -> Region | None:
-        """Where what the diagnosis leaves of one axis is largest."""
-        return self.diagnosis.left_over.get(axis) if self.diagnosis else None
-
-    def refit(self, axis: str) -> Refit | None:
-        """What fitting changed of the given model on one axis."""
-        return self.diagnosis.refits.get(axis) if self.diagnosis else None
-
-    def told(self, axis: str) -> Told | None:
-        """What is told of the final model of one axis, where it was diagnosed."""
-        return self.diagnosis.told.get(axis) if self.diagnosis else None
-
-    def floors(self, axis: str) -> Mapping[Role, float]:
-        """The noise floors of one axis by role of logs, N RMS."""
-        told, compared = self.told(axis), self.comparison.axes.get(axis)
-        if told is not None:
-            return told.floors
-        return {} if compared is None else {Role.TRAINING: compared.floor}
-
-    def final(self, axis: str) -> Fit | None:
-        """The model of this axis with everything that was found; None where nothing was."""
-        found = self.diagnosed(axis)
-        return found.final if found and found.final is not found.base else None
-
-    def found_on(self, axis: str) -> str:
-        """What was found on this axis, as a label; "" where nothing was."""
-        found = self.diagnosed(axis)
-        return what_was_found(found) if found and found.final is not found.base else ""
-
-    def model(self, axis: str) -> AxisModel:
-        """The model of the comparison."""
-        return self.comparison.model.axes[axis]
+        missing = leading and leading.verdict is not Verdict.NOTHING_MISSING
+        first = leading.dataset.axis if leading and missing else None
+        ordered = sorted(self.comparison.axes.values(), key=lambda a: a.axis != first)
+        return [AxisView(self, axis) for axis in ordered]
 
     @property
     def steps(self) -> Sequence[HistoryStep]:
         """The added effects, from the model's history or else from the additions."""
         return self.history or tuple(a.step for a in self.additions)
 
-    def heading(self, axis: str) -> str:
-        """Heading of what belongs to one axis of several, "" where there is one only."""
-        return f"Axis {axis}" if len(self.comparison.axes) > 1 else ""
+    @property
+    def forces(self) -> str:
+        """What the axes are moved by: force, torque, or both."""
+        return " and ".join(dict.fromkeys(view.words("force") for view in self.views))
 
-
-def what_was_found(found: AxisDiagnosis) -> str:
-    """A label for what was found: the effect where it is one."""
-    names = dict.fromkeys(f.effect for f in found.findings)
-    return spaced(next(iter(names))) if len(names) == 1 else "all that was found"
+    def floors(self, axis: str) -> Mapping[Role, float]:
+        """The noise floors of one axis by role of logs, N RMS; none where it does not move."""
+        view = next((v for v in self.views if v.name == axis), None)
+        return view.floors if view else {}
 
 
 @dataclass(frozen=True, eq=False)
-class LogForces:
-    """Forces of one axis over one log, each (n,) in ``unit``; time (n,) s.
+class AxisView:
+    """One axis of a report. axis: the errors of the model of the comparison."""
 
-    explain: command less inertia, the force that the effects must explain. model, found: that force
-    by the model, and by the model with what was found; nan where static friction is undetermined.
-    """
+    subject: Subject
+    axis: AxisComparison
 
-    name: str
-    time: Array
-    explain: Array
-    model: Array
-    found: Array | None
-    unit: str = LINEAR.force
+    @property
+    def name(self) -> str:
+        return self.axis.axis
 
+    @property
+    def units(self) -> AxisUnits:
+        return self.axis.units
 
-def forces_by_log(axis: AxisComparison, mass: float, final: Fit | None) -> list[LogForces]:
-    """Forces of a model of that mass (kg), and of the final one, over each log."""
-    left = by_log(axis, axis.residual, axis.kept)
-    less = None if final is None else by_log(axis, final.residual, final.kept)
-    out = []
-    for i, log in enumerate(axis.logs):
-        explain = log.command - mass * log.acceleration
-        out.append(
-            LogForces(
-                name=log.motion.name,
-                time=log.time,
-                explain=explain,
-                model=explain - left[i],
-                found=None if less is None else explain - less[i],
-                unit=axis.units.force,
-            )
+    def words(self, linear: str) -> str:
+        """Words that are for a linear axis, on this one."""
+        return self.units.words(linear)
+
+    @property
+    def model(self) -> AxisModel:
+        """The model of the comparison."""
+        return self.subject.comparison.model.axes[self.name]
+
+    @property
+    def found(self) -> AxisDiagnosis | None:
+        """The diagnosis of this axis, where there is one."""
+        return self.subject.diagnosis.axes.get(self.name) if self.subject.diagnosis else None
+
+    @property
+    def told(self) -> Told | None:
+        """What is told of its final model, where it was diagnosed."""
+        return self.subject.diagnosis.told.get(self.name) if self.subject.diagnosis else None
+
+    @cached_property
+    def said(self) -> Said | None:
+        """The sentences about its diagnosis."""
+        return (
+            said_of(self.subject.diagnosis, self.name)
+            if self.subject.diagnosis and self.found
+            else None
         )
-    return out
 
+    @property
+    def final(self) -> Fit | None:
+        """The model with everything that was found; None where nothing was."""
+        return self.found.final if self.found and self.label else None
 
-def by_log(axis: AxisComparison, residual: Array, kept: NDArray[np.bool_]) -> list[Array]:
-    """A residual (n,) N of each log of a comparison, nan where it carries no information."""
-    every = np.full(len(kept), np.nan)
-    every[kept] = residual
-    return np.split(every, np.cumsum([len(log) for log in axis.logs])[:-1])
+    @property
+    def label(self) -> str:
+        """What was found on this axis; "" where nothing was."""
+        return all_found(self.found) if self.found else ""
+
+    @property
+    def floors(self) -> Mapping[Role, float]:
+        """The noise floors by role of logs, N RMS."""
+        return self.told.floors if self.told else {Role.TRAINING: self.axis.floor}
+
+    def by_log(self, residual: Array, kept: NDArray[np.bool_]) -> list[Array]:
+        """A residual (n,) N of each log of the comparison, nan where it carries no information."""
+        every = np.full(len(kept), np.nan)
+        every[kept] = residual
+        return np.split(every, np.cumsum([len(log) for log in self.axis.logs])[:-1])

@@ -14,7 +14,7 @@ from identify.dataset.prepared_log import moving
 from identify.estimation.channel_delay import realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import error_on, fit_axis
-from identify.output.words.estimation import prepared_in_words
+from identify.output.words.fit import prepared_in_words
 from twin.model.machine import MachineModel
 
 RATE, SECONDS = 1000.0, 6.0
@@ -54,14 +54,14 @@ def test_what_lies_beyond_the_fit_logs_tests_nothing() -> None:
     position = held.test_function.mean(held.motion.position)
     assert position[~held.reached].min() > 0.03
     assert 0.2 < part < 0.6
-    (told,) = [text for text in prepared_in_words(beyond) if "held-out" in text]
-    assert told.startswith(f"held 0: a held-out log, but {100 * part:.0f} % of it lies at pos")
+    (told,) = [text for text in prepared_in_words(beyond) if "selection log" in text]
+    assert told.startswith(f"held 0: a selection log, but {100 * part:.0f} % of it lies at pos")
 
 
 def test_a_test_log_is_not_called_held_out() -> None:
     beyond = dataset_of(0.02)
     tested = replace(beyond, holdout=(), test=beyond.holdout)
-    (told,) = [text for text in prepared_in_words(tested) if "no fit log has been" in text]
+    (told,) = [text for text in prepared_in_words(tested) if "no training log has been" in text]
     assert told.startswith("held 0: a test log, but ")
 
 

@@ -12,7 +12,7 @@ from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
 from identify.dataset.test_function import LEAST_BLOCKS
 from identify.dataset.time_scale import HIDES, QUIET, SHOWS, Scale
-from identify.output.words.estimation import prepared_in_words
+from identify.output.words.fit import prepared_in_words
 from identify.workflow import compare, fit
 from twin.errors import InputError
 from twin.model.machine import AxisModel, MachineModel

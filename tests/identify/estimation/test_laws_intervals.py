@@ -21,7 +21,7 @@ from identify.estimation.intervals import (
     refusal,
 )
 from identify.estimation.scaling import Scaling
-from identify.output.words.estimation import no_interval_in_words
+from identify.output.words.fit import no_interval_in_words
 from twin.effect import Parameter
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters, read

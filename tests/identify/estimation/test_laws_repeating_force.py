@@ -8,7 +8,7 @@ from constructed import dataset_of, effect, fit_of, ridden, windowed
 
 from identify.dataset.spectrum import Record
 from identify.estimation.repeating_force import Repeat, _strongest, _term, not_general
-from identify.output.words.selection import repeat_in_words
+from identify.output.words.diagnosis import repeat_in_words
 from twin.model.machine import AxisModel
 
 
@@ -37,7 +37,7 @@ def test_a_repeat_is_general_where_its_terms_are_alike():
     assert not repeat(0.0, 0.49).general
     assert repeat(2.0 * np.pi).general
     words = repeat_in_words(repeat(1.0))
-    assert "repeats every 2.5 mm of travel (1 N in a, 1 N in b)" in words
+    assert "repeats every 2.50 mm of travel (1.00 N in a, 1.00 N in b)" in words
     assert "by 57 degrees" in words
 
 

@@ -16,7 +16,7 @@ from identify.estimation.remainder import (
     noise_known,
     with_own_noise,
 )
-from identify.output.words.estimation import prepared_in_words
+from identify.output.words.fit import prepared_in_words
 
 SIZE = 0.05  # N RMS, far above what sensors make here
 

@@ -21,7 +21,7 @@ from identify.estimation.replay import (
     simulated_error,
 )
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
-from identify.output.words.estimation import motion_fit_in_words
+from identify.output.words.fit import HELD_OUT_GREW, motion_fit_in_words
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.kinds import OpenLoopSine
@@ -120,8 +120,8 @@ def test_a_held_out_error_that_grows_is_said(slide, log) -> None:
     grew, fell = (
         " ".join(motion_fit_in_words("x", found, held)) for held in ((1e-6, 2e-6), (2e-6, 1e-6))
     )
-    assert "The held-out error grew" in grew
-    assert "The held-out error grew" not in fell
+    assert HELD_OUT_GREW in grew
+    assert HELD_OUT_GREW not in fell
 
 
 def test_the_command_says_the_objective_and_both_errors(slide, log, tmp_path: Path) -> None:

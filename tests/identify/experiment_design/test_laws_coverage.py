@@ -18,7 +18,7 @@ from identify.experiment_design.missing_excitation import (
     _weighted_quantiles,
     gap,
 )
-from identify.output.words.experiment_design import gap_in_words
+from identify.output.words.fit import gap_in_words
 from twin.model.units import LINEAR
 
 LOG = windowed(SHORT)
@@ -146,6 +146,6 @@ def test_a_gap_says_whether_motion_is_missing():
     def said(share):
         return gap_in_words(Gap("speed", "m/s", 0.1, 0.25, share))
 
-    assert said(None) == "the explanations differ most at speed 0.1 to 0.25 m/s"
-    assert said(0.98 * RARE).startswith("missing motion: speed 0.1 to 0.25 m/s; 4.9 % of the data")
-    assert said(RARE).startswith("no motion is missing, but more of it is needed at speed 0.1")
+    assert said(None) == "the explanations differ most at speed 100 to 250 mm/s"
+    assert said(0.98 * RARE).startswith("missing motion: speed 100 to 250 mm/s; 4.9 % of the data")
+    assert said(RARE).startswith("no motion is missing, but more of it is needed at speed 100 to")

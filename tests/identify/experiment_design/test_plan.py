@@ -16,7 +16,7 @@ from identify.experiment_design.discrimination import (
     Explanation,
     contest,
 )
-from identify.output.diagnosis_json import diagnose_json
+from identify.output.as_json import diagnose_json
 from identify.output.report import sections
 from identify.output.report.drawing import drawing_style
 from identify.output.report.subject import Subject

@@ -18,14 +18,15 @@ from identify.output.as_json import (
     fit_json,
     plan_json,
 )
-from identify.output.machine_json import check_json, effect_json
-from identify.output.words.estimation import (
+from identify.output.machine import check_json, effect_json
+from identify.output.words.fit import (
     aliasing_in_words,
+    gap_in_words,
+    loop_in_words,
     no_interval_in_words,
     outcome_in_words,
+    region_in_words,
 )
-from identify.output.words.experiment_design import gap_in_words
-from identify.output.words.validation import loop_in_words, region_in_words
 from twin.log.check import CheckReport, Fault, Finding, Severity
 from twin.model.units import LINEAR
 
@@ -212,5 +213,5 @@ def test_a_thinned_log_is_told_with_what_to_log_instead(folded: float, told: boo
     said = aliasing_in_words(noise, LINEAR)
     assert (said is not None) is told
     if said is not None:
-        assert "0.038 N of the noise floor of 0.04 N" in said
+        assert "38.0 mN of the noise floor of 40.0 mN" in said
         assert "log at the control rate, or the drive's averaged current" in said

@@ -12,13 +12,10 @@ from built_fits import built_fit
 from report_cases import cogging_case
 from strict_json import expected_refit, strict
 
-from identify.output.as_json import add_json, estimate_json, plan_json
-from identify.output.diagnosis_json import _finding, diagnose_json
-from identify.output.remarks import remarks_on
+from identify.output.as_json import _finding, add_json, diagnose_json, estimate_json, plan_json
 from identify.output.report import sections
 from identify.output.report.drawing import drawing_style
-from identify.output.words.findings import advice
-from identify.output.words.selection import SEVERAL
+from identify.output.words.diagnosis import SEVERAL, advice, remarks_on
 from identify.selection.bends import Bend
 from identify.selection.diagnosis import Verdict
 

@@ -10,58 +10,47 @@ import pytest
 from built_results import Page
 
 from identify.dataset.given_logs import Role
-from identify.output.remarks import remarks_on
-from identify.output.report import (
-    answer,
-    growth,
-    maps,
-    notes,
-    ranking,
-    regions,
-    render,
-    sections,
-)
-from identify.output.report.blocks import Answer, Heading, Picture, Section, Table, Tile, Tone
-from identify.output.report.html import page
+from identify.output.numbers import arrow, capitalised, number, quantity, spaced
+from identify.output.report import SECTIONS, facts, sections
+from identify.output.report.answer import cards as cards_of
+from identify.output.report.answer import notes
+from identify.output.report.drawing import drawing_style
+from identify.output.report.page import Answer, Picture, Section, Tile, Tone, page
+from identify.output.report.residual import regions
 from identify.output.report.subject import Subject
-from identify.output.report.units import SCALED, number, quantity, spaced
-from identify.output.words.experiment_design import gap_in_words
-from identify.output.words.findings import advice, finding_in_words, shares_in_words
-from identify.output.words.numbers import capitalised
-from identify.output.words.selection import SEVERAL, VERDICTS, refit_in_words
-from identify.output.words.validation import region_in_words
+from identify.output.words.diagnosis import (
+    SEVERAL,
+    VERDICTS,
+    advice,
+    finding_in_words,
+    refit_in_words,
+    remarks_on,
+    shares_in_words,
+)
+from identify.output.words.fit import next_step_in_words, region_in_words
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 
-
-@pytest.fixture(autouse=True)
-def no_pictures(monkeypatch):
-    """Pictures are other tests'."""
-    blank = Picture(None, "")
-    for module, name in (
-        (growth, "_picture"), (ranking, "_picture"), (maps, "picture"), (regions, "_picture"),
-    ):  # fmt: skip
-        monkeypatch.setattr(module, name, lambda *_: blank)
+TABLES = ("answer", "regions", "ranking", "growth", "equations", "parameters", "logs", "notes")
 
 
 def subject_of(diagnosis=None, *, history=made.STEPS, additions=(), **changes) -> Subject:
     return Subject("The title", diagnosis, made.compared(), history, additions, **changes)
 
 
-def page_of(subject: Subject, *parts) -> Page:
-    """The page with some sections, their pictures left out."""
-    shown = [part.section(subject) for part in parts]
-    bare = [
-        replace(s, blocks=[b for b in s.blocks if not isinstance(b, Picture)]) for s in shown if s
-    ]
-    return Page(render(subject, bare))
+def page_of(subject: Subject) -> Page:
+    """The page, its pictures left out."""
+    with drawing_style():
+        shown = sections(subject, [part for part in SECTIONS if part.anchor in TABLES])
+    bare = [replace(s, blocks=[b for b in s.blocks if not isinstance(b, Picture)]) for s in shown]
+    return Page(page(subject.title, facts(subject), bare))
 
 
 # --- the answer -----------------------------------------------------------------------------
 
 
 def cards(diagnosis=None, **changes):
-    return answer.section(subject_of(diagnosis, **changes)).blocks
+    return [card for view in subject_of(diagnosis, **changes).views for card in cards_of(view)]
 
 
 def test_the_answer_for_an_ambiguity():
@@ -69,28 +58,28 @@ def test_the_answer_for_an_ambiguity():
     assert first.headline == "Axis x: cogging or quadratic drag, and lugre are missing"
     assert (first.sentence, first.tone) == (SEVERAL, Tone.STRONG)
     tiles = [(t.name, t.value, t.remark) for t in first.tiles]
-    ratio = f"{number(8.37 / 2.03)} → {number(3.19 / 2.03)}"
+    ratio = arrow(8.37 / 2.03, 3.19 / 2.03, "1")
     assert tiles == [
-        ("Force error on the fit logs", "8.37 → 3.19 N", "with all that was found, RMS"),
-        ("Held-out force error", "7.81 → 2.39 N", "with all that was found, RMS"),
-        ("Error over noise floor", ratio, "fit logs; floor 2.03 N RMS"),
+        ("Force error, training logs", "8.37 -> 3.19 N", "with all that was found, RMS"),
+        ("Force error, selection logs", "7.81 -> 2.39 N", "with all that was found, RMS"),
+        ("Error over noise floor", ratio, "training logs; floor 2.03 N RMS"),
         ("Position, free run", "4.29 µm", "RMS of the worst log, without all that was found"),
     ]  # fmt: skip
-    findings = [spaced(". ".join(finding_in_words(f, SCALED))) for f in made.FOUND]
+    findings = [spaced(". ".join(finding_in_words(f))) for f in made.FOUND]
     assert first.remarks == [
         *map(capitalised, findings),
         capitalised(shares_in_words(made.diagnosis_of())[0]),
-        "Runner-up: quadratic drag, ΔBIC 423, held-out error 7.34 → 2.38 N, proved too.",
-        "The experiment that decides (8.30 s; twin plan writes it): passes: axis x, span 0.0831 m, "
-        "speed 0.0127 m/s, repeats 7. The rival leaves 41.2 mN RMS unexplained, where noise is "
-        "11.3 mN; "
-        f"{gap_in_words(made.plan_of('a').gap)}.",
+        "Runner-up: quadratic drag, evidence (difference of BIC) 423, selection error 7.34 -> "
+        "2.38 N, proved too.",
+        next_step_in_words(made.plan_of("cogging", "quadratic_drag")),
     ]
     assert second.headline == "Axis y: nothing is missing"
     assert second.tone is Tone.PLAIN
-    words = refit_in_words(made.refit_of(0.01), SCALED)
+    words = refit_in_words(made.refit_of(0.01))
     assert second.remarks[-1] == f"{words[0].upper()}{words[1:]}."
-    assert second.remarks[0].startswith("Nearest candidate: constant force, ΔBIC 66.0")
+    assert second.remarks[0].startswith(
+        "Nearest candidate: constant force, evidence (difference of BIC) 66.0"
+    )
     assert second.remarks[0].endswith("gain uncertain: t = 1.3, where 1.6 is sure.")
     assert [(t.name, t.value) for t in second.tiles] == [
         ("Force error", "1.07 N"), ("Error over noise floor", number(1.07 / 0.97)),
@@ -102,10 +91,10 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     left = made.diagnosis_of(unexplained=made.STRUCTURE)
     card, _ = cards(made.diagnosed(left))
     assert card.sentence.startswith(
-        f"{SEVERAL} What remains beside the named effects is 3.19 N on the fit logs, "
+        f"{SEVERAL} What remains beside the named effects is 3.19 N on the training logs, "
         "1.6 times the noise floor. The error depends most on other axis position"
     )
-    where = region_in_words(made.LEFT_OVER, SCALED)
+    where = region_in_words(made.LEFT_OVER)
     assert card.sentence.endswith(f"It is largest at {where}.")
     assert [r.split(" explains ")[0] for r in card.remarks[:2]] == ["Cogging", "Lugre"]
     told = "without it the error on the selection logs is 7.17 N, with it 2.19 N. On the logs that"
@@ -163,14 +152,14 @@ def test_cross_validated_errors_have_a_tile_of_their_own():
         findings=made.FOUND[:1], dataset=replace(made.DATASET, holdout=()), on=Role.TRAINING
     )
     card, _ = cards(made.diagnosed(one))
-    assert [t.name for t in card.tiles][1] == "Cross-validated force error"
+    assert [t.name for t in card.tiles][1] == "Force error, cross-validated"
 
 
 @pytest.mark.parametrize(("error", "tone"), [(1.29, Tone.PLAIN), (1.31, Tone.STRONG)])
 def test_a_comparison_alone_says_whether_the_error_is_noise(error, tone):
     c = made.comparison_of()
     c = replace(c, residual=c.residual * (error * c.floor / c.total_error))
-    card = answer._compared(c)
+    (card,) = cards_of(Subject("t", None, made.Comparison(made.MODEL, {"x": c}), (), ()).views[0])
     assert card.tone is tone
     assert ("explains the measurement" in card.headline) is (tone is Tone.PLAIN)
     assert ("at its noise floor" in card.sentence) is (tone is Tone.PLAIN)
@@ -185,8 +174,9 @@ def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
     assert len(rest) == 2
     assert first.headline == "Axis x: cogging added"
     assert [(t.name, t.value) for t in first.tiles] == [
-        ("Force error on the fit logs", "7.31 → 4.57 N"),
-        ("Held-out force error", "7.83 → 4.91 N"), ("Position, free run", "3.71 → 1.93 µm"),
+        ("Force error, training logs", "7.31 -> 4.57 N"),
+        ("Force error, selection logs", "7.83 -> 4.91 N"),
+        ("Position, free run", "3.71 -> 1.93 µm"),
     ]  # fmt: skip
     assert "1.97 µm replayed by MuJoCo" in first.tiles[2].remark
     assert (first.tone is Tone.STRONG) is kept
@@ -199,7 +189,7 @@ def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
 
 
 def scaled(region) -> str:
-    return capitalised(region_in_words(region, SCALED))
+    return capitalised(region_in_words(region))
 
 
 def test_the_worst_regions_in_words():
@@ -219,16 +209,17 @@ def test_a_narrow_region_has_the_digits_of_its_width():
 
 
 def test_regions_have_headings_only_among_several_axes():
-    quiet = replace(made.comparison_of("y"), residual=np.full(9, 0.001))
+    quiet = made.comparison_of("y")
+    quiet = replace(quiet, residual=np.full(len(quiet.residual), 0.001))
     for axes, expected in (
         ({"x": made.comparison_of(), "y": made.comparison_of("y")}, ["Axis x", "Axis y"]),
         ({"x": made.comparison_of(), "y": quiet}, ["Axis x"]),
         ({"x": made.comparison_of()}, []),
     ):
         subject = Subject("t", None, made.Comparison(made.MODEL, axes), (), ())
-        found = regions.section(subject)
-        assert [b.text for b in found.blocks if isinstance(b, Heading)] == expected
-        assert (found.anchor, found.title) == ("regions", "Where the error is")
+        text = page_of(subject).texts["regions"]
+        assert [name for name in ("Axis x", "Axis y") if name in text] == expected
+        assert "Where the error is" in text
 
 
 @pytest.mark.parametrize(("ratio", "shown"), [(1.29, False), (1.31, True)])
@@ -236,32 +227,31 @@ def test_regions_are_shown_above_the_noise(ratio, shown):
     c = made.comparison_of()
     c = replace(c, residual=c.residual * (ratio * c.floor / c.total_error))
     subject = Subject("t", None, made.Comparison(made.MODEL, {"x": c}), (), ())
-    assert (regions.section(subject) is not None) is shown
+    assert bool(regions(subject.views[0])) is shown
 
 
 def test_notes_are_said_once():
     subject = subject_of(made.diagnosed(), additions=(made.addition(),))
-    (listing,) = notes.section(subject).blocks
+    (listing,) = notes(subject)
     assert listing.items.count("Axis x, cogging added: mass moved.") == 1
     told = [i for i in listing.items if i.startswith("Axis x: ")]
-    expected = remarks_on(made.diagnosed(), "x", SCALED)
+    expected = remarks_on(made.diagnosed(), "x")
     assert "after the fit 127 mN" in expected[0]
     assert told == [f"Axis x: {r.removesuffix('.')}." for r in expected]
-    assert notes.section(subject_of(history=())) is None
+    assert notes(subject_of(history=())) == []
     refused = replace(made.diagnosed(), next_experiments={}, not_planned={"x": "no travel"})
-    (listing,) = notes.section(subject_of(refused)).blocks
+    (listing,) = notes(subject_of(refused))
     why = "no experiment that would tell them apart is proposed: no travel"
     assert f"Axis x: {why}." in listing.items
 
 
 def test_the_line_under_the_title_and_the_order_of_axes():
     found = made.diagnosed()
-    facts = page_of(subject_of(found)).facts
-    assert facts == {
-        "Model": "the stage", "Logs": "run 1, run 2", "Held out": "held 1",
-        "Test function": "40.0 ms",
+    assert dict(facts(subject_of(found))) == {
+        "Model": "the stage", "Training logs": "run 1, run 2", "Selection logs": "held 1",
+        "Test functions": "40.0 ms",
     }  # fmt: skip
-    assert "Held out" not in page_of(subject_of()).facts
+    assert "Selection logs" not in dict(facts(subject_of()))
     y_first = replace(
         found,
         axes={
@@ -269,21 +259,10 @@ def test_the_line_under_the_title_and_the_order_of_axes():
             "y": replace(found.axes["x"], dataset=found.axes["y"].dataset),
         },
     )
-    assert [a.axis for a in subject_of(y_first).axes] == ["y", "x"]
-    assert [a.axis for a in subject_of(found).axes] == ["x", "y"]
+    assert [a.name for a in subject_of(y_first).views] == ["y", "x"]
+    assert [a.name for a in subject_of(found).views] == ["x", "y"]
     quiet = replace(found, axes={"y": found.axes["y"]})
-    assert [a.axis for a in subject_of(quiet).axes] == ["x", "y"]
-
-
-def test_only_sections_with_something_to_show_are_made(monkeypatch):
-    def empty(subject):
-        return None
-
-    def one(subject):
-        return regions.Section("one", subject.title, [Table([], [])])
-
-    monkeypatch.setattr("identify.output.report.SECTIONS", (empty, one, empty))
-    assert [s.anchor for s in sections(subject_of())] == ["one"]
+    assert [a.name for a in subject_of(quiet).views] == ["x", "y"]
 
 
 @pytest.mark.parametrize(("count", "columns"), [(1, 1), (3, 3), (4, 4), (5, 3), (6, 3), (7, 4)])

@@ -9,17 +9,24 @@ import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built_fit
 
-from identify.output.report import overlay, residuals, shape, whiteness
-from identify.output.report.drawing import (
-    BLUE,
-    ORANGE,
-    binned_mean,
-    noise_band,
-    symmetric_limit,
+from identify.output.numbers import Scale
+from identify.output.report.drawing import BLUE, ORANGE, binned_mean, noise_band, symmetric_limit
+from identify.output.report.effects import curves
+from identify.output.report.residual import (
+    LogForces,
+    Panel,
+    draw_forces,
+    draw_residuals,
+    draw_tests,
+    forces,
+    forces_by_log,
+    panels,
+    reasons,
+    residuals,
+    whiteness,
 )
-from identify.output.report.subject import LogForces, Subject, forces_by_log
-from identify.output.report.units import Scale
-from identify.output.words.validation import correlation_in_words, loop_in_words
+from identify.output.report.subject import Subject
+from identify.output.words.fit import correlation_in_words, loop_in_words
 from twin.model.machine import Fitted
 from twin.model.units import LINEAR
 
@@ -38,21 +45,28 @@ def subject_of(diagnosis=None, **changes) -> Subject:
 # --- forces ---------------------------------------------------------------------------------
 
 
-def test_forces_add_up_to_the_command_less_inertia():
-    final = made.diagnosis_of(final=built_fit(0.5, kept=KEPT, residual=SMALL)).final
+def view_of(comparison, diagnosis=None):
+    axes = {**made.compared().axes, "x": comparison}
+    subject = subject_of(diagnosis, comparison=replace(made.compared(), axes=axes))
+    return next(view for view in subject.views if view.name == "x")
+
+
+def test_forces_add_up_to_the_command_minus_mass_times_acceleration():
+    final = built_fit(0.5, kept=KEPT, residual=SMALL)
     c = replace(made.comparison_of(), residual=LARGE, kept=KEPT)
-    for i, found in enumerate(forces_by_log(c, 4.9, final)):
+    view = view_of(c, made.diagnosed(made.diagnosis_of(final=final)))
+    for i, found in enumerate(forces_by_log(view)):
         log = c.logs[i]
         span = slice(0, len(log)) if i == 0 else slice(len(c.logs[0]), None)
-        np.testing.assert_allclose(found.explain, log.command - 4.9 * log.acceleration)
+        np.testing.assert_allclose(found.explain, log.command - 5.3 * log.acceleration)
         for force, left in ((found.model, LARGE), (found.found, SMALL)):
             every = np.full(len(KEPT), np.nan)
             every[KEPT] = left
             np.testing.assert_allclose(found.explain - force, every[span])
         assert found.name == log.motion.name
         np.testing.assert_array_equal(found.time, log.time)
-    assert np.isnan(forces_by_log(c, 4.9, None)[0].model[:10]).all()  # at rest, it tells nothing
-    assert forces_by_log(c, 4.9, None)[0].found is None
+    assert np.isnan(forces_by_log(view_of(c))[0].model[:10]).all()  # at rest, it tells nothing
+    assert forces_by_log(view_of(c))[0].found is None
 
 
 SAMPLES = sum(len(log) for log in made.DATASET.fit)
@@ -69,17 +83,17 @@ def forces_of(scale: float, named: bool = True) -> LogForces:
 
 def test_measured_and_modelled_force_are_drawn_whole_and_in_part():
     forces, span = forces_of(1.0), slice(300, 700)
-    figure = overlay._figure(forces, span, 0.02, "the effect")
+    figure = draw_forces(forces, span, 0.02, "the effect")
     whole, stretch, left = figure.axes
     for axes, part in ((whole, slice(None)), (stretch, span)):
         lines = lines_of(axes)
         np.testing.assert_allclose(
-            lines["measured (command less inertia)"].get_ydata(), forces.explain[part]
+            lines["measured force minus mass x acceleration"].get_ydata(), forces.explain[part]
         )
         np.testing.assert_allclose(lines["model"].get_ydata(), forces.model[part])
         np.testing.assert_allclose(lines["model with the effect"].get_ydata(), forces.found[part])
         np.testing.assert_allclose(lines["model"].get_xdata(), TIME[part])
-        wide = lines["measured (command less inertia)"].get_linewidth()
+        wide = lines["measured force minus mass x acceleration"].get_linewidth()
         assert wide > lines["model"].get_linewidth()  # a model that hides it is seen to fit
     own, named = left.get_lines()
     assert (own.get_color(), named.get_color()) == (BLUE, ORANGE)
@@ -93,30 +107,26 @@ def test_measured_and_modelled_force_are_drawn_whole_and_in_part():
     assert band.get_height() == pytest.approx(2 * scale(0.02))
     shaded = whole.patches[0]
     assert (shaded.get_x(), shaded.get_width()) == pytest.approx((TIME[300], TIME[699] - TIME[300]))
-    assert len(overlay._lines(forces_of(1.0, named=False), "")) == 2
+    bare = draw_forces(forces_of(1.0, named=False), span, 0.02, "")
+    assert len(bare.axes[0].get_lines()) == 2
 
 
-def test_the_log_shown_is_the_one_nearest_to_the_whole_error(monkeypatch):
-    drawn = []
-    monkeypatch.setattr(overlay, "_figure", lambda *given: drawn.append(given))
+def test_the_log_shown_is_the_one_nearest_to_the_whole_error():
     c = made.comparison_of()
     sizes = np.repeat([3.0, 1.2], [len(log) for log in c.logs])
     c = replace(c, residual=sizes * np.where(np.arange(SAMPLES) % 2, 1.0, -1.0))
-    c = replace(c, logs=c.logs, force_error={"run 1": 3.0, "run 2": 1.2})
-    picture = overlay._picture(subject_of(), c)
+    (picture,) = forces(view_of(c))
     shown = min((3.0, "run 1"), (1.2, "run 2"), key=lambda one: abs(one[0] - c.total_error))
     assert f"Log {shown[1]}:" in picture.caption
-    assert drawn[0][0].found is None
-    assert drawn[0][2:] == (c.floor, "")
+    assert len(picture.figure.axes[0].get_lines()) == 2
     final = built_fit(0.5, residual=np.full(SAMPLES, 0.5), kept=np.ones(SAMPLES, dtype=bool))
-    overlay._picture(subject_of(made.diagnosed(made.diagnosis_of(final=final))), c)
-    assert drawn[1][0].found is not None
-    assert drawn[1][3] == "all that was found"
+    (picture,) = forces(view_of(c, made.diagnosed(made.diagnosis_of(final=final))))
+    assert "model with all that was found" in lines_of(picture.figure.axes[0])
 
 
 def test_the_residual_is_seen_against_time_speed_position_and_phase():
     c = replace(made.comparison_of(), kept=KEPT, periods={"roller_spikes_phase": 0.034})
-    views = residuals._views(c)
+    views = panels(view_of(c))
     assert [(v.quantity.split(",")[0], v.unit) for v in views] == [
         ("Time", "s"), ("Speed", "m/s"), ("Position", "m"), ("Roller spikes phase", "m"),
     ]  # fmt: skip
@@ -127,14 +137,14 @@ def test_the_residual_is_seen_against_time_speed_position_and_phase():
     both = np.concatenate([first.time, second.time + first.motion.time[-1]])
     np.testing.assert_allclose(views[0].values, both[KEPT])
     short = replace(c, coordinates={**c.coordinates, "position": np.linspace(0.0, 0.0339, 9)})
-    assert len(residuals._views(short)) == 3
+    assert len(panels(view_of(short))) == 3
 
 
 def test_dots_and_means_of_the_residual():
     n = 4000
     x = np.linspace(-0.08, 0.08, n)
-    left = residuals._Left(0.02 * np.sign(x), np.full(n, 0.007), "mean with it", 0.004)
-    figure = residuals._figure([residuals.View(x, "Position", "m")] * 3, left)
+    means = {"mean": 0.02 * np.sign(x), "mean with it": np.full(n, 0.007)}
+    figure = draw_residuals([Panel(x, "Position", "m")] * 3, means, 0.004)
     assert len(figure.axes) == 3
     axes = figure.axes[0]
     lines = lines_of(axes)
@@ -146,24 +156,23 @@ def test_dots_and_means_of_the_residual():
     assert axes.get_ylim() == pytest.approx((-23.0, 23.0))
     assert axes.patches[0].get_height() == pytest.approx(8.0)
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("Position (mm)", "Unexplained force (mN)")
-    many = residuals._Left(RNG.standard_normal(25_000), None, "", 1.0)
-    wide = residuals.View(RNG.uniform(size=25_000), "Time", "s")
-    dots = lines_of(residuals._figure([wide], many).axes[0])["single test functions"]
+    wide = Panel(RNG.uniform(size=25_000), "Time", "s")
+    many = draw_residuals([wide], {"mean": RNG.standard_normal(25_000)}, 1.0)
+    dots = lines_of(many.axes[0])["single test functions"]
     assert len(dots.get_xdata()) == -(-25_000 // 3)
 
 
-def test_the_residual_of_the_final_model_is_on_the_same_test_functions(monkeypatch):
-    drawn = []
-    monkeypatch.setattr(residuals, "_figure", lambda views, left: drawn.append(left))
+def test_the_residual_of_the_final_model_is_on_the_same_test_functions():
     all_kept = np.ones(SAMPLES, dtype=bool)
-    final = built_fit(0.5, residual=RNG.standard_normal(SAMPLES), kept=all_kept)
-    subject = subject_of(made.diagnosed(made.diagnosis_of(final=final)))
-    c = replace(subject.axes[0], residual=LARGE, kept=KEPT)
-    residuals._picture(subject, c)
-    (left,) = drawn
-    np.testing.assert_array_equal(left.named, final.residual[KEPT])
-    assert (left.label, left.floor) == ("mean with all that was found", c.floor)
-    assert left.model is c.residual
+    final = built_fit(0.5, residual=np.arange(SAMPLES) * 1e3, kept=all_kept)
+    found = made.diagnosed(made.diagnosis_of(final=final))
+    c = made.comparison_of()
+    coordinates = {name: values[KEPT] for name, values in c.coordinates.items()}
+    c = replace(c, residual=LARGE, kept=KEPT, coordinates=coordinates)
+    (picture,) = residuals(view_of(c, found))
+    drawn = lines_of(picture.figure.axes[0])["mean with all that was found"].get_ydata()
+    assert np.nanmax(drawn) > 100.0 * np.nanmax(np.abs(LARGE))  # of the final model, in its order
+    assert np.all(np.diff(drawn[np.isfinite(drawn)]) > 0.0)
 
 
 # --- whiteness and shape --------------------------------------------------------------------
@@ -171,7 +180,7 @@ def test_the_residual_of_the_final_model_is_on_the_same_test_functions(monkeypat
 
 def test_the_histogram_and_correlations_have_their_bounds():
     tests = made.whiteness_of()
-    figure = whiteness._figure(tests, LINEAR)
+    figure = draw_tests(tests, LINEAR)
     bars, *rest = figure.axes
     data = bars.patches[0].get_data()
     scale = Scale.of("N", tests.edges)
@@ -200,17 +209,14 @@ def test_the_histogram_and_correlations_have_their_bounds():
     assert rest[0].get_ylabel() == "Autocorrelation (1)"
 
 
-def test_the_tests_of_each_axis_are_in_words_and_their_reason_once(monkeypatch):
-    monkeypatch.setattr(whiteness, "_figure", lambda tests, unit: tests)
-    compared = made.compared()
-    *blocks, reason = whiteness.section(subject_of(comparison=compared)).blocks
+def test_the_tests_of_each_axis_are_in_words_and_their_reason_once():
+    subject = subject_of()
+    (reason,) = reasons(subject)
     assert reason.items == (loop_in_words(made.whiteness_of().loop),)
-    for axis, (heading, picture, listing) in zip("xy", (blocks[:3], blocks[3:]), strict=True):
-        tests = compared.axes[axis].tests
-        assert heading.text == f"Axis {axis}"
-        assert picture.figure is tests
+    for view in subject.views:
+        picture, listing = whiteness(view)
         assert "The force residual on 387 test functions" in picture.caption
-        words = [correlation_in_words(c) for c in tests.correlations]
+        words = [correlation_in_words(c) for c in view.axis.tests.correlations]
         assert listing.items == [f"F{w[1:]}." for w in words]
 
 
@@ -222,20 +228,17 @@ def test_a_description_is_drawn_forwards_and_backwards():
     c = made.comparison_of()
     along = RNG.uniform(0.1, 0.3, sum(len(log.motion.position) for log in c.logs))
     c = replace(c, curves={effect.name: along})
-    figure = shape._figure(c, description)
-    left, right = figure.axes
-    assert (left.get_xlabel(), right.get_xlabel()) == ("Position (mm)", "Speed (m/s)") or (
-        right.get_xlabel() == "Speed (mm/s)"
-    )
-    forwards, backwards = (lines_of(right)[n].get_xdata() for n in ("forwards", "backwards"))
-    assert backwards.max() <= 0.0 <= forwards.min()
     model = replace(made.MODEL, axes={"x": axis_of(description), "y": PLAIN})
     axes = {"x": c, "y": made.comparison_of("y")}
     subject = subject_of(comparison=replace(made.compared(), model=model, axes=axes))
-    blocks = shape.section(subject).blocks
-    assert len(blocks) == 3
-    assert blocks[0].text == "Empirical map on x"
-    assert shape.section(subject_of()) is None
+    heading, picture, _ = curves(subject.views[0])
+    left, right = picture.figure.axes
+    assert left.get_xlabel() == "Position (mm)"
+    assert right.get_xlabel() in ("Speed (m/s)", "Speed (mm/s)")
+    forwards, backwards = (lines_of(right)[n].get_xdata() for n in ("forwards", "backwards"))
+    assert backwards.max() <= 0.0 <= forwards.min()
+    assert heading.text == "Empirical map on x"
+    assert curves(subject_of().views[0]) == []
 
 
 # --- drawing --------------------------------------------------------------------------------
@@ -277,5 +280,5 @@ def test_a_noise_band_lies_about_zero():
 
 def test_a_stretch_at_rest_comes_last():
     error = np.where(TIME < 10.0, np.nan, 1.0)
-    span = overlay.representative(LogForces("l", TIME, error, np.zeros_like(error), None), 4.0)
+    span = LogForces("l", TIME, error, np.zeros_like(error), None).representative(4.0)
     assert np.isfinite(error[span]).any()

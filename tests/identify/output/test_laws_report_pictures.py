@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 
 from identify.dataset.given_logs import Role
-from identify.output.report import growth, maps, ranking, regions
 from identify.output.report.drawing import (
     BLUE,
     GREY,
     ORANGE,
     settle,
 )
+from identify.output.report.effects import draw_growth, draw_ranking
+from identify.output.report.residual import draw_dependence, draw_maps
 from identify.output.report.subject import Subject
+from twin.model.units import LINEAR
 
 RNG = np.random.default_rng(8)
 
@@ -34,11 +36,11 @@ def subject_of(diagnosis=None, **changes) -> Subject:
 
 
 def test_the_growth_runs_from_the_first_error_to_the_last():
-    figure = growth._figure(made.STEPS[:2], {Role.TRAINING: 1.17, Role.SELECTION: 1.31})
+    figure = draw_growth(made.STEPS[:2], {Role.TRAINING: 1.17, Role.SELECTION: 1.31})
     (axes,) = figure.axes
     lines = lines_of(axes)
-    np.testing.assert_allclose(lines["fit logs"].get_ydata(), [7.31, 4.57, 2.29])
-    np.testing.assert_allclose(lines["held out"].get_ydata(), [7.83, 4.91, 2.71])
+    np.testing.assert_allclose(lines["training logs"].get_ydata(), [7.31, 4.57, 2.29])
+    np.testing.assert_allclose(lines["selection logs"].get_ydata(), [7.83, 4.91, 2.71])
     np.testing.assert_allclose(lines["noise floor, training logs"].get_ydata(), 1.17)
     np.testing.assert_allclose(lines["noise floor, selection logs"].get_ydata(), 1.31)
     assert [t.get_text() for t in axes.get_xticklabels()] == [
@@ -57,17 +59,17 @@ def test_the_growth_runs_from_the_first_error_to_the_last():
 
 def test_of_two_equal_errors_one_number_is_above_and_one_below():
     alike = replace(made.STEPS[0], fit_error_before=3.0, holdout_error_before=3.0)
-    (axes,) = growth._figure([alike], {}).axes
+    (axes,) = draw_growth([alike], {}).axes
     sides = [t.xyann[1] > 0 for t in axes.texts if t.get_text() == "3.00"]
     assert sorted(sides) == [False, True]
 
 
 def test_without_held_out_errors_there_is_one_line():
     small = replace(made.STEPS[2], fit_error_before=0.0341, fit_error_after=0.0313)
-    (axes,) = growth._figure([small], {}).axes
+    (axes,) = draw_growth([small], {}).axes
     lines = lines_of(axes)
-    assert list(lines) == ["fit logs"]
-    np.testing.assert_allclose(lines["fit logs"].get_ydata(), [34.1, 31.3])
+    assert list(lines) == ["training logs"]
+    np.testing.assert_allclose(lines["training logs"].get_ydata(), [34.1, 31.3])
     assert axes.get_ylabel() == "Force error, RMS (mN)"
     assert axes.get_xticklabels()[1].get_text() == "replace wear"
     assert all(t.xyann[1] > 0 for t in axes.texts)
@@ -75,7 +77,7 @@ def test_without_held_out_errors_there_is_one_line():
 
 def test_no_error_ends_below_the_floor_that_is_drawn():
     """The history of a file may be of other logs, over another noise."""
-    (axes,) = growth._figure(made.STEPS[:2], {Role.TRAINING: 2.30, Role.SELECTION: 2.30}).axes
+    (axes,) = draw_growth(made.STEPS[:2], {Role.TRAINING: 2.30, Role.SELECTION: 2.30}).axes
     assert [n for n in lines_of(axes) if "floor" in n] == ["noise floor, selection logs"]
 
 
@@ -88,7 +90,7 @@ def test_each_axis_has_floors_of_its_own_those_of_the_final_model_where_it_was_d
 
 
 def test_a_picture_is_laid_out_on_a_grid_once():
-    figure = ranking._figure(made.diagnosis_of(), made.told_of(made.diagnosis_of()))
+    figure = draw_ranking(made.diagnosis_of(), made.told_of(made.diagnosis_of()))
     settle(figure)
     assert figure.get_layout_engine() is None
     places = [axes.get_position().bounds for axes in figure.axes]
@@ -98,7 +100,7 @@ def test_a_picture_is_laid_out_on_a_grid_once():
 def test_a_bar_for_each_candidate_ends_at_its_error():
     worse = replace(made.WEAK, gain=replace(made.WEAK.gain, after=20.0))
     x = made.diagnosis_of(ranking=(made.BEST, made.RIVAL, worse))
-    (axes,) = ranking._figure(x, made.told_of(x)).axes
+    (axes,) = draw_ranking(x, made.told_of(x)).axes
     bars = axes.patches
     end = 1.6 * 7.13
     assert [b.get_width() for b in bars] == pytest.approx([2.17, 2.38, end])
@@ -113,7 +115,7 @@ def test_a_bar_for_each_candidate_ends_at_its_error():
     lines = lines_of(axes)
     assert lines["before"].get_xdata() == pytest.approx([7.13, 7.13])
     assert lines["noise floor"].get_xdata() == pytest.approx([2.17, 2.17])
-    assert axes.get_xlabel() == "Held-out force error, RMS (N)"
+    assert axes.get_xlabel() == "Selection force error, RMS (N)"
     assert axes.get_xlim() == pytest.approx((0.0, 1.15 * end))
     assert axes.yaxis_inverted()
 
@@ -125,7 +127,7 @@ def test_the_longest_share_is_on_top_and_marked():
         shares={"time": 0.117, "position": 0.631, "other_axis_velocity": 0.2},
     )
     units = {"position": "rad", "other_axis_velocity": "m/s"}
-    (axes,) = regions._figure(structure, units).axes
+    (axes,) = draw_dependence(structure, units).axes
     assert [b.get_width() for b in axes.patches] == pytest.approx([63.1, 20.0, 11.7])
     assert [t.get_text() for t in axes.get_yticklabels()] == [
         "angle", "other axis velocity", "time",
@@ -144,7 +146,7 @@ def test_the_map_of_each_coordinate_has_its_error_above_its_noise():
     direction = replace(made.map_of("direction", "1", 0.2))
     point = replace(made.map_of("time", "s", 0.3), low=np.full(3, 0.1))
     spectrum = made.map_of("frequency", "Hz", 0.4)
-    figure = maps._figure(replace(c, maps=[*c.maps, direction, point, spectrum]))
+    figure = draw_maps([*c.maps, direction, point, spectrum], c.units)
     first, second, third = figure.axes
     labels = [a.get_xlabel() for a in figure.axes]
     assert labels == ["Position (mm)", "Speed (mm/s)", "Frequency (Hz)"]
@@ -169,12 +171,11 @@ def test_standstill_is_named_not_numbered():
         made.map_of("standstill", "1", 0.0), low=np.array([-0.5, 0.5]), high=np.array([0.5, 1.5]),
         rms=np.array([0.2, 0.3]), floor=np.array([0.1, 0.1]), visited=np.ones(2),
     )  # fmt: skip
-    (axes,) = maps._figure(replace(made.comparison_of(), maps=[rest])).axes
+    (axes,) = draw_maps([rest], LINEAR).axes
     assert [t.get_text() for t in axes.get_xticklabels()] == ["moving", "at rest"]
 
 
 def test_the_least_error_of_a_bin_that_was_visited_sets_the_limit():
     low = replace(made.comparison_of().maps[0], rms=np.array([0.011, 0.5, 0.0013]))
-    picture = maps.picture(replace(made.comparison_of(), maps=[low]))
-    assert picture.figure.axes[0].get_ylim()[0] == pytest.approx(0.5 * 0.011)
-    assert picture.caption.startswith("RMS force error by region")
+    figure = draw_maps([low], LINEAR)
+    assert figure.axes[0].get_ylim()[0] == pytest.approx(0.5 * 0.011)

@@ -14,12 +14,12 @@ from identify.estimation.fit import Outcome
 from identify.estimation.replay import Beginning
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.signature import FORCE, MASS, exemplary_motion, signature
-from identify.output.agreement import agree_json, agree_text
-from identify.output.laws import laws_json, laws_text
-from identify.output.plain import plain
-from identify.output.simulation_fit import simulation_fit_json, simulation_fit_text
-from identify.output.words.estimation import HELD_OUT_GREW, MOTION_OUTCOMES, motion_fit_in_words
-from identify.output.words.selection import notes_in_words, step_in_words
+from identify.output.as_json import agree_json, simulation_fit_json
+from identify.output.machine import laws_json, laws_text, plain
+from identify.output.numbers import Scale
+from identify.output.text import agree_text, simulation_fit_text
+from identify.output.words.diagnosis import notes_in_words, step_in_words
+from identify.output.words.fit import HELD_OUT_GREW, MOTION_OUTCOMES, motion_fit_in_words
 from identify.results.addition import Addition
 from identify.results.results import SimulationFit
 from identify.selection.confounded import MovedParameter
@@ -78,23 +78,24 @@ def test_a_motion_fit_in_json() -> None:
 def test_a_motion_fit_in_words() -> None:
     first, ended, starts, none = motion_fit_in_words("x", motion_fit(), (6.1e-3, 4.3e-3))
     assert first.startswith("axis x: ")
-    assert "position error 0.0085 m with the force fit, 0.003536 m now" in first
-    assert first.endswith("; held out 0.0061 m, 0.0043 m now")
+    assert "position error 8.50 mm with the force fit, 3.54 mm now" in first
+    assert first.endswith("; on logs that were not fitted 6.10 mm, 4.30 mm now")
     assert ended == MOTION_OUTCOMES[Outcome.CONVERGED]
     assert "from 3 starts" in starts
-    assert starts.endswith("0.0071, 0.0053, 0.0097 m")
+    assert starts.endswith("7.10, 5.30, 9.70 mm")
     assert none.startswith("no intervals")
     grown = motion_fit_in_words("x", motion_fit(), (4.3e-3, 6.1e-3))
     assert grown[1] == HELD_OUT_GREW
     assert HELD_OUT_GREW not in motion_fit_in_words("x", motion_fit(), None)
-    assert "held out" not in motion_fit_in_words("x", motion_fit(), None)[0]
+    assert "not fitted" not in motion_fit_in_words("x", motion_fit(), None)[0]
     result = SimulationFit(None, None, {"x": motion_fit()}, {"x": None})  # type: ignore[arg-type]
     rows = [line.split() for line in simulation_fit_text(result).splitlines()[1:]]
     found = {row[0]: row for row in rows if "(force" in row}
     for c, value in zip(free_parameters(PLAIN), read(PLAIN, free_parameters(PLAIN)), strict=True):
         row = found[c.label]
-        assert row[1] == f"{1.07 * value:.6g}"
-        assert row[-1] == f"{value:.6g})"
+        scale = Scale.of(c.parameter.unit, [1.07 * value])
+        assert float(row[1]) == pytest.approx(1.07 * value / scale.size, rel=1e-5)
+        assert float(row[-1].rstrip(")")) == pytest.approx(value / scale.size, rel=1e-5)
 
 
 # --- what a reader should know of an added effect ------------------------------------------
@@ -112,8 +113,8 @@ def test_an_added_effect_is_noted_by_what_it_moved_removed_and_replaced() -> Non
 
     plain = notes(added, (moved, gone), ("empirical_map",))
     assert plain == (
-        "mass moved from 5 to 5.5 kg: more than it scatters between blocks of the logs",
-        "constant_force.F0 collapsed from 0.3 to 0.01 N: it had taken over the missing effect's "
+        "mass moved from 5.00 to 5.50 kg: more than its uncertainty",
+        "constant_force.F0 collapsed from 300 to 10.0 mN: it had taken over the missing effect's "
         "force",
         "empirical_map was removed before cogging was added; add it again for the error that is "
         "left",
@@ -189,11 +190,11 @@ def test_two_fits_in_words() -> None:
     lines = agree_text(Agreement({"x": SAME, "y": OTHER}, ("z",))).splitlines()
     assert lines[0].endswith("the fits agree in all 3 parameters that can be compared")
     said = lines[lines.index("axis y: the fits differ in 2 of 3 parameters") :]
-    assert said[1].startswith("  p0 differs by 1.1 kg (2 and 3.1 kg), 11.0 joint standard errors")
-    assert said[1].endswith("allowed are 3.1")
-    assert said[2].startswith("  p2 differs by -0.564 N s/m (4 and 3.436 N s/m), 4.7 joint")
+    assert said[1].startswith("  p0 differs by 1.10 kg (2.00 and 3.10 kg), 11.0 joint")
+    assert said[1].endswith("allowed are 3.10")
+    assert said[2].startswith("  p2 differs by -0.564 N·s/m (4.00 and 3.44 N·s/m), 4.70 joint")
     assert said[3:5] == ["  only the first fit has wear", "  only the second fit has gms, cogging"]
-    assert "amount to 0.0139 N RMS" in said[5]
+    assert "amount to 13.9 mN RMS" in said[5]
     assert said[6].startswith("  payload_mass or constant_force would make 61 % of this")
     assert said[7].startswith("  wear would make 23 %")
     assert "7.3 and 1.9 times the noise floor" in said[8]

@@ -14,7 +14,8 @@ from identify.estimation.intervals import NotExcited, refusal
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.experiment_design.missing_excitation import Gap
 from identify.output.as_json import plan_json
-from identify.output.machine_text import check_text, effect_text, effects_text
+from identify.output.machine import check_text, effect_text, effects_text
+from identify.output.numbers import quantity, span
 from identify.output.text import (
     add_text,
     compare_text,
@@ -22,11 +23,14 @@ from identify.output.text import (
     in_short,
     plan_text,
 )
-from identify.output.words.estimation import no_interval_in_words, outcome_in_words
-from identify.output.words.experiment_design import gap_in_words, in_order
-from identify.output.words.numbers import PLAIN, with_unit
-from identify.output.words.selection import axis_in_words, moved_in_words, refit_in_words
-from identify.output.words.validation import loop_in_words
+from identify.output.words.diagnosis import axis_in_words, moved_in_words, refit_in_words
+from identify.output.words.fit import (
+    gap_in_words,
+    in_order,
+    loop_in_words,
+    no_interval_in_words,
+    outcome_in_words,
+)
 from twin.experiments.kinds import Rests
 from twin.log.check import CheckReport, Fault, Finding, Severity
 
@@ -37,23 +41,25 @@ def test_a_fit():
     result = replace(result, estimates={**result.estimates, "x": (wrong,)})
     lines = fit_text(result).splitlines()
     assert lines[0] == (
-        "axis x: force error 0.0513 N, held out 0.0611 N, noise floor 0.0127 N (ratio 4.04)"
+        "axis x: force error on the training logs 51.3 mN, on the selection logs 61.1 mN, noise "
+        "floor 12.7 mN (ratio 4.04)"
     )
     second = lines.index(
-        "axis y: force error 0.0317 N, test 0.0733 N, noise floor 0.0131 N (ratio 2.42)"
+        "axis y: force error on the training logs 31.7 mN, on the test logs 73.3 mN, noise floor "
+        "13.1 mN (ratio 2.42)"
     )
     assert lines[1].strip() == outcome_in_words(Outcome.AT_BOUND)
     x, y = lines[:second], lines[second:]
-    assert any("acts 217 us (0.22 samples)" in line for line in x)
+    assert any("acts 217 µs (0.22 samples)" in line for line in x)
     assert not any("samples)" in line for line in y)
     assert sum(refit_in_words(made.refit_of(0.0)) in line for line in x) == 1
     assert not any("with the given values" in line for line in y)
-    reason = [line for line in x if "is 4.0 times the noise floor 0.0127 N" in line]
+    reason = [line for line in x if "is 4.0 times the noise floor 12.7 mN" in line]
     assert len(reason) == 1
     mass, hidden, held = (line.split() for line in y[-3:])
-    assert mass == ["mass", "5.33", "kg", "90", "%", "in", "[5.25,", "5.49]"]
-    assert hidden == ["cogging.p", "0.0441", "m", *no_interval_in_words(NotExcited()).split()]
-    assert held == ["coulomb_viscous.Fs", "0.357", "N", "fixed"]
+    assert mass == ["mass", "5.33", "kg", "90", "%", "in", "5.25", "to", "5.49"]
+    assert hidden == ["cogging.p", "44.1", "mm", *no_interval_in_words(NotExcited()).split()]
+    assert held == ["coulomb_viscous.Fs", "357", "mN", "fixed"]
 
 
 def test_a_reason_that_holds_for_all_is_said_once():
@@ -64,7 +70,7 @@ def test_a_reason_that_holds_for_all_is_said_once():
     text = fit_text(again)
     assert text.count(no_interval_in_words(reason)) == 1
     label = next(line for line in text.splitlines() if "cogging.p" in line)
-    assert label.split() == ["cogging.p", "0.0241", "m"]
+    assert label.split() == ["cogging.p", "24.1", "mm"]
 
 
 def test_the_strengths_of_a_description_are_one_sentence():
@@ -85,16 +91,16 @@ def test_the_strengths_of_a_description_are_one_sentence():
 def test_a_comparison():
     lines = compare_text(made.compared()).splitlines()
     assert lines[0] == (
-        "axis x, run 1: force error 0.0517 N (4.6 x noise floor), free-running position error "
-        "3.17e-06 m"
+        "axis x, run 1: force error 51.7 mN (4.6 times the noise floor), free-running position "
+        "error 3.17 µm"
     )
-    assert lines[1].startswith("axis x, run 2: force error 0.0731 N (6.5 x noise floor)")
-    assert lines[1].endswith("4.29e-06 m")
+    assert lines[1].startswith("axis x, run 2: force error 73.1 mN (6.5 times the noise floor)")
+    assert lines[1].endswith("4.29 µm")
     assert lines[2].strip() == (
-        "worst: position between 0.0123 and 0.0257 m: 0.121 N RMS, 14.3 times the noise floor, "
+        "worst: position between 12.3 and 25.7 mm: 121 mN RMS, 14.3 times the noise floor, "
         "37 % of the squared error"
     )
-    assert lines[3].strip().startswith("worst: moving backwards: 0.087 N RMS, 7.7 times")
+    assert lines[3].strip().startswith("worst: moving backwards: 87.0 mN RMS, 7.70 times")
     tested = [line for line in lines if line.startswith("  force residual against")]
     assert len(tested) == 6
     assert lines[-1] == loop_in_words(made.whiteness_of().loop)
@@ -108,17 +114,18 @@ def test_a_plan_between_two():
     lines = plan_text(made.plan_of("cogging", "wear", favoured="wear", supposed=True)).splitlines()
     assert lines[0] == "axis x: cogging or wear, decided by"
     assert lines[1] == "  passes: axis x, span 0.0831 m, speed 0.0127 m/s, repeats 7"
-    assert lines[2] == "  missing motion: speed 0.0137 to 0.0591 m/s; 1.2 % of the data is there"
+    assert lines[2] == "  missing motion: speed 13.7 to 59.1 mm/s; 1.2 % of the data is there"
     assert lines[3] == "  cogging is excited by slow passes"
     assert lines[4] == "  the existing logs already favour wear"
     assert lines[5] == (
         "  no logs given: each effect that the model lacks is assumed at 10 times the noise floor"
     )
     assert lines[6:] == [
-        "  passes: axis x, span 0.0831 m, speed 0.0127 m/s, repeats 7; 8.3 s: evidence 57.3, 0.0412"
-        " N unexplained by the rival (3.6 x noise floor)",
-        "  tracking: duration 9.7 s; 9.9 s: evidence 31.9, 0.0287 N unexplained by the rival (2.7 x"
-        " noise floor)",
+        "  passes: axis x, span 0.0831 m, speed 0.0127 m/s, repeats 7; takes 8.30 s: expected "
+        "evidence (difference of BIC) 57.3, the rival leaves 41.2 mN RMS unexplained, 3.65 times "
+        "the noise floor",
+        "  tracking: duration 9.7 s; takes 9.90 s: evidence 31.9, the rival "
+        "leaves 28.7 mN RMS unexplained, 2.68 times the noise floor",
     ]
     models = made.plan_of("a.toml", "b.toml", supposed=True, excited_by={})
     assert "the models are compared with the values in their files" in plan_text(models)
@@ -138,7 +145,8 @@ def test_the_experiments_of_a_plan_are_in_order_of_evidence():
     plan = made.plan_of("cogging", "wear", ranking=(first, weak, impossible, strong))
     assert in_order(plan) == [first, strong, weak]
     rows = plan_text(plan).splitlines()[4:]
-    assert [re.search(r"evidence (\S+?),", row)[1] for row in rows] == ["57.3", "91.0", "9.0"]
+    told = [re.search(r"evidence (?:\(.*\) )?([\d.]+)", row)[1] for row in rows]
+    assert told == ["57.3", "91.0", "9.00"]
     assert ["by one linear step" in row for row in rows] == [False, True, False]
     assert [t["delta_bic"] for t in plan_json(plan)["ranking"]] == [57.3, 91.0, 9.0]
 
@@ -147,9 +155,9 @@ def test_a_plan_for_one_model():
     lines = plan_text(made.plan_of("the stage", supposed=True)).splitlines()
     assert lines[0] == "axis x: the parameters of the stage, best constrained by"
     assert [" ".join(line.split()) for line in lines[4:]] == [
-        "passes: axis x, span 0.0831 m, speed 0.0127 m/s, repeats 7; 8.3 s: 57.3 nats on the "
-        "parameters",
-        "tracking: duration 9.7 s; 9.9 s: 31.9 nats on the parameters",
+        "passes: axis x, span 0.0831 m, speed 0.0127 m/s, repeats 7; takes 8.30 s: 57.3 nats "
+        "of information on the parameters",
+        "tracking: duration 9.7 s; takes 9.90 s: 31.9 nats of information on the parameters",
     ]  # fmt: skip
 
 
@@ -176,22 +184,22 @@ def test_a_gap_is_missing_where_few_of_the_data_are(share, said):
 def test_an_addition(kept):
     lines = [" ".join(line.split()) for line in add_text(made.addition(kept)).splitlines()]
     assert lines[:5] == [
-        "added cogging to axis x", "force error on the fit logs 7.31 -> 4.57 N",
-        "force error on the held-out logs 7.83 -> 4.91 N",
-        "free-running position error 3.71e-06 -> 1.93e-06 m on run 1 (MuJoCo: 1.97e-06 m)",
+        "added cogging to axis x", "force error on the training logs 7.31 -> 4.57 N",
+        "force error on the selection logs 7.83 -> 4.91 N",
+        "free-running position error 3.71 -> 1.93 µm on run 1 (MuJoCo: 1.97 µm)",
         "mass moved",
     ]  # fmt: skip
     assert lines[5] == "the errors told flatter it"
     assert (
-        "the logs do not prove it: gain uncertain: t = 1.3, where 1.6 is sure." in lines[-1]
+        "The logs do not prove it: gain uncertain: t = 1.3, where 1.6 is sure." in lines[-1]
     ) is not kept
     assert ("has it nevertheless, as asked for" in lines[-1]) is not kept
     assert len(lines) == (6 if kept else 7)
     tested = replace(made.addition(kept), step=made.STEPS[1])
     assert "force error on the test logs      5.03 -> 2.83 N" in add_text(tested)
-    assert "took part in the choice" not in add_text(tested)
+    assert "helped to choose" not in add_text(tested)
     unheld = add_text(replace(made.addition(kept), step=made.STEPS[2]))
-    assert "held-out" not in unheld
+    assert "selection" not in unheld
     assert "added wear to axis y" in unheld
 
 
@@ -208,9 +216,8 @@ def test_why_an_axis_was_chosen_is_said():
 
 def test_a_number_without_dimension_has_no_unit():
     moved = replace(made.MOVED, before=0.2261, after=0.201, unit="1", collapsed=False)
-    assert " moved from 0.2261 to 0.201: more than" in moved_in_words(moved)
-    assert (PLAIN.amount(0.5, "1"), PLAIN.span(1.0, 2.0, "1")) == ("0.5", "1 and 2")
-    assert (PLAIN.amount(0.5, "N"), with_unit("3", "m/s")) == ("0.5 N", "3 m/s")
+    assert " moved from 0.226 to 0.201: more than" in moved_in_words(moved)
+    assert (quantity(0.5, "1"), span(1.0, 2.0, "1")) == ("0.500", "1.00 and 2.00")
 
 
 def test_the_catalogue_and_one_effect():

@@ -10,29 +10,28 @@ from built_fits import NOISE, built, built_fit, step
 
 from identify.dataset.given_logs import Role
 from identify.estimation.fit import Outcome
-from identify.output.diagnosis_json import diagnose_json
-from identify.output.remarks import remarks_on
+from identify.output.as_json import diagnose_json
 from identify.output.text import diagnose_text, plan_text
-from identify.output.words.estimation import outcome_in_words
-from identify.output.words.findings import (
-    advice,
-    finding_in_words,
-    next_command,
-    shares_in_words,
-    together_in_words,
-)
-from identify.output.words.selection import (
+from identify.output.words.diagnosis import (
     SEVERAL,
+    advice,
     change_in_words,
+    finding_in_words,
     moved_in_words,
     named_errors_in_words,
+    next_command,
+    not_named_in_words,
     refit_in_words,
+    remarks_on,
     repeat_in_words,
+    shares_in_words,
+    step_lines,
     ties_in_words,
+    together_in_words,
     verdict_in_words,
+    why_not,
 )
-from identify.output.words.steps import not_named_in_words, step_lines, why_not
-from identify.output.words.validation import region_in_words
+from identify.output.words.fit import outcome_in_words, region_in_words
 from identify.selection.confounded import Change, Refit
 
 COGGING, LUGRE = made.FOUND
@@ -50,9 +49,9 @@ def test_a_diagnosis():
     lines = told_of_x(x)
     assert lines[:4] == [
         f"{SEVERAL} Missing: cogging or quadratic_drag, and lugre.",
-        "  force error on the training logs 8.37 -> 3.19 N, noise floor 2.03 N (ratio 4.12 -> "
-        "1.57)",
-        "  force error on the selection logs 7.81 N, with what was found 2.39 N",
+        "  force error on the training logs 8.37 -> 3.19 N with all that was found, noise floor "
+        "2.03 N (ratio 4.12 -> 1.57)",
+        "  force error on the selection logs 7.81 -> 2.39 N with all that was found",
         "  these data cannot separate cogging from: quadratic_drag",
     ]
     planned = [f"  {line}" for line in plan_text(result.next_experiments["x"]).splitlines()]
@@ -61,18 +60,18 @@ def test_a_diagnosis():
     found = [*finding_in_words(COGGING), *finding_in_words(LUGRE), *shares_in_words(x)]
     assert rest[: len(found)] == found
     assert rest[len(found) :] == [
-        "what remains beside the named effects is 3.19 N on the fit logs, 1.6 times the noise "
-        "floor",
+        "What remains beside the named effects is 3.19 N on the training logs, 1.6 times the "
+        "noise floor.",
         "The error depends most on other axis position, which accounts for 63 % of the squared "
-        "error, with a period of 0.0273 m.",
-        f"it is largest at {region_in_words(made.LEFT_OVER)}",
+        "error, with a period of 27.3 mm.",
+        f"It is largest at {region_in_words(made.LEFT_OVER)}.",
         advice(),
-        "cogging evidence 510.0 held-out error 7.13 -> 2.17 N",
-        "quadratic_drag evidence 423.0 held-out error 7.34 -> 2.38 N",
-        "constant_force evidence 66.0 held-out error 7.46 -> 2.5 N gain uncertain: t = 1.3, where "
-        "1.6 is sure",
-        "step 1: with cogging the held-out error falls from 7.13 to 2.17 N",
-        "step 2: with lugre the held-out error falls from 7.57 to 2.61 N; no longer needed: wear",
+        "candidates with their evidence (difference of BIC) and the selection error",
+        "cogging 510.0 7.13 -> 2.17 N",
+        "quadratic_drag 423.0 7.34 -> 2.38 N",
+        "constant_force 66.0 7.46 -> 2.50 N gain uncertain: t = 1.3, where 1.6 is sure",
+        "step 1: with cogging the selection error falls from 7.13 to 2.17 N",
+        "step 2: with lugre the selection error falls from 7.57 to 2.61 N; no longer needed: wear",
         *(f"note: {r}" for r in remarks_on(result, "x")),
     ]
     y = diagnose_text(result).split("axis x: ", 1)[0]
@@ -87,14 +86,14 @@ def test_a_finding_is_told_with_what_it_takes_and_what_could_not_be_real():
         "On the logs that decided it removes 81 % of what is left above the noise floor",
         "The same force shifted in time, which cannot be real, removes at most 14 % (19 of 20 "
         "times)",
-        "Found: p = 0.0261 m, a1 = 0.127 N",
-        f"{100.0 * COGGING.confidence:.0f} % of such answers were right on machines with a known "
-        "truth: 1.00 times the noise floor is left on the selection logs, "
-        "1.00 times on the training logs",
+        "Found: p = 26.1 mm, a1 = 127 mN",
+        f"{100.0 * COGGING.confidence:.0f} % of such answers were right in the self-test. What is "
+        "left is 1.00 times the noise floor on the selection logs, 1.00 times on the training logs",
     )
     alone = replace(LUGRE, chosen=replace(LUGRE.chosen, on=Role.TRAINING), left=1.33)
     assert finding_in_words(alone)[-1].endswith(
-        ": 1.33 times the noise floor is left on the training logs"
+        "What is left is 1.33 times the noise floor on the training logs, so something else is "
+        "missing too"
     )
 
 
@@ -132,10 +131,11 @@ def test_what_decided_nothing_is_told_apart_from_what_also_chose():
     tested = made.diagnosis_of(on=Role.TEST, dataset=dataset, findings=(finding,))
     assert "without it the test error is 7.17 N" in diagnose_text(made.diagnosed(tested))
     for on, d in (("test", tested), ("selection", made.diagnosis_of())):
-        errors = f"force error on the {on} logs 7.81 N, with what was found 2.39 N"
+        what = "cogging" if on == "test" else "all that was found"
+        errors = f"force error on the {on} logs 7.81 -> 2.39 N with {what}"
         assert named_errors_in_words(d) == errors
         told = remarks_on(made.diagnosed(d), "x")
-        flatters = [r for r in told if "which took part in the choice" in r]
+        flatters = [r for r in told if "helped to choose" in r]
         assert [f"are of the {on} logs" in r for r in flatters] == [True] * (on != "test")
     assert diagnose_json(made.diagnosed(tested))["axes"]["x"]["test_error_on"] == "test"
 
@@ -146,11 +146,11 @@ def test_nothing_is_said_of_held_out_logs_where_there_are_none():
     alone = made.diagnosis_of(findings=held.findings, on=Role.TRAINING, dataset=alone)
     assert verdict_in_words(held).endswith("the training logs and the selection logs prove it.")
     assert verdict_in_words(alone).endswith(
-        "the training logs prove it, block by block; no log was held out."
+        "the training logs prove it, block by block; there is no selection log."
     )
     text = "\n".join(told_of_x(alone))
     assert "with cogging the cross-validated error falls from 7.13 to 2.17 N" in text
-    assert "held-out" not in text
+    assert "selection error" not in text
 
 
 def test_shares_of_several_are_said_to_be_no_parts_of_a_whole():
@@ -189,7 +189,7 @@ def test_two_effects_that_need_each_other_are_told_as_such():
     taken = (7.81**2 - 2.39**2) / (7.81**2 - 2.11**2)
     assert said.startswith(
         "cogging and lugre are needed together, so the logs prove neither alone; together they "
-        f"take {100.0 * taken:.0f} % of"
+        f"explain {100.0 * taken:.0f} % of"
     )
     assert "twin add lugre first.toml LOG... -o both.toml; judge after the second" in said
     assert f"  {said}" in told_of_x(x)
@@ -224,7 +224,7 @@ def test_remarks_are_about_what_a_reader_must_know():
     told = {**result.told, "x": replace(result.told["x"], moved=moved)}
     found = remarks_on(replace(result, told=told), "x")
     assert found[0] == refit_in_words(made.refit_of(0.0))
-    assert "217 us" in found[1]
+    assert "217 µs" in found[1]
     assert found[2:4] == tuple(f"with cogging and lugre, {moved_in_words(m)}" for m in moved)
     x = made.diagnosis_of(
         base=built_fit(2.0, outcome=Outcome.NOT_CONVERGED), repeat=made.REPEAT,
@@ -237,7 +237,7 @@ def test_remarks_are_about_what_a_reader_must_know():
         f"with cogging: {outcome_in_words(Outcome.AT_BOUND)}",
         repeat_in_words(made.REPEAT),
     )
-    assert "no log was held out" in found[3]
+    assert "no selection log" in found[3]
     quiet = replace(made.diagnosed(), refits={"y": Refit(1.0, 1.0, ())})
     assert remarks_on(quiet, "y") == ()
     refused = replace(result, next_experiments={}, not_planned={"x": "no travel"})
@@ -257,9 +257,7 @@ def test_nothing_missing_of_the_training_logs_alone_is_told_as_such(ratio, said)
 def test_numbers_that_differ_look_different():
     """Where the error is above noise intervals are refused, so none is told of."""
     moved = moved_in_words(replace(made.MOVED, before=15.2004, after=15.2021))
-    assert moved == (
-        "mass moved from 15.200 to 15.202 kg: more than it scatters between blocks of the logs"
-    )
+    assert moved == ("mass moved from 15.200 to 15.202 kg: more than its uncertainty")
     assert "mass 15.200 -> 15.202 kg" in change_in_words(
         Change("mass", 15.2004, 15.2021, "kg", 0.572)
     )
@@ -276,7 +274,7 @@ def test_a_change_has_its_values_and_force_in_place():
     assert one.endswith("(payload_mass gives the same force)")
     refit = Refit(0.913, 0.127, (change, replace(change, alike=())))
     assert refit_in_words(refit) == (
-        "with the given values the force error is 0.913 N, after the fit 0.127 N: "
+        "with the given values the force error is 0.913 N, after the fit 127 mN: "
         f"{change_in_words(change)}, mass 15.1 -> 15.7 kg changes the force by 0.572 N"
     )
     assert refit_in_words(Refit(0.913, 0.127, ())) is None

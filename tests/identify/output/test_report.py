@@ -23,10 +23,10 @@ from report_cases import (
 
 import identify.output.report
 from identify.estimation.residual_dependence import Dependence
-from identify.output.report import residuals
+from identify.output.numbers import arrow, quantity, typeset
 from identify.output.report.drawing import data_uri, drawing_style
-from identify.output.report.units import Scale, number, quantity
-from identify.output.words.selection import verdict_in_words
+from identify.output.report.residual import Panel, draw_residuals
+from identify.output.words.diagnosis import verdict_in_words
 from identify.selection.diagnosis import Verdict
 from twin.errors import InputError
 
@@ -75,10 +75,10 @@ def test_page_is_small_and_reproducible(case: Case, page: str, tmp_path: Path) -
 def test_many_samples_stay_small() -> None:
     """A dense scatter is thinned and rasterised: as vectors this one would take some 100 MB."""
     rng = np.random.default_rng(0)
-    left = residuals._Left(rng.standard_normal(300_000), None, "", 1.0)
-    views = [residuals.View(rng.uniform(size=300_000), "Position", "m")] * 4
+    shown = [Panel(rng.uniform(size=300_000), "Position", "m")] * 4
+    means = {"mean": rng.standard_normal(300_000)}
     with drawing_style():
-        assert len(data_uri(residuals._figure(views, left))) < MOST_BYTES / 3
+        assert len(data_uri(draw_residuals(shown, means, 1.0))) < MOST_BYTES / 3
 
 
 def test_every_section_is_there(page: str) -> None:
@@ -98,11 +98,9 @@ def test_page_says_the_verdict(case: Case, page: str) -> None:
     assert "Axis x: cogging is missing" in text
     assert verdict_in_words(case.x) in text
     assert "Next: twin add cogging MODEL LOG... -o better.toml" in text
-    scale = Scale.of("N", [case.x.base.error])
-    before = number(case.x.base.error / scale.size)
-    assert f"{before} → {scale.text(best.fit.error)}" in text
+    assert typeset(arrow(case.x.base.error, best.fit.error, "N")) in text
     final, floor = case.x.final, case.diagnosis.told["x"].floor
-    assert f"{number(case.x.base.error / floor)} → {number(final.error / floor)}" in text
+    assert typeset(arrow(case.x.base.error / floor, final.error / floor, "1")) in text
     assert best.effect.equation in text
     assert best.effect.fingerprint in text
     pitch = best.fit.axis["cogging"].values["p"]
@@ -114,8 +112,8 @@ def test_parameters_come_with_intervals_or_a_reason(case: Case, page: str) -> No
     # The model without cogging is wrong, so it has no intervals; with cogging there is one column.
     assert case.x.base.ratio > 3.0
     assert text.count("90 % interval") == 1
-    assert "no intervals, because the force error" in text
-    assert re.search(r"cogging\.p\s+–\s+[\d.]+ mm\s+[\d.]+ … [\d.]+", text)
+    assert "no interval: the force error" in text
+    assert re.search(r"cogging\.p\s+–\s+[\d.]+ mm\s+[\d.]+ to [\d.]+", text)
 
 
 def test_a_parameter_that_moved_is_noted(case: Case, page: str) -> None:
@@ -171,7 +169,7 @@ def test_a_failure_leaves_the_old_report(
     def broken(*_: object) -> None:
         raise OSError("no space left on the device")
 
-    for target in ((os, "replace"), (identify.output.report, "render")):
+    for target in ((os, "replace"), (identify.output.report, "page")):
         with monkeypatch.context() as patch, without_drawing():
             patch.setattr(*target, broken)
             with pytest.raises((InputError, OSError), match="no space"):

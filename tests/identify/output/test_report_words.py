@@ -20,14 +20,13 @@ from report_cases import (
 
 from identify import workflow
 from identify.estimation.residual_dependence import Dependence
-from identify.output.report import equations
-from identify.output.report.blocks import Heading
+from identify.output.numbers import Scale, capitalised, number, quantity, typeset
 from identify.output.report.drawing import binned_mean
-from identify.output.report.overlay import representative
-from identify.output.report.subject import LogForces, Subject
-from identify.output.report.units import Scale, number, quantity
-from identify.output.words.numbers import capitalised
-from identify.output.words.selection import verdict_in_words
+from identify.output.report.effects import equations
+from identify.output.report.page import Heading
+from identify.output.report.residual import LogForces
+from identify.output.report.subject import Subject
+from identify.output.words.diagnosis import verdict_in_words
 from identify.results.results import Diagnosis
 from identify.results.told import told_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
@@ -85,12 +84,11 @@ def test_every_verdict_has_its_words(case: Case) -> None:
 
 def test_only_named_effects_have_their_law_printed(case: Case) -> None:
     tied = ambiguous(case)
-    section = equations.section(case.subject(case.concluding(tied)))
-    assert section
-    assert [b.text for b in section.blocks if isinstance(b, Heading)] == [
+    blocks = equations(case.subject(case.concluding(tied)).views[0])
+    assert [b.text for b in blocks if isinstance(b, Heading)] == [
         "Cogging on x", "Quadratic drag on x",
     ]  # fmt: skip
-    assert equations.section(case.subject(case.concluding(case.quiet))) is None
+    assert equations(case.subject(case.concluding(case.quiet)).views[0]) == []
 
 
 def test_the_axis_of_the_answer_comes_first(case: Case) -> None:
@@ -153,7 +151,7 @@ def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
     ],
 )
 def test_numbers_with_units(value: float | None, unit: str, text: str) -> None:
-    assert quantity(value, unit) == text
+    assert typeset(quantity(value, unit)) == text
 
 
 @pytest.mark.parametrize(
@@ -165,7 +163,7 @@ def test_numbers_with_units(value: float | None, unit: str, text: str) -> None:
     ],
 )
 def test_a_sentence_of_the_terminal_is_typeset_on_a_page(said: str, printed: str) -> None:
-    assert capitalised(said) == printed
+    assert typeset(capitalised(said)) == printed
 
 
 def test_an_interval_sets_the_digits_of_its_value() -> None:
@@ -189,7 +187,7 @@ def test_the_stretch_shown_has_the_error_of_the_whole() -> None:
     time = np.arange(0.0, 40.0, 0.01)
     error = np.where(time < 20.0, 0.0, np.where(time < 30.0, 1.0, 3.0))
     forces = LogForces("log", time, error, np.zeros_like(error), None)
-    span = representative(forces, 4.0)
+    span = forces.representative(4.0)
     whole = np.sqrt(np.mean(error**2))
     assert abs(np.sqrt(np.mean(error[span] ** 2)) - whole) < 0.35 * whole
     assert span.stop - span.start == 400

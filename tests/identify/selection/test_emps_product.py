@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from emps_published import direction_dependent, identify, prediction_error, symmetric
 
-from identify.output.remarks import remarks_on
+from identify.output.words.diagnosis import remarks_on
 from identify.selection.diagnosis import Verdict
 from identify.workflow import add, diagnose
 from twin.effects import Catalogue, load_catalogue

@@ -26,7 +26,7 @@ from identify.experiment_design import rival_hypotheses as explanations
 from identify.experiment_design.discrimination import Explanation
 from identify.experiment_design.rival_hypotheses import differing_axis, explained, require_different
 from identify.experiment_design.signature import FORCE, exemplary_motion, signature
-from identify.output.signature import draw
+from identify.output.machine import draw
 from identify.selection import confounded as given
 from twin.effects import Catalogue
 from twin.errors import InputError

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from identify.output.words.selftest import (
+from identify.output.selftest import (
     failure_in_words,
     rate_in_words,
     target_in_words,

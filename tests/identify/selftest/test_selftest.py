@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from cli_runs import refusal
 
-from identify.output.plain import plain
+from identify.output.machine import plain
 from identify.output.selftest import selftest_json, selftest_text
 from identify.selection.findings import FindingKind
 from identify.selftest import Case, TrialResult, draw, draw_reliability, run_all

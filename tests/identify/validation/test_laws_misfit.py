@@ -12,7 +12,7 @@ from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.force_balance import residual
 from identify.estimation.residual_dependence import UNITS
-from identify.output.words.validation import region_in_words
+from identify.output.words.fit import region_in_words
 from identify.validation.error_spectrum import bands
 from identify.validation.misfit_maps import (
     ABOVE_FLOOR,
@@ -126,7 +126,7 @@ def test_an_error_planted_in_a_bin_is_the_worst_region():
     assert found.ratio == pytest.approx(found.rms / 0.01)
     assert found.share > 0.9
     assert found.unit == "m"
-    assert "position between 0.05" in region_in_words(found)
+    assert "position between 50.2 and 60.2 mm" in region_in_words(found)
     assert f"{100 * found.share:.0f} % of the squared error" in region_in_words(found)
 
 

@@ -7,8 +7,8 @@ import pytest
 from machines import one_axis
 
 from identify.output import as_json
-from identify.output.plain import plain
-from identify.output.words.validation import region_in_words
+from identify.output.machine import plain
+from identify.output.words.fit import region_in_words
 from identify.validation.error_spectrum import bands
 from identify.workflow import compare, fit
 from twin.effects import load_catalogue

@@ -1,13 +1,21 @@
-"""What a section is made of. Each block is drawn by the macro of its name in blocks.html.j2."""
+"""What a page is made of: blocks in sections, and their way into one HTML text."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import importlib.metadata
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
+
+from identify.output.numbers import typeset
+from identify.output.report.drawing import data_uri
+
+if TYPE_CHECKING:
+    from identify.output.report.subject import AxisView, Subject
 
 
 class Tone(Enum):
@@ -16,6 +24,9 @@ class Tone(Enum):
     PLAIN = "plain"
     STRONG = "strong"
     MUTED = "muted"
+
+
+# Each block is drawn by the macro of its name in blocks.html.j2.
 
 
 @dataclass(frozen=True)
@@ -104,8 +115,36 @@ Block = Heading | Picture | Table | Listing | Facts | Answer
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """A section of the report; ``anchor`` is its name in links."""
+    """A section of a page; ``anchor`` is its name in links."""
 
     anchor: str
     title: str
     blocks: Sequence[Block]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A section of every report: its blocks for one axis, and those for all axes together."""
+
+    anchor: str
+    title: str
+    of_axis: Callable[[AxisView], list[Block]] | None = None
+    of_all: Callable[[Subject], list[Block]] | None = None
+
+
+def page(title: str, facts: Sequence[tuple[str, str]], shown: Sequence[Section]) -> str:
+    """The page as HTML text; every text is escaped by the template. facts: under the title."""
+    environment = Environment(
+        loader=PackageLoader("identify.output.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(data_uri=data_uri, typeset=typeset)
+    return environment.get_template("report.html.j2").render(
+        title=title,
+        facts=facts,
+        sections=shown,
+        version=importlib.metadata.version("proton-twin"),
+    )
