@@ -8,7 +8,7 @@ import pytest
 from mcap_bytes import CHUNK, MESSAGE_INDEX, Piece
 
 from twin.errors import InputError
-from twin.log import AxisLog, Log, Recovery, read_log, recover_log
+from twin.logs import AxisLog, Log, Recovery, read_log, recover_log
 
 RATE, COUNT, PER_CHUNK = 500.0, 33, 7
 CHUNKS = -(-COUNT // PER_CHUNK)

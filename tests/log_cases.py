@@ -10,9 +10,9 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message_factory import GetMessages
 from mcap.writer import CompressionType, Writer
 
-from twin.log import FIELDS, AxisLog, Log
-from twin.log.log import Array
-from twin.log.schema import file_descriptor_set
+from twin.logs import FIELDS, AxisLog, Log
+from twin.logs.codecs import file_descriptor_set
+from twin.logs.log import Array
 
 RATE = 10_000.0
 

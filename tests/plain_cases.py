@@ -5,7 +5,7 @@ from mcap.records import Message
 from mcap_bytes import json_channel, json_message, json_schema, plain_file
 
 from twin.errors import InputError
-from twin.log import Log, read_log
+from twin.logs import Log, read_log
 
 MS = 1_000_000
 HEAD = [json_schema(1), json_channel(1, "/axis/x", schema=1)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from twin.effect import Effect
 
 if TYPE_CHECKING:
-    from twin.log.check import CheckReport
+    from twin.checks import CheckReport
 
 
 def effect_json(effect: Effect) -> dict[str, Any]:

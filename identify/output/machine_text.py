@@ -13,7 +13,7 @@ from twin.effect import Effect
 from twin.model.units import ROTARY
 
 if TYPE_CHECKING:
-    from twin.log.check import CheckReport
+    from twin.checks import CheckReport
 
 
 def effects_text(effects: list[Effect]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from identify.validation.side_by_side import SideBySide
-from twin.log import write_topics
+from twin.logs import write_topics
 
 
 def write_side_by_side(found: SideBySide, path: Path) -> None:

@@ -15,13 +15,13 @@ import identify.experiment_design.signature
 import identify.output.report
 import identify.output.signature
 import identify.selftest
+import twin.checks
+import twin.checks.long
 import twin.experiments.file
 import twin.experiments.named
 import twin.experiments.setpoint_csv
-import twin.log
-import twin.log.check
-import twin.log.importers
-import twin.log.long
+import twin.importers
+import twin.logs
 import twin.model.file
 from identify import workflow
 from identify.cli.shared import sentences
@@ -30,7 +30,7 @@ from identify.output import selftest as selftest_output
 from identify.output import text as as_text
 from identify.selftest.case import Case
 from identify.selftest.tally import Rate
-from twin.log.check import CheckReport, Fault, Finding, Severity
+from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.model.units import LINEAR
 
 
@@ -163,7 +163,7 @@ def test_simulate(monkeypatch, cli):
         warnings = staticmethod(lambda: ("axis x went",))
 
     call = stub(monkeypatch, twin.experiments.named, "simulate_parts", ["one", "two"])
-    record = stub(monkeypatch, twin.log, "record_log", 35_000)
+    record = stub(monkeypatch, twin.logs, "record_log", 35_000)
     monkeypatch.setattr(twin.experiments.named, "Reach", lambda stage: Reach)
     monkeypatch.setattr(twin.experiments.file, "load_experiment", lambda path: f"file {path}")
     command = ("simulate", "moves", "--model", "m.toml", "-o", "r.mcap", "--seed", "5",
@@ -195,9 +195,9 @@ def test_import_and_recover(monkeypatch, cli):
         axes: ClassVar[dict[str, str]] = {}
 
     log = Recording([0] * 9)
-    load = stub(monkeypatch, twin.log.importers, "load_mapping", "the map")
-    read = stub(monkeypatch, twin.log.importers, "import_log", log)
-    write = stub(monkeypatch, twin.log, "write_log")
+    load = stub(monkeypatch, twin.importers, "load_mapping", "the map")
+    read = stub(monkeypatch, twin.importers, "import_log", log)
+    write = stub(monkeypatch, twin.logs, "write_log")
     code, text, _ = cli("import", "d.csv", "--map", "m.toml", "-o", "r.mcap", "--json")
     assert (code, json.loads(text)) == (
         0, {"log": "r.mcap", "samples": 9, "sample_rate": 125.0, "unit": "Hz"},
@@ -206,7 +206,7 @@ def test_import_and_recover(monkeypatch, cli):
     assert write.calls.pop()[0] == (log, Path("r.mcap"))
     found = SimpleNamespace(kept=41, lost=("end",), unproved=("all",))
     files = {Path("g.mcap"): "41 samples", Path("g.part1.mcap"): "2 samples"}
-    mend = stub(monkeypatch, twin.log, "recover_file", (found, files))
+    mend = stub(monkeypatch, twin.logs, "recover_file", (found, files))
     code, text, _ = cli("recover", "bad.mcap", "-o", "g.mcap", "--json")
     assert json.loads(text) == {
         "log": "g.mcap", "kept": 41, "lost": ["end"], "not_proved": ["all"],
@@ -219,7 +219,7 @@ def test_import_and_recover(monkeypatch, cli):
 def test_check(monkeypatch, cli, severity, code):
     finding = Finding(severity, Fault.LAG, "y", "what", "where", "remedy")
     reports = {Path("a.mcap"): CheckReport((finding,)), Path("b.mcap"): CheckReport(())}
-    monkeypatch.setattr(twin.log.long, "check_file", reports.__getitem__)
+    monkeypatch.setattr(twin.checks.long, "check_file", reports.__getitem__)
     found, text, _ = cli("check", "a.mcap", "b.mcap", "--json")
     assert (found, json.loads(text)["ok"]) == (code, code == 0)
     assert list(json.loads(text)["logs"]) == ["a.mcap", "b.mcap"]

@@ -30,9 +30,9 @@ from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
 from identify.dataset.whittle import _underneath, fitted_levels
 from identify.estimation.force_balance import residual
+from twin.checks import moves
 from twin.effect import LEAST
 from twin.errors import InputError
-from twin.log.check import moves
 from twin.model.machine import AxisModel, MachineModel
 
 

@@ -28,7 +28,7 @@ from identify.experiment_design.discrimination import (
 )
 from twin.errors import CannotRun
 from twin.experiments.kinds import Tracking
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import MachineModel
 from twin.model.parameters import free_parameters, read
 

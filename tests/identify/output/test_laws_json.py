@@ -26,7 +26,7 @@ from identify.output.words.estimation import (
 )
 from identify.output.words.experiment_design import gap_in_words
 from identify.output.words.validation import loop_in_words, region_in_words
-from twin.log.check import CheckReport, Fault, Finding, Severity
+from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.model.units import LINEAR
 
 

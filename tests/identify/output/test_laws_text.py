@@ -27,8 +27,8 @@ from identify.output.words.experiment_design import gap_in_words, in_order
 from identify.output.words.numbers import PLAIN, with_unit
 from identify.output.words.selection import axis_in_words, moved_in_words, refit_in_words
 from identify.output.words.validation import loop_in_words
+from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.experiments.kinds import Rests
-from twin.log.check import CheckReport, Fault, Finding, Severity
 
 
 def test_a_fit():

@@ -13,7 +13,7 @@ from twin import simulator
 from twin.experiments import follow as module
 from twin.experiments.follow import follow, follow_parts
 from twin.experiments.trajectory import Setpoint
-from twin.log import LINEAR_UNITS, ROTARY_UNITS
+from twin.logs import LINEAR_UNITS, ROTARY_UNITS
 from twin.model.file import parse_model
 from twin.model.machine import AxisModel, Hardware, MachineModel
 from twin.simulator import ReducedSimulator
