@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from twin.errors import InputError
 from twin.importers.mapping import ImportMap
 from twin.importers.table import Table, chosen, extra, parsing, require_columns
-from twin.logs.container import Damaged, Inflation, McapFile, parse, payloads
+from twin.logs.container import IN_CHUNKS, Damaged, Inflation, McapFile, open_chunk, parse
 from twin.logs.decode import message_parts, record_at
 
 LOG_TIME = "log_time"
@@ -81,22 +81,19 @@ class _Topics:
         shown = Counter[int]()
         with open(path, "rb") as stream:
             file = McapFile(stream, path.stat().st_size)
-            for payload in payloads(file.records(), lambda record: None, Inflation(file.size)):
-                offset = 0
-                while offset < len(payload.data):
-                    opcode, content, offset = record_at(payload.data, offset)
-                    if opcode != Opcode.MESSAGE:
-                        self._register(opcode, content)
-                        continue
-                    number, _, time, _, data = message_parts(content)
-                    topic = self._channels[number].topic
-                    shown[number] += 1
-                    if shown[number] > 1 and not any(
-                        w.startswith(f"{topic}.") for w in wanted or (f"{topic}.",)
-                    ):
-                        continue
-                    decode = self._decoder(number)
-                    yield topic, time, decode(data) if decode else None
+            for opcode, content in _records(file):
+                if opcode != Opcode.MESSAGE:
+                    self._register(opcode, content)
+                    continue
+                number, _, time, _, data = message_parts(content)
+                topic = self._channels[number].topic
+                shown[number] += 1
+                if shown[number] > 1 and not any(
+                    w.startswith(f"{topic}.") for w in wanted or (f"{topic}.",)
+                ):
+                    continue
+                decode = self._decoder(number)
+                yield topic, time, decode(data) if decode else None
         if file.statistics is not None:
             _require_all(shown, file.statistics.channel_message_counts)
 
@@ -115,6 +112,19 @@ class _Topics:
             schema = self._schemas.get(channel.schema_id)
             self._decoders[number] = _decoder_for(channel.message_encoding, schema)
         return self._decoders[number]
+
+
+def _records(file: McapFile) -> Iterator[tuple[int, bytes]]:
+    """Opcode and content of schemas, channels and messages, in chunks and outside."""
+    budget = Inflation(file.size)
+    for record in file.records():
+        if record.opcode == Opcode.CHUNK:
+            data, offset = open_chunk(record, budget).data, 0
+            while offset < len(data):
+                opcode, content, offset = record_at(data, offset)
+                yield opcode, content
+        elif record.opcode in IN_CHUNKS:
+            yield record.opcode, record.content
 
 
 def _require_all(found: Mapping[int, int], announced: Mapping[int, int]) -> None:

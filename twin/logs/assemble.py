@@ -14,12 +14,13 @@ from twin.errors import InputError, at
 from twin.logs.container import Damaged, Record
 from twin.logs.layout import Block
 from twin.logs.log import Array, AxisLog, Log
-from twin.logs.series import JITTER, Series, Spacing, seconds
+from twin.logs.series import Series, seconds
 from twin.logs.topics import AXIS_PREFIX, TRUTH_PREFIX, Topic, Topics, axis_of, positive_number
 
 METADATA_NAME = "twin"
 CHECKSUM = "checksum"  # entry of the metadata, as their record has none
 SCHEMA_VERSION = "1"
+EARLY = 0.1  # of a period: how much before a sample a range may begin to hold it
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ class Run:
             self.append(block)
 
     def _open(self, channel: int) -> Series | None:
-        topic = self._topics.topic(channel, b"")
+        topic = self._topics.topic(channel)
         if topic is None or not self._wanted.takes(topic.name):
             return None
         if any(s.topic.name == topic.name for s in self._opened()):
@@ -143,14 +144,14 @@ class Run:
         alike = {(s.start, s.count) for s in series}
         if len(series) != topics or len(alike) != 1:
             return False
-        return series[0].count >= samples and series[0].rate_is_stated
+        return series[0].count >= samples
 
     def spans(self) -> dict[str, slice]:
         """Topic -> the samples of it that all topics have in common."""
         series = self._opened()
         if not series:
             return {}
-        rate, zero = series[0].sample_rate(), min(s.start for s in series)
+        rate, zero = series[0].rate, min(s.start for s in series)
         first = [round((s.start - zero) * 1e-9 * rate) for s in series]
         begin = max(first)
         end = max(begin, min(f + s.count for f, s in zip(first, series, strict=True)))
@@ -167,11 +168,11 @@ class Run:
         series = self._opened()
         if not series:
             raise InputError(f"has no samples from {start:g} to {stop:g} s")
-        rate = series[0].sample_rate()
+        rate = series[0].rate
         zero = max(s.start for s in series) * 1e-9
         log = self.trimmed_log(extras)
         first, last = (
-            math.ceil(min(max((t - zero) * rate - JITTER, 0), len(log))) for t in (start, stop)
+            math.ceil(min(max((t - zero) * rate - EARLY, 0), len(log))) for t in (start, stop)
         )
         if first == last:
             raise InputError(
@@ -183,11 +184,11 @@ class Run:
     def log(self, extras: Extras) -> Log:
         """The log; raises InputError where topics differ in time or something is missing."""
         self._check_axes()
-        common_rate(self._opened(), extras)
+        self._rate(extras)
         spans = self.spans()
         for series in self._opened():
             if spans[series.topic.name] != slice(0, series.count):
-                end = series.start + (series.count - 1) * 1e9 / series.sample_rate()
+                end = series.start + (series.count - 1) * 1e9 / series.rate
                 raise InputError(
                     f"{series.topic.name} has {series.count} samples from "
                     f"{seconds(series.start)} to {seconds(end)}, other topics differ; "
@@ -198,10 +199,13 @@ class Run:
     def trimmed_log(self, extras: Extras) -> Log:
         """The log of the samples all topics have in common; raises InputError."""
         self._check_axes()
-        rate = common_rate(self._opened(), extras)
+        rate = self._rate(extras)
         spans = self.spans()
         columns = ((s.topic, s.columns(spans[s.topic.name])) for s in self._opened())
         return assembled(columns, rate, extras)
+
+    def _rate(self, extras: Extras) -> float:
+        return common_rate({s.topic.name: s.rate for s in self._opened()}, extras)
 
     def _check_axes(self) -> None:
         axes = [s for s in self._opened() if not s.topic.is_truth and s.count]
@@ -241,14 +245,14 @@ def require_fields(topic: Topic) -> None:
     missing = "position" if "position" not in fields else "current or force"
     raise InputError(
         f"{topic.name} has no {missing}; fields in its messages: "
-        f"{', '.join(topic.codec.fields) or 'none'}; rename or add the field, "
+        f"{', '.join(topic.numbers.values()) or 'none'}; rename or add the field, "
         "or convert the log with: twin import"
     )
 
 
-def common_rate(series: Iterable[Spacing], extras: Extras) -> float:
-    """The sample rate of all series, Hz; raises InputError where they or the metadata differ."""
-    rates = {s.topic.name: s.sample_rate() for s in series}
+def common_rate(topics: Mapping[str, float], extras: Extras) -> float:
+    """The sample rate of all topics, Hz; raises InputError where they or the metadata differ."""
+    rates = dict(topics)
     stated = positive_number(extras.metadata, "sample_rate_hz")
     if stated is not None:
         rates["the metadata"] = stated

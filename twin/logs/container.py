@@ -62,16 +62,6 @@ class FileBytes:
             crc = zlib.crc32(data, crc)
         return crc
 
-    def last(self, text: bytes, stop: int) -> int | None:
-        """Where ``text`` begins for the last time, all of it before ``stop``."""
-        found = None
-        while found is None and stop >= len(text):
-            start = max(0, stop - LARGEST_WINDOW)
-            place = self.part(start, stop).rfind(text)
-            found = start + place if place >= 0 else None
-            stop = start + len(text) - 1 if start else 0
-        return found
-
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
@@ -266,20 +256,22 @@ def open_mcap(path: Path) -> Iterator[McapFile]:
         yield McapFile(stream, os.fstat(stream.fileno()).st_size)
 
 
-LOOSE_BYTES = 1 << 20  # messages outside chunks are decoded in batches of this size
 SMALLEST_INFLATION = 1 << 24  # bytes, whatever the size of the file
 LARGEST_RATIO = 256
 LARGEST_BOMB = 1 << 27  # bytes of a chunk that shrank by more than is usual
 USUAL_RATIO = 16
-_SIZE_INSIDE, _CHECKSUM = slice(16, 24), slice(24, 28)  # of the content of a chunk
 
 
 @dataclass(frozen=True)
 class Payload:
-    """Schema, channel and message records as they stand in a chunk, decompressed."""
+    """Schema, channel and message records as they stand in a chunk, decompressed.
+
+    proved: whether a checksum says that they are what was written.
+    """
 
     place: str
     data: bytes
+    proved: bool
 
 
 class Inflation:
@@ -309,12 +301,8 @@ def open_chunk(record: Record, budget: Inflation) -> Payload:
     chunk = record.parsed(Chunk)
     with at(place):
         budget.take(chunk.uncompressed_size, len(chunk.data))
-        return Payload(place, decompressed(chunk))
-
-
-def has_checksum(record: Record) -> bool:
-    """Whether a chunk states the checksum of its samples; that of no samples is 0."""
-    return any(record.content[_CHECKSUM]) or not any(record.content[_SIZE_INSIDE])
+        data = decompressed(chunk)
+    return Payload(place, data, chunk.uncompressed_crc != 0)
 
 
 def decompressed(chunk: Chunk) -> bytes:
@@ -347,24 +335,17 @@ def _decompress(chunk: Chunk) -> bytes:
 def payloads(
     records: Iterator[Record], other: Callable[[Record], None], budget: Inflation
 ) -> Iterator[Payload]:
-    """Chunks, and messages outside chunks joined to batches; the rest goes to ``other``."""
-    batch, start = bytearray(), 0
-    checked: set[bool] = set()  # a writer gives every chunk its checksum, or none
+    """The chunks; the rest goes to ``other``. Raises Damaged, InputError."""
     for record in records:
-        if record.opcode in IN_CHUNKS:
-            start = start if batch else record.offset
-            batch += RECORD_HEAD.pack(record.opcode, len(record.content)) + record.content
-        if batch and (record.opcode == Opcode.CHUNK or len(batch) >= LOOSE_BYTES):
-            yield Payload(f"messages from byte {start}", bytes(batch))
-            batch.clear()
         if record.opcode == Opcode.CHUNK:
-            checked.add(has_checksum(record))
-            if len(checked) > 1:
-                raise Damaged(
-                    f"chunk at byte {record.offset}: some chunks have a checksum and some have none"
-                )
-            yield open_chunk(record, budget)
-        elif record.opcode not in IN_CHUNKS:
+            payload = open_chunk(record, budget)
+            if payload.data and not payload.proved:
+                raise Damaged(f"{payload.place}: states no checksum of its samples")
+            yield payload
+        elif record.opcode == Opcode.MESSAGE:
+            raise InputError(
+                f"a message at byte {record.offset} is outside the chunks; convert the log with: "
+                "twin import"
+            )
+        else:
             other(record)
-    if batch:
-        yield Payload(f"messages from byte {start}", bytes(batch))

@@ -9,7 +9,6 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
 from mcap.opcode import Opcode
 
 from twin.errors import InputError, at
@@ -26,6 +25,7 @@ from twin.logs.container import (
 )
 from twin.logs.layout import Block, MessageLayout, RowLayout
 from twin.logs.log import Log
+from twin.logs.schema import segments_of
 from twin.logs.topics import AXIS_PREFIX, Topics
 
 MOST_DEFINITIONS = 100_000  # of schemas and channels in a chunk; there are 65535 of each
@@ -184,56 +184,49 @@ def _capacities(file: McapFile, samples: int | None) -> dict[int, int]:
 
 
 class Decoder:
-    """Turns schema, channel and message records into blocks of samples."""
+    """Turns the records of a chunk into blocks of samples."""
 
     def __init__(self, topics: Topics) -> None:
         self._topics = topics
         self._layouts: dict[int, RowLayout] = {}  # by the channel of their first message
-        self._registered = 0  # schemas and channels in the present chunk
 
-    def blocks(self, data: bytes) -> Iterator[Block]:
-        """Samples by channel, in file order; raises InputError, Damaged for broken framing.
+    def blocks(self, data: bytes) -> list[Block]:
+        """Samples by channel; raises InputError, Damaged for broken framing.
 
-        Rows of the same layout are taken as they lie; whatever else there is, message by message.
+        The messages of a chunk must all be laid out as the first ones, as this program writes them.
         """
-        self._registered = 0
         offset = self._register_leading(data)
-        for layout in self._likely(data, offset):
-            rows = layout.rows(data, offset)
-            if rows is not None:
-                yield from layout.blocks(rows)
-                offset += rows.nbytes
-                self._layouts[layout.messages[0].channel] = layout
-                break
-        yield from self._message_blocks(data, offset)
-
-    def _likely(self, data: bytes, offset: int) -> Iterator[RowLayout]:
-        """Layouts to try: that of the chunk that began alike, what the first messages look like."""
-        if len(data) - offset >= RECORD_HEAD.size + _MESSAGE_HEAD.size:
-            channel = _MESSAGE_HEAD.unpack_from(data, offset + RECORD_HEAD.size)[0]
-            if channel in self._layouts:
-                yield self._layouts[channel]
-        inferred = self._infer(data, offset)
-        if inferred is not None:
-            yield inferred
+        if offset == len(data):
+            return []
+        if len(data) - offset < RECORD_HEAD.size + _MESSAGE_HEAD.size:
+            raise Damaged(f"a record is cut off, {offset} bytes into it")
+        first = _MESSAGE_HEAD.unpack_from(data, offset + RECORD_HEAD.size)[0]
+        if self._topics.topic(first) is None:
+            return []
+        for layout in (self._layouts.get(first), self._inferred(data, offset)):
+            rows = layout.rows(data, offset) if layout else None
+            if layout and rows is not None and offset + rows.nbytes == len(data):
+                self._layouts[first] = layout
+                return list(layout.blocks(rows))
+        raise InputError(
+            "its messages are not laid out as this program writes them; convert the log with: "
+            "twin import"
+        )
 
     def _register_leading(self, data: bytes) -> int:
-        offset = 0
+        offset = registered = 0
         while offset < len(data):
             opcode, content, end = record_at(data, offset)
             if opcode == Opcode.MESSAGE:
                 break
-            self._register(opcode, content)
+            registered += 1
+            if registered > MOST_DEFINITIONS:
+                raise Damaged(f"more than {MOST_DEFINITIONS} schemas and channels in one chunk")
+            self._topics.register(opcode, content)
             offset = end
         return offset
 
-    def _register(self, opcode: int, content: bytes) -> None:
-        self._registered += 1
-        if self._registered > MOST_DEFINITIONS:
-            raise Damaged(f"more than {MOST_DEFINITIONS} schemas and channels in one chunk")
-        self._topics.register(opcode, content)
-
-    def _infer(self, data: bytes, offset: int) -> RowLayout | None:
+    def _inferred(self, data: bytes, offset: int) -> RowLayout | None:
         """Layout of the messages up to the one whose channel comes a second time."""
         messages: dict[int, MessageLayout] = {}
         while offset < len(data):
@@ -243,32 +236,12 @@ class Decoder:
             channel, _, _, _, payload = message_parts(content)
             if channel in messages:
                 break
-            topic = self._topics.topic(channel, payload)
-            segments = topic.codec.segments(payload) if topic else None
+            topic = self._topics.topic(channel)
+            segments = segments_of(payload, topic.numbers) if topic else None
             if segments is None:
                 return None
             messages[channel] = MessageLayout(channel, segments)
-        return RowLayout(tuple(messages.values())) if messages else None
-
-    def _message_blocks(self, data: bytes, offset: int) -> Iterator[Block]:
-        samples: dict[int, list[tuple[int, int, Sequence[float]]]] = {}
-        while offset < len(data):
-            opcode, content, offset = record_at(data, offset)
-            if opcode != Opcode.MESSAGE:
-                self._register(opcode, content)
-            else:
-                channel, sequence, time, _, payload = message_parts(content)
-                topic = self._topics.topic(channel, payload)
-                if topic is not None:
-                    with at(topic.name):
-                        values = topic.codec.values(payload)
-                    samples.setdefault(channel, []).append((sequence, time, values))
-        for channel, rows in samples.items():
-            topic = self._topics.topic(channel, b"")
-            assert topic is not None
-            numbers, times, values = zip(*rows, strict=True)
-            columns = dict(zip(topic.codec.fields, np.array(values).T, strict=True))
-            yield Block(channel, np.array(numbers, "u4"), np.array(times, "u8"), columns)
+        return RowLayout(tuple(messages.values()))
 
 
 def record_at(data: bytes, offset: int) -> tuple[int, bytes, int]:

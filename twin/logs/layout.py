@@ -43,7 +43,7 @@ def sample_times(first: int, count: int, sample_rate: float) -> NDArray[np.int64
 class Block:
     """Consecutive samples of one channel.
 
-    sequence, log_time (ns): (n,); columns: name -> (n,). A column that is absent is 0 throughout.
+    sequence, log_time (ns): (n,); columns: name -> (n,).
     """
 
     channel: int

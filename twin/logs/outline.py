@@ -12,7 +12,9 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 
 from twin.errors import InputError, at
 from twin.logs.assemble import CHECKSUM, SCHEMA_VERSION
-from twin.logs.codecs import (
+from twin.logs.layout import MessageLayout
+from twin.logs.log import Array, AxisLog, Log
+from twin.logs.schema import (
     AXIS_SAMPLE,
     AXIS_TRUTH,
     FIELD_NUMBERS,
@@ -20,8 +22,6 @@ from twin.logs.codecs import (
     numbered,
     protobuf_segments,
 )
-from twin.logs.layout import MessageLayout
-from twin.logs.log import Array, AxisLog, Log
 from twin.logs.series import seconds
 from twin.logs.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_units
 

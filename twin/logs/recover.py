@@ -1,35 +1,63 @@
 """Recover a damaged log: every stretch of samples that a checksum proves, without a gap in it.
 
+Every chunk of a log can be read alone, and its messages carry the numbers of their samples. So the
+chunks are looked for wherever they lie in the file. A chunk record is opcode u1, length u8, first
+and last time u8 each, uncompressed size u8, checksum u4, the name of the compression (u4 and text),
+the size of the data u8, and the data. The checksum is that of the decompressed data, so where it
+holds, it proves the samples and all that led to them.
+
 Samples stay in the file until they are written or asked for, so that a log of any length can be
-recovered: it is read to find what is proved, in the order of time to find the gaps, and to be kept.
+recovered.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+import struct
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 from mcap.opcode import Opcode
+from mcap.records import Chunk, ChunkIndex
 
 from twin.errors import InputError, at
 from twin.files import is_same_file
-from twin.logs.assemble import EVERYTHING, Extras
-from twin.logs.container import FileBytes, has_checksum, open_mcap, reading
-from twin.logs.decode import log_parts
+from twin.logs.assemble import EVERYTHING, Extras, assembled, common_rate, require_fields
+from twin.logs.container import (
+    MAGIC,
+    RECORD_HEAD,
+    Damaged,
+    FileBytes,
+    Inflation,
+    Record,
+    decompressed,
+    open_chunk,
+    open_mcap,
+    reading,
+)
+from twin.logs.decode import Decoder, log_parts
 from twin.logs.layout import Block, sample_times
-from twin.logs.log import Log, joined
-from twin.logs.salvage import Part, Salvage
-from twin.logs.series import seconds
-from twin.logs.stretch import Stretch, Trace
-from twin.logs.topics import Topic
+from twin.logs.log import Array, Log, joined
+from twin.logs.series import require_even, require_finite, seconds
+from twin.logs.topics import Topic, Topics
 from twin.logs.writer import write_parts
 
 METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
 INTACT_STEP = 1 << 17  # samples of an intact log that are held in memory at a time
+STEP = 1 << 15  # the same of a damaged one
+_KEPT_CHUNKS = 2  # decompressed at a time
+_HEAD = struct.Struct("<BQQQQII")  # of a chunk, up to the length of the compression's name
+_SIZE = struct.Struct("<Q")
+_ZSTD = b"\x04\0\0\0zstd"
+_BEFORE = _HEAD.size + 4 + _SIZE.size  # bytes of a chunk before its data
+_LEAST_ROOM = 1 << 12  # bytes: what does not shrink may grow, a little
+_OPCODES = frozenset(Opcode)
 
 
 @dataclass(frozen=True)
@@ -62,8 +90,7 @@ def recover_log(path: str | Path, *, unproved: bool = False) -> tuple[Log, Recov
     """Read the longest series of intact chunks without a gap between them, and all others.
 
     Samples are kept only where a checksum proves them, or, where ``unproved`` is asked for, where
-    nothing speaks against them. Metadata has no checksum of its own; where it contradicts the
-    chunks it is ignored. Raises InputError where nothing is left.
+    nothing speaks against them. Raises InputError where nothing is left.
     """
     with _recovered(Path(path), unproved) as (kept, recovery):
         log, *others = [joined(stretch.logs()) for stretch in kept]
@@ -97,18 +124,15 @@ def _recovered(path: Path, unproved: bool) -> Iterator[tuple[list[_Kept], Recove
     except InputError as error:
         reason = str(error).removeprefix(f"{path}: ")
     else:
-        doubt = _doubt(path)
-        if doubt and not unproved:
-            raise InputError(f"{path}: {doubt[0]}; it can be read as it is, or with --unproved")
         text = f"all {count} samples"
-        yield [_Kept(text, lambda: _intact(path))], Recovery(text, (), doubt)
+        yield [_Kept(text, lambda: _intact(path))], Recovery(text, ())
         return
     with reading(path):
         stream = open(path, "rb")  # noqa: SIM115
     with stream:
         with reading(path):
             file = FileBytes(stream, os.fstat(stream.fileno()).st_size)
-            kept, recovery = _Stretches(path, file, reason, unproved).result()
+            kept, recovery = _Salvage(file, reason, unproved).result(str(path))
         yield kept, recovery
 
 
@@ -118,174 +142,379 @@ def _intact(path: Path) -> Iterator[Log]:
         yield from log_parts(file, file.records(), EVERYTHING, INTACT_STEP)
 
 
-def _doubt(path: Path) -> tuple[str, ...]:
-    """Why nothing proves the samples of a log in which no fault was found."""
-    with open_mcap(path) as file:
-        records = file.records()
-        opcodes = {r.opcode for r in records if r.opcode != Opcode.CHUNK or not has_checksum(r)}
-        if file.checked or not opcodes & {Opcode.CHUNK, Opcode.MESSAGE}:
-            return ()
-    return ("the log has no checksums that prove its samples",)
+@dataclass(frozen=True)
+class _FoundChunk:
+    """A chunk that lies in the file from ``offset`` to ``end``; size, crc: of what it holds.
+
+    length_holds: whether the length of its record says so too.
+    """
+
+    offset: int
+    end: int
+    size: int
+    crc: int
+    length_holds: bool
+
+    @property
+    def proved(self) -> bool:
+        """Whether a checksum says that its records are what was written."""
+        return self.crc != 0
+
+    @property
+    def place(self) -> str:
+        """Where it is."""
+        return f"chunk at byte {self.offset}"
+
+    def content(self, file: FileBytes) -> bytes:
+        """Its schema, channel and message records, decompressed; raises Damaged."""
+        data = file.part(self.offset + _BEFORE, self.end)
+        return decompressed(Chunk("zstd", data, 0, 0, self.crc, self.size))
 
 
-class _Stretches:
-    """The samples of a damaged log in stretches without a gap."""
+def _found_chunks(file: FileBytes) -> Iterator[_FoundChunk]:
+    """The chunks that can be decompressed and have no wrong checksum, in the order of the file.
 
-    def __init__(self, path: Path, file: FileBytes, reason: str, keep_unproved: bool) -> None:
-        self._name = str(path)
-        self._keep_unproved = keep_unproved
-        self._salvage = Salvage(file, reason, keep_unproved)
-        self._lost = self._salvage.lost
-        self._parts = self._sorted(list(self._salvage.parts()))
+    Within one that is proved none is looked for.
+    """
+    budget, start = Inflation(len(file)), 0
+    while (found := _first(file, start, budget)) is not None:
+        yield found
+        start = found.end if found.proved else found.offset + 1
 
-    def result(self) -> tuple[list[_Kept], Recovery]:
-        """The longest series and the others; raises InputError where there is none."""
-        stretches = self._together(self._by_topic())
-        self._report_absent_chunks()
-        if not stretches:
-            hint = (
-                ""
-                if self._keep_unproved or not self._salvage.unproved
-                else "; read it with --unproved"
+
+def _first(file: FileBytes, start: int, budget: Inflation) -> _FoundChunk | None:
+    before = _HEAD.size - 4
+    for place, length, data in file.windows(start, len(file), _BEFORE):
+        name = data.find(_ZSTD, before)
+        while before <= name < before + length:
+            offset = name - before
+            found = _opened(file, place + offset, data[offset : offset + _BEFORE], budget)
+            if found is not None:
+                return found
+            name = data.find(_ZSTD, name + 1)
+    return None
+
+
+def _opened(file: FileBytes, offset: int, head: bytes, budget: Inflation) -> _FoundChunk | None:
+    """The chunk at a place, by either of the two sizes that it states of its data."""
+    if len(head) < _BEFORE:
+        return None
+    _, length, _, _, size, crc, _ = _HEAD.unpack_from(head)
+    (inner,) = _SIZE.unpack_from(head, _BEFORE - _SIZE.size)
+    start, outer = offset + _BEFORE, length - (_BEFORE - RECORD_HEAD.size)
+    for stored in dict.fromkeys((inner, outer)):
+        if not 0 < stored <= min(len(file) - start, 2 * size + _LEAST_ROOM):
+            continue
+        found = _FoundChunk(offset, start + stored, size, crc, stored == outer)
+        try:
+            budget.take(size, stored)  # before it is read: what only looks like chunks may be many
+            found.content(file)
+        except Damaged:
+            continue
+        return found
+    return None
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Samples number ``first`` to before ``stop`` of a topic, which lie in a chunk."""
+
+    topic: Topic
+    channel: int
+    first: int
+    stop: int
+    chunk: _FoundChunk
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Samples number ``first`` to before ``stop`` of topics, whose pieces hold at least these."""
+
+    pieces: Mapping[str, Sequence[_Piece]]
+    first: int
+    stop: int
+
+    @property
+    def count(self) -> int:
+        """How many samples."""
+        return self.stop - self.first
+
+    @property
+    def start(self) -> str:
+        """Time of its first sample."""
+        topic = next(iter(self.pieces.values()))[0].topic
+        return seconds(int(sample_times(self.first, 1, topic.sample_rate)[0]))
+
+    def empty(self, extras: Extras) -> Log:
+        """The log without samples; raises InputError where an axis has too few signals, ..."""
+        topics = [pieces[0].topic for pieces in self.pieces.values()]
+        for topic in topics:
+            if not topic.is_truth:
+                require_fields(topic)
+        rate = common_rate({topic.name: topic.sample_rate for topic in topics}, extras)
+        nothing = ((topic, {name: np.empty(0) for name in topic.fields}) for topic in topics)
+        return assembled(nothing, rate, extras)
+
+    def logs(self, extras: Extras, read: Callable[[_Piece], Block]) -> Iterator[Log]:
+        """Its samples as logs that follow each other; raises InputError as ``empty`` does."""
+        rate = self.empty(extras).sample_rate
+        for first in range(self.first, self.stop, STEP):
+            stop = min(first + STEP, self.stop)
+            columns = (
+                (pieces[0].topic, _columns(pieces, first, stop, read))
+                for pieces in self.pieces.values()
             )
-            why = "; ".join(dict.fromkeys([*self._lost, *self._salvage.unproved]))
+            yield assembled(columns, rate, extras)
+
+
+def _columns(
+    pieces: Sequence[_Piece], first: int, stop: int, read: Callable[[_Piece], Block]
+) -> dict[str, Array]:
+    """Samples number ``first`` to before ``stop`` of one topic."""
+    found: dict[str, list[Array]] = {name: [] for name in pieces[0].topic.fields}
+    for piece in pieces[bisect_right(pieces, first, key=lambda p: p.stop) :]:
+        if piece.first >= stop:
+            break
+        block = read(piece)
+        for name, parts in found.items():
+            parts.append(block.columns[name][max(0, first - piece.first) : stop - piece.first])
+    return {name: np.concatenate(parts) for name, parts in found.items()}
+
+
+class _Salvage:
+    """What can be had from the bytes of a damaged log; it keeps no sample, but where they are.
+
+    reason: why the log cannot be read as it is.
+    """
+
+    def __init__(self, file: FileBytes, reason: str, keep_unproved: bool) -> None:
+        self._file = file
+        self._keep_unproved = keep_unproved
+        self._lost = [reason]
+        self._unproved: list[str] = []
+        self._extras = Extras()
+        self._topics = Topics()
+        self._decoder = Decoder(self._topics)
+        self._announced: dict[int, int] = {}  # ns, of the last sample by channel, by the summary
+        self._content = lru_cache(_KEPT_CHUNKS)(lambda chunk: chunk.content(file))
+
+    def result(self, name: str) -> tuple[list[_Kept], Recovery]:
+        """The longest stretch of the file called so and the others; raises InputError for none."""
+        stretches = self._stretches(self._by_topic())
+        if not stretches:
+            hint = "; read it with --unproved" * bool(self._unproved and not self._keep_unproved)
+            why = "; ".join(dict.fromkeys([*self._lost, *self._unproved]))
             raise InputError(f"nothing can be recovered ({why}){hint}")
-        extras = self._salvage.extras
         # the rate is stated in every chunk too, and there a checksum protects it
-        extras.metadata.pop("sample_rate_hz", None)
-        longest = max(stretches, key=lambda s: s.count * len(s.spans))
-        longest.empty(extras)
-        others = list(self._others(stretches, longest))
-        lost = self._lost if self._keep_unproved else [*self._lost, *self._salvage.unproved]
-        unproved: list[str] = [METADATA] if extras.metadata and not extras.proved else []
-        unproved += self._salvage.unproved if self._keep_unproved else []
-        recovery = Recovery(
-            longest.text, tuple(dict.fromkeys(lost)), tuple(dict.fromkeys(unproved))
-        )
-        return [self._kept(stretch) for stretch in (longest, *others)], recovery
+        self._extras.metadata.pop("sample_rate_hz", None)
+        longest = max(stretches, key=lambda s: s.count * len(s.pieces))
+        longest.empty(self._extras)
+        kept = [longest, *self._others(stretches, longest)]
+        unproved = [METADATA] if self._extras.metadata and not self._extras.proved else []
+        (unproved if self._keep_unproved else self._lost).extend(self._unproved)
+        lost = tuple(dict.fromkeys(self._lost))
+        recovery = Recovery(_text(longest), lost, tuple(dict.fromkeys(unproved)))
+        return [self._kept(stretch, name) for stretch in kept], recovery
 
-    def _kept(self, stretch: Stretch) -> _Kept:
-        metadata = {**self._salvage.extras.metadata, "recovered": stretch.text}
-        if self._keep_unproved and self._salvage.unproved:
-            metadata["not_proved"] = "; ".join(self._salvage.unproved)
-        extras = Extras(metadata, self._salvage.extras.attachments)
-        return _Kept(stretch.text, lambda: self._logs(stretch, extras))
+    def _kept(self, stretch: _Stretch, name: str) -> _Kept:
+        metadata = {**self._extras.metadata, "recovered": _text(stretch)}
+        if self._keep_unproved and self._unproved:
+            metadata["not_proved"] = "; ".join(self._unproved)
+        extras = Extras(metadata, self._extras.attachments)
 
-    def _logs(self, stretch: Stretch, extras: Extras) -> Iterator[Log]:
-        with at(self._name):
-            yield from stretch.logs(extras)
+        def logs() -> Iterator[Log]:
+            with at(name):
+                yield from stretch.logs(extras, self._block)
 
-    def _others(self, stretches: list[Stretch], longest: Stretch) -> Iterator[Stretch]:
-        topics = set().union(*(s.names for s in stretches))
+        return _Kept(_text(stretch), logs)
+
+    def _block(self, piece: _Piece) -> Block:
+        """The samples of a piece, read from the file again."""
+        blocks = self._decoder.blocks(self._content(piece.chunk))
+        return next(block for block in blocks if block.channel == piece.channel)
+
+    def _others(self, stretches: list[_Stretch], longest: _Stretch) -> Iterator[_Stretch]:
+        topics = {topic for s in stretches for topic in s.pieces}
         for stretch in stretches:
             if stretch is longest:
                 continue
             try:
-                stretch.empty(self._salvage.extras)
+                stretch.empty(self._extras)
             except InputError as error:
-                self._lost.append(f"{stretch.text}: {error}")
+                self._lost.append(f"{_text(stretch)}: {error}")
                 continue
             yield stretch
-            absent = ", ".join(sorted(topics - stretch.names))
+            absent = ", ".join(sorted(topics - stretch.pieces.keys()))
             why = (
                 f"{absent} has no samples there"
                 if absent
                 else "a gap separates them from the longer run"
             )
             self._lost.append(
-                f"{stretch.count} intact samples from {seconds(stretch.start)} are in a log of "
-                f"their own: {why}"
+                f"{stretch.count} intact samples from {stretch.start} are in a log of their own: "
+                f"{why}"
             )
 
-    def _sorted(self, parts: list[Part]) -> list[Part]:
-        """In the order of time, each once."""
-        seen: dict[tuple[int, ...], str] = {}
-        once = []
-        for part in parts:
-            if (first := seen.setdefault(part.identity, part.place)) != part.place:
-                self._lost.append(f"a copy of the {first} is left out (the {part.place})")
+    def _by_topic(self) -> dict[str, list[_Piece]]:
+        """The pieces of each topic by their numbers, each once; topics in the order of the file."""
+        found: dict[int, list[_Piece]] = {}
+        for chunk in self._walk():
+            if self._is_taken(chunk):
+                for piece in self._pieces(chunk):
+                    found.setdefault(piece.channel, []).append(piece)
+        out: dict[str, list[_Piece]] = {}
+        for _, pieces in sorted(found.items()):
+            name = pieces[0].topic.name
+            if name in out:
+                self._lost.append(f"{pieces[0].chunk.place}: another channel has the topic {name}")
             else:
-                once.append(part)
-        ordered = sorted(once, key=lambda p: p.start)
-        if [p.place for p in ordered] != [p.place for p in once]:
-            self._lost.append("chunks were out of order; they are sorted by time")
-        return ordered
-
-    def _by_topic(self) -> list[Trace]:
-        """The samples of each topic in series without a gap, topics in the order of the file."""
-        found: dict[int, list[Trace]] = {}
-        known: dict[int, int] = {}  # losses when the last samples of a channel were read
-        channels: dict[str, int] = {}
-        for part in self._parts:
-            for number, block in enumerate(self._salvage.blocks(part)):
-                topic = self._salvage.topics.topic(block.channel, b"")
-                if topic is None:
-                    continue
-                if channels.setdefault(topic.name, block.channel) != block.channel:
-                    self._lost.append(f"{part.place}: another channel has the topic {topic.name}")
-                    continue
-                own = found.setdefault(block.channel, [])
-                explained = bool(own) and known[block.channel] != part.losses
-                known[block.channel] = part.losses
-                self._append(own, topic, (part, number, block), explained)
-        every = (trace for _, own in sorted(found.items()) for trace in own)
-        return [trace for trace in every if trace.count and self._has_rate(trace)]
-
-    def _append(
-        self, own: list[Trace], topic: Topic, samples: tuple[Part, int, Block], explained: bool
-    ) -> None:
-        """Take samples into the last series, or a new one.
-
-        explained: whether damage that was seen explains a gap, so that it is no loss of its own.
-        """
-        place = "" if explained else f"{samples[0].place}: "
-        if own:
-            try:
-                own[-1].append(*samples)
-                return
-            except InputError as error:
-                if not explained:
-                    self._lost.append(f"{place}{error}")
-        own.append(Trace(topic, self._salvage.blocks))
-        try:
-            own[-1].append(*samples)
-        except InputError as error:
-            self._lost.append(f"{place}{error}")
-
-    def _has_rate(self, trace: Trace) -> bool:
-        try:
-            return trace.sample_rate() > 0.0
-        except InputError as error:
-            self._lost.append(str(error))
-            return False
-
-    def _together(self, series: list[Trace]) -> list[Stretch]:
-        """The stretches of time in which the same topics have samples, an axis at least."""
-        if not series:
-            return []
-        zero, rate = min(s.start for s in series), series[0].sample_rate()
-        begins = [round((s.start - zero) * 1e-9 * rate) for s in series]
-        spans = {s: range(b, b + s.count) for s, b in zip(series, begins, strict=True)}
-        out = []
-        for a, b in pairwise(sorted({e for r in spans.values() for e in (r.start, r.stop)})):
-            here = {s.topic.name: s for s, r in spans.items() if a in r}
-            if all(s.topic.is_truth for s in here.values()):
-                if here:
-                    self._lost.append(
-                        f"{b - a} samples of {', '.join(here)} have no axis beside them"
-                    )
-                continue
-            within = {s: slice(a - spans[s].start, b - spans[s].start) for s in here.values()}
-            start = max(s.start + int(sample_times(w.start, 1, rate)[0]) for s, w in within.items())
-            out.append(Stretch(within, b - a, start))
+                out[name] = self._sorted(pieces)
         return out
 
-    def _report_absent_chunks(self) -> None:
-        """Chunks of the summary that were not found at all, not even damaged."""
-        there = {p.span for p in self._parts}
-        for place, span in self._salvage.announced:
-            if span not in there and place not in self._salvage.damaged:
+    def _is_taken(self, chunk: _FoundChunk) -> bool:
+        if not chunk.length_holds:
+            self._lost.append(
+                f"bytes {chunk.offset} to {chunk.offset + RECORD_HEAD.size - 1}: the length of "
+                "a chunk is unreadable; its samples are intact"
+            )
+        if not chunk.proved:
+            self._unproved.append(f"{chunk.place}: has no checksum that proves its samples")
+        return chunk.proved or self._keep_unproved
+
+    def _pieces(self, chunk: _FoundChunk) -> Iterator[_Piece]:
+        """The samples of a chunk, each topic's that are numbered, timed and finite as they must."""
+        try:
+            with at(chunk.place):
+                blocks = self._decoder.blocks(self._content(chunk))
+        except InputError as error:
+            self._lost.append(str(error))
+            return
+        for block in blocks:
+            try:
+                with at(chunk.place):
+                    yield self._piece(chunk, block)
+            except InputError as error:
+                self._lost.append(str(error))
+
+    def _piece(self, chunk: _FoundChunk, block: Block) -> _Piece:
+        topic = self._topics.topic(block.channel)
+        assert topic is not None
+        first = int(block.sequence[0])
+        require_even(topic.name, block, first, 0, first, topic.sample_rate)
+        for name in topic.fields:
+            require_finite(topic.name, block, name, first)
+        return _Piece(topic, block.channel, first, first + len(block.sequence), chunk)
+
+    def _sorted(self, pieces: list[_Piece]) -> list[_Piece]:
+        """In the order of their numbers, each once, what is proved before what is not."""
+        ordered = sorted(pieces, key=lambda p: (p.first, not p.chunk.proved, p.chunk.offset))
+        out: list[_Piece] = []
+        for piece in ordered:
+            if out and piece.first < out[-1].stop:
                 self._lost.append(
-                    f"the chunk of samples from {seconds(span[0])} to {seconds(span[1])} that the "
-                    "summary announces is not there"
+                    f"a copy of the {out[-1].chunk.place} is left out (the {piece.chunk.place})"
                 )
+            else:
+                out.append(piece)
+        if any(one.chunk.offset > other.chunk.offset for one, other in pairwise(out)):
+            self._lost.append("chunks were out of order; they are sorted by time")
+        return out
+
+    def _stretches(self, pieces: Mapping[str, list[_Piece]]) -> list[_Stretch]:
+        """The samples that the same topics have side by side, an axis at least."""
+        runs = {name: self._runs(name, own) for name, own in pieces.items()}
+        edges = {e for own in runs.values() for run in own for e in (run.start, run.stop)}
+        out = []
+        for a, b in pairwise(sorted(edges)):
+            here = {n: pieces[n] for n, own in runs.items() if any(a in run for run in own)}
+            if here and all(own[0].topic.is_truth for own in here.values()):
+                self._lost.append(f"{b - a} samples of {', '.join(here)} have no axis beside them")
+            elif here:
+                out.append(_Stretch(here, a, b))
+        return out
+
+    def _runs(self, name: str, pieces: Sequence[_Piece]) -> list[range]:
+        """The numbers of samples that follow each other without a gap."""
+        rate, runs, stop = pieces[0].topic.sample_rate, [range(0)], 0
+        end = round(self._announced.get(pieces[0].channel, -1e9) * 1e-9 * rate) + 1
+        for first, last in [*((p.first, p.stop) for p in pieces), (max(end, 0), 0)]:
+            if first > stop:
+                gone = (seconds(int(sample_times(k, 1, rate)[0])) for k in (stop, first))
+                self._lost.append(
+                    f"{name}: {first - stop} samples are missing, from {' to '.join(gone)}"
+                )
+                runs.append(range(first, first))
+            stop = max(stop, last)
+            runs[-1] = range(runs[-1].start, max(stop, runs[-1].stop))
+        return [run for run in runs if run]
+
+    def _walk(self) -> Iterator[_FoundChunk]:
+        """Chunks in the order of the file; behind unreadable bytes, from the next one on."""
+        file, previous, offset = self._file, len(MAGIC), len(MAGIC)
+        budget, found = Inflation(len(file)), _found_chunks(file)
+        following = next(found, None)
+        while offset < len(file) and not self._ends(offset):
+            while following is not None and following.offset < offset:
+                following = next(found, None)
+            if following is not None and following.offset == offset:
+                yield following
+                previous = offset = following.end
+                continue
+            end = self._end(offset, following)
+            if end is not None:
+                self._take(offset, end, budget)
+                previous, offset = offset, end
+            elif following is None:
+                self._lost.append(f"bytes {offset} to {len(file) - 1}: cut off or unreadable")
+                return
+            else:
+                self._lost.append(f"bytes {previous} to {following.offset - 1}: unreadable")
+                previous = offset = following.offset
+
+    def _ends(self, offset: int) -> bool:
+        return (
+            offset == len(self._file) - len(MAGIC) and self._file.part(offset, offset + 8) == MAGIC
+        )
+
+    def _end(self, offset: int, following: _FoundChunk | None) -> int | None:
+        """Where the record at a place ends, if there is one.
+
+        One that reaches over a chunk has a damaged length, but for an attachment whose checksum
+        holds: that may be a log, with chunks of its own.
+        """
+        start = offset + RECORD_HEAD.size
+        head = self._file.part(offset, start)
+        if len(head) < RECORD_HEAD.size:
+            return None
+        opcode, length = RECORD_HEAD.unpack(head)
+        end = start + length
+        if opcode not in _OPCODES or end > len(self._file):
+            return None
+        if following is not None and following.offset < end:
+            crc = int.from_bytes(self._file.part(end - 4, end), "little")
+            if opcode != Opcode.ATTACHMENT or self._file.checksum(start, end - 4) != crc:
+                return None
+        return end
+
+    def _take(self, offset: int, end: int, budget: Inflation) -> None:
+        """Take metadata or an attachment; say what is wrong with a chunk that was not found."""
+        opcode = self._file.part(offset, offset + 1)[0]
+        if opcode not in (Opcode.CHUNK, Opcode.CHUNK_INDEX, Opcode.METADATA, Opcode.ATTACHMENT):
+            return
+        record = Record(opcode, offset, self._file.part(offset + RECORD_HEAD.size, end))
+        try:
+            if opcode == Opcode.CHUNK:
+                open_chunk(record, budget)
+            elif opcode == Opcode.CHUNK_INDEX:
+                index = record.parsed(ChunkIndex)
+                for channel in index.message_index_offsets:
+                    ends = self._announced.get(channel, 0), index.message_end_time
+                    self._announced[channel] = max(ends)
+            else:
+                self._extras.add(record)
+        except InputError as error:
+            self._lost.append(str(error))
+
+
+def _text(stretch: _Stretch) -> str:
+    return f"{stretch.count} samples from {stretch.start}"

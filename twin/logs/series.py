@@ -1,4 +1,4 @@
-"""The samples of one topic as they arrive, block by block, and where they lie in time."""
+"""The samples of one topic as they arrive, block by block, and the times that they must have."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Collection
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.errors import InputError
 from twin.logs.layout import Block, sample_times
@@ -36,144 +35,46 @@ def instant(time: float) -> str:
     return seconds(round(time * 1e6) * 1000) if is_calendar(time) else f"{time:.9g} s"
 
 
-JITTER = 0.1  # of a period: how far a time may be off the even grid
+ROUNDING = 2.0  # ns: how far a time may be off that of its number, of which both are rounded
+LATEST_TIME = 1 << 62  # ns
 
 
-class Spacing:
-    """Numbers and times of the samples of one topic, evenly spaced; ``count`` were taken.
-
-    start: time of the first sample in ns.
-    """
-
-    def __init__(self, topic: Topic) -> None:
-        self.topic = topic
-        self.start = 0
-        self.count = 0
-        self._first_sequence = 0
-        self._rate = topic.sample_rate
-        self._elapsed: list[NDArray[np.int64]] = []  # ns, kept only where the rate is not stated
-
-    def check(self, block: Block) -> None:
-        """Raise InputError where samples do not go on where the last ended."""
-        if self.count == 0:
-            self.start = int(block.log_time[0])
-            self._first_sequence = int(block.sequence[0])
-        self._check_sequence(block.sequence)
-        elapsed = block.log_time.astype(np.int64) - self.start
-        if self._rate:
-            self._check_times(elapsed, self.count, self._rate)
-        elif self.count > 1:
-            self._check_step(float(elapsed[0]))
-
-    def take(self, block: Block) -> None:
-        """Count samples that were checked."""
-        if self._rate is None:
-            self._elapsed.append(block.log_time.astype(np.int64) - self.start)
-        self.count += len(block.log_time)
-
-    @property
-    def rate_is_stated(self) -> bool:
-        """Whether the sample rate is known without the times."""
-        return self._rate is not None
-
-    def sample_rate(self) -> float:
-        """Sample rate in Hz, stated or counted; raises InputError where times are uneven."""
-        if self._rate is None:
-            elapsed = np.concatenate(self._elapsed)
-            rate = self._counted_rate(elapsed)
-            self._check_times(elapsed, 0, rate)
-            self._rate = rate
-        return self._rate
-
-    def require_behind(self, before: Spacing) -> None:
-        """Raise InputError where there is a gap behind the samples of the part before."""
-        rate = before.sample_rate()
-        end = before.start + int(sample_times(before.count, 1, rate)[0])
-        if abs(self.start - end) > JITTER * 1e9 / rate:
-            last = before.start + int(sample_times(before.count - 1, 1, rate)[0])
-            self._refuse_time(0, float(last - self.start), 0.0, rate)
-
-    def _check_sequence(self, sequence: NDArray[np.uint32]) -> None:
-        """Sequence numbers count the samples, or are 0 where the writer does not use them."""
-        first = self._first_sequence + self.count
-        expected = np.arange(first, first + len(sequence)).astype(np.uint32)
-        wrong = sequence != expected
-        if wrong.any() and sequence.any():
-            i = int(np.argmax(wrong))
-            raise InputError(
-                f"{self.topic.name}: message {self.count + i} has sequence number {sequence[i]}, "
-                f"expected {expected[i]}: messages are missing or out of order"
-            )
-
-    def _check_times(self, elapsed: NDArray[np.int64], first: int, rate: float) -> None:
-        """``elapsed``: ns since the start, of the samples from number ``first``."""
-        expected = sample_times(first, len(elapsed), rate)
-        off = np.abs(elapsed - expected) > JITTER * 1e9 / rate
-        if off.any():
-            i = int(np.argmax(off))
-            before = elapsed[i - 1] if i else expected[0] - 1e9 / rate
-            self._refuse_time(first + i, float(before), float(elapsed[i]), rate)
-
-    def _check_step(self, elapsed: float) -> None:
-        """The step from the last sample to the next, where the rate is not known yet."""
-        last = float(self._elapsed[-1][-1])
-        period = last / (self.count - 1)
-        if elapsed - last > 1.5 * period > 0.0:
-            self._refuse_time(self.count, last, elapsed, 1e9 / period)
-
-    def _refuse_time(self, sample: int, before: float, elapsed: float, rate: float) -> None:
-        period = 1e9 / rate
-        times = f"{seconds(self.start + before)} is followed by {seconds(self.start + elapsed)}"
-        if elapsed <= before:
-            fault = f"time does not increase: {times}"
-        elif elapsed - before > 1.5 * period:
-            fault = f"gap: {times}"
-        else:
-            fault = f"uneven time: {times}"
-        raise InputError(
-            f"{self.topic.name}: {fault} at sample {sample}, expected a sample every "
-            f"{period / 1e9:.9g} s ({rate:.9g} Hz); correct the rate or the times, "
-            "or keep the longest even part with: twin recover"
-        )
-
-    def _counted_rate(self, elapsed: NDArray[np.int64]) -> float:
-        """Rate from first and last time; the integer nearest to it where jitter allows that."""
-        steps = np.diff(elapsed)
-        if not (steps > 0).any():
-            raise InputError(
-                f"{self.topic.name}: {len(elapsed)} samples do not determine the sample rate; "
-                "state sample_rate_hz (Hz) in the channel metadata"
-            )
-        period = float(np.median(steps[steps > 0]))
-        bad = (steps <= 0) | (steps > 1.5 * period)
-        if bad.any():
-            i = int(np.argmax(bad))
-            self._refuse_time(i + 1, float(elapsed[i]), float(elapsed[i + 1]), 1e9 / period)
-        rate = len(steps) * 1e9 / float(elapsed[-1])
-        nearest = round(rate)
-        return float(nearest) if abs(nearest - rate) * len(steps) < JITTER * rate else rate
-
-
-class Series(Spacing):
+class Series:
     """Columns of one topic; ``append`` refuses what is not evenly spaced and finite.
 
     capacity: samples expected; more are taken too. wanted: the fields that are kept, None for all.
+    start: time of the first sample in ns; ``count`` samples were taken; rate in Hz.
     """
 
     def __init__(self, topic: Topic, capacity: int, wanted: Collection[str] | None = None) -> None:
-        super().__init__(topic)
+        self.topic = topic
+        self.rate = topic.sample_rate
+        self.start = 0
+        self.count = 0
+        self._first_sequence = 0
         fields = [f for f in topic.fields if wanted is None or f in wanted]
         self._columns = {name: np.empty(capacity) for name in fields}
 
     def append(self, block: Block) -> None:
         """Take the next samples; raises InputError for a gap, a NaN or a time out of place."""
-        self.check(block)
+        if self.count == 0:
+            self.start = int(block.log_time[0])
+            self._first_sequence = int(block.sequence[0])
+        first = self._first_sequence + self.count
+        require_even(self.topic.name, block, first, self.start, self.count, self.rate)
         self._reserve(len(block.log_time))
         span = slice(self.count, self.count + len(block.log_time))
         for name, column in self._columns.items():
-            column[span] = block.columns.get(name, 0.0)
-            require_finite(self, block, name, column[span])
-        self.take(block)
+            column[span] = block.columns[name]
+            require_finite(self.topic.name, block, name, self.count)
+        self.count += len(block.log_time)
+
+    def require_behind(self, before: Series) -> None:
+        """Raise InputError where there is a gap behind the samples of the part before."""
+        end = before.start + int(sample_times(before.count, 1, before.rate)[0])
+        if abs(self.start - end) > ROUNDING:
+            last = before.start + int(sample_times(before.count - 1, 1, before.rate)[0])
+            raise _misplaced(self.topic.name, 0, last, self.start, self.rate)
 
     def columns(self, span: slice) -> dict[str, Array]:
         """The samples in ``span`` of every field; releases the buffers."""
@@ -193,13 +94,61 @@ class Series(Spacing):
                 self._columns[name] = grown
 
 
-def require_finite(samples: Spacing, block: Block, name: str, column: Array) -> None:
-    """Raise InputError where a column of the next samples is not a number."""
+def require_even(
+    name: str, block: Block, sequence: int, start: int, count: int, rate: float
+) -> None:
+    """Raise InputError where samples of a topic are not those behind ``count`` others.
+
+    sequence: number that their first must have; start: time of the topic's first sample in ns;
+    rate: Hz.
+    """
+    expected = np.arange(sequence, sequence + len(block.sequence)).astype(np.uint32)
+    wrong = block.sequence != expected
+    if wrong.any():
+        i = int(np.argmax(wrong))
+        raise InputError(
+            f"{name}: message {count + i} has sequence number {block.sequence[i]}, "
+            f"expected {expected[i]}: messages are missing or out of order"
+        )
+    if (latest := int(block.log_time.max())) > LATEST_TIME:
+        raise InputError(f"{name}: a message has the time {latest} ns, which no clock shows")
+    last = (count + len(expected)) * 1e9 / rate
+    if not last < LATEST_TIME:
+        raise InputError(f"{name}: at {rate:g} Hz {len(expected)} samples would last {last:g} ns")
+    elapsed = block.log_time.astype(np.int64) - start
+    times = sample_times(count, len(elapsed), rate)
+    off = np.abs(elapsed - times) > ROUNDING
+    if off.any():
+        i = int(np.argmax(off))
+        before = int(elapsed[i - 1]) if i else times[0] - 1e9 / rate
+        raise _misplaced(name, count + i, start + before, start + int(elapsed[i]), rate)
+
+
+def _misplaced(name: str, sample: int, before: float, time: float, rate: float) -> InputError:
+    """The error for a sample whose time (ns) is not a period behind that of the one before."""
+    period = 1e9 / rate
+    times = f"{seconds(before)} is followed by {seconds(time)}"
+    if time <= before:
+        fault = f"time does not increase: {times}"
+    elif time - before > 1.5 * period:
+        fault = f"gap: {times}"
+    else:
+        fault = f"uneven time: {times}"
+    return InputError(
+        f"{name}: {fault} at sample {sample}, expected a sample every "
+        f"{period / 1e9:.9g} s ({rate:.9g} Hz); keep the longest even part with: twin recover, or "
+        "convert the log with: twin import"
+    )
+
+
+def require_finite(topic: str, block: Block, name: str, count: int) -> None:
+    """Raise InputError where a column of the samples behind ``count`` others is not a number."""
+    column = block.columns[name]
     finite = np.isfinite(column)
     if not finite.all():
         i = int(np.argmin(finite))
         raise InputError(
-            f"{samples.topic.name}: {name} is {column[i]} at {seconds(float(block.log_time[i]))} "
-            f"(sample {samples.count + i}); leave out a signal that was not recorded, "
+            f"{topic}: {name} is {column[i]} at {seconds(float(block.log_time[i]))} "
+            f"(sample {count + i}); leave out a signal that was not recorded, "
             "or keep the longest part without it with: twin recover"
         )

@@ -11,9 +11,9 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from twin.errors import InputError, at
-from twin.logs.codecs import Codec, open_codec
 from twin.logs.container import Damaged, parse
 from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS
+from twin.logs.schema import fields_of
 
 AXIS_PREFIX = "/axis/"
 TRUTH_PREFIX = "/truth/"
@@ -22,12 +22,12 @@ IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 @dataclass(frozen=True)
 class Topic:
-    """One topic of samples: "/axis/x" or "/truth/x"."""
+    """One topic of samples: "/axis/x" or "/truth/x"; numbers: field number -> name."""
 
     name: str
     fields: tuple[str, ...]
     metadata: Mapping[str, str]
-    codec: Codec
+    numbers: Mapping[int, str]
 
     @property
     def axis(self) -> str:
@@ -40,9 +40,12 @@ class Topic:
         return self.name.startswith(TRUTH_PREFIX)
 
     @property
-    def sample_rate(self) -> float | None:
-        """Sample rate in Hz as stated; None: to be taken from the times."""
-        return positive_number(self.metadata, "sample_rate_hz")
+    def sample_rate(self) -> float:
+        """Sample rate in Hz; raises InputError where it is not stated."""
+        rate = positive_number(self.metadata, "sample_rate_hz")
+        if rate is None:
+            raise InputError("states no sample rate; convert the log with: twin import")
+        return rate
 
     @property
     def force_constant(self) -> float | None:
@@ -109,13 +112,13 @@ class Topics:
                 raise Damaged(f"channel {channel.id} is defined twice, differently")
         self._seen.add(content)
 
-    def topic(self, channel: int, payload: bytes) -> Topic | None:
-        """Topic of a channel, ``payload`` its first message; None where it holds no samples."""
+    def topic(self, channel: int) -> Topic | None:
+        """Topic of a channel; None where it holds no samples."""
         if channel not in self._topics:
-            self._topics[channel] = self._open(channel, payload)
+            self._topics[channel] = self._open(channel)
         return self._topics[channel]
 
-    def _open(self, channel_id: int, payload: bytes) -> Topic | None:
+    def _open(self, channel_id: int) -> Topic | None:
         channel = self.channels.get(channel_id)
         if channel is None:
             raise Damaged(f"a message belongs to channel {channel_id}, which is not defined")
@@ -127,7 +130,7 @@ class Topics:
         else:
             return None
         with at(channel.topic):
-            codec = open_codec(channel, self.schemas.get(channel.schema_id), payload)
-        known = codec.fields if prefix == TRUTH_PREFIX else FIELDS
-        fields = tuple(f for f in known if f in codec.fields)
-        return Topic(channel.topic, fields, channel.metadata, codec)
+            numbers = fields_of(channel, self.schemas.get(channel.schema_id))
+        there = tuple(numbers.values())
+        fields = there if prefix == TRUTH_PREFIX else tuple(f for f in FIELDS if f in there)
+        return Topic(channel.topic, fields, channel.metadata, numbers)

@@ -4,21 +4,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from google.protobuf.descriptor_pb2 import (
-    FieldDescriptorProto,
-    FileDescriptorProto,
-    FileDescriptorSet,
-)
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message_factory import GetMessages
 from mcap.records import Channel, Message, Schema
-from mcap_bytes import CHANNEL, SCHEMA, joined, json_channel, json_schema, parsed, records
+from mcap_bytes import CHANNEL, SCHEMA, joined, json_channel, parsed, records
 
 from twin.errors import InputError
 from twin.logs import AxisLog, Log, write_log
-from twin.logs.codecs import ProtobufCodec, file_descriptor_set, protobuf_segments
-from twin.logs.container import Damaged
 from twin.logs.decode import Decoder
 from twin.logs.layout import MessageLayout, RowLayout, sample_times
+from twin.logs.schema import fields_of, file_descriptor_set, protobuf_segments, segments_of
 from twin.logs.topics import Topics
 
 
@@ -51,45 +46,17 @@ def test_a_payload_is_its_segments_and_segments_are_its_payload(number):
     numbers = {"late": number, "early": number + 1}
     descriptors = file_descriptor_set("twin.Any", numbers)
     kind = GetMessages(FileDescriptorSet.FromString(descriptors).file)["twin.Any"]
-    codec = ProtobufCodec("twin.Any", descriptors)
+    fields = fields_of(
+        Channel(1, "/axis/x", "protobuf", {}, 1), Schema(1, descriptors, "protobuf", "twin.Any")
+    )
     stock = kind(late=1.5, early=-2.5).SerializeToString()
     segments = protobuf_segments(numbers)
     doubles = {"late": np.float64(1.5).tobytes(), "early": np.float64(-2.5).tobytes()}
     assert b"".join(doubles[s] if isinstance(s, str) else s for s in segments) == stock
-    assert codec.segments(stock) == segments
-    assert codec.values(stock) == [1.5, -2.5]
-    assert codec.fields == ("late", "early")
-    for size in range(1, len(stock)):  # a payload cut off is never taken for one of this layout
-        if size != len(stock) // 2:
-            assert codec.segments(stock[:size]) is None
-
-
-@pytest.mark.parametrize(
-    "kind", ["float", "int32", "int64", "uint32", "uint64", "sint32", "sint64"]
-)
-def test_numbers_that_are_no_doubles_are_fields_read_one_by_one(kind):
-    """Text, truth values and lists are no fields; a payload with other types has no layout."""
-    file = FileDescriptorProto(name="a.proto", package="a", syntax="proto3")
-    message = file.message_type.add(name="M")
-    types = {"text": "string", "flag": "bool", "many": "double", "some": kind, "last": "double"}
-    for number, (name, type_name) in enumerate(types.items(), 1):
-        message.field.add(
-            name=name,
-            number=number,
-            type=getattr(FieldDescriptorProto, f"TYPE_{type_name.upper()}"),
-            label=3 if name == "many" else 1,
-        )
-    descriptors = FileDescriptorSet(file=[file])
-    stock = GetMessages(descriptors.file)["a.M"]
-    codec = ProtobufCodec("a.M", descriptors.SerializeToString())
-    assert codec.fields == ("some", "last")
-    payload = stock(text="a", flag=True, many=[1.0, 2.0], some=7, last=-3.25).SerializeToString()
-    assert codec.segments(payload) is None
-    assert codec.segments(stock(some=7).SerializeToString()) is None
-    assert codec.segments(stock(last=7).SerializeToString()) is not None
-    assert codec.values(payload) == [7.0, -3.25]
-    with pytest.raises(Damaged):
-        codec.values(payload[:-1])
+    assert segments_of(stock, fields) == segments
+    assert fields == {number: "late", number + 1: "early"}
+    for size in range(len(stock)):  # a payload cut off is never taken for one of this layout
+        assert segments_of(stock[:size], fields) is None
 
 
 LAYOUT = RowLayout(
@@ -158,7 +125,7 @@ def test_a_byte_that_is_the_same_in_every_row_must_be_so_and_no_other():
 
 
 def decoded(items, extra: bytes = b"") -> dict[int, list[tuple]]:
-    """Samples by channel of some bytes, message after message."""
+    """Samples by channel of some bytes."""
     found: dict[int, list[tuple]] = {}
     for block in Decoder(Topics()).blocks(joined(items) + extra):
         columns = [block.columns[n] for n in sorted(block.columns)]
@@ -186,43 +153,27 @@ def protobuf_items():
     return items, want
 
 
-@pytest.mark.parametrize("order", ["as written", "shuffled", "one channel after the other"])
-def test_samples_arrive_by_channel_whatever_the_order_of_the_messages(order):
+def test_samples_arrive_by_channel_and_chunks_of_no_axis_are_passed_over():
     items, want = protobuf_items()
-    head, messages = items[:3], items[3:]
-    if order == "shuffled":
-        # only the order between channels may change, not that within one
-        picks = np.random.default_rng(2).permutation([m.channel_id for m in messages])
-        by_channel = {c: iter([m for m in messages if m.channel_id == c]) for c in (4, 9)}
-        messages = [next(by_channel[c]) for c in picks]
-    elif order != "as written":
-        messages = sorted(messages, key=lambda m: m.channel_id)
-    assert decoded([*head, *messages]) == want
+    assert decoded(items) == want
+    for topic in ("/camera", "/axis/1x", "/axis/x/y", "/axes/x"):
+        assert decoded([json_channel(5, topic), Message(5, 0, b"{}", 0, 0)]) == {}
+    with pytest.raises(InputError, match="channel 77, which is not defined"):
+        decoded([Message(77, 0, b"{}", 0, 0)])
+
+
+def test_messages_in_another_order_are_refused():
+    items, _ = protobuf_items()
+    with pytest.raises(InputError, match="not laid out"):
+        decoded([*items[:-2], items[-1], items[-2]])
 
 
 @pytest.mark.parametrize("size", [1, 8, 9, 20, 30, 31, 40])
-def test_a_record_cut_off_within_a_chunk_is_damage(size):
+def test_a_record_cut_off_within_a_chunk_is_refused(size):
     items, _ = protobuf_items()
     last = joined(items[-1:])
-    whole = joined(items[:-1])
     assert len(last) == 31 + 18
-    with pytest.raises(Damaged):
-        list(Decoder(Topics()).blocks(whole + last[:size]))
-    short = b"\x05" + (21).to_bytes(8, "little") + bytes(21)
-    with pytest.raises(Damaged, match="too short"):
-        list(Decoder(Topics()).blocks(whole + short))
-
-
-def test_a_message_of_an_unknown_channel_is_damage_and_one_of_no_axis_is_passed_over():
-    items, want = protobuf_items()
-    foreign = [
-        json_schema(2),
-        json_channel(5, "/camera", schema=2),
-        json_channel(6, "/axis/1x"),
-        json_channel(7, "/axis/x/y"),
-        json_channel(8, "/axes/x"),
-    ]
-    noise = [Message(c, 0, b"{}", 0, 0) for c in (5, 6, 7, 8)]
-    assert decoded([*foreign, *items[:5], *noise, *items[5:]]) == want
-    with pytest.raises(InputError, match="channel 77, which is not defined"):
-        decoded([*items, Message(77, 0, b"{}", 0, 0)])
+    with pytest.raises(InputError):
+        Decoder(Topics()).blocks(joined(items[:-1]) + last[:size])
+    with pytest.raises(InputError):
+        Decoder(Topics()).blocks(joined(items[:3]) + last[:size])

@@ -12,13 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zstandard
-from log_cases import RATE, protobuf_encoder, two_axes, write_foreign
+from log_cases import RATE, two_axes
 from mcap.records import Channel, Chunk, Message
 from mcap_bytes import MAGIC, joined, json_channel, plain_file
 
 from twin.errors import InputError
-from twin.logs import Log, read_log, recover_log
-from twin.logs.log import FIELDS
+from twin.logs import Log, read_log, recover_log, write_log
 
 SECONDS = 5.0
 MEGABYTES = 256.0
@@ -90,11 +89,7 @@ def test_an_answer_takes_seconds_and_little_memory(case: str, tmp_path: Path) ->
 
 def test_a_bomb_beside_a_log_costs_none_of_its_samples(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    schema, make = protobuf_encoder(FIELDS)
-    log = Log(RATE, {"x": two_axes(200).axes["x"]})
-    write_foreign(
-        path, log, make, schema=("twin.AxisSample", "protobuf", schema), encoding="protobuf"
-    )
+    write_log(Log(RATE, {"x": two_axes(200).axes["x"]}), path)
     chunk = bomb(bytes(1000), GIGABYTE // 4)[8 + 25 : -60]
     path.write_bytes(path.read_bytes()[:-8] + chunk)
     assert len(recover_log(path)[0]) == 200

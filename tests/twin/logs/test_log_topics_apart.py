@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_cases import assert_same_samples, protobuf_encoder, two_axes, write_foreign
+from log_cases import assert_same_samples, two_axes, write_together
 from mcap.records import ChunkIndex
 from mcap_bytes import CHUNK, CHUNK_INDEX, Piece, parsed, records
 
@@ -134,17 +134,13 @@ def test_the_longest_part_is_the_one_with_most_samples_of_all_topics(path):
 
 
 def test_logs_with_all_topics_in_one_chunk_are_read_too(tmp_path):
-    """As older versions and other programs write them: whole, in part, and in parts."""
+    """As older versions wrote them: whole, in part, and in parts."""
     fields = ("position", "force")
     axes = {
         a: AxisLog({f: LOG.axes["x"].columns[f] + n for f in fields}) for n, a in enumerate("xy")
     }
     old = Log(LOG.sample_rate, axes)
-    schema, make = protobuf_encoder(FIELDS)
-    write_foreign(
-        tmp_path / "a.mcap", old, make, schema=("twin.AxisSample", "protobuf", schema),
-        encoding="protobuf", chunk_size=1000, metadata={"sample_rate_hz": "10000.0"},
-    )  # fmt: skip
+    write_together(tmp_path / "a.mcap", old, rows=11)
     got = read_log(tmp_path / "a.mcap")
     for name in axes:
         one = read_log(tmp_path / "a.mcap", axes=(name,))
@@ -170,10 +166,6 @@ def test_a_log_is_smaller_than_the_stock_writers(tmp_path):
 
     log = Log(LOG.sample_rate, {"x": axis(0.0), "y": axis(1.0)})
     write_log(log, tmp_path / "own.mcap")
-    schema, make = protobuf_encoder(tuple(log.axes["x"].columns))
-    write_foreign(
-        tmp_path / "stock.mcap", log, make, schema=("twin.AxisSample", "protobuf", schema),
-        encoding="protobuf", chunk_size=1 << 20,
-    )  # fmt: skip
+    write_together(tmp_path / "stock.mcap", log, rows=4000)
     own, stock = ((tmp_path / f"{n}.mcap").stat().st_size for n in ("own", "stock"))
     assert own < stock

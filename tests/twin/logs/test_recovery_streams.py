@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_cases import RATE, assert_same_samples, protobuf_encoder, two_axes, write_foreign
+from log_cases import RATE, assert_same_samples, two_axes, write_together
 from mcap_bytes import CHUNK, records
 
 from twin.errors import InputError
@@ -19,13 +19,11 @@ from twin.logs import (
     recover,
     recover_file,
     recover_log,
-    stretch,
     write_log,
 )
 from twin.logs import container as file_bytes
 from twin.logs import writer as encode
 from twin.logs.container import FileBytes
-from twin.logs.log import FIELDS
 
 LOG = two_axes()
 
@@ -51,11 +49,7 @@ def path(request, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     if request.param == "together":
         x = LOG.axes["x"]
         log = Log(RATE, {"x": x, "y": AxisLog({n: c + 1.0 for n, c in x.columns.items()})})
-        schema, make = protobuf_encoder(FIELDS)
-        write_foreign(
-            path, log, make, schema=("twin.AxisSample", "protobuf", schema),
-            encoding="protobuf", chunk_size=4000,
-        )  # fmt: skip
+        write_together(path, log)
         return damaged(path, chunks(path.read_bytes())[7] - 50)
     monkeypatch.setattr(encode, "CHUNK_BYTES", 20_000)
     write_log(LOG, path)
@@ -70,7 +64,7 @@ def test_what_is_written_piece_by_piece_is_what_is_read_as_a_whole(
 ) -> None:
     """In windows of which none holds the head of a chunk as a whole."""
     log, wanted = recover_log(path)
-    monkeypatch.setattr(stretch, "STEP", 33)
+    monkeypatch.setattr(recover, "STEP", 33)
     monkeypatch.setattr(recover, "INTACT_STEP", 33)
     monkeypatch.setattr(file_bytes, "SMALLEST_WINDOW", 37)
     monkeypatch.setattr(file_bytes, "LARGEST_WINDOW", 71)
@@ -90,7 +84,7 @@ def test_a_recovery_takes_little_memory(tmp_path: Path, monkeypatch: pytest.Monk
     """Of samples of 1 MB, a few at a time, and where each chunk is."""
     monkeypatch.setattr(encode, "CHUNK_BYTES", 1 << 15)
     monkeypatch.setattr(file_bytes, "LARGEST_WINDOW", 1 << 16)
-    monkeypatch.setattr(stretch, "STEP", 500)
+    monkeypatch.setattr(recover, "STEP", 500)
     monkeypatch.setattr(recover, "INTACT_STEP", 500)
     noise = np.random.default_rng(1).standard_normal((4, 30_000))
     columns = [{"position": noise[i], "force": noise[i + 2]} for i in range(2)]
