@@ -110,12 +110,14 @@ def require_even(
             f"{name}: message {count + i} has sequence number {block.sequence[i]}, "
             f"expected {expected[i]}: messages are missing or out of order"
         )
-    if (latest := int(block.log_time.max())) > LATEST_TIME:
+    time = block.log_time.astype(np.int64)
+    if time.min() < 0:
+        latest = int(block.log_time.max())
         raise InputError(f"{name}: a message has the time {latest} ns, which no clock shows")
     last = (count + len(expected)) * 1e9 / rate
     if not last < LATEST_TIME:
         raise InputError(f"{name}: at {rate:g} Hz {len(expected)} samples would last {last:g} ns")
-    elapsed = block.log_time.astype(np.int64) - start
+    elapsed = time - start
     times = sample_times(count, len(elapsed), rate)
     off = np.abs(elapsed - times) > ROUNDING
     if off.any():

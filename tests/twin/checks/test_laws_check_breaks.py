@@ -49,19 +49,6 @@ FAST = 1000 + int(np.argmax(np.abs(motion(11.0 + np.arange(2000) / RATE, 1))))
 # --- the course of a position --------------------------------------------------------------
 
 
-def test_the_course_around_a_step_is_told_from_ten_samples_each_side():
-    x = np.r_[2.0 * np.arange(30), 7.0 + 2.0 * 29 + 3.0 * np.arange(1, 31)]
-    step, before, after = breaks._around(x, 30, 30)
-    assert (before, after) == (2.0, 3.0)
-    # from the last sample before to the first behind it goes 7 + 3 + 3, of which two samples' way
-    # at the mean speed is its course
-    assert step == pytest.approx((x[31] - x[29]) - 2.5 * 2)
-    assert breaks._around(x, 10, 10) is None
-    assert breaks._around(x, 11, 11) is not None
-    assert breaks._around(x, 48, 48) is not None
-    assert breaks._around(x, 49, 49) is None
-
-
 @pytest.mark.parametrize("lost", [3, 12])
 def test_missing_samples_are_counted_by_the_way_that_the_motion_went_on(lost):
     t = 10.0 + np.arange(4000) / RATE

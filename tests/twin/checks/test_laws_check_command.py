@@ -84,15 +84,6 @@ def test_a_single_sample_is_off_by_three_tenths_of_the_command(part, told, monke
         assert found[0].where == "1.2 s and 1 more times"
 
 
-def test_four_samples_together_are_a_burst_and_no_single_ones():
-    off = np.zeros(3000)
-    off[[100, 109, 120]] = 5.0
-    np.testing.assert_array_equal(commands._single(off, 1.0), [100, 109, 120])
-    off[[103, 106]] = 5.0
-    np.testing.assert_array_equal(commands._single(off, 1.0), [120])
-    assert len(commands._single(off, 6.0)) == 0
-
-
 @pytest.mark.parametrize(("part", "told"), [(0.04, False), (0.06, True)])
 def test_noise_of_a_twentieth_of_the_command_is_told(part, told):
     log = drive(RATE)
