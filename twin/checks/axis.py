@@ -8,29 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.checks import limits
 from twin.checks.explain import Dynamics, Lag, Trend, find_lag, find_trend, fit_dynamics
 from twin.checks.smooth import Smoother
 from twin.logs.log import AxisLog
 from twin.signals import Array, median, white_noise
 
-_IMPOSSIBLE = 4.0  # times the acceleration that 99 % of the samples stay below
-_NOISE = 10.0  # times the rms of noise
-_SLOW = 0.02  # times the highest speed: below, Coulomb friction is not yet full
 _TINY = float(np.finfo(float).tiny)
-_COVERED = 15.0  # rms of noise; of 3 million samples white noise covers 10
-_MOVING = 5.0  # speed, in units of its noise
-_MOST_HELD = 20  # samples
-_PHASE = 0.95  # of the changes fall on one of every m samples where a signal is held
-_FEWEST_CHANGES = 50
-_PASSED_IN, _FEWEST_COUNTS = 4, 5  # samples in which a count is passed; counts that tell it
-_ONE_COUNT = (0.5, 0.25, 0.1)  # parts of the ways that may be less, as text far from 0 is coarser
-_WHOLE, _OF_WHOLE = 0.05, 0.9  # how far a way is off a whole one; least part of them in whole ones
-_SAME_LAG = 0.3  # largest difference of a lag with and without a memory, as a part of it
-_PRESLIDING = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the way covered, over which friction may build up
-_SHORT = 0.8  # of the setpoint's spread, up to which a position falls short of it
-_SPRING = 0.3  # largest part of a command that a spring to the setpoint leaves
-_AS_GOOD, _WELL = 1.5, 0.03  # times what is left with two gains; or that part of the command
-_LEAST_MOTION = 0.3  # s; a loop that is closed at rest settles within half of that
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,24 +94,24 @@ class Axis:
 
         An axis that is held at rest covers a little while its loop settles.
         """
-        if not np.ptp(self.log.position) > _COVERED * self.position_noise:
+        if not np.ptp(self.log.position) > limits.COVERED * self.position_noise:
             return False
-        fast = _MOVING * self.smoother.velocity_noise(self.position_noise)
+        fast = limits.MOVING * self.smoother.velocity_noise(self.position_noise)
         moving = np.count_nonzero(np.abs(self.velocity) > fast)
-        return bool(moving * self.smoother.block > _LEAST_MOTION)
+        return bool(moving * self.smoother.block > limits.LEAST_MOTION)
 
     @cached_property
     def moves_often(self) -> bool:
         """Whether a tenth of the log or more has motion beyond the noise of the encoder."""
         speed = float(np.quantile(np.abs(self.velocity), 0.9))
-        return speed > _MOVING * self.smoother.velocity_noise(self.position_noise)
+        return speed > limits.MOVING * self.smoother.velocity_noise(self.position_noise)
 
     @cached_property
     def possible_jump(self) -> float:
         """Largest second difference of the position, in m, that motion and noise explain."""
         usual = float(np.quantile(np.abs(self.acceleration), 0.99))
-        noise = _NOISE * 6**0.5 * self.position_noise
-        return _IMPOSSIBLE * usual / self.sample_rate**2 + noise
+        noise = limits.JUMP_NOISE * 6**0.5 * self.position_noise
+        return limits.IMPOSSIBLE * usual / self.sample_rate**2 + noise
 
     @cached_property
     def jumps(self) -> Array:
@@ -165,7 +149,7 @@ class Axis:
         if not found.clear:
             return found
         beside = find_lag(self.force, self.remembering, self.kept, self.smoother.block)
-        same = abs(beside.seconds - found.seconds) < _SAME_LAG * abs(found.seconds)
+        same = abs(beside.seconds - found.seconds) < limits.SAME_LAG * abs(found.seconds)
         return found if beside.clear and same else Lag(0.0, False)
 
     @cached_property
@@ -195,7 +179,7 @@ class Axis:
             [
                 self.acceleration,
                 self.velocity,
-                self.smoother.direction(self.log.position, max(_SLOW * fast, _TINY)),
+                self.smoother.direction(self.log.position, max(limits.SLOW_SPEED * fast, _TINY)),
                 np.ones_like(position),
                 position - position.mean(),
             ]
@@ -205,7 +189,7 @@ class Axis:
     def remembering(self) -> Array:
         """(m, 5 + k) regressors of a command, with friction that builds up over k distances."""
         position = self.smoother.position(self.log.position)
-        widths = np.ptp(position) * np.array(_PRESLIDING)
+        widths = np.ptp(position) * np.array(limits.PRESLIDING)
         return np.column_stack([self.regressors, *(_built_up(position, w) for w in widths)])
 
     @cached_property
@@ -219,7 +203,7 @@ class Axis:
         if setpoint is None:
             return False
         goal, position = self.smoother.position(setpoint), self.smoother.position(self.log.position)
-        if np.std(position) > _SHORT * np.std(goal):
+        if np.std(position) > limits.FALLS_SHORT * np.std(goal):
             return False
         rates = np.column_stack(
             [np.ones_like(goal), self.velocity, self.smoother.velocity(setpoint)]
@@ -227,7 +211,11 @@ class Axis:
         spring, left = _fitted(self.force, np.column_stack([goal - position, rates]))
         apart = _fitted(self.force, np.column_stack([goal, position, rates]))[1]
         size = float(np.std(self.force))
-        return spring > 0.0 and left < _SPRING * size and left < max(_AS_GOOD * apart, _WELL * size)
+        return (
+            spring > 0.0
+            and left < limits.SPRING * size
+            and left < max(limits.AS_GOOD_GAINS * apart, limits.WELL * size)
+        )
 
 
 def _fitted(signal: Array, columns: Array) -> tuple[float, float]:
@@ -257,13 +245,16 @@ def count_of(signal: Array) -> float:
     """
     edges = np.flatnonzero(np.diff(np.diff(signal) != 0.0, prepend=False, append=False))
     first, last = edges[::2], edges[1::2]
-    ways = np.abs(signal[last] - signal[first])[last - first <= _PASSED_IN]
+    ways = np.abs(signal[last] - signal[first])[last - first <= limits.PASSED_IN]
     ways = ways[ways > 0.0]
-    if len(ways) < _FEWEST_COUNTS:
+    if len(ways) < limits.FEWEST_COUNTS:
         return 0.0
-    for count in np.quantile(ways, _ONE_COUNT):
+    for count in np.quantile(ways, limits.ONE_COUNT):
         off = np.abs(ways / count - np.round(ways / count))
-        if ways[(off < _WHOLE) & (ways > 0.5 * count)].sum() > _OF_WHOLE * ways.sum():
+        if (
+            ways[(off < limits.WHOLE_WAY) & (ways > 0.5 * count)].sum()
+            > limits.OF_WHOLE_WAYS * ways.sum()
+        ):
             return float(count)
     return 0.0
 
@@ -274,13 +265,13 @@ def held_samples(signal: Array) -> int:
     if 3 * np.count_nonzero(changes) > 2 * len(signal):  # most from each sample to the next
         return 0
     change = np.flatnonzero(changes)
-    if len(change) < _FEWEST_CHANGES:
+    if len(change) < limits.FEWEST_CHANGES:
         return 0
     steps = np.diff(change)
     if np.count_nonzero(steps == 1) > len(steps) // 2:  # so is their median
         return 0
     count = int(np.median(steps))
-    if not 2 <= count <= _MOST_HELD:
+    if not 2 <= count <= limits.MOST_HELD:
         return 0
     share = np.bincount(change % count).max() / len(change)
-    return count if share >= _PHASE else 0
+    return count if share >= limits.PHASE else 0

@@ -16,22 +16,10 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.checks import limits
 from twin.checks.axis import Axis
 from twin.checks.report import Fault, Finding, Severity
 from twin.signals import Array
-
-_COURSE = 10  # samples on either side from which the course is told
-_CLUSTER = 3  # samples between two bends of one break
-_STUCK = 5e-3  # s of one value
-_STUCK_SAMPLES = 5
-_SURE = 6.0  # times the bend that motion allows
-_ALIKE = 0.3  # difference of two speeds, as a part of the larger
-_WHOLE_TRAVEL = 0.8  # of the travel; a counter that wraps goes back by nearly all of it
-_LONGEST_GAP = 2.0  # s of missing samples
-_SHORT_GAP = 0.05  # s, over which the speed may change, and which makes two breaks one
-_A_SAMPLE = 2.0  # times the motion of a sample
-_MANY = 12  # places from which on it is not this and that, but the clock
-_EVERYWHERE = 1.0  # bends a second at least, where the clock is uneven
 
 
 class Kind(Enum):
@@ -85,7 +73,7 @@ def find_breaks(axis: Axis) -> list[Break]:
         bends = bends[(bends < b.first - 2) | (bends > b.last + 2)]
     if not len(bends):
         return stuck
-    clusters = np.split(bends, np.flatnonzero(np.diff(bends) > _CLUSTER) + 1)
+    clusters = np.split(bends, np.flatnonzero(np.diff(bends) > limits.CLUSTER) + 1)
     single = [_classified(axis, int(c[0]), int(c[-1])) for c in clusters]
     return _undone(sorted([*stuck, *(b for b in single if b)], key=lambda b: b.first), axis)
 
@@ -95,8 +83,8 @@ def _undone(breaks: list[Break], axis: Axis) -> list[Break]:
     out: list[Break] = []
     for b in breaks:
         last = out[-1] if out else None
-        if last is not None and b.first - last.last < _SHORT_GAP * axis.sample_rate:
-            opposed = abs(last.step + b.step) < _ALIKE * abs(b.step)
+        if last is not None and b.first - last.last < limits.SHORT_GAP * axis.sample_rate:
+            opposed = abs(last.step + b.step) < limits.ALIKE_SPEEDS * abs(b.step)
             if opposed or {last.kind, b.kind} <= {Kind.SAMPLE, Kind.CLOCK}:
                 size = max(abs(last.size), abs(b.step or b.size))
                 out[-1] = Break(Kind.SAMPLE, last.first, b.last, size)
@@ -109,7 +97,7 @@ def _stuck(axis: Axis) -> Iterator[Break]:
     """One value for long, with a bend where it begins and where it ends."""
     x = axis.log.position
     same = np.flatnonzero(np.diff(np.concatenate([[1.0], np.diff(x), [1.0]]) == 0.0))
-    least = max(_STUCK * axis.sample_rate, _STUCK_SAMPLES)
+    least = max(limits.STUCK * axis.sample_rate, limits.STUCK_SAMPLES)
     bends = axis.jumps > 0.0
     for first, last in zip(same[::2], same[1::2], strict=False):
         if last - first < least:
@@ -128,23 +116,26 @@ def _classified(axis: Axis, first: int, last: int) -> Break | None:
         return None
     step, before, after = course
     speed = 0.5 * (before + after) / dt
-    alike = abs(before - after) <= _ALIKE * max(abs(before), abs(after)) + axis.possible_jump
-    sure = _SURE * axis.possible_jump
+    alike = (
+        abs(before - after)
+        <= limits.ALIKE_SPEEDS * max(abs(before), abs(after)) + axis.possible_jump
+    )
+    sure = limits.SURE_BREAK * axis.possible_jump
     if abs(step) <= sure:
         off = float(axis.jumps[first - 1 : last].max())
-        if last - first > _CLUSTER:
+        if last - first > limits.CLUSTER:
             return None
-        kind = Kind.CLOCK if off < _A_SAMPLE * abs(speed) * dt else Kind.SAMPLE
+        kind = Kind.CLOCK if off < limits.A_SAMPLE * abs(speed) * dt else Kind.SAMPLE
         return Break(kind, first, last, off)
     setpoint = axis.log.columns.get("setpoint_position")
     follows = _around(setpoint, first, last) if setpoint is not None else None
     with_setpoint = follows is not None and abs(follows[0]) > 0.5 * abs(step)
-    if abs(step) >= _WHOLE_TRAVEL * np.ptp(x) and alike and not with_setpoint:
+    if abs(step) >= limits.WHOLE_TRAVEL * np.ptp(x) and alike and not with_setpoint:
         return Break(Kind.WRAPPED, first, last, abs(step))
     if setpoint is not None and not with_setpoint:
         return Break(Kind.STEP, first, last, step, step)
     samples = step / (speed * dt) if speed else np.inf
-    gap = _LONGEST_GAP if alike else _SHORT_GAP
+    gap = limits.LONGEST_GAP if alike else limits.SHORT_GAP
     if 0.5 < samples <= gap * axis.sample_rate:
         return Break(Kind.MISSING, first, last, float(round(samples)), step)
     return Break(Kind.STEP if alike else Kind.JOINED, first, last, step, step)
@@ -153,10 +144,10 @@ def _classified(axis: Axis, first: int, last: int) -> Break | None:
 def _around(x: Array, first: int, last: int) -> tuple[float, float, float] | None:
     """The step of a signal's course, and its slopes a sample before and behind."""
     begin, end = first - 1, last + 1  # the last sample before, the first behind
-    if begin - _COURSE < 0 or end + _COURSE >= len(x):
+    if begin - limits.COURSE < 0 or end + limits.COURSE >= len(x):
         return None
-    before = float(x[begin] - x[begin - _COURSE]) / _COURSE
-    after = float(x[end + _COURSE] - x[end]) / _COURSE
+    before = float(x[begin] - x[begin - limits.COURSE]) / limits.COURSE
+    after = float(x[end + limits.COURSE] - x[end]) / limits.COURSE
     expected = 0.5 * (before + after) * (end - begin)
     return float(x[end] - x[begin]) - expected, before, after
 
@@ -209,8 +200,8 @@ def is_uneven(axis: Axis) -> bool:
     bends = _bends_of_a_clock(axis)
     if not len(bends) or axis.position_held:
         return False
-    places = 1 + np.count_nonzero(np.diff(bends) > _SHORT_GAP * axis.sample_rate)
-    return bool(places >= max(_MANY, _EVERYWHERE * axis.duration))
+    places = 1 + np.count_nonzero(np.diff(bends) > limits.SHORT_GAP * axis.sample_rate)
+    return bool(places >= max(limits.MANY_BENDS, limits.EVERYWHERE * axis.duration))
 
 
 def _bends_of_a_clock(axis: Axis) -> NDArray[np.intp]:
@@ -242,14 +233,6 @@ def held(axis: Axis, name: str, count: int) -> Finding:
         "whole log",
         f"record it at {axis.sample_rate:g} Hz, or the log at {axis.sample_rate / count:g} Hz",
     )  # fmt: skip
-
-
-_APART = 0.05  # s without an outlier ends a burst
-_UNUSUAL = 5.0  # times the level that 99 % of the samples stay below
-_CONTRADICTION = 0.1  # least contradiction, as a part of the command
-_ROUGH = 0.1  # least roughness, as a part of the command
-_ROUGH_SPAN = 10e-3  # s, in which half of the samples are rough; a commanded step is only a few
-_FEWEST_ROUGH = 5
 
 
 def check_outliers(axis: Axis) -> Iterator[Finding]:
@@ -287,10 +270,10 @@ def _rough_command(axis: Axis) -> Array:
     """Times (k,) in s within bursts of noise on the command."""
     force = axis.log.force
     second = np.abs(np.diff(force, 2))
-    rough = second > _ROUGH * axis.force_size
-    span = max(round(_ROUGH_SPAN * axis.sample_rate), 2 * _FEWEST_ROUGH)
+    rough = second > limits.ROUGH * axis.force_size
+    span = max(round(limits.ROUGH_SPAN * axis.sample_rate), 2 * limits.FEWEST_ROUGH)
     if np.count_nonzero(rough) >= span // 2:
-        rough &= second > _UNUSUAL * _usual(axis, second)
+        rough &= second > limits.UNUSUAL * _usual(axis, second)
     if np.count_nonzero(rough) < span // 2:
         return np.empty(0)
     dense = np.convolve(rough, np.ones(span), "same") > span // 2
@@ -305,7 +288,7 @@ def _contradictions(axis: Axis) -> Iterator[Finding]:
     error = np.abs(fit.residual) * axis.kept[fit.first : fit.first + len(fit.residual)]
     command = np.quantile(np.abs(axis.force - np.median(axis.force)), 0.99)
     usual = _usual(axis, error)
-    bad = np.flatnonzero(error > max(_UNUSUAL * usual, _CONTRADICTION * command))
+    bad = np.flatnonzero(error > max(limits.UNUSUAL * usual, limits.CONTRADICTION * command))
     if len(bad):
         unit = axis.log.units["force"]
         yield _outliers(
@@ -328,7 +311,7 @@ def _outliers(
     what: str,
     remedy: str = "cut the log there (was an end stop hit, the carriage touched?)",
 ) -> Finding:
-    bursts = np.split(times, np.flatnonzero(np.diff(times) > _APART) + 1)
+    bursts = np.split(times, np.flatnonzero(np.diff(times) > limits.BURSTS_APART) + 1)
     more = f" and {len(bursts) - 1} more times" if len(bursts) > 1 else ""
     return Finding(
         Severity.ERROR,

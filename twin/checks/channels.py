@@ -8,31 +8,24 @@ from itertools import combinations
 
 import numpy as np
 
+from twin.checks import limits
 from twin.checks.axis import Axis
 from twin.checks.explain import Trend, find_lag, fit_dynamics
 from twin.checks.report import Fault, Finding, Severity
 from twin.signals import Array
 
-ALLOWED = 3e-3  # s
-ALLOWED_SAMPLES = 2.0
-PHYSICAL = 10e-3  # s, what a slow drive may account for
-STEADY = 0.25e-3  # s, what friction that the check does not know may account for
-STEADY_SAMPLES = 1.5
-SURE = 5.0  # times the error
-DRIFT = 60e-6  # s/s
 READINGS = ("position", "velocity", "current", "force")
-FOLLOWING = 30e-3  # s, what a slow position loop may account for
 
 
 def check_timing(axis: Axis) -> Iterator[Finding]:
     """Command, measured velocity and setpoint against the position."""
     if not axis.moves:
         return
-    allowed = max(ALLOWED, ALLOWED_SAMPLES / axis.sample_rate)
+    allowed = max(limits.ALLOWED, limits.ALLOWED_SAMPLES / axis.sample_rate)
     columns = axis.log.columns
     lag = axis.lag.seconds if axis.lag.clear else 0.0
     if abs(lag) > allowed:
-        dead_time = -PHYSICAL <= lag < 0.0
+        dead_time = -limits.PHYSICAL <= lag < 0.0
         late = "force" if lag > 0.0 else "position"
         yield Finding(
             Severity.WARNING if dead_time else Severity.ERROR,
@@ -52,7 +45,7 @@ def check_timing(axis: Axis) -> Iterator[Finding]:
     if "setpoint_position" in columns:
         setpoint = axis.smoother.velocity(columns["setpoint_position"])
         lag = _lag(axis, axis.velocity, setpoint)
-        slow = lag > max(allowed, FOLLOWING) and not axis.soft_loop
+        slow = lag > max(allowed, limits.FOLLOWING) and not axis.soft_loop
         if lag < -allowed or slow:
             yield _disagree(axis, "position", "its setpoint", _late(axis, lag, allowed), lag)
 
@@ -74,7 +67,7 @@ def _steady(axis: Axis) -> Iterator[Finding]:
     trend = axis.trend
     if trend is None or not axis.dynamics.explains:
         return
-    if abs(trend.drift) > max(DRIFT, SURE * trend.drift_error):
+    if abs(trend.drift) > max(limits.DRIFT, limits.SURE_LAG * trend.drift_error):
         yield Finding(
             Severity.WARNING, Fault.DRIFT, axis.name,
             f"the force gets {abs(trend.drift) * 1e3:.2g} ms a second "
@@ -98,8 +91,10 @@ def _is_steady(axis: Axis, trend: Trend | None) -> bool:
     """Whether a lag is more than its error and than what is usual, and may be a drive's."""
     if trend is None:
         return False
-    least = max(STEADY_SAMPLES / axis.sample_rate, STEADY, SURE * trend.error)
-    return least < abs(trend.seconds) < PHYSICAL
+    least = max(
+        limits.STEADY_SAMPLES / axis.sample_rate, limits.STEADY, limits.SURE_LAG * trend.error
+    )
+    return least < abs(trend.seconds) < limits.PHYSICAL
 
 
 def _lag(axis: Axis, signal: Array, other: Array) -> float:
@@ -130,8 +125,6 @@ def _remedy(axis: Axis, late: str, lag: float) -> str:
     return f"give {late} delay_samples = {samples} in the import map"
 
 
-LONGEST_TRAVEL = 10.0  # m
-_RELATED = 0.9  # correlation of two signals that state the same
 _SLIPS: Mapping[float, str] = {
     1e3: "a unit a thousand times smaller, as mm for m",
     1e6: "a unit a million times smaller, as um for m",
@@ -168,12 +161,12 @@ def check_units(axis: Axis) -> Iterator[Finding]:
 def _travel(axis: Axis) -> Iterator[Finding]:
     for name in ("position", "setpoint_position"):
         travel = np.ptp(axis.log.columns[name]) if name in axis.log.columns else 0.0
-        if travel > LONGEST_TRAVEL and not axis.log.kind.rotary:
+        if travel > limits.LONGEST_TRAVEL and not axis.log.kind.rotary:
             yield Finding(
                 Severity.ERROR,
                 Fault.UNIT,
                 axis.name,
-                f"{name} travels {travel:.4g} m, more than {LONGEST_TRAVEL:g} m; "
+                f"{name} travels {travel:.4g} m, more than {limits.LONGEST_TRAVEL:g} m; "
                 f"in mm it would be {travel / 1e3:.4g} m",
                 "whole log",
                 "correct its unit in the import map",
@@ -212,7 +205,7 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
     if power == 0.0 or not axis.moves:
         return
     product = float(one @ other)
-    if abs(product) < _RELATED * np.sqrt(power * float(one @ one)):
+    if abs(product) < limits.RELATED * np.sqrt(power * float(one @ one)):
         return
     ratio = product / power
     if pair.low <= ratio <= pair.high:
@@ -257,11 +250,6 @@ def _reversed_force(axis: Axis) -> Iterator[Finding]:
         )
 
 
-_WORSE = 1.2  # times what the motion of the other axis leaves of a force, its own leaves
-_EXPLAINED = 0.6  # largest part that the motion of the other axis leaves
-_ALIKE = 0.98  # correlation of a position and the setpoint that it follows
-
-
 def check_crossed(axes: Sequence[Axis]) -> Iterator[Finding]:
     """Swapped positions or forces, for each pair of axes that move."""
     for one, other in combinations([a for a in axes if a.moves], 2):
@@ -269,7 +257,7 @@ def check_crossed(axes: Sequence[Axis]) -> Iterator[Finding]:
             continue
         own = min(_left(one, one), _left(other, other))
         crossed = max(_left(one, other), _left(other, one))
-        if own < _WORSE * crossed or crossed > _EXPLAINED:
+        if own < limits.WORSE * crossed or crossed > limits.EXPLAINED_CROSSED:
             continue
         what = "positions" if _follows(one, other) and _follows(other, one) else "forces"
         yield Finding(
@@ -293,7 +281,7 @@ def _follows(position: Axis, setpoint: Axis) -> bool:
     if told is None:
         return False
     x, r = _centred(position.log.position), _centred(told)
-    return float(x @ r) > _ALIKE * float(np.linalg.norm(x) * np.linalg.norm(r))
+    return float(x @ r) > limits.ALIKE_SETPOINT * float(np.linalg.norm(x) * np.linalg.norm(r))
 
 
 def _centred(x: Array) -> Array:

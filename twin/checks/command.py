@@ -7,16 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.checks import limits
 from twin.checks.axis import Axis
 from twin.checks.breaks import held
 from twin.checks.report import Fault, Finding, Severity
 from twin.signals import Array
-
-_NOISY = 0.05  # noise of the command, as a part of it
-_HIDES = 0.4  # averaged noise, as a part of what the motion leaves unexplained
-_ALONE = 60.0  # times what 99 % of the samples are off their neighbours
-_LARGE = 0.3  # of the command
-_BURST, _MOST_TOGETHER = 21, 3  # more in so many samples are a burst, and no single ones
 
 
 def check_command(axis: Axis) -> Iterator[Finding]:
@@ -27,7 +22,7 @@ def check_command(axis: Axis) -> Iterator[Finding]:
     if count := axis.force_held:
         yield held(axis, "the force", count)
         return
-    least = _LARGE * axis.force_size
+    least = limits.LARGE_SAMPLE * axis.force_size
     steps = np.abs(np.diff(force)).max()  # a sample off its neighbours is off one beside it
     if steps > least and len(single := _single(off := off_course(force), least)):
         first = single[0] / axis.sample_rate
@@ -45,9 +40,11 @@ def _single(off: Array, least: float) -> NDArray[np.intp]:
     bad = off > least
     if not bad.any():
         return np.flatnonzero(bad)
-    bad &= off > _ALONE * float(np.quantile(off, 0.99))  # one at a steep edge is off by as much
-    together = np.convolve(bad, np.ones(_BURST), "same")
-    return np.flatnonzero(bad & (together <= _MOST_TOGETHER))  # noise is no single sample
+    bad &= off > limits.SINGLE_SAMPLE * float(
+        np.quantile(off, 0.99)
+    )  # one at a steep edge is off by as much
+    together = np.convolve(bad, np.ones(limits.NOISE_BURST), "same")
+    return np.flatnonzero(bad & (together <= limits.MOST_TOGETHER))  # noise is no single sample
 
 
 def _noise(axis: Axis) -> Iterator[Finding]:
@@ -55,9 +52,9 @@ def _noise(axis: Axis) -> Iterator[Finding]:
     noise, unit = axis.force_noise, axis.log.units["force"]
     left = float(np.median(np.abs(axis.dynamics.residual)))
     averaged = axis.smoother.held_noise(noise)
-    if not axis.dynamics.explains or averaged < _HIDES * left:
+    if not axis.dynamics.explains or averaged < limits.HIDES * left:
         return
-    if noise > _NOISY * float(np.std(axis.log.force)):
+    if noise > limits.NOISY * float(np.std(axis.log.force)):
         yield Finding(
             Severity.WARNING, Fault.NOISE, axis.name,
             f"the force has noise of {noise:.3g} {unit} rms from sample to sample, {averaged:.2g} "
@@ -78,16 +75,6 @@ def off_course(signal: Array) -> Array:
         low, high = np.minimum(low, high), np.maximum(low, high)
         off[2:-2] = np.abs(signal[2:-2] - np.clip(signal[2:-2], low, high))
     return off
-
-
-_STUCK = 5e-3  # s at one value exactly
-_STUCK_SAMPLES = 5
-_LEVEL = 20e-3  # s at one value but for noise, after the low-pass
-_LEVEL_BLOCKS = 10
-_NEAR = 10.0  # times the noise
-_WIDE = 40.0
-_EDGE_BLOCKS = 3  # a limited command leaves its level at once, a smooth one slowly
-_LIVELY = 200.0  # least range of a command, times the noise
 
 
 def check_saturation(axis: Axis) -> Iterator[Finding]:
@@ -113,7 +100,7 @@ def check_saturation(axis: Axis) -> Iterator[Finding]:
 def _exactly(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | None:
     """Start of the first interval at the extreme and length of all, s."""
     starts, lengths = _runs(np.abs(force - extreme) <= 1e-9 * np.ptp(force))
-    stuck = lengths >= max(_STUCK * axis.sample_rate, _STUCK_SAMPLES)
+    stuck = lengths >= max(limits.EXTREME * axis.sample_rate, limits.EXTREME_SAMPLES)
     if not stuck.any():
         return None
     return starts[stuck][0] / axis.sample_rate, lengths[stuck].sum() / axis.sample_rate
@@ -123,14 +110,14 @@ def _but_for_noise(axis: Axis, height: Array) -> tuple[float, float] | None:
     """Likewise, of a low-passed command (m,): a level with steep edges at its top."""
     smoother = axis.smoother
     noise = smoother.held_noise(axis.force_noise)
-    if np.ptp(height) < _LIVELY * noise:
+    if np.ptp(height) < limits.LIVELY_COMMAND * noise:
         return None
-    starts, near = _runs(height >= height.max() - _NEAR * noise)
-    wide = _runs(height >= height.max() - _WIDE * noise)[1]
+    starts, near = _runs(height >= height.max() - limits.NEAR_LEVEL * noise)
+    wide = _runs(height >= height.max() - limits.WIDE_LEVEL * noise)[1]
     longest = int(np.argmax(near))
     inside = 0 < starts[longest] < len(height) - near[longest]
-    level = max(_LEVEL / smoother.block, _LEVEL_BLOCKS)
-    if not inside or near[longest] < level or wide.max() - near[longest] > _EDGE_BLOCKS:
+    level = max(limits.LEVEL / smoother.block, limits.LEVEL_BLOCKS)
+    if not inside or near[longest] < level or wide.max() - near[longest] > limits.EDGE_BLOCKS:
         return None
     return smoother.time(starts[:1])[0], float(near.sum() * smoother.block)
 

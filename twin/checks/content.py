@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from twin.checks import limits
 from twin.checks.axis import Axis
 from twin.checks.report import Fault, Finding, Severity
 from twin.signals import Array
-
-SHORTEST = 1.0  # s, least duration for identification
 
 
 def check_content(axis: Axis) -> Iterator[Finding]:
@@ -18,12 +17,12 @@ def check_content(axis: Axis) -> Iterator[Finding]:
     yield from _missing(axis)
     yield from _not_finite(axis)
     yield from _flat(axis)
-    if axis.duration < SHORTEST:
+    if axis.duration < limits.SHORTEST:
         yield Finding(
             Severity.ERROR,
             Fault.TOO_SHORT,
             axis.name,
-            f"the log lasts {axis.duration:.3g} s, a fit needs {SHORTEST:g} s",
+            f"the log lasts {axis.duration:.3g} s, a fit needs {limits.SHORTEST:g} s",
             "whole log",
             "record longer",
         )
@@ -87,15 +86,6 @@ def _is_flat(column: Array | None) -> bool:
     return column is not None and len(column) > 0 and bool(np.all(column == column[0]))
 
 
-_COARSE = 0.3  # acceleration noise as a part of the acceleration
-_ROUNDED = 0.05  # the same, where it is the rounding: that is no noise and does not average out
-_ROUNDING = 1.0  # noise of rounding is at most its step
-_CREEP = 0.02  # of the highest speed; slower motion counts as standstill
-_ONE_WAY = 0.02  # share of the moving time
-_INERTIAL = 0.005  # share of the force, below which friction that the check does not know hides it
-_SAME_SPEED = 0.05  # spread of the speeds as a part of their median
-
-
 def check_excitation(axis: Axis) -> Iterator[Finding]:
     """Weak excitation and coarse position."""
     unit = axis.log.units["position"]
@@ -116,7 +106,7 @@ def check_excitation(axis: Axis) -> Iterator[Finding]:
 
 def _inertia(axis: Axis) -> Iterator[Finding]:
     share = axis.dynamics.inertial_share
-    if axis.dynamics.explains and share < _INERTIAL:
+    if axis.dynamics.explains and share < limits.INERTIAL:
         mass = axis.log.kind.mass_name
         yield _warning(
             axis,
@@ -130,10 +120,10 @@ def _inertia(axis: Axis) -> Iterator[Finding]:
 def _directions(axis: Axis) -> Iterator[Finding]:
     unit = axis.log.units["velocity"]
     fastest = float(np.quantile(np.abs(axis.velocity), 0.999))
-    moving = axis.velocity[np.abs(axis.velocity) > _CREEP * fastest]
+    moving = axis.velocity[np.abs(axis.velocity) > limits.CREEP * fastest]
     forward = float(np.mean(moving > 0.0))
     one_way = max(forward, 1.0 - forward)
-    if one_way > 1.0 - _ONE_WAY:
+    if one_way > 1.0 - limits.ONE_WAY:
         yield _warning(
             axis,
             Fault.WEAK_EXCITATION,
@@ -143,7 +133,7 @@ def _directions(axis: Axis) -> Iterator[Finding]:
             "move both ways",
         )
     low, middle, high = np.quantile(np.abs(moving), (0.1, 0.5, 0.9))
-    if high - low < _SAME_SPEED * middle:
+    if high - low < limits.SAME_SPEED * middle:
         yield _warning(
             axis,
             Fault.WEAK_EXCITATION,
@@ -156,8 +146,8 @@ def _directions(axis: Axis) -> Iterator[Finding]:
 def _coarse(axis: Axis) -> Iterator[Finding]:
     noise = axis.smoother.acceleration_noise(axis.position_noise)
     rms = float(np.sqrt(np.mean(axis.acceleration**2)))
-    rounded = axis.position_white < _ROUNDING * axis.position_step
-    if noise < (_ROUNDED if rounded else _COARSE) * rms:
+    rounded = axis.position_white < limits.ROUNDING * axis.position_step
+    if noise < (limits.ROUNDED if rounded else limits.COARSE) * rms:
         return
     unit = axis.log.units["position"]
     yield _warning(

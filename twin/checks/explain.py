@@ -7,13 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from twin.checks import limits
 from twin.signals import Array, sliding_products
-
-_TRIMMED = 0.05  # share of the samples that a fit leaves out
-_ROUNDS = 4
-_LEVERAGE = 3.0  # times the acceleration that 99 % of the samples stay below
-_EXPLAINED = 0.3  # residual as a part of the command
-_NOTICED = 0.3  # share of mass x acceleration in the command
 
 
 @dataclass(frozen=True)
@@ -33,43 +28,30 @@ class Dynamics:
     @property
     def mass_matters(self) -> bool:
         """Whether acceleration makes a part of the command worth the name."""
-        return self.inertial_share > _NOTICED
+        return self.inertial_share > limits.NOTICED
 
 
 def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int) -> Dynamics:
     """Least trimmed squares of a force (m,) on regressors (m, k), the first the acceleration."""
     acceleration = np.abs(regressors[:, 0])
-    use = (kept > 0.0) & (acceleration <= _LEVERAGE * np.quantile(acceleration, 0.99))
+    use = (kept > 0.0) & (acceleration <= limits.LEVERAGE * np.quantile(acceleration, 0.99))
     size = np.sqrt(np.mean(regressors**2, axis=0))
     scaled = regressors / np.where(size > 0.0, size, 1.0)
-    for _ in range(_ROUNDS):
+    for _ in range(limits.ROUNDS):
         rows = scaled * use[:, None]
         gains = np.linalg.lstsq(rows.T @ scaled, rows.T @ force, rcond=1e-12)[0]
         residual = force - scaled @ gains
         error = np.abs(residual)
-        use = (kept > 0.0) & (error <= np.quantile(error[kept > 0.0], 1.0 - _TRIMMED))
+        use = (kept > 0.0) & (error <= np.quantile(error[kept > 0.0], 1.0 - limits.TRIMMED))
     spread = float(np.std(force[use]))
     inertial = float(np.std(gains[0] * scaled[use, 0]))
     return Dynamics(
         mass=float(gains[0] / size[0]) if size[0] > 0.0 else 0.0,
-        explains=float(np.std(residual[use])) < _EXPLAINED * spread,
+        explains=float(np.std(residual[use])) < limits.EXPLAINED * spread,
         inertial_share=inertial / spread if spread > 0.0 else 0.0,
         residual=residual,
         first=first,
     )
-
-
-LONGEST = 0.25  # s, searched both ways
-_MOTION = 20  # least length of the log over the longest lag, so that it holds several moves
-_CLEAR = 0.5  # largest residual at the best lag, as a part of the signal
-_WRONG = 0.03  # least residual without a lag, as a part of the signal
-_BETTER = 0.6  # largest residual at the best lag, as a part of that without a lag
-PARTS = 8  # of a log, each with a lag of its own
-_FEWEST_PARTS = 5
-_LIVELY = 0.04  # least range of a part, of that of the whole
-_REPEATS = 0.7  # least correlation of a signal with itself a period later
-_OF_A_PERIOD = 0.125  # lags beyond that part of a period are told from none by the harmonics alone
-_AS_GOOD = 1.5  # times the least residual: lags up to it count as equally good
 
 
 @dataclass(frozen=True)
@@ -85,7 +67,7 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
 
     kept: (n,) 1.0 where the regressors may be believed, else 0.0; block: s from sample to sample.
     """
-    reach = min(round(LONGEST / block), len(signal) // _MOTION)
+    reach = min(round(limits.LONGEST_LAG / block), len(signal) // limits.MOTION_OVER_LAG)
     inner = slice(reach, len(signal) - reach)
     weights = kept[inner]
     columns = _unit_columns(explained_by[inner] * weights[:, None])
@@ -104,19 +86,21 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
     fraction = 0.5 * (below - above) / bend
     bottom = np.maximum(at - 0.25 * (below - above) * fraction, 0.0)
     least = min(bottom.min(), residual.min())  # the latter where it falls to an end
-    good = (bottom <= _AS_GOOD**2 * least) | (bottom <= _WRONG**2 * total[dips])
+    good = (bottom <= limits.AS_GOOD_LAG**2 * least) | (bottom <= limits.WRONG_LAG**2 * total[dips])
     if not good.any():
         return Lag(0.0, False)
     dips, fraction = dips[good], fraction[good]
     nearest = int(np.argmin(np.abs(dips - reach)))  # a periodic motion has several
     best, at = int(dips[nearest]), residual[dips[nearest]]
     clear = (
-        at < _CLEAR**2 * total[best]
-        and residual[reach] > _WRONG**2 * total[reach]
-        and at < _BETTER**2 * residual[reach]
+        at < limits.CLEAR_LAG**2 * total[best]
+        and residual[reach] > limits.WRONG_LAG**2 * total[reach]
+        and at < limits.BETTER_LAG**2 * residual[reach]
     )
     samples = float(best - reach + fraction[nearest])
-    return Lag(samples * block, bool(clear) and abs(samples) <= _OF_A_PERIOD * _period(centred))
+    return Lag(
+        samples * block, bool(clear) and abs(samples) <= limits.OF_A_PERIOD * _period(centred)
+    )
 
 
 @dataclass(frozen=True)
@@ -131,14 +115,14 @@ class Trend:
 
 def find_trend(signal: Array, explained_by: Array, kept: Array, block: float) -> Trend | None:
     """The lag in each part of a log; None where too few parts tell one."""
-    edges = np.linspace(0, len(signal), PARTS + 1).astype(int)
+    edges = np.linspace(0, len(signal), limits.LAG_PARTS + 1).astype(int)
     found = []
     for first, last in pairwise(edges):
         part = slice(first, last)
-        if kept[part].mean() > 0.5 and np.ptp(signal[part]) > _LIVELY * np.ptp(signal):
+        if kept[part].mean() > 0.5 and np.ptp(signal[part]) > limits.LIVELY_PART * np.ptp(signal):
             lag = find_lag(signal[part], explained_by[part], kept[part], block)
             found.append((0.5 * (first + last) * block, lag.seconds))
-    if len(found) < _FEWEST_PARTS:
+    if len(found) < limits.FEWEST_LAG_PARTS:
         return None
     times, lags = np.array(found).T
     times = times - times.mean()
@@ -166,7 +150,7 @@ def _period(signal: Array) -> float:
     below = np.flatnonzero(alike < 0.0)
     if not len(below):
         return float("inf")
-    again = np.flatnonzero(alike[below[0] :] > _REPEATS)
+    again = np.flatnonzero(alike[below[0] :] > limits.REPEATS)
     return float(below[0] + again[0]) if len(again) else float("inf")
 
 
