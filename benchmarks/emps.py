@@ -18,8 +18,8 @@ import identify
 from benchmarks.emps_frictions import error, exact, least, least_of_all, mujoco
 from benchmarks.figures import Figure, Target
 from twin.effects import Catalogue, load_catalogue
-from twin.log import Log
-from twin.log.importers import import_log, load_mapping
+from twin.importers import import_log, load_mapping
+from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
 

@@ -24,8 +24,9 @@ from mcap.writer import CompressionType, Writer
 from benchmarks.figures import Figure, Target
 from twin.effects import load_catalogue
 from twin.errors import InputError
-from twin.log import AxisLog, Log, encode, read_log, recover_log, write_log
-from twin.log.importers import import_log, load_mapping
+from twin.importers import import_log, load_mapping
+from twin.logs import AxisLog, Log, read_log, recover_log, write_log
+from twin.logs import writer as encode
 from twin.model.file import find_model, load_model
 
 INPUTS = 10_000

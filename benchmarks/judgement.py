@@ -18,7 +18,7 @@ from identify.estimation.fit import Fit
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding, FindingKind
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import MachineModel
 
 Row = dict[str, Any]

@@ -23,7 +23,7 @@ from identify.selftest.drawing import drawn_values
 from identify.selftest.laws import BUMPS
 from identify.workflow import diagnose, fit
 from twin.effects import load_catalogue
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import Fitted
 
 TITLE = "Diagnosis of fifteen kinds of hidden effect, bumps of another form, in passes"

@@ -19,7 +19,7 @@ from benchmarks.figures import Figure, Target
 from benchmarks.processes import Cost, twin
 from benchmarks.workload import Workload, saved
 from twin.experiments.named import simulate
-from twin.log import write_log
+from twin.logs import write_log
 
 TITLE = "Commands in passes: CPU of a process, over that of the fused laws over all its samples"
 ROUNDS = 3  # of a command

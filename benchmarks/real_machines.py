@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.judgement import Logs
-from twin.log import AxisLog, Log
-from twin.log.importers import import_log, load_mapping
+from twin.importers import import_log, load_mapping
+from twin.logs import AxisLog, Log
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 INCH, KIP = 0.0254, 4448.2216152605  # m, N

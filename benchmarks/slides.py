@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.timing import Array
 from twin.effects import load_catalogue
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import ParameterReference, free_parameters, read, write
 

@@ -25,7 +25,7 @@ from identify.selection.candidates import absent_effects
 from identify.selection.trying import try_effect
 from twin.core.calling import law_address
 from twin.effects import load_catalogue
-from twin.log import Log, read_log
+from twin.logs import Log, read_log
 from twin.parallel import parallel
 
 TITLE = "Stages of a diagnosis in passes, and the effects that it tries"

@@ -22,8 +22,8 @@ from identify.experiment_design.planting import added_force, other_machine, stre
 from identify.workflow import fit
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
-from twin.log import Log, write_log
-from twin.log.log import Array
+from twin.logs import Log, write_log
+from twin.logs.log import Array
 from twin.model.file import load_model, save_model
 from twin.model.machine import Fitted, MachineModel
 

@@ -15,10 +15,10 @@ import numpy as np
 from identify.dataset.motion import Motion
 from identify.experiment_design.signature import signature
 from identify.output.machine import draw
+from twin.checks.report import Fault
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue, load_catalogue
 from twin.files import write_atomically
-from twin.log.check.report import Fault
 
 HERE = Path(__file__).resolve().parent
 GENERATED = HERE / "_generated"

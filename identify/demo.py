@@ -20,7 +20,7 @@ from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
 from twin.files import make_folder
-from twin.log import Log, write_log
+from twin.logs import Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import Fitted, MachineModel
 from twin.numbers import require_seed

@@ -39,7 +39,7 @@ from identify.validation.side_by_side import SideBySide, side_by_side
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
-from twin.log import GivenLogs, Log, logs_by_name
+from twin.logs import GivenLogs, Log, logs_by_name
 from twin.memory import give_back
 from twin.model.file import as_model
 from twin.model.machine import MachineModel

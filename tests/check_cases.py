@@ -6,11 +6,11 @@ from functools import cache
 
 import numpy as np
 
+from twin.checks import CheckReport, Fault, Finding
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
-from twin.log import Log
-from twin.log.check import CheckReport, Fault, Finding
-from twin.log.log import Array
+from twin.logs import Log
+from twin.logs.log import Array
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
 

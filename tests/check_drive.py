@@ -4,22 +4,14 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from twin.log import LINEAR_UNITS, AxisLog, Log
-from twin.log.check import (
-    CheckReport,
-    Fault,
-    Finding,
-    breaks,
-    check_log,
-    content,
-    excitation,
-    outliers,
-    saturation,
-    timing,
-    units,
-)
-from twin.log.check.axis import Axis
-from twin.log.log import Array
+from twin.checks import CheckReport, Fault, Finding, check_log
+from twin.checks.axis import Axis
+from twin.checks.breaks import check_breaks, check_outliers
+from twin.checks.channels import check_timing, check_units
+from twin.checks.command import check_saturation
+from twin.checks.content import check_content, check_excitation
+from twin.logs import LINEAR_UNITS, AxisLog, Log
+from twin.logs.log import Array
 
 MASS, DAMPING, COULOMB, BIAS = 2.5, 3.5, 1.5, 0.4  # kg, N s/m, N, N
 WAVES = ((0.031, 5.3, 0.2), (0.012, 13.7, 1.1), (0.005, 29.9, 2.3))  # m, rad/s, rad
@@ -67,19 +59,19 @@ def drive(
 
 
 CHECKS = {
-    Fault.UNIT: units.check,
-    Fault.SIGN: units.check,
-    Fault.LAG: timing.check,
-    Fault.SATURATION: saturation.check,
-    Fault.OUTLIERS: lambda axis: [*breaks.check(axis), *outliers.check(axis)],
-    Fault.COARSE_POSITION: excitation.check,
-    Fault.WEAK_EXCITATION: excitation.check,
+    Fault.UNIT: check_units,
+    Fault.SIGN: check_units,
+    Fault.LAG: check_timing,
+    Fault.SATURATION: check_saturation,
+    Fault.OUTLIERS: lambda axis: [*check_breaks(axis), *check_outliers(axis)],
+    Fault.COARSE_POSITION: check_excitation,
+    Fault.WEAK_EXCITATION: check_excitation,
 }
 
 
 def findings(log: Log, fault: Fault) -> list[Finding]:
     """What the check of one kind of fault finds on axis x; other checks are not run."""
-    check = CHECKS.get(fault, content.check)
+    check = CHECKS.get(fault, check_content)
     axis = Axis("x", log.sample_rate, log.axes["x"])
     return [f for f in check(axis) if f.fault is fault]
 

@@ -16,7 +16,7 @@ from identify.estimation.fit import Outcome as Ended
 from twin.effect import Excitation
 from twin.effects import load_catalogue
 from twin.laws.values import companion
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from mcap_bytes import (
     records,
 )
 
-from twin.log import FIELDS, AxisLog, Log
+from twin.logs import FIELDS, AxisLog, Log
 
 RATE, COUNT = 3000.0, 45
 TRUTH = tuple(f"state{k}" for k in range(18))

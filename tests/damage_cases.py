@@ -8,7 +8,7 @@ import pytest
 from mcap_bytes import CHUNK, MESSAGE_INDEX, Piece
 
 from twin.errors import InputError
-from twin.log import AxisLog, Log, Recovery, read_log, recover_log
+from twin.logs import AxisLog, Log, Recovery, read_log, recover_log
 
 RATE, COUNT, PER_CHUNK = 500.0, 33, 7
 CHUNKS = -(-COUNT // PER_CHUNK)
@@ -80,9 +80,8 @@ def account(case: Case, recovery: Recovery) -> Account:
                 first, last = (int(g) for g in found.groups())
                 if first < chunk.end and last >= chunk.start:
                     damaged |= samples_of(number)
-        if found := re.match(r"the chunk of samples from (\S+) s to (\S+) s that", sentence):
-            first, last = (round(float(g) * RATE) for g in found.groups())
-            damaged |= set(range(first, last + 1))
+        if found := re.match(r"/axis/x: (\d+) samples are missing, from (\S+) s to", sentence):
+            damaged |= span(*found.groups())
     whole = recovery.kept == f"all {COUNT} samples"
     match = re.fullmatch(r"(\d+) samples from (\S+) s", recovery.kept)
     assert whole or match, recovery.kept

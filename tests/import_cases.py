@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from twin.log.importers import ImportMap, load_mapping
+from twin.importers import ImportMap, load_mapping
 
 RATE = 2000.0
 COUNT = 300

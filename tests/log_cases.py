@@ -1,18 +1,16 @@
-"""Logs for the tests of the log codec, and files as other writers make them."""
+"""Logs for the tests of the log codec."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import struct
 from pathlib import Path
 
 import numpy as np
-from google.protobuf.descriptor_pb2 import FileDescriptorSet
-from google.protobuf.message_factory import GetMessages
-from mcap.writer import CompressionType, Writer
+from mcap.writer import Writer
 
-from twin.log import FIELDS, AxisLog, Log
-from twin.log.log import Array
-from twin.log.schema import file_descriptor_set
+from twin.logs import FIELDS, AxisLog, Log
+from twin.logs.log import Array
+from twin.logs.schema import file_descriptor_set, protobuf_segments
 
 RATE = 10_000.0
 
@@ -66,51 +64,30 @@ def assert_same_log(got: Log, want: Log) -> None:
     assert got.attachments == want.attachments
 
 
-Encode = Callable[[Mapping[str, float]], bytes]
+def write_together(path: Path, log: Log, *, rows: int = 30, **options: object) -> None:
+    """Write the axes as older versions did: rows of all of them in a chunk, by the stock writer.
 
-
-def protobuf_encoder(fields: tuple[str, ...]) -> tuple[bytes, Encode]:
-    """Schema and encoder with the stock protobuf library, which omits zeros."""
-    schema = file_descriptor_set("twin.AxisSample", {f: n for n, f in enumerate(fields, 1)})
-    message = GetMessages(FileDescriptorSet.FromString(schema).file)["twin.AxisSample"]
-    return schema, lambda values: message(**values).SerializeToString()
-
-
-def write_foreign(
-    path: Path,
-    log: Log,
-    encode: Encode,
-    *,
-    schema: tuple[str, str, bytes],
-    encoding: str,
-    start: int = 0,
-    metadata: Mapping[str, str] | None = None,
-    times: Callable[[int], int] = lambda k: k * 100_000,
-    compression: CompressionType = CompressionType.ZSTD,
-    chunk_size: int = 1 << 14,
-    use_chunking: bool = True,
-    enable_crcs: bool = True,
-) -> None:
-    """Write the axes with the stock MCAP writer, sequence numbers unused."""
+    Fields are numbered from 1. options: of the stock writer.
+    """
     with open(path, "wb") as stream:
-        writer = Writer(
-            stream,
-            chunk_size=chunk_size,
-            compression=compression,
-            use_chunking=use_chunking,
-            enable_crcs=enable_crcs,
-        )
+        writer = Writer(stream, chunk_size=1 << 30, **options)  # type: ignore[arg-type]
         writer.start()
-        schema_id = writer.register_schema(*schema)
-        camera = writer.register_channel("/camera", "json", 0)
-        channels = {
-            name: writer.register_channel(f"/axis/{name}", encoding, schema_id, metadata or {})
-            for name in log.axes
-        }
-        writer.add_message(camera, start, b"{}", start)
+        channels = {}
+        for name, axis in log.axes.items():
+            numbers = {f: n for n, f in enumerate(axis.columns, 1)}
+            schema = file_descriptor_set("twin.AxisSample", numbers)
+            number = writer.register_schema("twin.AxisSample", "protobuf", schema)
+            stated = {"sample_rate_hz": repr(log.sample_rate)}
+            channel = writer.register_channel(f"/axis/{name}", "protobuf", number, stated)
+            channels[name] = channel, protobuf_segments(numbers)
         for k in range(len(log)):
-            for name, axis in log.axes.items():
-                values = {f: float(c[k]) for f, c in axis.columns.items()}
-                time = start + times(k)
-                writer.add_message(channels[name], time, encode(values), time)
+            if k % rows == 0 and k:
+                writer.flush()
+            time = round(k * 1e9 / log.sample_rate)
+            for name, (channel, segments) in channels.items():
+                parts = (
+                    struct.pack("<d", log.axes[name].columns[s][k]) if isinstance(s, str) else s
+                    for s in segments
+                )
+                writer.add_message(channel, time, b"".join(parts), time, k)
         writer.finish()

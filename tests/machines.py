@@ -11,7 +11,7 @@ from identify.estimation.fit import fit_axis
 from identify.experiment_design.planting import draw_effect, other_machine
 from twin.effects import Catalogue
 from twin.experiments.named import simulate
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import Fitted, MachineModel
 from twin.simulator import ReducedSimulator
 

@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import json
 import struct
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 
+import zstandard
 from mcap.data_stream import ReadDataStream, RecordBuilder
-from mcap.records import Channel, DataEnd, Footer, Header, McapRecord, Message, Schema
+from mcap.records import (
+    Channel,
+    Chunk,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Message,
+    Metadata,
+    Schema,
+)
 
 MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
@@ -67,6 +79,16 @@ def plain_file(items: Iterable[McapRecord]) -> bytes:
     """A file without chunks, checksums and summary that holds these records."""
     ends = [DataEnd(0), Footer(0, 0, 0)]
     return MAGIC + joined([Header("", "test"), *items, *ends]) + MAGIC
+
+
+def log_file(items: Iterable[McapRecord]) -> bytes:
+    """A log without a summary: metadata, and all else in one chunk with its checksum."""
+    given = list(items)
+    outside = [item for item in given if isinstance(item, Metadata)]
+    content = joined(item for item in given if not isinstance(item, Metadata))
+    data = zstandard.compress(content)
+    chunk = Chunk("zstd", data, 0, 0, zlib.crc32(content), len(content))
+    return plain_file([*outside, chunk])
 
 
 def json_channel(

@@ -1,29 +1,56 @@
-"""Small files of JSON messages, put together record by record, and what reading them gives."""
+"""Small logs, put together record by record, and what reading them gives."""
+
+import struct
+from collections.abc import Iterable, Mapping
 
 import pytest
-from mcap.records import Message
-from mcap_bytes import json_channel, json_message, json_schema, plain_file
+from mcap.records import Channel, Message, Schema
+from mcap_bytes import log_file
 
 from twin.errors import InputError
-from twin.log import Log, read_log
+from twin.logs import Log, read_log
+from twin.logs.schema import file_descriptor_set, protobuf_segments
 
 MS = 1_000_000
-HEAD = [json_schema(1), json_channel(1, "/axis/x", schema=1)]
+RATED = {"sample_rate_hz": "1000"}
 
 
-def sample(k: int, channel: int = 1, time: int | None = None, sequence: int = 0) -> Message:
-    """Sample k of a channel, one a ms: numbers that no other sample of the file has."""
+def schema(number: int = 1, fields: Iterable[str] = ("position", "force")) -> Schema:
+    """The schema of a message of these fields, numbered from 1."""
+    numbers = {name: n for n, name in enumerate(fields, 1)}
+    data = file_descriptor_set("twin.AxisSample", numbers)
+    return Schema(number, data, "protobuf", "twin.AxisSample")
+
+
+def channel(
+    number: int, topic: str, metadata: Mapping[str, str] | None = None, of: int = 1
+) -> Channel:
+    """A channel of such messages at 1 kHz."""
+    return Channel(number, topic, "protobuf", {**RATED, **(metadata or {})}, of)
+
+
+def message(channel: int, k: int, values: Mapping[str, float], time: int | None = None) -> Message:
+    """Message k of a channel, one a ms or at a time in ns."""
+    segments = protobuf_segments({name: n for n, name in enumerate(values, 1)})
+    data = b"".join(struct.pack("<d", values[s]) if isinstance(s, str) else s for s in segments)
+    at = MS * k if time is None else time
+    return Message(channel, at, data, at, k)
+
+
+def sample(k: int, channel: int = 1, time: int | None = None) -> Message:
+    """Sample k of a channel: numbers that no other sample of the file has."""
     values = {"position": 10.0 * channel + k, "force": -100.0 * channel - k}
-    return json_message(channel, MS * k if time is None else time, values, sequence)
+    return message(channel, k, values, time)
 
 
+HEAD = [schema(), channel(1, "/axis/x")]
 SAMPLES = [sample(k) for k in range(6)]
 
 
-def refused(path, items, message: str) -> str:
-    """The one line, naming the file, that a file of these records is answered with."""
-    path.write_bytes(plain_file(items))
-    with pytest.raises(InputError, match=message) as caught:
+def refused(path, items, text: str) -> str:
+    """The one line, naming the file, that a log of these records is answered with."""
+    path.write_bytes(log_file(items))
+    with pytest.raises(InputError, match=text) as caught:
         read_log(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
@@ -32,5 +59,5 @@ def refused(path, items, message: str) -> str:
 
 def accepted(path, items) -> Log:
     """The log of a file of these records."""
-    path.write_bytes(plain_file(items))
+    path.write_bytes(log_file(items))
     return read_log(path)

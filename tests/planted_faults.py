@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from check_cases import Columns, stage
 
+from twin.checks import Fault
 from twin.experiments.named import simulate
-from twin.log import Log
-from twin.log.check import Fault
+from twin.logs import Log
 
 Plant = Callable[[Log], Log]
 DRIVEN = ("force", "current")

@@ -19,7 +19,7 @@ from identify.dataset.prepared_log import on_blocks, total_force
 from identify.estimation.fit import Fit, fit_axis
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from twin.effects import Catalogue
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 
 Array = NDArray[np.float64]

@@ -26,7 +26,7 @@ from identify.results.told import told_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.simulator import ReducedSimulator
 

@@ -20,6 +20,7 @@ ROOMS = (
     "dataset", "estimation", "selection", "validation", "experiment_design", "selftest",
     "analysis", "results", "output", "workflow", "testing", "demo", "cli", "start",
 )  # fmt: skip
+LOG_ROOMS = {"logs", "importers", "checks"}
 MOST_FLOORS = 10
 # Functions that tell what a model or a result holds, without its logs.
 READING = {"followed", "nonparametric_labels", "speeds_of"}
@@ -89,6 +90,14 @@ def test_no_module_of_the_machine_imports_identify() -> None:
             for n in ast.walk(parsed(path))
             if isinstance(n, ast.ImportFrom)
         }, name
+
+
+def test_logs_know_neither_importers_nor_checks_nor_these_each_other() -> None:
+    known = modules(TWIN)
+    for name, path in known.items():
+        if room(name) in LOG_ROOMS:
+            others = LOG_ROOMS - {"logs", room(name)}
+            assert not [u for u in imports(path, known) if room(u) in others], name
 
 
 @pytest.mark.parametrize("package", [IDENTIFY, TWIN], ids=lambda p: p.name)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from twin.effects import load_catalogue
-from twin.log.importers import load_mapping
+from twin.importers import load_mapping
 
 DOCS = Path(__file__).parent.parent / "docs"
 GENERATED = ("_build", "_generated", "effects")

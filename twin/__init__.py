@@ -14,16 +14,16 @@ TYPE_CHECKING = False  # as in identify: `twin --help` loads none of it
 if TYPE_CHECKING:
     from typing import Any
 
+    from twin.checks import check_log
     from twin.effect import Effect, Parameter
     from twin.effects import Catalogue, load_catalogue
     from twin.errors import CannotRun, InputError
     from twin.experiments.experiment import Experiment
     from twin.experiments.file import load_experiment, save_experiment
     from twin.experiments.named import simulate
+    from twin.importers import import_log, load_mapping
     from twin.laws.verdict import check_effect
-    from twin.log import AxisLog, Log, read_log, recover_log, write_log
-    from twin.log.check import check_log
-    from twin.log.importers import import_log, load_mapping
+    from twin.logs import AxisLog, Log, read_log, recover_log, write_log
     from twin.model.file import load_model, save_model
     from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 
@@ -35,9 +35,9 @@ HOMES = {
     "twin.experiments.file": ("load_experiment", "save_experiment"),
     "twin.experiments.named": ("simulate",),
     "twin.laws.verdict": ("check_effect",),
-    "twin.log": ("AxisLog", "Log", "read_log", "recover_log", "write_log"),
-    "twin.log.check": ("check_log",),
-    "twin.log.importers": ("import_log", "load_mapping"),
+    "twin.logs": ("AxisLog", "Log", "read_log", "recover_log", "write_log"),
+    "twin.checks": ("check_log",),
+    "twin.importers": ("import_log", "load_mapping"),
     "twin.model.file": ("load_model", "save_model"),
     "twin.model.machine": ("AxisModel", "Fitted", "Hardware", "MachineModel"),
 }

@@ -67,7 +67,7 @@ def write_example(name: str, folder: Path) -> tuple[Example, list[Path]]:
 
 def _hidden_effect(folder: Path) -> None:
     from twin.experiments.named import simulate
-    from twin.log import write_log
+    from twin.logs import write_log
     from twin.model.file import load_model
 
     machine = load_model("example_machine")

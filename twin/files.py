@@ -6,7 +6,7 @@ import os
 import stat
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -23,12 +23,12 @@ _unfinished: set[Path] = set()
 def require_writable(path: Path) -> None:
     """Raise InputError now, instead of after the work, where the file could not be written."""
     with _explained(path):
-        if _is_direct(path):
-            _try_device(path)
-            return
-        target = _target(path)
-        with _part(path, target) as (stream, _):
-            stream.write(TRIAL)
+        if not _is_direct(path):
+            with _opened(_beside(path, ".", _passing())) as stream:
+                stream.write(TRIAL)
+        elif path.is_char_device():  # a pipe would end there for its reader
+            with open(path, "wb", buffering=0) as stream:
+                stream.write(b"")
 
 
 def make_folder(path: Path) -> None:
@@ -40,42 +40,22 @@ def make_folder(path: Path) -> None:
         raise InputError(f"{path}: cannot be made: {reason}; give another folder") from error
 
 
-@contextmanager
-def replacing(path: Path) -> Iterator[BinaryIO]:
+def replacing(path: Path) -> AbstractContextManager[BinaryIO]:
     """A stream whose bytes become ``path`` at the end, or nothing where anything fails.
 
     A symbolic link is followed, a file keeps its permissions, and a device or pipe is written to.
     Raises InputError where the folder or the disk refuses.
     """
-    with _explained(path):
-        if _is_direct(path):
-            with open(path, "wb") as stream:
-                yield stream
-            return
-        target = _target(path)
-        with _part(path, target) as (stream, part):
-            yield stream
-            _put_in_place(stream, part, target)
+    return _written(path, ".", _passing())
 
 
-@contextmanager
-def recording(path: Path) -> Iterator[BinaryIO]:
+def recording(path: Path) -> AbstractContextManager[BinaryIO]:
     """``replacing`` for what grows while a long run lasts: the file ``path.unfinished``.
 
     It is removed where the run fails or is interrupted. A killed run leaves it to be recovered,
     until the next run that records to the same path. Raises InputError where one does just now.
     """
-    with _explained(path):
-        if _is_direct(path):
-            with open(path, "wb") as stream:
-                yield stream
-            return
-        target = _target(path)
-        _require_file(path, target)
-        part = target.with_name(f"{target.name}{UNFINISHED}")
-        with _opened(part) as stream:
-            yield stream
-            _put_in_place(stream, part, target)
+    return _written(path, "", UNFINISHED)
 
 
 def is_same_file(one: Path, other: Path) -> bool:
@@ -101,21 +81,36 @@ def remove_unfinished() -> None:
 
 
 @contextmanager
-def _part(path: Path, target: Path) -> Iterator[tuple[BinaryIO, Path]]:
-    """A file beside the target that is removed on leaving, if it is still there."""
-    _require_file(path, target)
-    _remove_left_over(target.parent)
-    part = target.with_name(f".{target.name}.{os.getpid()}{PART}")
-    with _opened(part) as stream:
-        yield stream, part
+def _written(path: Path, before: str, behind: str) -> Iterator[BinaryIO]:
+    """A stream whose bytes lie beside ``path`` and become it; before, behind: see ``_beside``."""
+    with _explained(path):
+        if _is_direct(path):
+            with open(path, "wb") as stream:
+                yield stream
+            return
+        part = _beside(path, before, behind)
+        with _opened(part) as stream:
+            yield stream
+            _put_in_place(stream, part, _target(path))
 
 
-def _require_file(path: Path, target: Path) -> None:
-    """Raise InputError for a path that is no file in a folder that is there."""
+def _passing() -> str:
+    """The end of the name of a file of this process until it is whole."""
+    return f".{os.getpid()}{PART}"
+
+
+def _beside(path: Path, before: str, behind: str) -> Path:
+    """The file beside ``path`` whose name has that before and behind it; removes left-over ones.
+
+    Raises InputError for a path that is no file in a folder that is there.
+    """
+    target = _target(path)
     if target.is_dir():
         raise InputError(f"{path}: is a folder; give the name of a file in it")
     if not target.parent.is_dir():
         raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
+    _remove_left_over(target.parent)
+    return target.with_name(f"{before}{target.name}{behind}")
 
 
 @contextmanager
@@ -156,13 +151,6 @@ def _explained(path: Path) -> Iterator[None]:
         raise InputError(
             f"{path}: cannot be written: {reason}; check folder, rights and free space"
         ) from error
-
-
-def _try_device(path: Path) -> None:
-    """Write nothing to a device, which it may refuse; a pipe would end there for its reader."""
-    if path.is_char_device():
-        with open(path, "wb", buffering=0) as stream:
-            stream.write(b"")
 
 
 def _is_direct(path: Path) -> bool:

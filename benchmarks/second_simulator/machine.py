@@ -23,7 +23,7 @@ from benchmarks.second_simulator.kernel import (
     simulate,
 )  # fmt: skip
 from benchmarks.second_simulator.motion import random_moves
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 
 PLACE = np.linspace(-HALF_SPAN, HALF_SPAN, PLACES)  # m
 SPEED = np.linspace(-TOP_SPEED, TOP_SPEED, SPEEDS)  # m/s

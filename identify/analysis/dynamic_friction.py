@@ -20,7 +20,7 @@ from identify.estimation.presliding import Presliding
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
 from twin.effect import Kind
 from twin.errors import InputError
-from twin.log import GivenLogs, logs_by_name
+from twin.logs import GivenLogs, logs_by_name
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters
 

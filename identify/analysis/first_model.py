@@ -12,11 +12,11 @@ from identify.dataset.motion import Motion, motion_of
 from identify.dataset.reading_ripple import ripples_of_widest
 from identify.dataset.test_function import TestFunction
 from identify.estimation.first_values import FirstValues, first_values
+from twin.checks import moves
 from twin.effect import Effect, Excitation, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
-from twin.log import Log
-from twin.log.check import moves
+from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.units import AxisUnits
 

@@ -18,7 +18,7 @@ from identify.estimation.intervals import scatter
 from twin.core.control import Controller
 from twin.experiments.replay import replay
 from twin.experiments.trajectory.setpoint import Setpoint
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import MachineModel
 from twin.signals import Array, local_parabola, rate
 from twin.simulator import MujocoSimulator, ReducedSimulator

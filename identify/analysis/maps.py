@@ -18,7 +18,7 @@ from identify.estimation.cable_force import cable_force as of_cable
 from identify.estimation.velocity_map import VelocityMap
 from identify.estimation.velocity_map import velocity_map as of_velocity
 from twin.errors import InputError
-from twin.log import GivenLogs, logs_by_name
+from twin.logs import GivenLogs, logs_by_name
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import AxisUnits
 

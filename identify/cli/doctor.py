@@ -56,7 +56,7 @@ def doctor(as_json_: Json = False) -> None:
 
 
 def _twin() -> Line:
-    from twin.log.writer import software_version
+    from twin.logs.writer import software_version
 
     return Line("twin", f"{software_version()} in {Path(__file__).parent.parent.parent}")
 
@@ -81,7 +81,7 @@ def _importers() -> Line:
 
 
 def _versions(names: tuple[str, ...]) -> tuple[str, list[str]]:
-    from twin.log.writer import software_version
+    from twin.logs.writer import software_version
 
     found = {name: software_version(name) for name in names}
     absent = [name for name, version in found.items() if version == "uninstalled"]

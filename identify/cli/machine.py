@@ -54,7 +54,7 @@ def simulate(
     from twin.experiments.lasting import missed
     from twin.experiments.named import DURATION, Reach, find_experiment, simulate_parts
     from twin.experiments.setpoint_csv import write_setpoints
-    from twin.log import record_log
+    from twin.logs import record_log
 
     for file in (out, setpoints):
         if file is not None:
@@ -101,9 +101,9 @@ def import_(
 
     Example: twin import recording.csv --map map.toml -o run.mcap
     """
-    from twin.log import write_log
-    from twin.log.check import assumed
-    from twin.log.importers import import_log, load_mapping
+    from twin.checks import assumed
+    from twin.importers import import_log, load_mapping
+    from twin.logs import write_log
 
     if out is not None:
         require_folder(out)
@@ -116,7 +116,7 @@ def import_(
     write_log(log, out)
     result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
     resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
-    unsure = [str(f) for axis in log.axes for f in assumed.check(axis, log.metadata)]
+    unsure = [str(f) for axis in log.axes for f in assumed.check_assumed(axis, log.metadata)]
     said = [*resampled, *(f"{out}: warning: {finding}" for finding in unsure)]
     say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, said)
 
@@ -124,7 +124,7 @@ def import_(
 def _guess(sources: list[Path], out: Path | None, as_json_: bool) -> None:
     """Print or write a proposed map; exit code 1 where something is missing in it."""
     from twin.files import write_atomically
-    from twin.log.importers.guess import guess_map
+    from twin.importers.guess import guess_map
 
     if len(sources) != 1:
         raise InputError(f"--guess was given {len(sources)} files; give one at a time")
@@ -175,7 +175,7 @@ def check(logs: Logs, as_json_: Json = False) -> None:
     Example: twin check run.mcap
     """
     from identify.output import machine as told
-    from twin.log.long import check_file
+    from twin.checks.long import check_file
 
     reports = {str(path): check_file(path) for path in logs}
     say(told.check_text(reports), told.check_json(reports), as_json_)
@@ -196,7 +196,7 @@ def recover(
 
     Example: twin recover bad.mcap -o good.mcap
     """
-    from twin.log import recover_file
+    from twin.logs import recover_file
 
     require_folder(out)
     recovery, files = recover_file(log, out, unproved=unproved)

@@ -16,9 +16,9 @@ from identify.cli.progress import progress_on_stderr
 from twin.errors import InputError
 
 if TYPE_CHECKING:
+    from twin.checks import CheckReport
     from twin.effects import Catalogue
-    from twin.log import Log
-    from twin.log.check import CheckReport
+    from twin.logs import Log
     from twin.model.machine import MachineModel
 
 Result = TypeVar("Result")
@@ -79,7 +79,7 @@ TestFunction = Annotated[
 
 def _version(asked: bool) -> None:
     if asked:
-        from twin.log.writer import software_version
+        from twin.logs.writer import software_version
 
         print(software_version())
         raise typer.Exit
@@ -193,8 +193,8 @@ def read_measured(
     beside: other logs that are held in memory as well. Where all are too long, they are read at a
     lower rate.
     """
-    from twin.log.long import read_measured as read
-    from twin.log.long import step_of
+    from twin.checks.long import read_measured as read
+    from twin.checks.long import step_of
 
     every = step_of([*(paths or ()), *(beside or ())]) if paths else 1
     return Recordings(paths or (), lambda path: said(path, read(path, MEASURED, every), every))
@@ -210,8 +210,8 @@ def read_checked(
     They are there when the logs have been read. Raises InputError then for an error of a kind that
     is refused.
     """
-    from twin.log.long import read_checked as read
-    from twin.log.long import step_of
+    from twin.checks.long import read_checked as read
+    from twin.checks.long import step_of
 
     every = step_of([*(paths or ()), *(beside or ())]) if paths else 1
     findings: list[str] = []

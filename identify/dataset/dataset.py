@@ -27,7 +27,7 @@ from identify.dataset.reading_ripple import ripples_of_widest
 from identify.dataset.test_function import LEAST_BLOCKS, require_test_function
 from identify.dataset.time_scale import choose_length
 from twin.effect import Excitation
-from twin.log import Log
+from twin.logs import Log
 from twin.memory import give_back
 from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits

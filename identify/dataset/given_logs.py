@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from identify.dataset.motion import SHORTEST_LOG, other_axes
 from identify.dataset.shared_samples import share_samples
+from twin.checks import moves
 from twin.errors import InputError
-from twin.log import Log
-from twin.log.check import moves
+from twin.logs import Log
 from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]

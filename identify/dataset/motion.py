@@ -18,7 +18,7 @@ from identify.dataset.reading_ripple import ripple, ripple_periods
 from identify.dataset.resolution import resolution_of, rounding
 from identify.dataset.velocity import together
 from twin.errors import InputError
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import MOST_AXES_OF_A_PAIR
 from twin.model.units import LINEAR, AxisUnits
 from twin.signals import Array, between, local_parabola, rate, usual_size, white_noise

@@ -16,7 +16,7 @@ import numpy as np
 from identify.dataset.resolution import resolution_of
 from identify.dataset.spectral_lines import strongest_line
 from identify.dataset.spectrum import Record
-from twin.log import Log
+from twin.logs import Log
 from twin.signals import Array, usual_size
 
 ORDER = 4  # of the differences

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from twin.log import AxisLog, Log
-from twin.log.check import moves
+from twin.checks import moves
+from twin.logs import AxisLog, Log
 from twin.signals import Array
 
 WINDOWS = 8  # of the shorter log, evenly spaced, that are sought in the longer one

@@ -27,12 +27,12 @@ from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.subspace import orthonormal, unabsorbed
 from identify.experiment_design.candidate_experiments import NotRun
+from twin.checks import moves
 from twin.effect import Kind
 from twin.errors import CannotRun
 from twin.experiments.experiment import Experiment
 from twin.experiments.named import outside_travel, simulate
-from twin.log import Log
-from twin.log.check import moves
+from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters, read
 from twin.model.units import AxisUnits

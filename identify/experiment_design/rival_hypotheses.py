@@ -21,7 +21,7 @@ from twin.effect import Effect, Kind
 from twin.errors import InputError
 from twin.experiments.kinds import Tracking
 from twin.experiments.named import simulate
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import ReducedSimulator
 

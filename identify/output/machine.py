@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from identify.dataset.motion import Motion
+    from twin.checks import CheckReport
     from twin.laws.verdict import LawReport
-    from twin.log.check import CheckReport
 
 
 def plain(value: Any) -> Any:

@@ -28,7 +28,7 @@ from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
 from twin.experiments.kinds import Moves, Tracking
 from twin.experiments.named import simulate
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import FineSimulator, ReducedSimulator
 

@@ -20,7 +20,7 @@ from identify.selftest.trial import STAGE, TrialResult, run
 from identify.selftest.variations import VARIATIONS
 from twin.effect import Kind
 from twin.effects import Catalogue, load_catalogue
-from twin.log.writer import software_version
+from twin.logs.writer import software_version
 from twin.model.file import load_model
 from twin.numbers import require_seed
 

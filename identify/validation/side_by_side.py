@@ -11,7 +11,7 @@ import numpy as np
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.force_balance import residual
 from identify.validation.free_run import free_run
-from twin.log import write_topics
+from twin.logs import write_topics
 from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits
 from twin.signals import Array

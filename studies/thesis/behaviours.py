@@ -18,7 +18,7 @@ from twin.core.control import Controller
 from twin.experiments.kinds import Staircase
 from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import MachineModel
 from twin.signals import rate
 from twin.simulator import FineSimulator

@@ -19,7 +19,7 @@ from studies.thesis import study
 from studies.thesis.study import Array, Found, Numbers
 from twin.experiments.kinds import Passes
 from twin.experiments.named import simulate
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import AxisModel
 from twin.simulator import MujocoSimulator, ReducedSimulator
 

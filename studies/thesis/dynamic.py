@@ -35,7 +35,7 @@ from twin.core.control import Controller
 from twin.effect import Kind
 from twin.experiments.kinds import Reversals
 from twin.experiments.trajectory import open_loop_sine
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters, read, write
 

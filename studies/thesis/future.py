@@ -33,7 +33,7 @@ from studies.thesis.mixed_friction import EQUAL, mixed, mixture, mixture_in_word
 from studies.thesis.study import CATALOGUE, Array, Found, Numbers, friction_of
 from twin.effect import DRY, DT, ELEMENTS, IO_SIZE, Kind
 from twin.experiments.kinds import Staircase
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import free_parameters
 

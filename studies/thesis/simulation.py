@@ -30,7 +30,7 @@ from studies.thesis import study
 from studies.thesis.study import SIDES, Array, Found, Numbers, friction_of
 from twin.experiments.kinds import Reversals, Staircase
 from twin.experiments.named import simulate
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import ParameterReference, free_parameters, write
 from twin.simulator import MujocoSimulator, ReducedSimulator

@@ -21,7 +21,7 @@ from twin.experiments.experiment import Experiment
 from twin.experiments.follow import follow
 from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
-from twin.log import Log
+from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import FineSimulator

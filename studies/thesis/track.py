@@ -32,7 +32,7 @@ from studies.thesis import study
 from studies.thesis.study import SIDES, Array, Found, Numbers
 from twin.effect import Kind
 from twin.experiments.kinds import Staircase
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 
 TITLE = "Velocity maps along the track"

@@ -10,7 +10,7 @@ from cli_runs import RATE, in_small, refusal, twin
 
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
-from twin.log import AxisLog, Log, write_log
+from twin.logs import AxisLog, Log, write_log
 from twin.model.file import load_model
 
 

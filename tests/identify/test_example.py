@@ -11,7 +11,7 @@ import pytest
 
 from twin.errors import InputError
 from twin.examples import EXAMPLES, examples_folder, write_example
-from twin.log.importers import load_mapping
+from twin.importers import load_mapping
 from twin.model.file import load_model
 
 ROOT = Path(__file__).parent.parent.parent

@@ -20,9 +20,9 @@ from identify.cli.shared import (
     say,
     sentences,
 )
+from twin.checks import check_log
 from twin.errors import InputError
-from twin.log import AxisLog, Log, write_log
-from twin.log.check import check_log
+from twin.logs import AxisLog, Log, write_log
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from identify.selftest import FULL, QUICK, Case, TrialResult, release_seed
 from twin.effects import load_catalogue
 from twin.experiments.file import load_experiment
 from twin.experiments.named import simulate
-from twin.log import read_log, write_log
+from twin.logs import read_log, write_log
 from twin.model.file import load_model, save_model
 from twin.model.machine import MachineModel
 

@@ -11,8 +11,8 @@ from cli_runs import twin
 from identify.analysis.first_model import first_model, not_determined
 from twin.effects import load_catalogue
 from twin.errors import InputError
-from twin.log import ROTARY_UNITS, AxisLog, Log
-from twin.log.importers import import_log, load_mapping
+from twin.importers import import_log, load_mapping
+from twin.logs import ROTARY_UNITS, AxisLog, Log
 from twin.model.file import load_model
 
 CATALOGUE = load_catalogue()

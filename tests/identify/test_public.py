@@ -11,7 +11,7 @@ import pytest
 import identify
 import twin
 from twin.errors import InputError
-from twin.log import Log, logs_by_name
+from twin.logs import Log, logs_by_name
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ import pytest
 import twin
 from identify.output.words.objectives import objectives_in_words
 from identify.results.results import SimulationFit
-from twin.log import Log, write_log
+from twin.logs import Log, write_log
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from identify.workflow import add_named, diagnose
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
-from twin.log import Log
+from twin.logs import Log
 from twin.model.file import load_model
 from twin.simulator import ReducedSimulator
 

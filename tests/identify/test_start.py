@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from twin.log import AxisLog, Log, write_log
+from twin.logs import AxisLog, Log, write_log
 from twin.threads import VARIABLES, one_for_matrices
 
 SLOW_PARTS = ("signal", "stats", "special", "optimize", "ndimage", "fft")

@@ -11,9 +11,9 @@ import numpy as np
 from twin.core.control import Controller
 from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
 from twin.experiments.trajectory.setpoint import AnySetpoint, Setpoint
-from twin.log import AxisLog, Log
-from twin.log.log import LINEAR_UNITS, ROTARY_UNITS, joined
-from twin.log.writer import software_version
+from twin.logs import AxisLog, Log
+from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS, joined
+from twin.logs.writer import software_version
 from twin.model.file import format_model
 from twin.model.machine import AxisModel, MachineModel
 from twin.simulator import MujocoSimulator, Progress, ReducedSimulator, Run, run_parts

@@ -30,8 +30,8 @@ from twin.experiments.lasting import lasting
 from twin.experiments.setpoint_csv import setpoint_of
 from twin.experiments.trajectory import Limits
 from twin.experiments.trajectory.setpoint import require_length
-from twin.log import Log
-from twin.log.log import joined
+from twin.logs import Log
+from twin.logs.log import joined
 from twin.model.machine import AxisModel, MachineModel
 from twin.numbers import require_seed
 from twin.simulator import MujocoSimulator, Progress, ReducedSimulator

@@ -14,7 +14,7 @@ from twin.core.control import Controller
 from twin.errors import InputError
 from twin.experiments.follow import follow
 from twin.experiments.trajectory.setpoint import Setpoint
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import MachineModel
 from twin.signals import Array, rate
 from twin.simulator import MujocoSimulator, Progress, ReducedSimulator

@@ -18,7 +18,7 @@ FOLDER = Path(__file__).parent
 def written() -> dict[Path, str]:
     """Each schema file and its text."""
     from twin.effects import load_catalogue
-    from twin.log.importers import map_schema
+    from twin.importers import map_schema
     from twin.model import schema
 
     documents = {

@@ -12,8 +12,8 @@ from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.kinds import Passes, Staircase
 from twin.experiments.named import simulate
-from twin.log import Log
-from twin.log.importers import import_log, load_mapping
+from twin.importers import import_log, load_mapping
+from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
 from twin.simulator import ReducedSimulator

@@ -21,8 +21,8 @@ from identify.workflow import agree
 from twin.core.control import Controller
 from twin.effects import load_catalogue
 from twin.experiments.replay import recorded_setpoint
-from twin.log import Log
-from twin.log.importers import import_log, load_mapping
+from twin.importers import import_log, load_mapping
+from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
 

@@ -26,8 +26,8 @@ from identify.dataset.prepared_log import on_blocks, total_force
 from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
 from identify.estimation.force_balance import residual
+from twin.checks import moves
 from twin.effect import LEAST
-from twin.log.check import moves
 from twin.model.machine import AxisModel
 
 

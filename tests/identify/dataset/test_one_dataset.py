@@ -20,11 +20,11 @@ from identify.output.text import fit_text
 from identify.validation.free_run import HORIZON, free_run, rms_error
 from identify.validation.misfit_maps import AxisComparison
 from identify.workflow import compare, diagnose, fit
+from twin.checks import Fault, check_log, moves
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
-from twin.log import AxisLog, Log, write_log
-from twin.log.check import Fault, check_log, moves
+from twin.logs import AxisLog, Log, write_log
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator

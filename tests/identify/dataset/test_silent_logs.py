@@ -18,7 +18,7 @@ from cli_runs import twin
 from identify.workflow import compare, fit
 from twin.effects import load_catalogue
 from twin.errors import InputError
-from twin.log import AxisLog, Log, write_log
+from twin.logs import AxisLog, Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 

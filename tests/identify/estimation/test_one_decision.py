@@ -11,7 +11,7 @@ from identify.validation.agreement import agreement
 from identify.workflow import fit
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
-from twin.log.log import Array
+from twin.logs.log import Array
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 

@@ -26,8 +26,8 @@ from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.kinds import OpenLoopSine
 from twin.experiments.named import simulate
-from twin.log import AxisLog, Log, write_log
-from twin.log.importers import import_log, load_mapping
+from twin.importers import import_log, load_mapping
+from twin.logs import AxisLog, Log, write_log
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import free_parameters, read, write

@@ -14,7 +14,7 @@ from identify.selection.trying import try_effect
 from identify.workflow import compare, fit
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
-from twin.log import Log
+from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted
 

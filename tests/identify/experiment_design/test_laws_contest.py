@@ -27,7 +27,7 @@ from identify.experiment_design.discrimination import (
 from identify.experiment_design.plan import _planned
 from twin.errors import CannotRun
 from twin.experiments.kinds import Passes, Tracking
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import MachineModel
 from twin.model.parameters import free_parameters, read
 

@@ -27,7 +27,7 @@ from twin.errors import InputError
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, Passes
 from twin.experiments.named import simulate
-from twin.log import Log
+from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
 from twin.simulator import ReducedSimulator

@@ -27,7 +27,7 @@ from identify.output.words.fit import (
     outcome_in_words,
     region_in_words,
 )
-from twin.log.check import CheckReport, Fault, Finding, Severity
+from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.model.units import LINEAR
 
 

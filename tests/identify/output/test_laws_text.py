@@ -31,8 +31,8 @@ from identify.output.words.fit import (
     no_interval_in_words,
     outcome_in_words,
 )
+from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.experiments.kinds import Rests
-from twin.log.check import CheckReport, Fault, Finding, Severity
 
 
 def test_a_fit():

@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from twin.errors import InputError
-from twin.log import write_topics
+from twin.logs import write_topics
 
 LAYOUT = Path(__file__).parents[3] / "examples" / "foxglove.json"
 Columns = dict[str, np.ndarray]

@@ -11,7 +11,7 @@ from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
 from twin.laws.verdict import check_effect
-from twin.log import Log
+from twin.logs import Log
 from twin.model.file import load_model, save_model
 from twin.model.machine import Fitted, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator

@@ -13,7 +13,7 @@ from identify.estimation.errors import holdout_error
 from identify.selection.diagnosis import Verdict
 from identify.workflow import add, diagnose
 from twin.effects import load_catalogue
-from twin.log.importers import import_log, load_mapping
+from twin.importers import import_log, load_mapping
 from twin.model.file import load_model
 
 pytestmark = pytest.mark.slow

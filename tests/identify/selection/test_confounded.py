@@ -13,7 +13,7 @@ from identify.results.results import FitResult
 from identify.selection.confounded import Refit
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
-from twin.log import Log
+from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
 from twin.model.parameters import free_parameters, write

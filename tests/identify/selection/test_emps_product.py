@@ -15,8 +15,8 @@ from identify.output.words.diagnosis import remarks_on
 from identify.selection.diagnosis import Verdict
 from identify.workflow import add, diagnose
 from twin.effects import Catalogue, load_catalogue
-from twin.log import read_log, write_log
-from twin.log.importers import import_log, load_mapping
+from twin.importers import import_log, load_mapping
+from twin.logs import read_log, write_log
 from twin.model.file import load_model
 
 EXAMPLES = Path(__file__).parents[3] / "examples"

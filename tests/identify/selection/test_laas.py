@@ -15,7 +15,7 @@ from identify.estimation.evidence import rms
 from identify.estimation.subspace import orthonormal, unabsorbed
 from identify.workflow import diagnose, fit
 from twin.effects import Catalogue, load_catalogue
-from twin.log.importers import import_log, load_mapping
+from twin.importers import import_log, load_mapping
 from twin.model.file import load_model
 
 EXAMPLES = Path(__file__).parents[3] / "examples"

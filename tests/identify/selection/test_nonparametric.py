@@ -24,7 +24,7 @@ from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.laws.motion import Motion
 from twin.laws.stepping import forces
-from twin.log import Log
+from twin.logs import Log
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator

@@ -18,7 +18,7 @@ from identify.selection.curves import shapes_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, diagnose_axis
 from identify.selection.findings import FindingKind
 from identify.selection.trying import try_effect
-from twin.log import Log
+from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ from identify.selftest.cases import NotShown, machine, own_error, plain_friction
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
-from twin.log import Log, read_log
+from twin.logs import Log, read_log
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, MachineModel
 from twin.simulator import ReducedSimulator

@@ -19,7 +19,7 @@ from identify.validation.whiteness import Loop, correlation, loop_of, residual_t
 from identify.workflow import compare, fit
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.file import load_model
 
 CATALOGUE = load_catalogue()

@@ -26,7 +26,7 @@ from studies.thesis import (
 )
 from studies.thesis.mixed_friction import PARTS, mixed
 from twin.effect import Kind
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted
 from twin.model.parameters import free_parameters
 

@@ -25,7 +25,7 @@ from twin.effect import (
     X,
 )
 from twin.experiments.named import simulate
-from twin.log import Log
+from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted
 from twin.simulator import MujocoSimulator, ReducedSimulator

@@ -18,7 +18,7 @@ from twin.laws import checks, physics
 from twin.laws.checks import LawBroken
 from twin.laws.values import absent, moderate
 from twin.laws.verdict import LAWS, Law
-from twin.log import Log
+from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
 from twin.mujoco.callback import passive_callback

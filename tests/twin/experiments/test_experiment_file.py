@@ -14,7 +14,7 @@ from twin.errors import InputError
 from twin.experiments.file import format_experiment, load_experiment, parameters, save_experiment
 from twin.experiments.kinds import Passes, Rests, Steps, Sweep
 from twin.experiments.named import simulate
-from twin.log import read_log
+from twin.logs import read_log
 from twin.model.file import load_model
 from twin.simulator import ReducedSimulator
 

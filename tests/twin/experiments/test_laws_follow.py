@@ -12,7 +12,7 @@ from constructed import CATALOGUE, effect
 from twin import simulator
 from twin.experiments.follow import follow
 from twin.experiments.trajectory import Setpoint
-from twin.log import LINEAR_UNITS, ROTARY_UNITS
+from twin.logs import LINEAR_UNITS, ROTARY_UNITS
 from twin.model.file import parse_model
 from twin.model.machine import AxisModel, Hardware, MachineModel
 from twin.simulator import ReducedSimulator

@@ -11,7 +11,7 @@ from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
 from twin.experiments.replay import recorded_setpoint, replay
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.file import load_model
 from twin.simulator import ReducedSimulator
 

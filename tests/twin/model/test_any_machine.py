@@ -33,12 +33,12 @@ from identify.output.machine import plain
 from identify.output.report import write_report
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis, FitResult
+from twin.checks import check_log
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.experiments.kinds import Passes
 from twin.experiments.named import outside_travel, simulate
-from twin.log import Log, read_log, write_log
-from twin.log.check import check_log
+from twin.logs import Log, read_log, write_log
 from twin.model.file import format_model, parse_model
 from twin.model.machine import MachineModel
 from twin.model.units import LINEAR, ROTARY, AxisUnits

@@ -20,7 +20,7 @@ from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.file import load_experiment, parse_experiment
 from twin.experiments.kinds import KINDS
-from twin.log.importers import load_mapping
+from twin.importers import load_mapping
 from twin.model.file import load_model, models_folder, parse_model
 from twin.model.schema import AxisEntry
 
@@ -173,7 +173,7 @@ def test_every_entry_of_a_map_with_everything_wrong(tmp_path: Path) -> None:
     for place in places(document):
         for value in WRONG:
             edited = changed(document, place, value)
-            with patch("twin.log.importers.mapping.toml_document", lambda p, e=edited: ("", e)):
+            with patch("twin.importers.mapping.toml_document", lambda p, e=edited: ("", e)):
                 text = answer(lambda: load_mapping(path))
             assert text is None or (text.startswith(str(path)) and "\n" not in text)
 

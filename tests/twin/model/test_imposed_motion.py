@@ -12,7 +12,7 @@ from twin.effect import Kind
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.named import simulate
-from twin.log import AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.model.file import format_model, load_model, save_model
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 

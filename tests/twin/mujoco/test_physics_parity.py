@@ -13,7 +13,7 @@ from twin.effect import Effect
 from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
 from twin.laws.values import moderate
-from twin.log import Log
+from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator, run

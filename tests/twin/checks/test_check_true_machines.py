@@ -1,0 +1,147 @@
+"""True machines of a few lines of NumPy: a soft loop, friction with a memory, one count. No fault.
+
+And beside each the fault that it looks like, which is still found.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from check_cases import faults
+
+from twin.checks import Fault, check_log
+from twin.logs import ROTARY_UNITS, AxisLog, Log
+from twin.logs.log import Array
+
+RATE, FINER = 1000.0, 10  # Hz, of the loop; steps of the integration a sample
+INERTIA, VISCOUS = 0.02, 0.02  # kg m^2, N m s/rad
+COUNT = 2.0 * np.pi / 4096  # rad
+Elements = tuple[tuple[float, float], ...]
+
+
+def joint(
+    goal: Array,
+    gain: float,
+    damping: float,
+    *,
+    gravity: float = 0.0,
+    elements: Elements = ((50.0, 0.05),),
+    count: float = 0.0,
+) -> tuple[Array, Array]:
+    """Position (n,) rad and torque (n,) N m of a joint whose P loop with damping follows a goal.
+
+    gain: N m/rad. elements: stiffness N m/rad and strength N m of springs that slip (W. D. Iwan,
+    J. Appl. Mech. 33, 1966), its friction. count: rad, to which the reading is rounded.
+    """
+    rng, dt = np.random.default_rng(1), 1.0 / RATE / FINER
+    reading, torque = np.empty(len(goal)), np.empty(len(goal))
+    q, v, held = float(goal[0]), 0.0, [0.0] * len(elements)
+    for k, wanted in enumerate(goal.tolist()):
+        seen = q + 1e-7 * rng.standard_normal()
+        seen = count * round(seen / count) if count else seen
+        u = gain * (wanted - seen) - damping * v
+        reading[k], torque[k] = seen, u
+        for _ in range(FINER):
+            held = [
+                min(max(z + stiff * v * dt, -most), most)
+                for z, (stiff, most) in zip(held, elements, strict=True)
+            ]
+            v += (u - sum(held) - VISCOUS * v - gravity * np.sin(q)) / INERTIA * dt
+            q += v * dt
+    return reading, torque
+
+
+def log(goal: Array, reading: Array, torque: Array, rate: float = RATE) -> Log:
+    columns = {"position": reading, "force": torque, "setpoint_position": goal}
+    return Log(rate, {"x": AxisLog(columns, ROTARY_UNITS)})
+
+
+def waves(size: float, slow: float, fast: float, seconds: float = 8.0) -> Array:
+    t = np.arange(round(seconds * RATE)) / RATE
+    return size * (np.sin(2.0 * np.pi * slow * t + 0.3) + 0.5 * np.sin(2.0 * np.pi * fast * t))
+
+
+SWING = waves(0.6, 0.23, 0.61)
+
+
+@pytest.mark.parametrize("gain", [1.0, 2.0])
+def test_a_soft_loop_under_gravity_has_no_wrong_scale(gain: float) -> None:
+    """It reaches a fifth, or a third, of where it should be, and the torque says why."""
+    found = joint(SWING, gain, 0.15, gravity=4.0)
+    assert np.std(found[0]) < 0.4 * np.std(SWING)
+    assert check_log(log(SWING, *found)).findings == ()
+
+
+@pytest.mark.parametrize("scale", [0.2, 0.35, 3.0, 1e-3, 180.0 / np.pi])
+@pytest.mark.parametrize("gravity", [0.0, 4.0])
+def test_a_wrong_scale_of_a_stiff_loop_is_found(scale: float, gravity: float) -> None:
+    reading, torque = joint(SWING, 60.0, 2.0, gravity=gravity)
+    assert Fault.UNIT not in faults(check_log(log(SWING, reading, torque)))
+    assert Fault.UNIT in faults(check_log(log(SWING, scale * reading, torque)))
+
+
+SLIPS: Elements = ((300.0, 0.05),)  # full after 0.17 mrad
+
+
+def small_motion(size: float, slow: float, fast: float, late: int) -> set[Fault]:
+    """What is said of a log without setpoint whose force is so many samples late."""
+    goal = waves(size, slow, fast)
+    gain = 8.0 * max(0.075 / size, 1.25)
+    reading, torque = joint(goal, gain, 0.1 * gain**0.5, elements=SLIPS)
+    columns = {"position": reading[100:], "force": np.roll(torque, late)[100:]}
+    return faults(check_log(Log(RATE, {"x": AxisLog(columns, ROTARY_UNITS)})))
+
+
+@pytest.mark.parametrize("size", [1e-2, 1e-1])
+def test_friction_with_a_memory_is_no_lag(size: float) -> None:
+    """What it lags by is a distance: another time at each speed."""
+    assert Fault.LAG not in small_motion(size, 0.5, 1.3, late=0)
+
+
+@pytest.mark.parametrize(
+    ("motion", "late"), [((1e-2, 2.0, 5.1), 20), ((1e-1, 0.5, 1.3), 60), ((1e-1, 0.5, 1.3), -60)]
+)
+def test_a_lag_beside_friction_with_a_memory_is_found(
+    motion: tuple[float, float, float], late: int
+) -> None:
+    assert Fault.LAG in small_motion(*motion, late)
+
+
+def steps_and_rests(seconds: float = 16.0) -> Array:
+    t = np.arange(round(seconds * RATE)) / RATE
+    return 0.5 * np.clip(1.5 * np.sin(0.2 * np.pi * t), -1.0, 1.0)
+
+
+BROKEN = {
+    Fault.STUCK, Fault.STEP, Fault.MISSING, Fault.OUTLIERS, Fault.JOINED, Fault.WRAPPED,
+}  # fmt: skip
+
+
+def resampled(x: Array, every: int) -> Array:
+    """Read at a clock that jitters by a tenth of a sample, between the readings."""
+    t = np.arange(len(x)) / RATE
+    jitter = 1e-4 * np.random.default_rng(0).uniform(-1.0, 1.0, len(x))
+    return np.interp(t[::every], (t + jitter)[::every], x[::every])
+
+
+@pytest.mark.parametrize("every", [1, 5])
+def test_one_count_is_neither_stuck_nor_lost(every: int) -> None:
+    goal = steps_and_rests()
+    reading, torque = joint(goal, 20.0, 0.5, count=COUNT)
+    rate, goal, torque = RATE / every, goal[::every], torque[::every]
+    for seen in (reading[::every], resampled(reading, every)):
+        assert not faults(check_log(log(goal, seen, torque, rate))) & BROKEN
+    at = int(np.argmax(np.abs(np.gradient(seen))))
+    lost, stuck = seen.copy(), seen.copy()
+    lost[at:] += 100.0 * COUNT
+    stuck[at : at + round(0.3 * rate)] = seen[at]
+    for broken in (lost, stuck):
+        assert faults(check_log(log(goal, broken, torque, rate))) & BROKEN
+
+
+def test_text_of_few_digits_is_neither_stuck_nor_lost() -> None:
+    """A motor behind a gear, written with four digits: far from 0 a step is a hundred times one."""
+    goal = steps_and_rests()
+    reading, torque = joint(goal, 20.0, 0.5)
+    text = np.array([float(f"{24.0 * q:.4g}") for q in reading]) / 24.0
+    assert not faults(check_log(log(goal, text, torque))) & BROKEN

@@ -1,0 +1,153 @@
+"""Text tables as programs write them."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from import_cases import MAP, RATE, mapping, table, write_csv
+
+from twin.errors import InputError
+from twin.importers import import_log
+from twin.logs import Log
+
+
+def lines(columns: dict[str, np.ndarray]) -> list[str]:
+    return [",".join(f"{v:.9g}" for v in row) for row in zip(*columns.values(), strict=True)]
+
+
+def imported(folder: Path, text: str | bytes, map_text: str = MAP) -> Log:
+    path = folder / "log.csv"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return import_log(path, mapping(folder, map_text))
+
+
+HEADER = "t,q,i,unused"
+ROWS = lines(table())
+PLAIN = "\n".join([HEADER, *ROWS])
+GERMAN = PLAIN.replace(",", ";").replace(".", ",")
+NUMBERED = MAP.replace('"q"', "2").replace('"i"', "3")
+
+
+@pytest.mark.parametrize(
+    ("text", "map_text"),
+    [
+        (PLAIN, MAP),
+        (PLAIN.replace("\n", "\r\n") + "\r\n\r\n", MAP),
+        (PLAIN.replace(",", ";"), MAP),
+        (PLAIN.replace(",", "\t"), MAP),
+        (PLAIN.replace(",", " | "), MAP),
+        (PLAIN.replace(",", "   "), MAP),
+        (PLAIN.replace(",", ", "), MAP),
+        (PLAIN.replace("\n", ",\n") + ",", MAP),
+        ("\n".join([HEADER, *(row + "," for row in ROWS)]), MAP),
+        (PLAIN.replace("nan", ""), MAP),
+        (GERMAN, MAP),
+        (GERMAN.replace(";", "\t"), MAP),
+        ("# " + PLAIN, MAP),
+        ("\ufeff" + PLAIN, MAP),
+        (PLAIN.encode("utf-16"), MAP),
+        (PLAIN.replace("unused", "Zählung [µm]").encode("cp1252"), MAP),
+        (PLAIN.replace("unused", "Zählung [µm]"), MAP),
+        ("Recorder 3\nRate: 2000\n\n" + PLAIN, MAP),
+        ("\n".join([HEADER, "s,mm,mA,-", *ROWS]), MAP),
+        ("\n".join(ROWS), NUMBERED),
+        (PLAIN.replace("t,q,i,unused", '"t","q","i","un,used"'), MAP),
+        ("a,b,c,d\n1,2,3,4\n" + PLAIN, "header_line = 3\n" + MAP),
+        ("\n".join([HEADER, *(row + "," for row in ROWS)]), "header_line = 1\n" + MAP),
+        (PLAIN.replace("nan", "idle since noon"), 'delimiter = ","\n' + MAP),
+        (GERMAN, 'delimiter = ";"\ndecimal = ","\n' + MAP),
+    ],
+)
+def test_the_layout_is_found(tmp_path: Path, text: str | bytes, map_text: str) -> None:
+    axis = imported(tmp_path, text, map_text).axes["x"]
+    expected = -1e-3 * (table()["q"] + 2.0)
+    np.testing.assert_allclose(axis.position, expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(axis.columns["current"], 1e-3 * table()["i"], rtol=1e-12)
+
+
+def with_row(number: int, row: str) -> str:
+    return "\n".join([HEADER, *ROWS[: number - 1], row, *ROWS[number:]])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (with_row(40, "0.02,abc,1,0"), "line 41, column 'q': 'abc' is not a number"),
+        (with_row(1, "0,x1,1,0"), "line 2, column 'q': 'x1' is not a number"),
+        (with_row(40, "0.02,,1,0"), "line 41, column 'q': is empty"),
+        (with_row(40, "0.02"), "line 41, column 'q': is empty"),
+        (with_row(40, "0.02,nan,1,0"), r"column 'q' is nan in row 40 of 300 \(0.0195 s\), 1 such"),
+        (with_row(40, "0.02,1,-inf,0"), "column 'i' is -inf in row 40"),
+        (PLAIN.replace("q,", "qq,"), "no column 'q'; did you mean 'qq'. columns: t, qq, i, unused"),
+        (PLAIN.replace("t,", "q,", 1), "2 columns are called 'q'"),
+        (PLAIN.replace(",unused", ""), "line 1 has 3 names, the rows have 4 cells"),
+        ("", "no line of text"),
+        ("t,q\nsome,words\n", "no rows of numbers"),
+        (HEADER, "no rows of numbers"),
+        (HEADER + "\n0,1,2,3\n", "has 1 rows; a log has at least 2"),
+        (b"\x00\x01" * 500, "no rows of numbers"),
+    ],
+)
+def test_what_cannot_be_read_is_named(tmp_path: Path, text: str | bytes, message: str) -> None:
+    with pytest.raises(InputError, match=message) as raised:
+        imported(tmp_path, text)
+    assert "log.csv" in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_header_line_that_does_not_fit_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="line 1 has 1 names, the rows have 4 cells"):
+        imported(tmp_path, "title\n" + PLAIN, "header_line = 1\n" + MAP)
+
+
+TIMED = MAP.replace("sample_rate = 2000.0", 'time = {column = "t", unit = "ms"}')
+
+
+def timed(folder: Path, change: Callable[[np.ndarray], None]) -> Log:
+    columns = table()
+    columns["t"] = 1e3 * columns["t"] + 5.0
+    change(columns["t"])
+    write_csv(folder / "log.csv", columns)
+    return import_log(folder / "log.csv", mapping(folder, TIMED))
+
+
+def test_the_rate_comes_from_the_times(tmp_path: Path) -> None:
+    assert timed(tmp_path, lambda t: None).sample_rate == RATE
+
+
+def test_times_of_day_are_precise_enough(tmp_path: Path) -> None:
+    def shift(t: np.ndarray) -> None:
+        t += 1.7e12  # ms since 1970; a double resolves 0.2 us there
+
+    assert timed(tmp_path, shift).sample_rate == RATE
+
+
+def test_a_rate_that_is_no_whole_number_is_kept(tmp_path: Path) -> None:
+    def stretch(t: np.ndarray) -> None:
+        t *= 1.0003
+
+    assert timed(tmp_path, stretch).sample_rate == pytest.approx(RATE / 1.0003, rel=1e-9)
+
+
+def add(row: int, milliseconds: float, *, onwards: bool) -> Callable[[np.ndarray], None]:
+    def change(t: np.ndarray) -> None:
+        t[row - 1 : None if onwards else row] += milliseconds
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (add(100, 0.5, onwards=True), "has a gap: 0.054 s is followed by 0.055 s in row 100"),
+        (add(100, -0.7, onwards=False), "does not increase: 0.054 s .* in row 100"),
+        (add(100, 0.02, onwards=False), r"off the even grid by up to 4 % .* in row 100"),
+        (add(100, np.nan, onwards=False), "time in row 100 is nan"),
+    ],
+)
+def test_uneven_times_are_refused(
+    tmp_path: Path, change: Callable[[np.ndarray], None], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        timed(tmp_path, change)

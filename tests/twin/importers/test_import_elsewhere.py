@@ -1,0 +1,272 @@
+"""Recordings of other programs: TwinCAT Scope, MCAP of other writers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import mcap_protobuf.writer
+import numpy as np
+import pytest
+from google.protobuf import timestamp_pb2
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto as Kind
+from google.protobuf.descriptor_pb2 import FileDescriptorProto
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.message_factory import GetMessageClass
+from import_cases import mapping
+from mcap_bytes import CHUNK, records
+
+from twin.errors import InputError
+from twin.importers import import_log
+from twin.logs import Log
+from twin.logs.series import instant
+
+COUNT = 400
+T = np.arange(COUNT) * 1e-3
+Q, F = 50.0 * np.sin(3.0 * T), 2.0 * np.cos(5.0 * T)
+EPOCH = 1_700_000_000
+FILETIME = 116_444_736_000_000_000 + EPOCH * 10**7
+
+
+def imported(folder: Path, name: str, text: str) -> Log:
+    return import_log(folder / name, mapping(folder, text))
+
+
+def assert_signals(log: Log, axis: str = "x", position: float = 1e-3) -> None:
+    np.testing.assert_allclose(log.axes[axis].position, position * Q, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(log.axes[axis].force, F, rtol=0, atol=1e-9)
+
+
+# --- TwinCAT Scope ------------------------------------------------------------------------------
+
+
+def scope(*, shared: bool, decimal: str = ",", end: str = "EOF\r\n", step: str = "1") -> str:
+    """An export as Beckhoff describes it, a time for each channel or one for both."""
+    between = [] if shared else [None]
+
+    def row(key: str, *values: str) -> str:
+        cells = [key]
+        for k, value in enumerate(values):
+            cells += ([key] if k and not shared else []) + [value]
+        return "\t".join(cells)
+
+    head = [
+        "Name\tScope01", "File\tC:\\a.svd", f"StartRecord\t{FILETIME}\tDienstag\t22:13:20", "",
+        row("Name", "ActPos", "Torque"), row("NetId", "1.1.1.1", "1.1.1.1"),
+        row("Port", "851", "851"), row("SampleTime[ms]", "1", step),
+        row("SymbolName", "MAIN.fPos", "MAIN.fForce"), row("Data-Type", "REAL64", "REAL64"), "",
+    ]  # fmt: skip
+    rows = []
+    for k in range(COUNT):
+        cells = [str(k), repr(float(Q[k])), *([str(k)] * len(between)), repr(float(F[k]))]
+        rows.append("\t".join(cells).replace(".", decimal))
+    return "\r\n".join([*head, *rows]) + "\r\n" + end
+
+
+SCOPE_MAP = """
+[axes.x]
+position = {column = "MAIN.fPos", unit = "mm"}
+force = {column = "MAIN.fForce", unit = "N"}
+"""
+
+
+@pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize(("decimal", "end"), [(",", "EOF\r\n"), (".", "")])
+def test_twincat_scope(tmp_path, shared, decimal, end):
+    (tmp_path / "a.csv").write_text(scope(shared=shared, decimal=decimal, end=end))
+    log = imported(tmp_path, "a.csv", SCOPE_MAP)
+    assert log.sample_rate == 1000.0
+    assert log.metadata["start_time_unix_ns"] == str(EPOCH * 10**9)
+    assert_signals(log)
+    timed = 'time = {column = "time", unit = "ms"}' + SCOPE_MAP
+    assert_signals(imported(tmp_path, "a.csv", timed))
+
+
+def test_channels_of_two_sample_times_are_refused(tmp_path):
+    (tmp_path / "a.csv").write_text(scope(shared=False, step="2"))
+    with pytest.raises(InputError, match="sample times of 1, 2 ms"):
+        imported(tmp_path, "a.csv", SCOPE_MAP)
+
+
+# --- MCAP ---------------------------------------------------------------------------------------
+
+JOINT_STATE = """std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+
+
+def write_joint_states(path: Path) -> None:
+    ros2 = pytest.importorskip("mcap_ros2.writer", reason="extra import")
+    with open(path, "wb") as stream:
+        writer = ros2.Writer(stream)
+        schema = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
+        for k in range(COUNT):
+            at = EPOCH * 10**9 + k * 10**6
+            message = {
+                "header": {"stamp": {"sec": at // 10**9, "nanosec": at % 10**9}, "frame_id": ""},
+                "name": ["wrist", "elbow"], "position": [0.0, Q[k]], "velocity": [0.0, 1.0],
+                "effort": [1.0, F[k]],
+            }  # fmt: skip
+            writer.write_message("/joint_states", schema, message, log_time=at + 7 * (k % 5))
+        writer.finish()
+
+
+@pytest.mark.parametrize("entry", ["[2]", ".elbow"])
+@pytest.mark.parametrize("time", ["header.stamp", "log_time"])
+def test_joint_states_of_ros_2(tmp_path, entry, time):
+    write_joint_states(tmp_path / "a.mcap")
+    text = f"""
+time = {{column = "/joint_states.{time}", unit = "s"}}
+[axes.elbow]
+position = {{column = "/joint_states.position{entry}", unit = "mrad"}}
+force = {{column = "/joint_states.effort{entry}", unit = "Nm"}}
+"""
+    log = imported(tmp_path, "a.mcap", text)
+    assert (log.sample_rate, log.axes["elbow"].kind.kind) == (1000.0, "rotary")
+    assert log.metadata["start_time_unix_ns"] == str(EPOCH * 10**9)
+    assert_signals(log, "elbow")
+    with pytest.raises(InputError, match=r"did you mean '/joint_states.position"):
+        imported(tmp_path, "a.mcap", text.replace("states.position", "states.positin"))
+
+
+def protobuf_state() -> type:
+    """A message of another program: a time stamp, a list of joints with names, numbers, an enum."""
+    message, text, double = Kind.TYPE_MESSAGE, Kind.TYPE_STRING, Kind.TYPE_DOUBLE
+    file = FileDescriptorProto(
+        name="drive.proto", package="acme", syntax="proto3",
+        dependency=["google/protobuf/timestamp.proto"],
+    )  # fmt: skip
+    mode = file.enum_type.add(name="Mode")
+    mode.value.add(name="OFF", number=0)
+    for name, fields in {
+        "Joint": [
+            ("name", text, "", 1), ("position", double, "", 1), ("effort", Kind.TYPE_FLOAT, "", 1),
+        ],
+        "State": [
+            ("stamp", message, ".google.protobuf.Timestamp", 1),
+            ("joints", message, ".acme.Joint", 3), ("values", double, "", 3),
+            ("mode", Kind.TYPE_ENUM, ".acme.Mode", 1), ("raw", Kind.TYPE_BYTES, "", 1),
+        ],
+    }.items():  # fmt: skip
+        made = file.message_type.add(name=name)
+        for n, (field, kind, named, label) in enumerate(fields, 1):
+            made.field.add(name=field, number=n, type=kind, type_name=named or None, label=label)
+    pool = DescriptorPool()
+    pool.AddSerializedFile(timestamp_pb2.DESCRIPTOR.serialized_pb)
+    pool.AddSerializedFile(file.SerializeToString())
+    return GetMessageClass(pool.FindMessageTypeByName("acme.State"))
+
+
+@pytest.mark.parametrize("column", ["joints[2].{}", "joints.elbow.{}", "values[{}]"])
+def test_protobuf_of_other_programs(tmp_path, column):
+    state = protobuf_state()
+    with open(tmp_path / "a.mcap", "wb") as stream:
+        writer = mcap_protobuf.writer.Writer(stream)
+        for k in range(COUNT):
+            joints = [{"name": "wrist"}, {"name": "elbow", "position": Q[k], "effort": F[k]}]
+            at = {"seconds": EPOCH, "nanos": k * 10**6}
+            message = state(stamp=at, joints=joints, values=[Q[k], F[k]], raw=b"ab")
+            writer.write_message("/state", message, log_time=k * 10**6)
+        writer.finish()
+    q, f = ("1", "2") if "values" in column else ("position", "effort")
+    log = imported(
+        tmp_path,
+        "a.mcap",
+        f"""
+time = {{column = "/state.stamp", unit = "s"}}
+[axes.x]
+position = {{column = "/state.{column.format(q)}", unit = "mm"}}
+force = {{column = "/state.{column.format(f)}", unit = "N"}}
+""",
+    )
+    assert log.metadata["start_time_unix_ns"] == str(EPOCH * 10**9)
+    np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(log.axes["x"].force, F, rtol=1e-6)  # effort is a float of 32 bits
+    with pytest.raises(InputError, match=r"no column '/state.jaw'; .*/state.joints.elbow.effort"):
+        imported(
+            tmp_path,
+            "a.mcap",
+            """
+sample_rate = 1000.0
+[axes.x]
+position = {column = "/state.jaw", unit = "mm"}
+force = {column = "/state.jaw", unit = "N"}
+""",
+        )
+
+
+def test_json_in_mcap_and_a_damaged_one(tmp_path):
+    from mcap.writer import Writer
+
+    with open(tmp_path / "a.mcap", "wb") as stream:
+        writer = Writer(stream, chunk_size=4000)
+        writer.start()
+        channel = writer.register_channel("/drive", "json", 0)
+        for k in range(COUNT):
+            message = {"a": {"q": float(Q[k])}, "f": [float(F[k]), 0], "on": True, "id": "z"}
+            text = json.dumps(message)
+            writer.add_message(channel, k * 10**6, text.encode(), k * 10**6)
+        writer.finish()
+    text = """
+sample_rate = 1000.0
+[axes.x]
+position = {column = "/drive.a.q", unit = "mm"}
+force = {column = "/drive.f[1]", unit = "N"}
+"""
+    assert_signals(imported(tmp_path, "a.mcap", text))
+    intact = (tmp_path / "a.mcap").read_bytes()
+    chunk = [r.start for r in records(intact) if r.opcode == CHUNK][2]
+    # A record of an unknown kind is passed over, so that a chunk may be gone without a word.
+    for place, bit, why in ((chunk + 60, 1, "chunk at byte"), (chunk, 128, "messages where")):
+        data = bytearray(intact)
+        data[place] ^= bit
+        (tmp_path / "a.mcap").write_bytes(data)
+        with pytest.raises(InputError, match=why):
+            imported(tmp_path, "a.mcap", text)
+
+
+# --- times --------------------------------------------------------------------------------------
+
+
+def test_times_since_1970_are_shown_as_dates(tmp_path):
+    assert instant(1.25) == "1.25 s"
+    assert instant(EPOCH + 0.5) == "2023-11-14 22:13:20.5 UTC"
+    t = EPOCH + T
+    t[200:] += 0.5
+    rows = [f"{float(a)!r},{float(q)!r}" for a, q in zip(t, Q, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["t,q", *rows]) + "\n")
+    text = """
+time = {column = "t", unit = "s"}
+[axes.x]
+position = {column = "q", unit = "mm"}
+force = {column = "q", unit = "N"}
+"""
+    with pytest.raises(InputError, match=r"gap: 2023-11-14 22:13:20\.199 UTC is followed by 2023"):
+        imported(tmp_path, "a.csv", text)
+
+
+@pytest.mark.parametrize(
+    ("unit", "size"), [("kip", 4448.2216), ("lbf", 4.4482216), ("in", 0.0254), ("ozf", 0.27801385)]
+)
+def test_units_of_a_library(tmp_path, unit, size):
+    rows = [f"{float(q)!r},{float(q)!r}" for q in Q]
+    (tmp_path / "a.csv").write_text("\n".join(["a,b", *rows]) + "\n")
+    own = {"position": "m", "force": "N"} | {"position" if unit == "in" else "force": unit}
+    text = "sample_rate = 1000.0\n[axes.x]\n" + "\n".join(
+        f'{field} = {{column = "{c}", unit = "{u}"}}'
+        for (field, u), c in zip(own.items(), "ab", strict=True)
+    )
+    axis = imported(tmp_path, "a.csv", text).axes["x"]
+    got = axis.position if unit == "in" else axis.force
+    np.testing.assert_allclose(got, size * Q, rtol=1e-7)

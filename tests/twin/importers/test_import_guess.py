@@ -1,0 +1,145 @@
+"""A proposed map reads the file that it was proposed for, and says what it assumes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from import_cases import mapping, write_csv
+from scipy.io import savemat
+
+from twin.importers import import_log
+from twin.importers.guess import guess_map
+
+T = np.arange(4000) / 1000.0
+Q = 0.05 * np.sin(5.0 * T) + 0.02 * np.sin(13.0 * T)
+V = 0.25 * np.cos(5.0 * T) + 0.26 * np.cos(13.0 * T)
+F = -3.0 * np.gradient(V, T) + 2.0 * np.sign(V) + 5.0 * V
+NOISE = np.random.default_rng(3).standard_normal(len(T))
+
+
+def columns_of(folder: Path, text: str) -> dict[str, dict[str, str]]:
+    """Axis -> field -> column."""
+    found = mapping(folder, text)
+    return {
+        axis: {field: c.column for field, c in entry.columns.items()}
+        for axis, entry in found.axes.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected", "rate"),
+    [
+        ({"time [ms]": 1e3 * T, "pos [mm]": 1e3 * Q, "force [N]": F, "ref_pos [mm]": 1e3 * Q},
+         {"x": {"position": "pos [mm]", "force": "force [N]",
+                "setpoint_position": "ref_pos [mm]"}}, 1000.0),
+        ({"t": T, "qm": Q, "qg": Q + 1e-6 * NOISE, "vir": F, "temp": NOISE},
+         {"x": {"position": "qm", "setpoint_position": "qg", "force": "vir"}}, 1000.0),
+        ({"Time": 1.7e9 + T, "xPos_mm": 1e3 * Q, "yPos_mm": 1e3 * V, "xCurrent_A": F,
+          "yCurrent_A": NOISE},
+         {"x": {"position": "xPos_mm", "current": "xCurrent_A"},
+          "y": {"position": "yPos_mm", "current": "yCurrent_A"}}, 1000.0),
+        ({"one": T, "two": NOISE, "three": V, "four": Q, "five": F},
+         {"x": {"position": "four", "velocity": "three", "force": "five"}}, 1000.0),
+    ],
+)  # fmt: skip
+def test_names_and_numbers_tell_the_signals(tmp_path, columns, expected, rate):
+    write_csv(tmp_path / "a.csv", columns)
+    found = guess_map(tmp_path / "a.csv")
+    assert not found.missing
+    assert columns_of(tmp_path, found.text) == expected
+    assert "resample" not in found.text  # the steps are even
+    log = import_log(tmp_path / "a.csv", mapping(tmp_path, found.text))
+    assert log.sample_rate == rate
+    np.testing.assert_allclose(log.axes["x"].position, Q, atol=1e-9)
+
+
+def trailing(column, samples=25):
+    """A loop that is so many samples behind its setpoint, a little smaller, read with noise."""
+    late = np.r_[np.full(samples, column[0]), column[:-samples]]
+    return 0.97 * late + 1e-5 * np.std(column) * NOISE
+
+
+GOAL, RATE_OF_GOAL, REACHED, SPEED = Q, V, trailing(Q), trailing(V)
+PUSH = -3.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED) + 5.0 * SPEED
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected", "told"),
+    [
+        ({"a": T, "b": REACHED, "c": SPEED, "d": GOAL, "e": PUSH},
+         {"position": "b", "velocity": "c", "setpoint_position": "d", "force": "e"},
+         "goes as the position, 30 ms ahead of it"),
+        ({"a": T, "b": GOAL, "c": RATE_OF_GOAL, "d": REACHED, "e": SPEED, "f": PUSH},
+         {"position": "d", "velocity": "e", "setpoint_position": "b", "setpoint_velocity": "c",
+          "force": "f"}, "setpoint_velocity"),
+        ({"t": T, "angle": REACHED, "u": 180.0 / np.pi * GOAL, "w": PUSH},
+         {"position": "angle", "setpoint_position": "u", "force": "w"}, 'unit = "deg"'),
+        ({"t": T, "position": REACHED, "goal_position": GOAL, "load": PUSH},
+         {"position": "position", "setpoint_position": "goal_position", "force": "load"}, ""),
+        ({"t": T, "present_position": REACHED, "goal": GOAL, "load": PUSH},
+         {"position": "present_position", "setpoint_position": "goal", "force": "load"}, ""),
+        ({"t": T, "pos": REACHED, "push": 40.0 * REACHED + 0.1 * PUSH},
+         {"position": "pos", "force": "push"}, ""),  # a spring's, of another size
+    ],
+)  # fmt: skip
+def test_what_follows_the_position_is_its_setpoint_and_no_force(tmp_path, columns, expected, told):
+    write_csv(tmp_path / "a.csv", columns)
+    found = guess_map(tmp_path / "a.csv")
+    assert not found.missing
+    assert columns_of(tmp_path, found.text) == {"x": expected}
+    assert told in found.text
+
+
+def test_a_setpoint_alone_is_no_force(tmp_path):
+    write_csv(tmp_path / "a.csv", {"t": T, "pos": REACHED, "u": GOAL})
+    assert guess_map(tmp_path / "a.csv").missing == (
+        "axis x: no column of pos, u looks like a force",
+    )
+
+
+def test_what_is_assumed_and_what_is_missing_is_said(tmp_path):
+    savemat(tmp_path / "a.mat", {"t": T, "angle": 100.0 * Q, "speed": 200.0 * V, "label": "abc"})
+    found = guess_map(tmp_path / "a.mat")
+    assert found.missing == ("axis x: no column of angle, speed looks like a force",)
+    assert "one of it is 0.5 rad/s by the position: correct one of the units" in found.text
+    assert found.text.count("ASSUMED") == 3  # the first line says it too
+
+
+def test_uneven_times_are_resampled(tmp_path):
+    t = T + 2e-4 * np.random.default_rng(1).uniform(-1.0, 1.0, len(T))
+    write_csv(tmp_path / "a.csv", {"t": t, "pos": Q, "force": F})
+    text = guess_map(tmp_path / "a.csv").text
+    assert "resample = 1000 " in text
+    assert import_log(tmp_path / "a.csv", mapping(tmp_path, text)).sample_rate == 1000.0
+
+
+def test_public_recordings(shared_data, tmp_path):
+    emps = columns_of(tmp_path, guess_map(shared_data / "emps" / "DATA_EMPS.mat").text)
+    assert emps == {"x": {"position": "qm", "setpoint_position": "qg", "force": "vir"}}
+    (arts,) = (shared_data / "arts").glob("1Hz*.json")
+    found = columns_of(tmp_path, guess_map(arts).text)
+    assert found == {"x": {"position": "data[2]", "velocity": "data[4]", "force": "data[3]"}}
+    laas = guess_map(shared_data / "laas" / "acc_current.txt").text
+    assert columns_of(tmp_path, laas) == {
+        "x": {"position": "Position", "velocity": "Velocity", "current": "Iq"}
+    }
+    assert "resample = 1000 " in laas
+
+
+@pytest.mark.parametrize(("position", "unit"), [("pos [mm]", "N/A"), ("angle [rad]", "N m/A")])
+def test_a_current_alone_asks_for_the_force_constant_in_the_units_of_the_axis(
+    tmp_path, position, unit
+):
+    write_csv(tmp_path / "a.csv", {"t": T, position: Q, "current [A]": F})
+    found = guess_map(tmp_path / "a.csv")
+    assert not found.missing
+    assert f"# force_constant = 1.0 # {unit}: NOT KNOWN" in found.text
+
+
+def test_a_force_asks_for_no_constant_and_what_is_used_is_not_listed(tmp_path):
+    write_csv(tmp_path / "a.csv", {"t": T, "pos [mm]": Q, "force [N]": F})
+    text = guess_map(tmp_path / "a.csv").text
+    assert "NOT KNOWN" not in text
+    assert "not used" not in text

@@ -1,0 +1,225 @@
+"""Laws of what a log says about itself: definitions agree, times are even, fields stay apart.
+
+Files are put together record by record. Clashes are one clear error each.
+"""
+
+import json
+
+import numpy as np
+import pytest
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, DataEnd, Footer, Header, Message, Metadata, Schema
+from mcap_bytes import MAGIC, joined, log_file, plain_file
+from plain_cases import (
+    HEAD,
+    MS,
+    RATED,
+    SAMPLES,
+    accepted,
+    channel,
+    message,
+    refused,
+    sample,
+    schema,
+)
+
+from twin.errors import InputError
+from twin.importers.units import field_unit
+from twin.logs import FIELDS, read_log, recover_log
+from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
+from twin.logs.topics import complete_units
+
+OWN = schema()
+CLASHES = {
+    "schema text": (schema(1, ("position",)), "schema 1 is defined twice, differently"),
+    "schema name": (Schema(1, OWN.data, "protobuf", "T"), "schema 1 is defined twice"),
+    "topic": (channel(1, "/axis/y"), "channel 1 is defined twice, differently"),
+    "schema of a channel": (channel(1, "/axis/x", of=2), "channel 1 is defined twice"),
+    "metadata": (channel(1, "/axis/x", {"a": "b"}), "channel 1 is defined twice"),
+    "encoding": (Channel(1, "/axis/x", "cdr", RATED, 1), "channel 1 is defined twice"),
+}
+
+
+@pytest.mark.parametrize("case", CLASHES)
+def test_a_definition_that_changes_is_refused(tmp_path, case):
+    other, text = CLASHES[case]
+    refused(tmp_path / "a.mcap", [*HEAD, other, *SAMPLES], text)
+
+
+def test_definitions_may_be_repeated_word_for_word(tmp_path):
+    position = accepted(tmp_path / "a.mcap", [*HEAD, *HEAD, *SAMPLES]).axes["x"].position
+    assert position.tolist() == [10.0 + k for k in range(6)]
+
+
+def test_a_topic_on_two_channels_is_refused_and_one_that_is_not_wanted_is_not(tmp_path):
+    twice = [*HEAD, channel(2, "/axis/x"), sample(0), sample(0, 2)]
+    refused(tmp_path / "a.mcap", twice, "two channels have the topic /axis/x")
+    y = [channel(n, "/axis/y") for n in (2, 3)]
+    path = tmp_path / "b.mcap"
+    path.write_bytes(log_file([*HEAD, *y, *(sample(0, n) for n in (1, 2, 3))]))
+    assert len(read_log(path, axes=["x"])) == 1
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_a_unit_of_each_field_is_that_of_a_linear_or_of_a_rotary_axis(name):
+    linear, rotary = LINEAR_UNITS[name], ROTARY_UNITS[name]
+    assert field_unit(name, linear).si == linear
+    assert complete_units({name: linear}) == {**LINEAR_UNITS, name: linear}
+    assert complete_units({name: rotary}) == (ROTARY_UNITS if linear != rotary else LINEAR_UNITS)
+    for wrong in ("mm", "kN", "", "g"):
+        with pytest.raises(InputError, match=f"unit of {name} is '{wrong}'"):
+            complete_units({name: wrong})
+
+
+FOREIGN = {
+    "JSON": (Schema(1, b"{}", "jsonschema", "S"), "json", json.dumps({"position": 1.0}).encode()),
+    "ROS 2": (Schema(1, b"float64 position", "ros2msg", "S"), "cdr", b"\0\1\0\0" + bytes(8)),
+    "a broken schema": (Schema(1, b"\xff", "protobuf", "S"), "protobuf", b""),
+    "a schema of another name": (schema(), "protobuf", b"\x09" + bytes(8)),
+    "a schema without a package": (Schema(1, OWN.data, "protobuf", "S"), "protobuf", b""),
+}
+
+
+@pytest.mark.parametrize("case", FOREIGN)
+def test_logs_of_other_programs_are_left_to_the_import(tmp_path, case):
+    given, encoding, data = FOREIGN[case]
+    items = [given, Channel(1, "/axis/x", encoding, RATED, 1)]
+    items += [Message(1, MS * k, data, MS * k, k) for k in range(3)]
+    text = refused(tmp_path / "a.mcap", items, "/axis/x|chunk at byte")
+    assert "twin import" in text or "cannot be used" in text
+
+
+def test_what_this_program_does_not_write_is_left_to_the_import(tmp_path):
+    """Messages outside chunks, fields that are left out where they are 0, and no sample rate."""
+    path = tmp_path / "a.mcap"
+    path.write_bytes(plain_file([*HEAD, *SAMPLES]))
+    with pytest.raises(InputError, match=r"outside the chunks; .*twin import"):
+        read_log(path)
+    short = message(1, 2, {"position": 3.0})
+    refused(path, [*HEAD, *SAMPLES[:2], short, *SAMPLES[3:]], "not laid out .*twin import")
+    unrated = Channel(1, "/axis/x", "protobuf", {}, 1)
+    refused(path, [HEAD[0], unrated, *SAMPLES], "states no sample rate; .*twin import")
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "nan", "inf", "x", ""])
+@pytest.mark.parametrize("key", ["sample_rate_hz", "force_constant"])
+def test_a_number_that_must_be_positive_is(tmp_path, key, text):
+    items = [HEAD[0], channel(1, "/axis/x", {key: text}), *SAMPLES]
+    refused(tmp_path / "a.mcap", items, f"metadata {key} is {text!r}; give a number above 0")
+    items[1] = channel(1, "/axis/x", {"force_constant": "1e-300"})
+    assert accepted(tmp_path / "a.mcap", items).axes["x"].force_constant == 1e-300
+
+
+@pytest.mark.parametrize("missing", ["position", "force"])
+def test_a_topic_without_position_or_without_force_is_refused_and_its_fields_named(
+    tmp_path, missing
+):
+    values = {"position": 1.0, "force": 2.0, "velocity": 3.0, "note": 4.0}
+    del values[missing]
+    items = [schema(1, values), HEAD[1], *(message(1, k, values) for k in range(3))]
+    lacking = "current or force" if missing == "force" else missing
+    there = ", ".join(values)
+    refused(
+        tmp_path / "a.mcap", items, f"/axis/x has no {lacking}; fields in its messages: {there}"
+    )
+
+
+@pytest.mark.parametrize("k", [0, 4])
+def test_a_sample_that_is_no_number_is_named_with_its_number_and_time(tmp_path, k):
+    spoilt = message(1, k, {"position": 1.0, "force": np.nan})
+    text = rf"/axis/x: force is nan at {k / 1e3:g} s \(sample {k}\)"
+    refused(tmp_path / "a.mcap", [*HEAD, *SAMPLES[:k], spoilt, *SAMPLES[k + 1 :]], text)
+
+
+@pytest.mark.parametrize("off", [3, -3, MS // 2, MS, -MS], ids=str)
+def test_a_time_is_that_of_its_number(tmp_path, off):
+    items = [*HEAD, *SAMPLES[:3], *(sample(k, time=MS * k + off) for k in range(3, 6))]
+    fault = {MS: "gap: 0.002 s is followed by 0.004 s", -MS: "time does not increase"}
+    text = refused(tmp_path / "a.mcap", items, fault.get(off, "uneven time"))
+    assert "at sample 3, expected a sample every 0.001 s (1000 Hz)" in text
+
+
+def test_a_missing_message_is_named_and_numbers_may_begin_anywhere(tmp_path):
+    refused(
+        tmp_path / "a.mcap", [*HEAD, *SAMPLES[:4], SAMPLES[5]],
+        "message 4 has sequence number 5, expected 4",
+    )  # fmt: skip
+    assert len(accepted(tmp_path / "a.mcap", [*HEAD, *SAMPLES[2:]])) == 4
+
+
+@pytest.mark.parametrize("time", [1 << 62, (1 << 63) - 1, 1 << 63, (1 << 64) - 1])
+@pytest.mark.parametrize("k", [0, 3, 5])
+def test_a_time_that_no_clock_shows_is_one_line(tmp_path, time, k):
+    path = tmp_path / "a.mcap"
+    samples = [sample(j, time=time if j == k else None) for j in range(6)]
+    refused(path, [*HEAD, *samples], "/axis/x: ")
+    with pytest.raises(InputError, match="nothing can be recovered"):
+        recover_log(path)
+
+
+@pytest.mark.parametrize("rate", ["9999", "1e-300", "1e-9", "1e300", "999.999"])
+def test_a_rate_that_the_times_deny_is_not_believed(tmp_path, rate):
+    path = tmp_path / "a.mcap"
+    refused(path, [HEAD[0], channel(1, "/axis/x", {"sample_rate_hz": rate}), *SAMPLES], "/axis/x: ")
+    with pytest.raises(InputError, match="nothing can be recovered"):
+        recover_log(path)
+    lying = Metadata("twin", {"sample_rate_hz": rate})
+    refused(path, [lying, *HEAD, *SAMPLES], "x is sampled at 1000 Hz, the metadata says")
+    assert recover_log(path)[0].sample_rate == 1000.0
+
+
+def test_metadata_of_another_name_is_not_the_logs(tmp_path):
+    others = {"schema_version": "9", "sample_rate_hz": "7", "source": "other"}
+    twin = {"schema_version": "1", "sample_rate_hz": "1000", "source": "this"}
+    items = [Metadata("twin", twin), Metadata("other", others), *HEAD, *SAMPLES]
+    assert accepted(tmp_path / "a.mcap", items).metadata == twin
+    items[0] = Metadata("twin", others)
+    refused(tmp_path / "a.mcap", items, "version is '9', this program reads '1'")
+
+
+@pytest.mark.parametrize("x", [range(12), range(10)], ids=str)
+@pytest.mark.parametrize("y", [range(10), range(3, 12), range(3, 10), range(4, 14)], ids=str)
+def test_what_topics_have_in_common_is_kept_at_the_same_times(tmp_path, x, y):
+    """Each in a chunk of its own; the longest stretch is the one with most samples of all."""
+    if x == y:
+        return
+    data = [[*HEAD, *(sample(k) for k in x)]]
+    data += [[HEAD[0], channel(2, "/axis/y"), *(sample(k, 2) for k in y)]]
+    chunks = [log_file(items)[len(MAGIC) + len(joined([Header("", "test")])) :] for items in data]
+    ends = len(joined([DataEnd(0), Footer(0, 0, 0)])) + len(MAGIC)
+    path = tmp_path / "a.mcap"
+    head = MAGIC + joined([Header("", "test")])
+    path.write_bytes(head + chunks[0][:-ends] + chunks[1])
+    with pytest.raises(InputError, match=r"/axis/[xy] has \d+ samples from .*other topics differ"):
+        read_log(path)
+    both = range(y.start, min(x.stop, y.stop))
+    log, recovery = recover_log(path)
+    for number, name in ((1, "x"), (2, "y")):
+        assert log.axes[name].position.tolist() == [10.0 * number + k for k in both]
+    assert recovery.kept == f"{len(both)} samples from {both.start / 1e3:g} s"
+
+
+@pytest.mark.parametrize("length", [3, 4, 5])
+def test_a_data_end_of_another_size_is_damage(tmp_path, length):
+    builder = RecordBuilder()
+    builder.start_record(Opcode.DATA_END)
+    builder.write(bytes(length))
+    builder.finish_record()
+    data = log_file([*HEAD, *SAMPLES])
+    end = joined([DataEnd(0)])
+    (tmp_path / "a.mcap").write_bytes(
+        data.replace(end + joined([Footer(0, 0, 0)]), builder.end() + joined([Footer(0, 0, 0)]))
+    )
+    if length == 4:
+        assert len(read_log(tmp_path / "a.mcap")) == 6
+    else:
+        with pytest.raises(InputError, match="before the summary"):
+            read_log(tmp_path / "a.mcap")
+
+
+def test_every_chunk_states_its_checksum(tmp_path):
+    content = joined([*HEAD, *SAMPLES])
+    (tmp_path / "a.mcap").write_bytes(plain_file([Chunk("", content, 0, 0, 0, len(content))]))
+    with pytest.raises(InputError, match=r"chunk at byte .*: states no checksum of its samples"):
+        read_log(tmp_path / "a.mcap")

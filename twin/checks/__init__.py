@@ -1,0 +1,43 @@
+"""Checks whether a log is suitable for identification, before anything is fitted."""
+
+from __future__ import annotations
+
+from twin.checks.assumed import check_assumed
+from twin.checks.axis import Axis
+from twin.checks.breaks import check_breaks, check_outliers
+from twin.checks.channels import check_crossed, check_timing, check_units
+from twin.checks.command import check_command, check_saturation
+from twin.checks.content import check_content, check_excitation
+from twin.checks.report import CheckReport, Fault, Finding, Severity
+from twin.logs.log import Log
+
+__all__ = ["CheckReport", "Fault", "Finding", "Severity", "check_log", "moves"]
+
+PARTS = (
+    check_units, check_timing, check_breaks, check_command, check_outliers, check_saturation,
+    check_excitation,
+)  # fmt: skip
+
+
+def moves(log: Log, axis: str) -> bool:
+    """Whether an axis of a log moves beyond the noise of its encoder."""
+    return Axis(axis, log.sample_rate, log.axes[axis]).moves
+
+
+def check_log(log: Log) -> CheckReport:
+    """Look for faults that spoil an identification; the log is not changed.
+
+    Where an axis lacks something that every other check needs, only that is reported.
+    """
+    findings: list[Finding] = []
+    sound: list[Axis] = []
+    for name, columns in log.axes.items():
+        axis = Axis(name, log.sample_rate, columns)
+        basic = list(check_content(axis))
+        findings += [*basic, *check_assumed(name, log.metadata)]
+        if not basic:
+            sound.append(axis)
+            for check in PARTS:
+                findings += check(axis)
+    findings += check_crossed(sound)
+    return CheckReport(tuple(findings))

@@ -1,0 +1,323 @@
+"""Where the position breaks off its course, and what no machine can produce.
+
+Each break looks different around it. Missing samples take the position and its setpoint as far on
+as the motion went meanwhile. An encoder that stands still is caught up with in one sample. A
+counter that wraps goes back by nearly the whole travel. A single sample that is off leaves the
+course as it was, and so does a clock that skips, by less than a sample's motion. Joined logs differ
+in everything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.checks import limits
+from twin.checks.axis import Axis
+from twin.checks.report import Fault, Finding, Severity
+from twin.signals import Array
+
+
+class Kind(Enum):
+    """What breaks a position."""
+
+    MISSING = "missing"
+    STUCK = "stuck"
+    WRAPPED = "wrapped"
+    SAMPLE = "sample"
+    JOINED = "joined"
+    STEP = "step"
+    CLOCK = "clock"
+
+
+@dataclass(frozen=True)
+class Break:
+    """From sample ``first`` to ``last``; size: m, or the number of samples that are missing.
+
+    step: m, by which the course is another behind it.
+    """
+
+    kind: Kind
+    first: int
+    last: int
+    size: float
+    step: float = 0.0
+
+
+def check_breaks(axis: Axis) -> Iterator[Finding]:
+    """What breaks the position, each kind once."""
+    if count := axis.position_held:
+        yield held(axis, "the position", count)
+        return
+    if is_uneven(axis):
+        yield _uneven(axis)
+        return
+    breaks = find_breaks(axis)
+    for kind in Kind:
+        found = [b for b in breaks if b.kind is kind]
+        if found:
+            yield _finding(axis, kind, found)
+
+
+def find_breaks(axis: Axis) -> list[Break]:
+    """All breaks in the order of time; none where the position is held for some samples each."""
+    bends = axis.bends
+    if not len(bends) or axis.position_held:
+        return []
+    stuck = list(_stuck(axis))
+    for b in stuck:
+        bends = bends[(bends < b.first - 2) | (bends > b.last + 2)]
+    if not len(bends):
+        return stuck
+    clusters = np.split(bends, np.flatnonzero(np.diff(bends) > limits.CLUSTER) + 1)
+    single = [_classified(axis, int(c[0]), int(c[-1])) for c in clusters]
+    return _undone(sorted([*stuck, *(b for b in single if b)], key=lambda b: b.first), axis)
+
+
+def _undone(breaks: list[Break], axis: Axis) -> list[Break]:
+    """A step that is soon taken back is an offset of the samples between; so are two samples."""
+    out: list[Break] = []
+    for b in breaks:
+        last = out[-1] if out else None
+        if last is not None and b.first - last.last < limits.SHORT_GAP * axis.sample_rate:
+            opposed = abs(last.step + b.step) < limits.ALIKE_SPEEDS * abs(b.step)
+            if opposed or {last.kind, b.kind} <= {Kind.SAMPLE, Kind.CLOCK}:
+                size = max(abs(last.size), abs(b.step or b.size))
+                out[-1] = Break(Kind.SAMPLE, last.first, b.last, size)
+                continue
+        out.append(b)
+    return out
+
+
+def _stuck(axis: Axis) -> Iterator[Break]:
+    """One value for long, with a bend where it begins and where it ends."""
+    x = axis.log.position
+    same = np.flatnonzero(np.diff(np.concatenate([[1.0], np.diff(x), [1.0]]) == 0.0))
+    least = max(limits.STUCK * axis.sample_rate, limits.STUCK_SAMPLES)
+    bends = axis.jumps > 0.0
+    for first, last in zip(same[::2], same[1::2], strict=False):
+        if last - first < least:
+            continue
+        ends = (bends[max(first - 3, 0) : first + 1], bends[max(last - 3, 0) : last + 1])
+        caught_up = abs(x[min(last + 1, len(x) - 1)] - x[last])
+        if all(part.any() for part in ends):
+            yield Break(Kind.STUCK, int(first), int(last), float(caught_up))
+
+
+def _classified(axis: Axis, first: int, last: int) -> Break | None:
+    """What the bends at samples ``first`` to ``last`` are; None where it cannot be told."""
+    x, dt = axis.log.position, 1.0 / axis.sample_rate
+    course = _around(x, first, last)
+    if course is None:
+        return None
+    step, before, after = course
+    speed = 0.5 * (before + after) / dt
+    alike = (
+        abs(before - after)
+        <= limits.ALIKE_SPEEDS * max(abs(before), abs(after)) + axis.possible_jump
+    )
+    sure = limits.SURE_BREAK * axis.possible_jump
+    if abs(step) <= sure:
+        off = float(axis.jumps[first - 1 : last].max())
+        if last - first > limits.CLUSTER:
+            return None
+        kind = Kind.CLOCK if off < limits.A_SAMPLE * abs(speed) * dt else Kind.SAMPLE
+        return Break(kind, first, last, off)
+    setpoint = axis.log.columns.get("setpoint_position")
+    follows = _around(setpoint, first, last) if setpoint is not None else None
+    with_setpoint = follows is not None and abs(follows[0]) > 0.5 * abs(step)
+    if abs(step) >= limits.WHOLE_TRAVEL * np.ptp(x) and alike and not with_setpoint:
+        return Break(Kind.WRAPPED, first, last, abs(step))
+    if setpoint is not None and not with_setpoint:
+        return Break(Kind.STEP, first, last, step, step)
+    samples = step / (speed * dt) if speed else np.inf
+    gap = limits.LONGEST_GAP if alike else limits.SHORT_GAP
+    if 0.5 < samples <= gap * axis.sample_rate:
+        return Break(Kind.MISSING, first, last, float(round(samples)), step)
+    return Break(Kind.STEP if alike else Kind.JOINED, first, last, step, step)
+
+
+def _around(x: Array, first: int, last: int) -> tuple[float, float, float] | None:
+    """The step of a signal's course, and its slopes a sample before and behind."""
+    begin, end = first - 1, last + 1  # the last sample before, the first behind
+    if begin - limits.COURSE < 0 or end + limits.COURSE >= len(x):
+        return None
+    before = float(x[begin] - x[begin - limits.COURSE]) / limits.COURSE
+    after = float(x[end + limits.COURSE] - x[end]) / limits.COURSE
+    expected = 0.5 * (before + after) * (end - begin)
+    return float(x[end] - x[begin]) - expected, before, after
+
+
+def _finding(axis: Axis, kind: Kind, found: list[Break]) -> Finding:
+    first, unit = found[0], axis.log.units["position"]
+    largest = max(found, key=lambda b: abs(b.size))
+    size = f"{abs(largest.size):.3g} {unit}"
+    fault, what, remedy = {
+        Kind.MISSING: (
+            Fault.MISSING, f"{largest.size:.0f} samples are missing, the motion goes on behind",
+            "import the file with its time stamps, or cut the log there",
+        ),
+        Kind.STUCK: (
+            Fault.STUCK,
+            f"the position stands still for {(first.last - first.first) / axis.sample_rate:.3g} s "
+            f"and is {size} farther in the next sample: the encoder was stuck",
+            "cut the log there, and check the encoder's connection",
+        ),
+        Kind.WRAPPED: (
+            Fault.WRAPPED, f"the position goes back by {size} in one sample: its counter wraps",
+            f"add {size} behind each wrap before the import",
+        ),
+        Kind.SAMPLE: (
+            Fault.OUTLIERS, f"samples of the position are off by up to {size}",
+            "repair these samples, or cut the log there",
+        ),
+        Kind.JOINED: (
+            Fault.JOINED, f"position and motion differ on both sides by {size}: logs were joined",
+            "import each part as a log of its own",
+        ),
+        Kind.STEP: (
+            Fault.STEP, f"the position steps by {size} and goes on as before: counts were lost",
+            "cut the log there, and check the encoder's connection",
+        ),
+        Kind.CLOCK: (
+            Fault.UNEVEN,
+            f"the position is off by {size}, less than two samples' motion: a clock skipped",
+            "record with the drive's own clock",
+        ),
+    }[kind]  # fmt: skip
+    more = f" and {len(found) - 1} more times" if len(found) > 1 else ""
+    where = f"{first.first / axis.sample_rate:.6g} to {first.last / axis.sample_rate:.6g} s{more}"
+    severity = Severity.WARNING if fault is Fault.UNEVEN else Severity.ERROR
+    return Finding(severity, fault, axis.name, what, where, remedy)
+
+
+def is_uneven(axis: Axis) -> bool:
+    """Whether the position bends everywhere: then it is the clock, and not this and that."""
+    bends = _bends_of_a_clock(axis)
+    if not len(bends) or axis.position_held:
+        return False
+    places = 1 + np.count_nonzero(np.diff(bends) > limits.SHORT_GAP * axis.sample_rate)
+    return bool(places >= max(limits.MANY_BENDS, limits.EVERYWHERE * axis.duration))
+
+
+def _bends_of_a_clock(axis: Axis) -> NDArray[np.intp]:
+    """Where the position bends, but not by most of the travel, as a counter that wraps."""
+    if not len(axis.bends):
+        return axis.bends
+    most = 0.5 * float(np.ptp(axis.log.position))
+    return np.flatnonzero((axis.jumps > 0.0) & (axis.jumps < most))
+
+
+def _uneven(axis: Axis) -> Finding:
+    bends = _bends_of_a_clock(axis)
+    unit = axis.log.units["position"]
+    return Finding(
+        Severity.WARNING, Fault.UNEVEN, axis.name,
+        f"the position bends by up to {axis.jumps[bends].max():.3g} {unit} at {len(bends)} "
+        "samples all over the log: the clock jitters, or samples are missing",
+        f"from {bends[0] / axis.sample_rate:.6g} s",
+        "record with the drive's own clock, or import with the time stamps",
+    )  # fmt: skip
+
+
+def held(axis: Axis, name: str, count: int) -> Finding:
+    """A signal that is held for ``count`` samples."""
+    return Finding(
+        Severity.WARNING, Fault.HELD, axis.name,
+        f"{name} changes at every {count}th sample only: it was sampled at "
+        f"{axis.sample_rate / count:g} Hz and held",
+        "whole log",
+        f"record it at {axis.sample_rate:g} Hz, or the log at {axis.sample_rate / count:g} Hz",
+    )  # fmt: skip
+
+
+def check_outliers(axis: Axis) -> Iterator[Finding]:
+    """Outliers in position and command."""
+    jumps = _unexplained_jumps(axis)
+    if len(jumps):
+        unit = axis.log.units["position"]
+        yield _outliers(
+            axis,
+            jumps / axis.sample_rate,
+            f"position bends by up to {axis.jumps[jumps - 1].max():.3g} {unit} within a sample, "
+            f"its usual motion and noise allow {axis.possible_jump:.2g} {unit}",
+            "cut the log there (was the carriage touched?) or repair the samples",
+        )
+    if not axis.moves:
+        return
+    rough = _rough_command(axis)
+    if len(rough):
+        yield _outliers(axis, rough, "the force jumps to and fro from sample to sample")
+    else:
+        yield from _contradictions(axis)
+
+
+def _unexplained_jumps(axis: Axis) -> NDArray[np.intp]:
+    """Samples (k,) where the position bends, but for those that another check names."""
+    if axis.position_held or is_uneven(axis):
+        return np.empty(0, dtype=np.intp)
+    jumps = axis.bends
+    for found in find_breaks(axis):
+        jumps = jumps[(jumps < found.first - 2) | (jumps > found.last + 2)]
+    return jumps
+
+
+def _rough_command(axis: Axis) -> Array:
+    """Times (k,) in s within bursts of noise on the command."""
+    force = axis.log.force
+    second = np.abs(np.diff(force, 2))
+    rough = second > limits.ROUGH * axis.force_size
+    span = max(round(limits.ROUGH_SPAN * axis.sample_rate), 2 * limits.FEWEST_ROUGH)
+    if np.count_nonzero(rough) >= span // 2:
+        rough &= second > limits.UNUSUAL * _usual(axis, second)
+    if np.count_nonzero(rough) < span // 2:
+        return np.empty(0)
+    dense = np.convolve(rough, np.ones(span), "same") > span // 2
+    return (np.flatnonzero(rough & dense) + 1) / axis.sample_rate
+
+
+def _contradictions(axis: Axis) -> Iterator[Finding]:
+    """Where command and motion contradict each other, except at jumps of the position."""
+    if not axis.dynamics.explains:
+        return
+    fit = axis.dynamics
+    error = np.abs(fit.residual) * axis.kept[fit.first : fit.first + len(fit.residual)]
+    command = np.quantile(np.abs(axis.force - np.median(axis.force)), 0.99)
+    usual = _usual(axis, error)
+    bad = np.flatnonzero(error > max(limits.UNUSUAL * usual, limits.CONTRADICTION * command))
+    if len(bad):
+        unit = axis.log.units["force"]
+        yield _outliers(
+            axis,
+            axis.smoother.time(bad + fit.first),
+            f"force and motion contradict each other by up to {error.max():.3g} {unit}, "
+            f"elsewhere by less than {usual:.2g} {unit}",
+        )
+
+
+def _usual(axis: Axis, values: Array) -> float:
+    """What 99 % of the values stay below; fewer in a log so short that a burst is more than 1 %."""
+    burst = 3.0 * axis.smoother.length / axis.duration
+    return float(np.quantile(values, 1.0 - max(0.01, burst)))
+
+
+def _outliers(
+    axis: Axis,
+    times: Array,
+    what: str,
+    remedy: str = "cut the log there (was an end stop hit, the carriage touched?)",
+) -> Finding:
+    bursts = np.split(times, np.flatnonzero(np.diff(times) > limits.BURSTS_APART) + 1)
+    more = f" and {len(bursts) - 1} more times" if len(bursts) > 1 else ""
+    return Finding(
+        Severity.ERROR,
+        Fault.OUTLIERS,
+        axis.name,
+        what,
+        f"{bursts[0][0]:.6g} to {bursts[0][-1]:.6g} s{more}",
+        remedy,
+    )

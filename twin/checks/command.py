@@ -1,0 +1,128 @@
+"""Faults of the command itself: noise, single samples that are off, held values, saturation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.checks import limits
+from twin.checks.axis import Axis
+from twin.checks.breaks import held
+from twin.checks.report import Fault, Finding, Severity
+from twin.signals import Array
+
+
+def check_command(axis: Axis) -> Iterator[Finding]:
+    """Held values, noise, and single samples."""
+    if not axis.moves:
+        return
+    force, unit = axis.log.force, axis.log.units["force"]
+    if count := axis.force_held:
+        yield held(axis, "the force", count)
+        return
+    least = limits.LARGE_SAMPLE * axis.force_size
+    steps = np.abs(np.diff(force)).max()  # a sample off its neighbours is off one beside it
+    if steps > least and len(single := _single(off := off_course(force), least)):
+        first = single[0] / axis.sample_rate
+        more = f" and {len(single) - 1} more times" if len(single) > 1 else ""
+        yield Finding(
+            Severity.ERROR, Fault.OUTLIERS, axis.name,
+            f"single samples of the force are off by up to {off.max():.3g} {unit}",
+            f"{first:.6g} s{more}", "repair these samples, or cut the log there",
+        )  # fmt: skip
+    yield from _noise(axis)
+
+
+def _single(off: Array, least: float) -> NDArray[np.intp]:
+    """Samples (k,) that are off their neighbours by more than ``least``, few of them together."""
+    bad = off > least
+    if not bad.any():
+        return np.flatnonzero(bad)
+    bad &= off > limits.SINGLE_SAMPLE * float(
+        np.quantile(off, 0.99)
+    )  # one at a steep edge is off by as much
+    together = np.convolve(bad, np.ones(limits.NOISE_BURST), "same")
+    return np.flatnonzero(bad & (together <= limits.MOST_TOGETHER))  # noise is no single sample
+
+
+def _noise(axis: Axis) -> Iterator[Finding]:
+    """Noise that hides what the motion does not explain, even when it is averaged."""
+    noise, unit = axis.force_noise, axis.log.units["force"]
+    left = float(np.median(np.abs(axis.dynamics.residual)))
+    averaged = axis.smoother.held_noise(noise)
+    if not axis.dynamics.explains or averaged < limits.HIDES * left:
+        return
+    if noise > limits.NOISY * float(np.std(axis.log.force)):
+        yield Finding(
+            Severity.WARNING, Fault.NOISE, axis.name,
+            f"the force has noise of {noise:.3g} {unit} rms from sample to sample, {averaged:.2g} "
+            f"{unit} over {axis.smoother.length * 1e3:.2g} ms: about all that is left of it beside "
+            "the motion",
+            "whole log", "record the command that the controller computed, or shield the cable",
+        )  # fmt: skip
+
+
+def off_course(signal: Array) -> Array:
+    """(n,) by how much each sample is off the median of the five around it; 0 at the ends."""
+    off = np.zeros(len(signal))
+    if len(signal) > 5:
+        a, b, c, d = signal[:-4], signal[1:-3], signal[3:-1], signal[4:]
+        # The median of five is that of one and of the middle two of the other four.
+        low = np.maximum(np.minimum(a, b), np.minimum(c, d))
+        high = np.minimum(np.maximum(a, b), np.maximum(c, d))
+        low, high = np.minimum(low, high), np.maximum(low, high)
+        off[2:-2] = np.abs(signal[2:-2] - np.clip(signal[2:-2], low, high))
+    return off
+
+
+def check_saturation(axis: Axis) -> Iterator[Finding]:
+    """Saturation of the command."""
+    force = axis.log.force
+    for sign, extreme in ((1.0, force.max()), (-1.0, force.min())):
+        if extreme == 0.0:  # a drive that is off
+            continue
+        stuck = _exactly(axis, force, extreme) or _but_for_noise(axis, sign * axis.force)
+        if stuck:
+            first, seconds = stuck
+            yield Finding(
+                Severity.WARNING,
+                Fault.SATURATION,
+                axis.name,
+                f"the force stays at its extreme of {extreme:.4g} {axis.log.units['force']} for "
+                f"{seconds:.3g} s in all",
+                f"from {first:.6g} s",
+                "move more gently if the drive was at its limit, and record its actual force",
+            )
+
+
+def _exactly(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | None:
+    """Start of the first interval at the extreme and length of all, s."""
+    starts, lengths = _runs(np.abs(force - extreme) <= 1e-9 * np.ptp(force))
+    stuck = lengths >= max(limits.EXTREME * axis.sample_rate, limits.EXTREME_SAMPLES)
+    if not stuck.any():
+        return None
+    return starts[stuck][0] / axis.sample_rate, lengths[stuck].sum() / axis.sample_rate
+
+
+def _but_for_noise(axis: Axis, height: Array) -> tuple[float, float] | None:
+    """Likewise, of a low-passed command (m,): a level with steep edges at its top."""
+    smoother = axis.smoother
+    noise = smoother.held_noise(axis.force_noise)
+    if np.ptp(height) < limits.LIVELY_COMMAND * noise:
+        return None
+    starts, near = _runs(height >= height.max() - limits.NEAR_LEVEL * noise)
+    wide = _runs(height >= height.max() - limits.WIDE_LEVEL * noise)[1]
+    longest = int(np.argmax(near))
+    inside = 0 < starts[longest] < len(height) - near[longest]
+    level = max(limits.LEVEL / smoother.block, limits.LEVEL_BLOCKS)
+    if not inside or near[longest] < level or wide.max() - near[longest] > limits.EDGE_BLOCKS:
+        return None
+    return smoother.time(starts[:1])[0], float(near.sum() * smoother.block)
+
+
+def _runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Starts and lengths of the intervals of True."""
+    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False))
+    return edges[::2], edges[1::2] - edges[::2]

@@ -1,0 +1,124 @@
+"""Times of a file: their sample rate, or where they are uneven one clock, and what that costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.importers.mapping import ImportMap
+from twin.logs.log import Array
+from twin.logs.series import instant
+
+JITTER = 0.01  # of a period: how far a time may be off the even grid
+
+
+def rate_of(time: Array) -> float:
+    """Sample rate in Hz of times (n,) in s.
+
+    It is the nearest whole number where the times allow that. Raises InputError that names row and
+    time where they do not increase, have a gap, or are off the even grid by more than 1 %.
+    """
+    if not np.isfinite(time).all():
+        k = int(np.argmin(np.isfinite(time)))
+        raise InputError(f"the time in row {k + 1} is {time[k]}; give every row a time")
+    elapsed = time - time[0]
+    steps = np.diff(elapsed)
+    period = float(np.median(steps))
+    back = steps <= 0.0
+    if back.any():
+        k = int(np.argmax(back))
+        raise _uneven("does not increase", time, k + 1, period)
+    gap = steps > 1.5 * period
+    if gap.any():
+        raise _uneven("has a gap", time, int(np.argmax(gap)) + 1, period)
+    rate = len(steps) / float(elapsed[-1])
+    if abs(round(rate) / rate - 1.0) * len(steps) < JITTER:
+        rate = float(round(rate))
+    off = np.abs(elapsed * rate - np.arange(len(time)))
+    if off.max() > JITTER:
+        raise _uneven(
+            f"is off the even grid by up to {100.0 * off.max():.3g} % of a sample",
+            time, int(np.argmax(off > JITTER)), period,
+        )  # fmt: skip
+    return rate
+
+
+def _uneven(fault: str, time: Array, row: int, period: float) -> InputError:
+    rate = 1.0 / max(period, 1e-9)
+    return InputError(
+        f"the time {fault}: {instant(time[row - 1])} is followed by {instant(time[row])} in row "
+        f"{row + 1}, usual are {period:.6g} s a sample; give resample = {rate:.6g} "
+        "(Hz) in the map, or sample_rate in place of time where only the printed times are inexact"
+    )
+
+
+LONGEST_GAP = 20.0  # usual steps, over which a line is no measurement
+
+
+@dataclass(frozen=True)
+class Clock:
+    """rows: those kept, in the order of time; times: (n,) s of them; grid: (m,) s, even."""
+
+    rows: NDArray[np.intp]
+    times: Array
+    grid: Array
+    dropped: int
+
+    def resampled(self, column: Array) -> Array:
+        """A column (rows of the file,) on the even clock, by straight lines."""
+        return np.asarray(np.interp(self.grid, self.times, column[self.rows]))
+
+    def cost(self, column: Array) -> float:
+        """RMS error of the straight lines, told from the lines between every other row."""
+        kept = column[self.rows]
+        between = np.interp(self.times[1:-1:2], self.times[::2], kept[::2])
+        # Of a smooth signal lines twice as long are four times as far off.
+        return float(np.sqrt(np.mean((between - kept[1:-1:2]) ** 2))) / 4.0
+
+    def costs(self, mapping: ImportMap, columns: Mapping[str, Array]) -> str:
+        """What the clock costs each signal of a map, one sentence."""
+        each = [
+            f"{axis}.{field} {c.unit.size * abs(c.scale) * self.cost(columns[c.column]):.2g} "
+            f"{entry.units[field]}"
+            for axis, entry in mapping.axes.items()
+            for field, c in entry.columns.items()
+        ]
+        return f"{self}; error rms about {', '.join(each)}"
+
+    def __str__(self) -> str:
+        steps = np.diff(self.times) * 1e3
+        dropped = f", {self.dropped} rows with a time that does not increase left out"
+        return (
+            f"steps of {steps.min():.3g} to {steps.max():.3g} ms were resampled to "
+            f"{np.median(np.diff(self.grid)) * 1e3:.4g} ms{dropped if self.dropped else ''}"
+        )
+
+
+def clock_of(time: Array, rate: float) -> Clock:
+    """The even clock of ``rate`` Hz over the times (n,) in s; raises InputError."""
+    if not np.isfinite(time).all():
+        k = int(np.argmin(np.isfinite(time)))
+        raise InputError(f"the time in row {k + 1} is {time[k]}; give every row a time")
+    increasing = time > np.maximum.accumulate(np.concatenate([[-np.inf], time[:-1]]))
+    rows = np.flatnonzero(increasing)
+    kept = time[rows]
+    if len(kept) < 3 or 2 * len(kept) < len(time):
+        raise InputError(f"the time increases in {len(kept)} of {len(time)} rows only")
+    steps = np.diff(kept)
+    usual = float(np.median(steps))
+    if rate * usual > 2.0 or rate * usual < 0.01:
+        raise InputError(
+            f"resample = {rate:g} Hz, but the rows come at about {1.0 / usual:.4g} Hz; give that"
+        )
+    gap = int(np.argmax(steps))
+    if steps[gap] > LONGEST_GAP * usual:
+        raise InputError(
+            f"there is nothing between {instant(kept[gap])} and {instant(kept[gap + 1])}; import "
+            "the parts before and behind it as logs of their own"
+        )
+    grid = kept[0] + np.arange(int((kept[-1] - kept[0]) * rate * (1.0 + 1e-12)) + 1) / rate
+    return Clock(rows, kept, grid, len(time) - len(kept))

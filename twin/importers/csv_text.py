@@ -1,0 +1,278 @@
+"""Text tables: delimiter, decimal sign, header and first row of numbers are found in the file.
+
+Lines above the header and a line of units below it are ignored. Where there is no header the
+columns are called "1", "2", ... An export of TwinCAT Scope is known by its own header, rows of a
+key and its value for each channel. Source: Beckhoff Infosys, TE13xx TwinCAT 3 Scope View, "Export
+to CSV". A column under the key is that of the times, in ms since the first sample or, as full time
+stamps, in 100 ns since 1601.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import itertools
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from twin.errors import InputError
+from twin.importers.mapping import CsvLayout, ImportMap
+from twin.importers.table import Table, chosen, parsing
+from twin.logs.log import Array
+
+TIME = "time"
+END = "EOF"  # the last line of an export, where it was asked for
+_NAME, _SYMBOL, _STEP = "Name", "SymbolName", "SampleTime[ms]"
+_STARTS = ("StartRecord", "Starttime of export", "StartTime")
+_UNIX_EPOCH = 116_444_736_000_000_000  # in 100 ns since 1601
+
+
+@dataclass(frozen=True)
+class ScopeHeader:
+    """names: of the columns; first: row of the first numbers; start_ns: since 1970, or None."""
+
+    names: tuple[str, ...]
+    first: int
+    sample_rate: float | None
+    start_ns: int | None
+
+
+def find_header(
+    rows: Sequence[Sequence[str]], is_number: Callable[[str], bool], value: Callable[[str], float]
+) -> ScopeHeader | None:
+    """The header of an export, None where the rows are none; raises InputError."""
+    keys = [row[0] if row else "" for row in rows]
+    if _STEP not in keys or _NAME not in keys:
+        return None
+    step = keys.index(_STEP)
+    first = next((k for k in range(step, len(rows)) if is_number(keys[k])), None)
+    if first is None:
+        raise InputError("has no numbers below the header of TwinCAT Scope; export it again")
+    named = keys.index(_SYMBOL) if _SYMBOL in keys[:first] else _last(keys[:step], _NAME)
+    names = [TIME if cell in (keys[named], "") else cell for cell in rows[named]]
+    width = len(rows[first])
+    if width < len(names):  # exported without times
+        names = [name for name in names if name != TIME]
+    if width > len(names) or not names:
+        raise InputError(
+            f"has {len(names)} names of channels, but rows of {width} cells; export it from "
+            "TwinCAT Scope with the whole header and one time column"
+        )
+    return ScopeHeader(
+        _distinct(names[:width]), first, _rate(rows[step], is_number, value), _start(rows[:first])
+    )
+
+
+def _last(keys: Sequence[str], key: str) -> int:
+    return len(keys) - 1 - keys[::-1].index(key)
+
+
+def _distinct(names: Sequence[str]) -> tuple[str, ...]:
+    """The time of the first channel is that of all; others are called time[2], time[3], ..."""
+    times, out = 0, []
+    for name in names:
+        times += name == TIME
+        out.append(f"{TIME}[{times}]" if name == TIME and times > 1 else name)
+    return tuple(out)
+
+
+def _rate(
+    row: Sequence[str], is_number: Callable[[str], bool], value: Callable[[str], float]
+) -> float | None:
+    steps = {value(cell) for cell in row if is_number(cell)}
+    if len(steps) > 1:
+        shown = ", ".join(f"{step:g}" for step in sorted(steps))
+        raise InputError(
+            f"has channels with sample times of {shown} ms; export those of one sample time at once"
+        )
+    step = steps.pop() if steps else 0.0
+    return 1e3 / step if step > 0.0 else None
+
+
+def _start(rows: Sequence[Sequence[str]]) -> int | None:
+    for row in rows:
+        if len(row) > 1 and row[0] in _STARTS and row[1].isdigit() and int(row[1]) > _UNIX_EPOCH:
+            return 100 * (int(row[1]) - _UNIX_EPOCH)
+    return None
+
+
+_HEAD_BYTES = 1 << 16
+_SAMPLE_LINES = 20
+_DELIMITERS = (",", ";", "\t", "|", None)  # None: any white space
+_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"))
+
+
+@dataclass(frozen=True)
+class _Style:
+    """How a line is cut into cells, and how a cell is a number."""
+
+    delimiter: str | None
+    decimal: str
+
+    def cells(self, line: str) -> list[str]:
+        text = line.strip(" \r\n").removeprefix("#").strip(" ")
+        if self.delimiter is None:
+            return text.split()
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=self.delimiter), [])]
+
+    def value(self, cell: str) -> float:
+        return float(cell.replace(self.decimal, "."))
+
+    def is_number(self, cell: str) -> bool:
+        try:
+            self.value(cell)
+        except ValueError:
+            return False
+        return True
+
+    def share_of_numbers(self, lines: Sequence[str], columns: int) -> float:
+        """Of the cells of ``lines``; 0 where there are fewer columns."""
+        rows = [self.cells(line) for line in lines]
+        if len(rows[-1]) < columns:
+            return 0.0
+        cells = list(itertools.chain.from_iterable(rows))
+        return sum(map(self.is_number, cells)) / len(cells)
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """encoding, style, names of the columns, and the lines before the first row of numbers.
+
+    sample_rate (Hz) and start_ns (since 1970): where the header states them.
+    """
+
+    encoding: str
+    style: _Style
+    names: tuple[str, ...]
+    skip: int
+    sample_rate: float | None = None
+    start_ns: int | None = None
+
+
+def read(path: Path, mapping: ImportMap) -> Table:
+    """Columns of a text table; raises InputError."""
+    with parsing("a text table"):
+        layout = _find_layout(path, mapping.csv)
+        wanted = chosen(mapping.column_names(), layout.names)
+        where = [layout.names.index(name) for name in wanted]
+        try:
+            values = _numbers(path, layout, where)
+        except ValueError as error:
+            raise _first_fault(path, layout, where) or InputError(str(error)) from error
+    columns = dict(zip(wanted, values, strict=True))
+    return Table(columns, layout.sample_rate, layout.start_ns)
+
+
+def _numbers(path: Path, layout: _Layout, where: Sequence[int]) -> Array:
+    """Columns ``where`` as rows (k, n)."""
+    with closing(_lines(path, layout)) as lines:
+        return np.loadtxt(
+            lines, delimiter=layout.style.delimiter, usecols=where, comments=None, quotechar='"',
+            ndmin=2, unpack=True,
+        )  # fmt: skip
+
+
+def _lines(path: Path, layout: _Layout) -> Generator[str]:
+    """Lines of numbers, with a point as decimal sign."""
+    with open(path, encoding=layout.encoding, errors="replace") as stream:
+        rows: Iterable[str] = itertools.islice(stream, layout.skip, None)
+        rows = itertools.takewhile(lambda line: not line.startswith(END), rows)
+        comma = layout.style.decimal == ","
+        yield from (line.replace(",", ".") for line in rows) if comma else rows
+
+
+def _find_layout(path: Path, stated: CsvLayout) -> _Layout:
+    with open(path, "rb") as stream:
+        head = stream.read(_HEAD_BYTES)
+        whole = not stream.read(1)
+    encoding = _encoding(head)
+    text = head.decode(encoding, errors="replace")
+    lines = text.split("\n") if whole else text.split("\n")[:-1]
+    while lines and lines[-1].strip() in ("", END):
+        lines.pop()
+    if not lines:
+        raise InputError("has no line of text; give a table of numbers")
+    style = _find_style(lines[-_SAMPLE_LINES:], stated)
+    rows = [style.cells(line) for line in lines]
+    scope = find_header(rows, style.is_number, style.value)
+    if scope is not None:
+        return _Layout(encoding, style, scope.names, scope.first, scope.sample_rate, scope.start_ns)
+    skip = _first_row(rows, style, stated.header_line)
+    return _Layout(encoding, style, _names(rows, skip, stated.header_line), skip)
+
+
+def _encoding(head: bytes) -> str:
+    for mark, encoding in _MARKS:
+        if head.startswith(mark):
+            return encoding
+    try:
+        head[: head.rfind(b"\n") + 1].decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252"  # what programs on Windows write where it is not UTF-8
+    return "utf-8"
+
+
+def _find_style(lines: Sequence[str], stated: CsvLayout) -> _Style:
+    delimiters = (stated.delimiter,) if stated.delimiter else _DELIMITERS
+    decimals = (stated.decimal,) if stated.decimal else (".", ",")
+    styles = [_Style(d, p) for d in delimiters for p in decimals if d != p]
+    for columns in (2, 1):  # 1,5 is two columns, unless the map states delimiter or decimal
+        best = max(styles, key=lambda style: style.share_of_numbers(lines, columns))
+        if best.share_of_numbers(lines, columns) > 0.0:
+            return best
+    raise InputError("has no rows of numbers; state delimiter and decimal in the map")
+
+
+def _first_row(rows: Sequence[Sequence[str]], style: _Style, header_line: int | None) -> int:
+    """Index of the first row with a number, as wide as the last row."""
+    for index in range(header_line or 0, len(rows)):
+        if len(rows[index]) == len(rows[-1]) and any(map(style.is_number, rows[index])):
+            return index
+    raise InputError(
+        f"has no rows of numbers below line {header_line or 0} that are as wide as its last line; "
+        "cut off what follows the numbers, or correct header_line"
+    )
+
+
+def _names(rows: Sequence[Sequence[str]], skip: int, header_line: int | None) -> tuple[str, ...]:
+    """Names of the columns: the topmost of the rows above the numbers that are as wide."""
+    width = len(rows[skip])
+    widths = (width, width - 1) if not rows[skip][-1] else (width,)  # rows may end in a delimiter
+    if header_line is not None:
+        top = header_line - 1
+    else:
+        top = skip
+        while top > 0 and len(rows[top - 1]) in widths:
+            top -= 1
+        if top == skip and (skip == 0 or len(rows[skip - 1]) < 2):
+            return tuple(str(k + 1) for k in range(width))
+        top = min(top, skip - 1)
+    if len(rows[top]) not in widths:
+        raise InputError(
+            f"line {top + 1} has {len(rows[top])} names, the rows have {width} cells; "
+            "state header_line, delimiter or decimal in the map"
+        )
+    return tuple(rows[top])
+
+
+def _first_fault(path: Path, layout: _Layout, where: Sequence[int]) -> InputError | None:
+    """The first cell that is not a number."""
+    with open(path, encoding=layout.encoding, errors="replace") as stream:
+        for number, line in enumerate(stream, 1):
+            if number <= layout.skip or not line.strip():
+                continue
+            cells = layout.style.cells(line)
+            for index in where:
+                place = f"line {number}, column '{layout.names[index]}'"
+                if index >= len(cells) or not cells[index]:
+                    return InputError(f"{place}: is empty; complete or cut out the row")
+                if not layout.style.is_number(cells[index]):
+                    return InputError(
+                        f"{place}: {cells[index]!r} is not a number; correct it, or state "
+                        "header_line, delimiter or decimal in the map"
+                    )
+    return None

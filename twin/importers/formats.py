@@ -1,0 +1,149 @@
+"""HDF5, JSON, Parquet and TDMS, each as columns by name.
+
+HDF5: a dataset is named by its path; fields of a compound dataset as ``path/field``. JSON: arrays
+by name, a matrix (``name[1]``, ``name[2]``, ...; a list of as many names beside it names its
+columns), or one object a row. Parquet: an empty cell is NaN, which the importer refuses. TDMS of
+LabVIEW: a channel is named ``group/channel``; its waveform may state the rate.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.importers.mapping import ImportMap
+from twin.importers.table import (
+    Table,
+    chosen,
+    extra,
+    parsing,
+    require_columns,
+    require_fits,
+    split_columns,
+)
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_MATLAB_HEADER = 512  # bytes before the signature in a MAT file of version 7.3
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether the file is HDF5, alone or behind the header of MATLAB."""
+    with open(path, "rb") as stream:
+        head = stream.read(_MATLAB_HEADER + len(_SIGNATURE))
+    return head.startswith(_SIGNATURE) or head[_MATLAB_HEADER:] == _SIGNATURE
+
+
+def read_hdf5(path: Path, mapping: ImportMap, separator: str = "/") -> Table:
+    """Columns of an HDF5 file, ``separator`` between the parts of a name; raises InputError."""
+    h5py = extra("h5py")
+    wanted = mapping.column_names()
+    with parsing("HDF5"), h5py.File(path, "r") as file:
+        datasets: dict[str, Any] = {}
+
+        def visit(name: str, item: Any) -> None:
+            if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+                datasets[name.replace("/", separator)] = item
+
+        file.visititems(visit)
+        # only what may hold a wanted column is read, the rest is known by its name
+        columns: dict[str, NDArray] = {}
+        size = 0.0
+        for name, dataset in datasets.items():
+            if not wanted or any(w.startswith(name) for w in wanted):
+                size += float(dataset.size or 0) * dataset.dtype.itemsize
+                require_fits(size, path)
+                columns |= _datasets(name, dataset, separator)
+        require_columns(wanted, {**datasets, **columns})  # lists all there are
+        return Table({name: columns[name] for name in chosen(wanted, columns)})
+
+
+def _datasets(name: str, dataset: Any, separator: str) -> dict[str, NDArray]:
+    if dataset.ndim not in (0, 1, 2):
+        return {}
+    values = np.asarray(dataset[()])
+    if values.dtype.names is None:
+        return split_columns(name, values)
+    parts = [split_columns(f"{name}{separator}{f}", values[f]) for f in values.dtype.names]
+    return {key: column for part in parts for key, column in part.items()}
+
+
+ROWS = "data"  # what the rows of a bare list are called
+
+
+def read_json(path: Path, mapping: ImportMap) -> Table:
+    """Columns of a JSON file; raises InputError."""
+    with parsing("JSON"):
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
+        columns = _arrays("", content if isinstance(content, dict) else {ROWS: content})
+    return Table({name: columns[name] for name in chosen(mapping.column_names(), columns)})
+
+
+def _arrays(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:
+    columns: dict[str, NDArray] = {}
+    names: list[str] = next((v for v in content.values() if _are_names(v)), [])
+    for key, value in content.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, dict):
+            columns |= _arrays(f"{name}.", value)
+        elif isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
+            columns |= {k: np.array([row.get(k, np.nan) for row in value]) for k in value[0]}
+        elif isinstance(value, list) and not _are_names(value):
+            split = split_columns(name, _numeric(value))
+            named = len(names) == len(split) > 1
+            columns |= dict(zip(names, split.values(), strict=True)) if named else split
+        elif isinstance(value, int | float | str):
+            columns[name] = np.array([value])
+    return columns
+
+
+def _numeric(value: list[Any]) -> NDArray:
+    """Rows as an array; what is no number, or is ragged, stays as it is and is refused later."""
+    try:
+        return np.array(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return np.array([str(v) for v in value], dtype=object)
+
+
+def _are_names(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(v, str) for v in value)
+
+
+def read_parquet(path: Path, mapping: ImportMap) -> Table:
+    """Columns of a Parquet file; raises InputError."""
+    parquet = extra("pyarrow.parquet")
+    with parsing("Parquet"), parquet.ParquetFile(path) as file:
+        wanted = list(chosen(mapping.column_names(), file.schema_arrow.names))
+        require_fits(8.0 * file.metadata.num_rows * len(wanted), path)
+        table = file.read(columns=wanted)
+        return Table({name: table.column(name).to_numpy() for name in wanted})
+
+
+_PERIOD = "wf_increment"  # s a sample
+
+
+def read_tdms(path: Path, mapping: ImportMap) -> Table:
+    """Columns of a TDMS file; raises InputError."""
+    nptdms = extra("nptdms")
+    with parsing("TDMS"), nptdms.TdmsFile.open(path) as file:
+        channels = {f"{g.name}/{c.name}": c for g in file.groups() for c in g.channels()}
+        read = {name: channels[name] for name in chosen(mapping.column_names(), channels)}
+        require_fits(sum(8.0 * len(channel) for channel in read.values()), path)
+        periods = {n: c.properties[_PERIOD] for n, c in read.items() if _PERIOD in c.properties}
+        return Table({name: c[:] for name, c in read.items()}, _rate(periods))
+
+
+def _rate(periods: dict[str, float]) -> float | None:
+    for name, period in periods.items():
+        first, expected = next(iter(periods.items()))
+        if period != expected or not period > 0.0:
+            raise InputError(
+                f"channel '{first}' has a sample every {expected:.9g} s, '{name}' every "
+                f"{period:.9g} s; export them at one rate"
+            )
+    return 1.0 / next(iter(periods.values())) if periods else None

@@ -1,0 +1,298 @@
+"""Foreign files + map -> Log: SI units, one time base, delays removed."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from twin.errors import InputError, at
+from twin.importers import csv_text, mat, mcap_topics
+from twin.importers.clock import Clock, clock_of, rate_of
+from twin.importers.formats import read_hdf5, read_json, read_parquet, read_tdms
+from twin.importers.mapping import ImportMap
+from twin.importers.table import Table, numbers
+from twin.logs.container import reading
+from twin.logs.log import Array, AxisLog, Log
+from twin.logs.series import instant, is_calendar
+
+Read = Callable[[Path, ImportMap], tuple[Mapping[str, Array], Array, str]]
+"""Columns by name, their times (n,) in s, and the sha256 of a file."""
+
+
+@dataclass(frozen=True)
+class Together:
+    """columns: by ColumnMap.key, on one clock; digests: sha256 by file; notes: what it cost."""
+
+    columns: Mapping[str, Array]
+    digests: tuple[str, ...]
+    notes: Mapping[str, str]
+    start: float
+
+
+def read_together(paths: Sequence[Path], mapping: ImportMap, read: Read) -> Together:
+    """The columns of all files where all have samples; raises InputError."""
+    if len(paths) != len(mapping.files):
+        raise InputError(
+            f"{len(paths)} files are given, the map has {len(mapping.files)} [[files]] tables; "
+            "give one for each, in the same order"
+        )
+    assert mapping.resample is not None
+    clocks: list[tuple[ImportMap, Mapping[str, Array], Clock]] = []
+    digests = []
+    for number, path in enumerate(paths, 1):
+        own = mapping.of_file(number)
+        with reading(path):
+            columns, times, digest = read(path, own)
+            times = times + mapping.files[number - 1].offset
+            clocks.append((own, columns, clock_of(times, mapping.resample)))
+            digests.append(digest)
+    grid = _common(paths, [clock for _, _, clock in clocks], mapping.resample)
+    out, notes = {}, {}
+    for number, (own, columns, clock) in enumerate(clocks, 1):
+        shared = replace(clock, grid=grid)
+        notes[f"resampled_{number}"] = shared.costs(own, columns)
+        for c in mapping.columns():
+            if c.file == number:
+                out[c.key] = shared.resampled(columns[c.column])
+    return Together(out, tuple(digests), notes, float(grid[0]))
+
+
+def _common(paths: Sequence[Path], clocks: Sequence[Clock], rate: float) -> Array:
+    """The even times that lie in all files."""
+    begin = max(clock.times[0] for clock in clocks)
+    end = min(clock.times[-1] for clock in clocks)
+    if not (end - begin) * rate >= 2.0:
+        spans = "; ".join(
+            f"{path} {instant(clock.times[0])} to {instant(clock.times[-1])}"
+            for path, clock in zip(paths, clocks, strict=True)
+        )
+        raise InputError(f"the files have no time in common ({spans}); correct their offset (s)")
+    count = int((end - begin) * rate * (1.0 + 1e-12)) + 1
+    return np.asarray(begin + np.arange(count) / rate)
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format: how its files end, and what reads them."""
+
+    endings: tuple[str, ...]
+    read: Callable[[Path, ImportMap], Table]
+
+
+FORMATS: Mapping[str, Format] = {
+    "csv": Format((".csv", ".txt", ".tsv", ".dat", ".asc"), csv_text.read),
+    "mat": Format((".mat",), mat.read),
+    "hdf5": Format((".h5", ".hdf5", ".hdf", ".he5"), read_hdf5),
+    "parquet": Format((".parquet", ".pq"), read_parquet),
+    "json": Format((".json",), read_json),
+    "tdms": Format((".tdms",), read_tdms),
+    "mcap": Format((".mcap",), mcap_topics.read),
+}
+
+
+def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> Log:
+    """Read a log of another program as ``mapping`` says; see ``load_mapping``.
+
+    path: the file, or the files in the order of the map's. Samples are in SI, those that delays
+    leave without a partner are cut off at the ends. Raises InputError for a missing file, column or
+    package, a cell that is not a finite number, columns of different length, and times that are not
+    even.
+    """
+    paths = [Path(p) for p in ([path] if isinstance(path, str | Path) else path)]
+    if mapping.files:
+        return _of_several(paths, mapping)
+    if len(paths) != 1:
+        raise InputError(
+            f"{len(paths)} files are given; several need a table [[files]] for each in the map"
+        )
+    with reading(paths[0]):
+        return _of_one(paths[0], mapping)
+
+
+def _of_one(path: Path, mapping: ImportMap) -> Log:
+    table, columns, facts = _read(path, mapping)
+    start = _start(table, mapping, columns)
+    notes: dict[str, str] = {}
+    if mapping.resample is None:
+        rate = _sample_rate(table, mapping, columns)
+    else:
+        rate = mapping.resample
+        columns, notes = _on_one_clock(mapping, columns)
+    return _log(mapping, columns, rate, {**facts, **start, **notes})
+
+
+def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
+    formats, starts = [], []
+
+    def read(path: Path, own: ImportMap) -> tuple[Mapping[str, Array], Array, str]:
+        table, columns, facts = _read(path, own)
+        formats.append(facts["original_format"])
+        start = _start(table, own, columns).get("start_time_unix_ns")
+        starts.append(start)
+        if own.time is None:
+            rate, count = _sample_rate(table, own, columns), _common_length(columns)
+            return columns, np.arange(count) / rate, facts["original_sha256"]
+        times = own.time.to_si(columns[own.time.column])
+        if start is not None and not is_calendar(times[0]):  # dates: seconds since the first
+            times = times - times[0] + int(start) * 1e-9
+        return columns, times, facts["original_sha256"]
+
+    found = read_together(paths, mapping, read)
+    facts = {
+        "original_format": ",".join(formats), "original_sha256": ",".join(found.digests),
+        **found.notes,
+    }  # fmt: skip
+    if is_calendar(found.start):
+        facts["start_time_unix_ns"] = str(round(found.start * 1e9))
+    assert mapping.resample is not None
+    return _log(mapping, found.columns, mapping.resample, facts)
+
+
+def table_of(path: Path, mapping: ImportMap) -> Table:
+    """The columns that a map names, all where it has no axes; raises InputError."""
+    return FORMATS[_format_name(path, mapping)].read(path, mapping)
+
+
+def _read(path: Path, mapping: ImportMap) -> tuple[Table, Mapping[str, Array], dict[str, str]]:
+    """The table, its columns as numbers, and format and sha256 of the file."""
+    name = _format_name(path, mapping)
+    with open(path, "rb") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    table = table_of(path, mapping)
+    columns = {n: numbers(n, raw) for n, raw in table.columns.items()}
+    _common_length(columns)
+    return table, columns, {"original_format": name, "original_sha256": digest}
+
+
+def _log(
+    mapping: ImportMap, columns: Mapping[str, Array], rate: float, facts: Mapping[str, str]
+) -> Log:
+    for column, values in columns.items():
+        _require_finite(column, values, rate)
+    span = _undelayed(mapping, _common_length(columns))
+    metadata = {"source": "import", "import_map": mapping.text, **facts}
+    return Log(rate, _axes(mapping, columns, span), metadata)
+
+
+def _on_one_clock(
+    mapping: ImportMap, columns: Mapping[str, Array]
+) -> tuple[dict[str, Array], dict[str, str]]:
+    """The columns resampled, and for the metadata what that cost."""
+    assert mapping.time is not None
+    assert mapping.resample is not None
+    with at(f"column '{mapping.time.column}'"):
+        clock = clock_of(mapping.time.to_si(columns[mapping.time.column]), mapping.resample)
+    even = {n: clock.resampled(c) for n, c in columns.items() if n != mapping.time.column}
+    return even, {"resampled": clock.costs(mapping, columns)}
+
+
+def _start(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> dict[str, str]:
+    """When the recording began by the wall clock, where the format or its times say so."""
+    if table.start_ns is not None:
+        return {"start_time_unix_ns": str(table.start_ns)}
+    if mapping.time is None:
+        return {}
+    raw = np.asarray(table.columns[mapping.time.column])
+    if raw.dtype.kind == "M" and len(raw):
+        return {"start_time_unix_ns": str(int(raw[0].astype("datetime64[ns]").astype(np.int64)))}
+    first = mapping.time.to_si(columns[mapping.time.column][:1])
+    if len(first) and is_calendar(first[0]):
+        return {"start_time_unix_ns": str(round(float(first[0]) * 1e9))}
+    return {}
+
+
+def _format_name(path: Path, mapping: ImportMap) -> str:
+    if mapping.format is not None:
+        if mapping.format not in FORMATS:
+            raise InputError(
+                f"the map gives format = '{mapping.format}'; allowed: {', '.join(FORMATS)}"
+            )
+        return mapping.format
+    for name, known in FORMATS.items():
+        if path.suffix.lower() in known.endings:
+            return name
+    endings = ", ".join(e for f in FORMATS.values() for e in f.endings)
+    raise InputError(
+        f"ends in '{path.suffix}', known are {endings}; state format in the map: "
+        f"{', '.join(FORMATS)}"
+    )
+
+
+def _common_length(columns: Mapping[str, Array]) -> int:
+    first, values = next(iter(columns.items()))
+    for name, other in columns.items():
+        if len(other) != len(values):
+            raise InputError(
+                f"column '{first}' has {len(values)} rows, '{name}' has {len(other)}; "
+                "export them with one time base"
+            )
+    if len(values) < 2:
+        raise InputError(f"has {len(values)} rows; a log has at least 2")
+    return len(values)
+
+
+def _sample_rate(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> float:
+    if mapping.time is not None:
+        dated = table.columns[mapping.time.column].dtype.kind == "M"
+        if dated and mapping.time.unit.size != 1.0:
+            raise InputError(f"column '{mapping.time.column}' holds dates; state its unit as s")
+        with at(f"column '{mapping.time.column}'"):
+            return rate_of(mapping.time.to_si(columns[mapping.time.column]))
+    rate = mapping.sample_rate or table.sample_rate
+    if rate is None:
+        raise InputError(
+            "does not state its sample rate; give sample_rate (Hz) or time "
+            '({column = "t", unit = "s"}) in the map'
+        )
+    if table.sample_rate is not None and abs(table.sample_rate - rate) > 1e-6 * rate:
+        raise InputError(
+            f"is sampled at {table.sample_rate:.9g} Hz, the map says {rate:.9g} Hz; "
+            "correct sample_rate in the map or leave it out"
+        )
+    return rate
+
+
+def _require_finite(name: str, values: Array, rate: float) -> None:
+    finite = np.isfinite(values)
+    if not finite.all():
+        k = int(np.argmin(finite))
+        raise InputError(
+            f"column '{name}' is {values[k]} in row {k + 1} of {len(values)} ({k / rate:.6g} s), "
+            f"{len(values) - np.count_nonzero(finite)} such rows in all; cut them out or leave "
+            "the signal out of the map"
+        )
+
+
+def _undelayed(mapping: ImportMap, count: int) -> range:
+    """Samples for which every column, moved back by its delay, has a value."""
+    delays = [c.delay_samples for axis in mapping.axes.values() for c in axis.columns.values()]
+    span = range(max(0, -min(delays)), count - max(0, *delays))
+    if len(span) < 2:
+        raise InputError(
+            f"delay_samples of {min(delays)} to {max(delays)} leave nothing of {count} rows; "
+            "correct them in the map"
+        )
+    return span
+
+
+def _axes(mapping: ImportMap, columns: Mapping[str, Array], span: range) -> dict[str, AxisLog]:
+    axes = {}
+    for name, axis in mapping.axes.items():
+        signals = {
+            field: c.to_si(
+                columns[c.key][span.start + c.delay_samples : span.stop + c.delay_samples]
+            )
+            for field, c in axis.columns.items()
+        }
+        for field, values in signals.items():
+            if not np.isfinite(values).all():
+                raise InputError(
+                    f"axes.{name}.{field} is too large for a number after unit, scale and offset; "
+                    "correct them in the map"
+                )
+        axes[name] = AxisLog(signals, axis.units, axis.force_constant)
+    return axes

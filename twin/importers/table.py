@@ -1,0 +1,126 @@
+"""The table that every format is read into, and the errors that all formats share."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.logs.container import LARGEST_RATIO
+from twin.logs.log import Array
+
+_MOST_NAMES = 40  # columns listed in a message
+SMALLEST_TABLE = 1 << 27  # bytes, whatever the size of the file
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns as the file holds them; what the format itself states of sample rate and start.
+
+    sample_rate: Hz. start_ns: when the recording began, ns since 1970.
+    """
+
+    columns: Mapping[str, NDArray]
+    sample_rate: float | None = None
+    start_ns: int | None = None
+
+
+def require_columns(wanted: Iterable[str], there: Collection[str]) -> None:
+    """Raises InputError that lists the columns there are where a wanted one is missing."""
+    names = list(there)
+    for name in wanted:
+        if names.count(name) > 1:
+            raise InputError(f"{names.count(name)} columns are called '{name}'; rename them")
+        if name in names:
+            continue
+        near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+        hint = f"did you mean '{near[0]}'? " if near else ""
+        more = len(names) - _MOST_NAMES
+        tail = f" and {more} more" if more > 0 else ""
+        raise InputError(
+            f"there is no column '{name}'; {hint}columns: "
+            f"{', '.join(names[:_MOST_NAMES]) or 'none'}{tail}"
+        )
+
+
+def chosen(wanted: Iterable[str], there: Collection[str]) -> tuple[str, ...]:
+    """The wanted columns, all where none is named; raises InputError where one is missing."""
+    names = tuple(wanted)
+    require_columns(names, there)
+    return names or tuple(there)
+
+
+def split_columns(name: str, values: NDArray) -> dict[str, NDArray]:
+    """A vector as it is; a matrix as ``name[1]``, ``name[2]``, ... along its shorter side.
+
+    A single value is a column of one row. Nothing where ``values`` has more than two sides.
+    """
+    array = np.atleast_1d(np.squeeze(values))
+    if array.ndim == 1:
+        return {name: array}
+    if array.ndim != 2:
+        return {}
+    across = array if array.shape[0] < array.shape[1] else array.T
+    return {f"{name}[{k}]": row for k, row in enumerate(across, 1)}
+
+
+def numbers(name: str, raw: NDArray) -> Array:
+    """Column as (n,) floats, dates as seconds since the first; raises InputError for text."""
+    array = np.asarray(raw)
+    if array.dtype.kind == "M":
+        return np.asarray((array - array[:1]) / np.timedelta64(1, "s"), dtype=np.float64)
+    if array.ndim != 1 or array.dtype.kind not in "fiub":
+        row = next((k for k, v in enumerate(array.flat, 1) if not _is_number(v)), None)
+        place = f": {array.flat[row - 1]!r} in row {row}" if row else ""
+        raise InputError(f"column '{name}' does not hold one real number a row{place}")
+    return array.astype(np.float64)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | np.number) and not isinstance(value, np.complexfloating)
+
+
+def extra(module: str) -> ModuleType:
+    """Import a package that only some formats need; raises InputError that says how to get it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise InputError(
+            f"needs the package {module.partition('.')[0]}; "
+            "install it with: pip install proton-twin[import]"
+        ) from error
+
+
+def require_fits(size: float, path: Path) -> None:
+    """Raise InputError where columns of ``size`` bytes are more than a file may expand to.
+
+    Recordings shrink to a tenth or so; a file of kB that announces GB has none.
+    """
+    most = SMALLEST_TABLE + LARGEST_RATIO * path.stat().st_size
+    if size > most:
+        raise InputError(
+            f"announces columns of {size:.3g} bytes, a file of this size has at most {most:.3g}; "
+            "export it again"
+        )
+
+
+@contextmanager
+def parsing(what: str) -> Iterator[None]:
+    """Make whatever a parser raises on a damaged file an InputError."""
+    try:
+        yield
+    except (InputError, OSError, MemoryError):
+        raise
+    except Exception as error:
+        raise InputError(
+            f"cannot be read as {what} ({error}); state the format in the map, or export it again"
+        ) from error

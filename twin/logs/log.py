@@ -1,0 +1,170 @@
+"""The log in memory: equally spaced samples of some axes, columns with units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.model.units import AxisUnits, rotary_unit, units_of
+
+Array = NDArray[np.float64]
+
+FIELDS = (
+    "setpoint_position",
+    "setpoint_velocity",
+    "setpoint_acceleration",
+    "position",
+    "velocity",
+    "current",
+    "force",
+)
+LINEAR_UNITS = dict(zip(FIELDS, ("m", "m/s", "m/s^2", "m", "m/s", "A", "N"), strict=True))
+ROTARY_UNITS = {name: rotary_unit(unit) for name, unit in LINEAR_UNITS.items()}
+
+
+@dataclass(frozen=True)
+class AxisLog:
+    """Recorded signals of one axis.
+
+    columns: field name -> (n,) samples in SI units; a signal not recorded is absent.
+    units: field name -> unit text; force_constant: N/A (N m/A on a rotary axis) or None.
+    Sample k of ``position`` is the reading at t_k; sample k of ``force``/``current`` is the
+    command held over [t_k, t_k + dt).
+    """
+
+    columns: Mapping[str, Array]
+    units: Mapping[str, str] = field(default_factory=lambda: LINEAR_UNITS)
+    force_constant: float | None = None
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()), ()))
+
+    def __repr__(self) -> str:
+        signals = ", ".join(f"{n} ({self.units.get(n, '?')})" for n in self.columns)
+        return f"<AxisLog of {len(self)} samples: {signals or 'no signals'}>"
+
+    @property
+    def kind(self) -> AxisUnits:
+        """The units of a linear or of a rotary axis, whichever the log states."""
+        return units_of(self.units.get("position"))
+
+    @property
+    def position(self) -> Array:
+        """(n,) encoder reading in m."""
+        return self.columns["position"]
+
+    @property
+    def force(self) -> Array:
+        """(n,) commanded actuator force in N: recorded, or force constant x current.
+
+        Raises InputError where neither is possible.
+        """
+        if "force" in self.columns:
+            return self.columns["force"]
+        if self.force_constant is None:
+            raise InputError(
+                f"the log has current (A) but no force and no force constant ({self.kind('N/A')}); "
+                "give force_constant in the axis' channel metadata or in the import map"
+            )
+        return self.force_constant * self.columns["current"]
+
+
+@dataclass(frozen=True)
+class Log:
+    """One log: ``axes`` by name ("x", "y"), sampled at ``sample_rate`` (Hz) from t = 0.
+
+    truth: axis -> column name -> (n,) array, simulation only; identification never reads it.
+    metadata: the MCAP metadata record "twin"; attachments: file name -> bytes.
+    """
+
+    sample_rate: float
+    axes: Mapping[str, AxisLog]
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    truth: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
+    attachments: Mapping[str, bytes] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(next(iter(self.axes.values()), ()))
+
+    def __repr__(self) -> str:
+        axes = "; ".join(f"{name}: {', '.join(a.columns)}" for name, a in self.axes.items())
+        seconds = len(self) * self.period
+        return f"<Log of {seconds:.4g} s at {self.sample_rate:g} Hz, {axes or 'no axes'}>"
+
+    def part(self, first: int, stop: int) -> Log:
+        """Its samples from number ``first`` to before ``stop``."""
+        span = slice(first, stop)
+        axes = {
+            name: replace(axis, columns={f: column[span] for f, column in axis.columns.items()})
+            for name, axis in self.axes.items()
+        }
+        truth = {a: {f: column[span] for f, column in c.items()} for a, c in self.truth.items()}
+        return replace(self, axes=axes, truth=truth)
+
+    def copied(self) -> Log:
+        """The same in memory of its own, where it is a small part of a large log."""
+        return joined([self.part(0, 0), self])
+
+    def with_fields(self, fields: Sequence[str]) -> Log:
+        """The same with the signals of these names alone, without truth and attachments."""
+        axes = {
+            name: replace(axis, columns={f: c for f, c in axis.columns.items() if f in fields})
+            for name, axis in self.axes.items()
+        }
+        return replace(self, axes=axes, truth={}, attachments={})
+
+    @property
+    def period(self) -> float:
+        """Sample period in s."""
+        return 1.0 / self.sample_rate
+
+    @property
+    def time(self) -> Array:
+        """(n,) sample times in s."""
+        return np.arange(len(self)) / self.sample_rate
+
+
+def joined(parts: Iterable[Log]) -> Log:
+    """One log of parts that follow each other without a gap, which all have the same columns."""
+    logs = list(parts)
+    first = logs[0]
+    if len(logs) == 1:
+        return first
+    axes = {
+        name: replace(axis, columns=_one_after_the_other([log.axes[name].columns for log in logs]))
+        for name, axis in first.axes.items()
+    }
+    truth = {name: _one_after_the_other([log.truth[name] for log in logs]) for name in first.truth}
+    return replace(first, axes=axes, truth=truth)
+
+
+def _one_after_the_other(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+HELD = ("current", "force")  # held over a sample, so that their mean acts; all others are readings
+
+
+def thinned(log: Log, every: int) -> Log:
+    """The log at 1/``every`` of its rate, less samples that do not fill a last step.
+
+    It is the log that a slower recorder would have written: position, velocity and setpoint at the
+    first of each ``every`` samples, current and force as means over them. Truth is left out.
+    """
+    if every == 1:
+        return replace(log, truth={})
+    count = len(log) // every * every
+
+    def fewer(field: str, column: Array) -> Array:
+        kept = column[:count].reshape(-1, every)
+        return kept.mean(axis=1) if field in HELD else kept[:, 0].copy()
+
+    axes = {
+        name: replace(axis, columns={f: fewer(f, c) for f, c in axis.columns.items()})
+        for name, axis in log.axes.items()
+    }
+    return replace(log, sample_rate=log.sample_rate / every, axes=axes, truth={})

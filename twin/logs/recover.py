@@ -1,0 +1,520 @@
+"""Recover a damaged log: every stretch of samples that a checksum proves, without a gap in it.
+
+Every chunk of a log can be read alone, and its messages carry the numbers of their samples. So the
+chunks are looked for wherever they lie in the file. A chunk record is opcode u1, length u8, first
+and last time u8 each, uncompressed size u8, checksum u4, the name of the compression (u4 and text),
+the size of the data u8, and the data. The checksum is that of the decompressed data, so where it
+holds, it proves the samples and all that led to them.
+
+Samples stay in the file until they are written or asked for, so that a log of any length can be
+recovered.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Chunk, ChunkIndex
+
+from twin.errors import InputError, at
+from twin.files import is_same_file
+from twin.logs.assemble import EVERYTHING, Extras, assembled, common_rate, require_fields
+from twin.logs.container import (
+    MAGIC,
+    RECORD_HEAD,
+    Damaged,
+    FileBytes,
+    Inflation,
+    Record,
+    decompressed,
+    open_chunk,
+    open_mcap,
+    reading,
+)
+from twin.logs.decode import Decoder, log_parts
+from twin.logs.layout import Block, sample_times
+from twin.logs.log import Array, Log, joined
+from twin.logs.series import require_even, require_finite, seconds
+from twin.logs.topics import Topic, Topics
+from twin.logs.writer import write_parts
+
+METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
+INTACT_STEP = 1 << 17  # samples of an intact log that are held in memory at a time
+STEP = 1 << 15  # the same of a damaged one
+_KEPT_CHUNKS = 2  # decompressed at a time
+_HEAD = struct.Struct("<BQQQQII")  # of a chunk, up to the length of the compression's name
+_SIZE = struct.Struct("<Q")
+_ZSTD = b"\x04\0\0\0zstd"
+_BEFORE = _HEAD.size + 4 + _SIZE.size  # bytes of a chunk before its data
+_LEAST_ROOM = 1 << 12  # bytes: what does not shrink may grow, a little
+_OPCODES = frozenset(Opcode)
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """What was kept of a log, and one sentence for each loss (none: the log was intact).
+
+    unproved: what was kept although no checksum proves it, one sentence each. others: the stretches
+    of samples that a gap separates from the longest one, in the order of time.
+    """
+
+    kept: str
+    lost: tuple[str, ...]
+    unproved: tuple[str, ...] = ()
+    others: tuple[Log, ...] = ()
+
+    def __str__(self) -> str:
+        lost = self.lost or ("nothing was lost",)
+        return "\n".join((f"kept {self.kept}", *(f"not proved: {u}" for u in self.unproved), *lost))
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """A stretch of samples: what it is, and its logs, which follow each other."""
+
+    text: str
+    logs: Callable[[], Iterator[Log]]
+
+
+def recover_log(path: str | Path, *, unproved: bool = False) -> tuple[Log, Recovery]:
+    """Read the longest series of intact chunks without a gap between them, and all others.
+
+    Samples are kept only where a checksum proves them, or, where ``unproved`` is asked for, where
+    nothing speaks against them. Raises InputError where nothing is left.
+    """
+    with _recovered(Path(path), unproved) as (kept, recovery):
+        log, *others = [joined(stretch.logs()) for stretch in kept]
+    return log, replace(recovery, others=tuple(others))
+
+
+def recover_file(
+    path: Path, out: Path, *, unproved: bool = False
+) -> tuple[Recovery, dict[Path, str]]:
+    """Write what ``recover_log`` reads to files, a piece at a time: the longest series to ``out``.
+
+    The others are beside it. Returns the recovery without its logs, and what each file holds.
+    Raises InputError as recover_log does, and where writing fails.
+    """
+    with _recovered(path, unproved) as (kept, recovery):
+        names = (out.with_name(f"{out.stem}.part{n}{out.suffix}") for n in range(1, len(kept)))
+        files = dict(zip((out, *names), kept, strict=True))
+        for name in files:
+            if is_same_file(name, path):
+                raise InputError(f"{path}: would be overwritten; give another name than {out}")
+        for name, stretch in files.items():
+            write_parts(stretch.logs(), name)
+    return recovery, {name: stretch.text for name, stretch in files.items()}
+
+
+@contextmanager
+def _recovered(path: Path, unproved: bool) -> Iterator[tuple[list[_Kept], Recovery]]:
+    """What is kept, the longest first; the file stays open until it was read."""
+    try:
+        count = sum(len(part) for part in _intact(path))
+    except InputError as error:
+        reason = str(error).removeprefix(f"{path}: ")
+    else:
+        text = f"all {count} samples"
+        yield [_Kept(text, lambda: _intact(path))], Recovery(text, ())
+        return
+    with reading(path):
+        stream = open(path, "rb")  # noqa: SIM115
+    with stream:
+        with reading(path):
+            file = FileBytes(stream, os.fstat(stream.fileno()).st_size)
+            kept, recovery = _Salvage(file, reason, unproved).result(str(path))
+        yield kept, recovery
+
+
+def _intact(path: Path) -> Iterator[Log]:
+    """A log in which no fault is found, in parts; raises InputError."""
+    with open_mcap(path) as file:
+        yield from log_parts(file, file.records(), EVERYTHING, INTACT_STEP)
+
+
+@dataclass(frozen=True)
+class _FoundChunk:
+    """A chunk that lies in the file from ``offset`` to ``end``; size, crc: of what it holds.
+
+    length_holds: whether the length of its record says so too.
+    """
+
+    offset: int
+    end: int
+    size: int
+    crc: int
+    length_holds: bool
+
+    @property
+    def proved(self) -> bool:
+        """Whether a checksum says that its records are what was written."""
+        return self.crc != 0
+
+    @property
+    def place(self) -> str:
+        """Where it is."""
+        return f"chunk at byte {self.offset}"
+
+    def content(self, file: FileBytes) -> bytes:
+        """Its schema, channel and message records, decompressed; raises Damaged."""
+        data = file.part(self.offset + _BEFORE, self.end)
+        return decompressed(Chunk("zstd", data, 0, 0, self.crc, self.size))
+
+
+def _found_chunks(file: FileBytes) -> Iterator[_FoundChunk]:
+    """The chunks that can be decompressed and have no wrong checksum, in the order of the file.
+
+    Within one that is proved none is looked for.
+    """
+    budget, start = Inflation(len(file)), 0
+    while (found := _first(file, start, budget)) is not None:
+        yield found
+        start = found.end if found.proved else found.offset + 1
+
+
+def _first(file: FileBytes, start: int, budget: Inflation) -> _FoundChunk | None:
+    before = _HEAD.size - 4
+    for place, length, data in file.windows(start, len(file), _BEFORE):
+        name = data.find(_ZSTD, before)
+        while before <= name < before + length:
+            offset = name - before
+            found = _opened(file, place + offset, data[offset : offset + _BEFORE], budget)
+            if found is not None:
+                return found
+            name = data.find(_ZSTD, name + 1)
+    return None
+
+
+def _opened(file: FileBytes, offset: int, head: bytes, budget: Inflation) -> _FoundChunk | None:
+    """The chunk at a place, by either of the two sizes that it states of its data."""
+    if len(head) < _BEFORE:
+        return None
+    _, length, _, _, size, crc, _ = _HEAD.unpack_from(head)
+    (inner,) = _SIZE.unpack_from(head, _BEFORE - _SIZE.size)
+    start, outer = offset + _BEFORE, length - (_BEFORE - RECORD_HEAD.size)
+    for stored in dict.fromkeys((inner, outer)):
+        if not 0 < stored <= min(len(file) - start, 2 * size + _LEAST_ROOM):
+            continue
+        found = _FoundChunk(offset, start + stored, size, crc, stored == outer)
+        try:
+            budget.take(size, stored)  # before it is read: what only looks like chunks may be many
+            found.content(file)
+        except Damaged:
+            continue
+        return found
+    return None
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Samples number ``first`` to before ``stop`` of a topic, which lie in a chunk."""
+
+    topic: Topic
+    channel: int
+    first: int
+    stop: int
+    chunk: _FoundChunk
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Samples number ``first`` to before ``stop`` of topics, whose pieces hold at least these."""
+
+    pieces: Mapping[str, Sequence[_Piece]]
+    first: int
+    stop: int
+
+    @property
+    def count(self) -> int:
+        """How many samples."""
+        return self.stop - self.first
+
+    @property
+    def start(self) -> str:
+        """Time of its first sample."""
+        topic = next(iter(self.pieces.values()))[0].topic
+        return seconds(int(sample_times(self.first, 1, topic.sample_rate)[0]))
+
+    def empty(self, extras: Extras) -> Log:
+        """The log without samples; raises InputError where an axis has too few signals, ..."""
+        topics = [pieces[0].topic for pieces in self.pieces.values()]
+        for topic in topics:
+            if not topic.is_truth:
+                require_fields(topic)
+        rate = common_rate({topic.name: topic.sample_rate for topic in topics}, extras)
+        nothing = ((topic, {name: np.empty(0) for name in topic.fields}) for topic in topics)
+        return assembled(nothing, rate, extras)
+
+    def logs(self, extras: Extras, read: Callable[[_Piece], Block]) -> Iterator[Log]:
+        """Its samples as logs that follow each other; raises InputError as ``empty`` does."""
+        rate = self.empty(extras).sample_rate
+        for first in range(self.first, self.stop, STEP):
+            stop = min(first + STEP, self.stop)
+            columns = (
+                (pieces[0].topic, _columns(pieces, first, stop, read))
+                for pieces in self.pieces.values()
+            )
+            yield assembled(columns, rate, extras)
+
+
+def _columns(
+    pieces: Sequence[_Piece], first: int, stop: int, read: Callable[[_Piece], Block]
+) -> dict[str, Array]:
+    """Samples number ``first`` to before ``stop`` of one topic."""
+    found: dict[str, list[Array]] = {name: [] for name in pieces[0].topic.fields}
+    for piece in pieces[bisect_right(pieces, first, key=lambda p: p.stop) :]:
+        if piece.first >= stop:
+            break
+        block = read(piece)
+        for name, parts in found.items():
+            parts.append(block.columns[name][max(0, first - piece.first) : stop - piece.first])
+    return {name: np.concatenate(parts) for name, parts in found.items()}
+
+
+class _Salvage:
+    """What can be had from the bytes of a damaged log; it keeps no sample, but where they are.
+
+    reason: why the log cannot be read as it is.
+    """
+
+    def __init__(self, file: FileBytes, reason: str, keep_unproved: bool) -> None:
+        self._file = file
+        self._keep_unproved = keep_unproved
+        self._lost = [reason]
+        self._unproved: list[str] = []
+        self._extras = Extras()
+        self._topics = Topics()
+        self._decoder = Decoder(self._topics)
+        self._announced: dict[int, int] = {}  # ns, of the last sample by channel, by the summary
+        self._content = lru_cache(_KEPT_CHUNKS)(lambda chunk: chunk.content(file))
+
+    def result(self, name: str) -> tuple[list[_Kept], Recovery]:
+        """The longest stretch of the file called so and the others; raises InputError for none."""
+        stretches = self._stretches(self._by_topic())
+        if not stretches:
+            hint = "; read it with --unproved" * bool(self._unproved and not self._keep_unproved)
+            why = "; ".join(dict.fromkeys([*self._lost, *self._unproved]))
+            raise InputError(f"nothing can be recovered ({why}){hint}")
+        # the rate is stated in every chunk too, and there a checksum protects it
+        self._extras.metadata.pop("sample_rate_hz", None)
+        longest = max(stretches, key=lambda s: s.count * len(s.pieces))
+        longest.empty(self._extras)
+        kept = [longest, *self._others(stretches, longest)]
+        unproved = [METADATA] if self._extras.metadata and not self._extras.proved else []
+        (unproved if self._keep_unproved else self._lost).extend(self._unproved)
+        lost = tuple(dict.fromkeys(self._lost))
+        recovery = Recovery(_text(longest), lost, tuple(dict.fromkeys(unproved)))
+        return [self._kept(stretch, name) for stretch in kept], recovery
+
+    def _kept(self, stretch: _Stretch, name: str) -> _Kept:
+        metadata = {**self._extras.metadata, "recovered": _text(stretch)}
+        if self._keep_unproved and self._unproved:
+            metadata["not_proved"] = "; ".join(self._unproved)
+        extras = Extras(metadata, self._extras.attachments)
+
+        def logs() -> Iterator[Log]:
+            with at(name):
+                yield from stretch.logs(extras, self._block)
+
+        return _Kept(_text(stretch), logs)
+
+    def _block(self, piece: _Piece) -> Block:
+        """The samples of a piece, read from the file again."""
+        blocks = self._decoder.blocks(self._content(piece.chunk))
+        return next(block for block in blocks if block.channel == piece.channel)
+
+    def _others(self, stretches: list[_Stretch], longest: _Stretch) -> Iterator[_Stretch]:
+        topics = {topic for s in stretches for topic in s.pieces}
+        for stretch in stretches:
+            if stretch is longest:
+                continue
+            try:
+                stretch.empty(self._extras)
+            except InputError as error:
+                self._lost.append(f"{_text(stretch)}: {error}")
+                continue
+            yield stretch
+            absent = ", ".join(sorted(topics - stretch.pieces.keys()))
+            why = (
+                f"{absent} has no samples there"
+                if absent
+                else "a gap separates them from the longer run"
+            )
+            self._lost.append(
+                f"{stretch.count} intact samples from {stretch.start} are in a log of their own: "
+                f"{why}"
+            )
+
+    def _by_topic(self) -> dict[str, list[_Piece]]:
+        """The pieces of each topic by their numbers, each once; topics in the order of the file."""
+        found: dict[int, list[_Piece]] = {}
+        for chunk in self._walk():
+            if self._is_taken(chunk):
+                for piece in self._pieces(chunk):
+                    found.setdefault(piece.channel, []).append(piece)
+        out: dict[str, list[_Piece]] = {}
+        for _, pieces in sorted(found.items()):
+            name = pieces[0].topic.name
+            if name in out:
+                self._lost.append(f"{pieces[0].chunk.place}: another channel has the topic {name}")
+            else:
+                out[name] = self._sorted(pieces)
+        return out
+
+    def _is_taken(self, chunk: _FoundChunk) -> bool:
+        if not chunk.length_holds:
+            self._lost.append(
+                f"bytes {chunk.offset} to {chunk.offset + RECORD_HEAD.size - 1}: the length of "
+                "a chunk is unreadable; its samples are intact"
+            )
+        if not chunk.proved:
+            self._unproved.append(f"{chunk.place}: has no checksum that proves its samples")
+        return chunk.proved or self._keep_unproved
+
+    def _pieces(self, chunk: _FoundChunk) -> Iterator[_Piece]:
+        """The samples of a chunk, each topic's that are numbered, timed and finite as they must."""
+        try:
+            with at(chunk.place):
+                blocks = self._decoder.blocks(self._content(chunk))
+        except InputError as error:
+            self._lost.append(str(error))
+            return
+        for block in blocks:
+            try:
+                with at(chunk.place):
+                    yield self._piece(chunk, block)
+            except InputError as error:
+                self._lost.append(str(error))
+
+    def _piece(self, chunk: _FoundChunk, block: Block) -> _Piece:
+        topic = self._topics.topic(block.channel)
+        assert topic is not None
+        first = int(block.sequence[0])
+        require_even(topic.name, block, first, 0, first, topic.sample_rate)
+        for name in topic.fields:
+            require_finite(topic.name, block, name, first)
+        return _Piece(topic, block.channel, first, first + len(block.sequence), chunk)
+
+    def _sorted(self, pieces: list[_Piece]) -> list[_Piece]:
+        """In the order of their numbers, each once, what is proved before what is not."""
+        ordered = sorted(pieces, key=lambda p: (p.first, not p.chunk.proved, p.chunk.offset))
+        out: list[_Piece] = []
+        for piece in ordered:
+            if out and piece.first < out[-1].stop:
+                self._lost.append(
+                    f"a copy of the {out[-1].chunk.place} is left out (the {piece.chunk.place})"
+                )
+            else:
+                out.append(piece)
+        if any(one.chunk.offset > other.chunk.offset for one, other in pairwise(out)):
+            self._lost.append("chunks were out of order; they are sorted by time")
+        return out
+
+    def _stretches(self, pieces: Mapping[str, list[_Piece]]) -> list[_Stretch]:
+        """The samples that the same topics have side by side, an axis at least."""
+        runs = {name: self._runs(name, own) for name, own in pieces.items()}
+        edges = {e for own in runs.values() for run in own for e in (run.start, run.stop)}
+        out = []
+        for a, b in pairwise(sorted(edges)):
+            here = {n: pieces[n] for n, own in runs.items() if any(a in run for run in own)}
+            if here and all(own[0].topic.is_truth for own in here.values()):
+                self._lost.append(f"{b - a} samples of {', '.join(here)} have no axis beside them")
+            elif here:
+                out.append(_Stretch(here, a, b))
+        return out
+
+    def _runs(self, name: str, pieces: Sequence[_Piece]) -> list[range]:
+        """The numbers of samples that follow each other without a gap."""
+        rate, runs, stop = pieces[0].topic.sample_rate, [range(0)], 0
+        end = round(self._announced.get(pieces[0].channel, -1e9) * 1e-9 * rate) + 1
+        for first, last in [*((p.first, p.stop) for p in pieces), (max(end, 0), 0)]:
+            if first > stop:
+                gone = (seconds(int(sample_times(k, 1, rate)[0])) for k in (stop, first))
+                self._lost.append(
+                    f"{name}: {first - stop} samples are missing, from {' to '.join(gone)}"
+                )
+                runs.append(range(first, first))
+            stop = max(stop, last)
+            runs[-1] = range(runs[-1].start, max(stop, runs[-1].stop))
+        return [run for run in runs if run]
+
+    def _walk(self) -> Iterator[_FoundChunk]:
+        """Chunks in the order of the file; behind unreadable bytes, from the next one on."""
+        file, previous, offset = self._file, len(MAGIC), len(MAGIC)
+        budget, found = Inflation(len(file)), _found_chunks(file)
+        following = next(found, None)
+        while offset < len(file) and not self._ends(offset):
+            while following is not None and following.offset < offset:
+                following = next(found, None)
+            if following is not None and following.offset == offset:
+                yield following
+                previous = offset = following.end
+                continue
+            end = self._end(offset, following)
+            if end is not None:
+                self._take(offset, end, budget)
+                previous, offset = offset, end
+            elif following is None:
+                self._lost.append(f"bytes {offset} to {len(file) - 1}: cut off or unreadable")
+                return
+            else:
+                self._lost.append(f"bytes {previous} to {following.offset - 1}: unreadable")
+                previous = offset = following.offset
+
+    def _ends(self, offset: int) -> bool:
+        return (
+            offset == len(self._file) - len(MAGIC) and self._file.part(offset, offset + 8) == MAGIC
+        )
+
+    def _end(self, offset: int, following: _FoundChunk | None) -> int | None:
+        """Where the record at a place ends, if there is one.
+
+        One that reaches over a chunk has a damaged length, but for an attachment whose checksum
+        holds: that may be a log, with chunks of its own.
+        """
+        start = offset + RECORD_HEAD.size
+        head = self._file.part(offset, start)
+        if len(head) < RECORD_HEAD.size:
+            return None
+        opcode, length = RECORD_HEAD.unpack(head)
+        end = start + length
+        if opcode not in _OPCODES or end > len(self._file):
+            return None
+        if following is not None and following.offset < end:
+            crc = int.from_bytes(self._file.part(end - 4, end), "little")
+            if opcode != Opcode.ATTACHMENT or self._file.checksum(start, end - 4) != crc:
+                return None
+        return end
+
+    def _take(self, offset: int, end: int, budget: Inflation) -> None:
+        """Take metadata or an attachment; say what is wrong with a chunk that was not found."""
+        opcode = self._file.part(offset, offset + 1)[0]
+        if opcode not in (Opcode.CHUNK, Opcode.CHUNK_INDEX, Opcode.METADATA, Opcode.ATTACHMENT):
+            return
+        record = Record(opcode, offset, self._file.part(offset + RECORD_HEAD.size, end))
+        try:
+            if opcode == Opcode.CHUNK:
+                open_chunk(record, budget)
+            elif opcode == Opcode.CHUNK_INDEX:
+                index = record.parsed(ChunkIndex)
+                for channel in index.message_index_offsets:
+                    ends = self._announced.get(channel, 0), index.message_end_time
+                    self._announced[channel] = max(ends)
+            else:
+                self._extras.add(record)
+        except InputError as error:
+            self._lost.append(str(error))
+
+
+def _text(stretch: _Stretch) -> str:
+    return f"{stretch.count} samples from {stretch.start}"
