@@ -76,7 +76,7 @@ def streams_in_one(outputs):  # type: ignore[no-untyped-def]
         elif (first := merged.get(output["name"])) is not None:
             first["text"] += output["text"]
         else:
-            merged[output["name"]] = output
+            merged[output["name"]] = type(output)(output)  # the cell keeps its own
     return list(merged.values())
 
 
