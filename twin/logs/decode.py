@@ -203,7 +203,8 @@ class Decoder:
         first = _MESSAGE_HEAD.unpack_from(data, offset + RECORD_HEAD.size)[0]
         if self._topics.topic(first) is None:
             return []
-        for layout in (self._layouts.get(first), self._inferred(data, offset)):
+        for likely in (lambda: self._layouts.get(first), lambda: self._inferred(data, offset)):
+            layout = likely()
             rows = layout.rows(data, offset) if layout else None
             if layout and rows is not None and offset + rows.nbytes == len(data):
                 self._layouts[first] = layout
