@@ -9,7 +9,8 @@ from identify.dataset.given_logs import Role
 from identify.output.numbers import quantity
 from identify.output.report import answer, effects, residual
 from identify.output.report.drawing import drawing_style
-from identify.output.report.page import Answer, Block, Heading, Part, Section, page
+from identify.output.report.page import Answer, Block, Heading, Part, Section
+from identify.output.report.page import page as whole_page
 from identify.output.report.subject import Subject
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis
@@ -55,7 +56,7 @@ def write_report(
         title, diagnosis, comparison, tuple(history), tuple(additions), tuple(assumed)
     )
     with drawing_style():
-        text = page(subject.title, facts(subject), sections(subject))
+        text = whole_page(subject.title, facts(subject), sections(subject))
     write_atomically(path, text.encode("utf-8"))
 
 

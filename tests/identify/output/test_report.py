@@ -169,7 +169,7 @@ def test_a_failure_leaves_the_old_report(
     def broken(*_: object) -> None:
         raise OSError("no space left on the device")
 
-    for target in ((os, "replace"), (identify.output.report, "page")):
+    for target in ((os, "replace"), (identify.output.report, "whole_page")):
         with monkeypatch.context() as patch, without_drawing():
             patch.setattr(*target, broken)
             with pytest.raises((InputError, OSError), match="no space"):
