@@ -123,7 +123,7 @@ def test_a_wrong_model_has_no_intervals():
     fit = Stub(residual=np.ones(3), ratio=LARGEST_RATIO, error=0.2, floor=0.1, axis=axis)
     assert refusal(fit) is None
     fit.ratio = 1.001 * LARGEST_RATIO
-    assert "0.2 N is 2.0 times the noise floor 0.1 N" in no_interval_in_words(refusal(fit))
+    assert "200 mN is 2.0 times the noise floor 100 mN" in no_interval_in_words(refusal(fit))
     fit.residual = np.zeros(0)
     assert "comes to rest within every test function" in no_interval_in_words(refusal(fit))
 

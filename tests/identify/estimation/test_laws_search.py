@@ -80,7 +80,7 @@ def planted(effect: str, **values: float) -> Dataset:
         ("quadratic_drag", {"c": 5.0}),
         ("periodic_disturbance", {"f": 11.0, "a": 0.1, "b": 0.05}),
         ("cogging", {"p": 0.0213, "a1": 0.1, "b2": 0.05}),
-        ("end_stop", {"low": -0.045, "high": 0.04, "stiffness": 500.0}),
+        ("end_stop", {"low": -0.0465, "high": 0.048, "stiffness": 500.0}),
     ],
 )
 def test_the_first_start_has_the_scanned_values_nearest_to_the_planted_ones(effect, values):

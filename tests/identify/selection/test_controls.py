@@ -96,7 +96,9 @@ def planted(effect: Effect, size: float = SIZE) -> Planted:
     base = axis_for(effect)
     honest = built_machine(logs(), base)
     fit = fit_axis(base, honest.fit)
-    shapes = list(tried_shapes(effect, SEEN))
+    places = np.concatenate([log.motion.position for log in honest.fit])
+    seen = replace(SEEN, position_low=float(places.min()), position_high=float(places.max()))
+    shapes = list(tried_shapes(effect, seen))
     axis = fit.axis.with_effect(Fitted.at_start(effect, shapes[len(shapes) // 2]))
     where = [ParameterReference(effect.name, p) for p in effect.strengths]
 

@@ -110,7 +110,7 @@ def test_the_helper_for_other_peoples_tests_says_what_differs(tmp_path: Path) ->
     path = tmp_path / "a.toml"
     save_model(fitted(), path)
     assert_agree(path, fitted(), catalogue=CATALOGUE)
-    with pytest.raises(AssertionError, match=r"mass differs by 1 kg.*\n.*RMS"):
+    with pytest.raises(AssertionError, match=r"mass differs by 1.00 kg.*\n.*RMS"):
         assert_agree(str(path), fitted(mass=11.0), catalogue=CATALOGUE)
     with pytest.raises(AssertionError, match="the model is wrong"):
         assert_agree(path, fitted(above=9.0, mass=11.0), catalogue=CATALOGUE)
