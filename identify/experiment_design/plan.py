@@ -46,7 +46,7 @@ from twin.progress import Progress, silent, within
 DURATION = 20.0  # s of a planned experiment
 NEXT_DURATION = 10.0  # s of the one that a diagnosis proposes
 VERIFIED = 6  # experiments at most that are judged again by full refits
-NEXT_VERIFIED = 3  # the same for the one that a diagnosis proposes
+NEXT_VERIFIED = 2  # the same for the one that a diagnosis proposes
 MOST_RIVALS = 3  # explanations that a diagnosis asks one experiment to separate
 
 
