@@ -200,6 +200,7 @@ def sections_of(found):
         return sections(subject)
 
 
+@pytest.mark.slow
 def test_what_no_motion_tells_apart_is_said():
     # The cable of this stage has a constant force of its own, which takes over the first.
     rivals = [CATALOGUE["constant_force"], CATALOGUE["asymmetric_friction"]]

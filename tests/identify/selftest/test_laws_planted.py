@@ -107,6 +107,7 @@ def test_a_friction_is_planted_first_and_scaled_until_the_model_falls_short():
 # --- the demonstration ----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_demonstration_hides_what_it_finds_again(tmp_path):
     """By its command, among few effects."""
     own = replace(STAGE, axes={"x": replace(SLIDE, hardware=HARDWARE)})

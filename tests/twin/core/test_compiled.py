@@ -73,6 +73,7 @@ def run(folder: Path) -> dict[str, float]:
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_a_change_of_law_structure_or_controller_is_seen_by_the_next_process(
     tmp_path: Path,
 ) -> None:
