@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 TRIED = 8.0  # s of motion on which nonlinear parameters are scanned before all of it is used
 SHORTEST_HEAD = 2.0  # s of each log
 ENOUGH = 30.0  # s of motion in each role, in which a search is made before all of it is fitted
-MARGIN = 0.05  # of the range of the fit logs, by which a log of another role may exceed it
+MARGIN = 0.05  # of the range of the training logs, by which a log of another role may exceed it
 LEAST_SHARED = 0.2  # part of the logs of a role that must lie within it
 
 
@@ -48,9 +48,9 @@ class Dataset:
 
     fit: the training logs. holdout: the selection logs (may be none), which take part in the choice
     of effects; no parameter is fitted on them. test: the test logs (may be none), on which nothing
-    is decided. covered: gives what the fit logs cover, which takes a while. channel_delay: s, by
-    which the force of the logs was shifted to earlier samples. left_out: the logs that say nothing,
-    by name, with the reason of each. begun: s that were left out at the beginning of logs,
+    is decided. covered: gives what the training logs cover, which takes a while. channel_delay: s,
+    by which the force of the logs was shifted to earlier samples. left_out: the logs that say
+    nothing, by name, with the reason of each. begun: s that were left out at the beginning of logs,
     by name, as the axis did not yet move freely.
     """
 
@@ -70,7 +70,7 @@ class Dataset:
 
     @property
     def beyond(self) -> dict[str, float]:
-        """Part of each log, 0..1 by name, that lies where no fit log has been."""
+        """Part of each log, 0..1 by name, that lies where no training log has been."""
         others = (*self.holdout, *self.test)
         parts = {log.motion.name: 1.0 - float(np.mean(log.reached)) for log in others}
         return {name: part for name, part in parts.items() if part > 0.0}
@@ -81,7 +81,7 @@ class Dataset:
 
     @property
     def excitation(self) -> Excitation:
-        """What the motions of the fit logs cover."""
+        """What the motions of the training logs cover."""
         return self.covered()
 
     @property
@@ -111,7 +111,7 @@ class Dataset:
 
     @cached_property
     def heads(self) -> tuple[PreparedLog, ...]:
-        """The beginnings of the fit logs, long enough together to scan nonlinear parameters on."""
+        """The beginnings of the training logs, long enough to scan nonlinear parameters on."""
         each = max(TRIED / len(self.fit), SHORTEST_HEAD)
         return tuple(PreparedLog.of(w.motion.head(each), w.test_function.length) for w in self.fit)
 
@@ -141,7 +141,7 @@ class Dataset:
 
     @cached_property
     def in_heads(self) -> NDArray[np.bool_]:
-        """Which test functions of the fit logs are in their heads."""
+        """Which test functions of the training logs are in their heads."""
         pairs = zip(self.heads, self.fit, strict=True)
         return np.concatenate([np.arange(len(w)) < len(h) for h, w in pairs])
 
@@ -253,7 +253,7 @@ def _within_reach(
     """Logs that test a fit, where its logs have been.
 
     Beyond, a force of position is extrapolated, and says nothing of what is there. All of them
-    where they have little in common with the fit logs.
+    where they have little in common with the training logs.
     """
     low, high = min(m.position.min() for m in fit), max(m.position.max() for m in fit)
     margin = MARGIN * (high - low)

@@ -33,7 +33,7 @@ class PreparedLog:
     test_function, fine: over the motion's blocks, and the same over the log's samples. command (n,)
     N and acceleration (n,) m/s^2 are means by test functions. force_noise: N RMS by test functions,
     which sensors do not make and nothing predicts; part of the noise floor. reach: positions (m)
-    between which its test functions count; of a log that is not fitted those of the fit logs.
+    between which its test functions count; of a log that is not fitted those of the training logs.
     """
 
     motion: Motion

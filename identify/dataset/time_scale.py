@@ -59,7 +59,7 @@ class Scale:
 def choose_length(
     motions_at: Callable[[float | None], tuple[Motions, ...]], *, imposed: bool = False
 ) -> float:
-    """Length of the test functions, s, for the logs to fit and the held-out ones.
+    """Length of the test functions, s, for the logs to fit and those that choose.
 
     motions_at: these for test functions of a length, whose blocks are short enough for it; for
     None as long as their noise asks for. imposed: whether there is no mass.

@@ -38,5 +38,5 @@ def error_if_any(role: Role, fit: Fit, dataset: Dataset) -> float | None:
 
 
 def holdout_error(fit: Fit, dataset: Dataset) -> float | None:
-    """RMS force error on the held-out logs in N, or None where there are none."""
+    """RMS force error on the selection logs in N, or None where there are none."""
     return error_if_any(Role.SELECTION, fit, dataset)

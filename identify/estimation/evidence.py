@@ -1,4 +1,4 @@
-"""Evidence for a larger model: BIC on the effective sample size, and held-out error by blocks."""
+"""Evidence for a larger model: BIC on the effective sample size, and selection error by blocks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-BLOCKS = 24  # over which the standard error of a held-out gain is taken
+BLOCKS = 24  # over which the standard error of a gain on selection logs is taken
 
 
 def rms(values: Array) -> float:
@@ -83,7 +83,7 @@ class Gain:
 
 
 def held_out_gain(before: Array, after: Array, floor: float) -> Gain:
-    """Compare two models on the same held-out residual samples (n,) N, with noise floor (N).
+    """Compare two models on the same selection residual samples (n,) N, with noise floor (N).
 
     t and the typical part are those of the logarithm of squared error plus squared floor, block by
     block, so that a few blocks with large errors do not decide alone.

@@ -66,7 +66,7 @@ def synchronised(fit: Fit, dataset: Dataset) -> tuple[Dataset, Fit]:
 
 
 def time_origins(dataset: Dataset) -> Array:
-    """When each log began, s; fit logs first."""
+    """When each log began, s; training logs first."""
     return np.array([log.motion.time_origin for log in dataset.logs])
 
 
@@ -82,7 +82,7 @@ def depends_on_time_origin(axis: AxisModel, dataset: Dataset) -> bool:
 
 
 def phases_found(axis: AxisModel, effect: str, dataset: Dataset) -> int:
-    """How many phases of fit logs were found for an effect of the axis, beside its parameters."""
+    """How many phases of training logs an effect of the axis has, beside its parameters."""
     found = [log for log in dataset.fit if log.motion.time_origin]
     alone = replace(axis, effects=(axis[effect],))
     return len(found) if found and depends_on_time_origin(alone, dataset) else 0

@@ -63,7 +63,7 @@ def _pairs(fit: MotionFit) -> Iterator[tuple[ParameterReference, float, float]]:
 class SimulationFit(Printed):
     """A machine fitted to the motion of whole logs, by axis, from a fit of the force residual.
 
-    holdout_error: by axis, RMS position error over the test logs, else the held-out logs, before
+    holdout_error: by axis, RMS position error over the test logs, else the selection logs, before
     and after, begun as measured; None where there are none.
     """
 

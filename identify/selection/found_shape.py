@@ -39,8 +39,8 @@ class FoundShape:
     """A law's curve as it is assumed and as it is found.
 
     over: its coordinate (k,) in ``unit``, within one period (m) where it has one. lets_go: whether
-    the force is gone at standstill. curves: by direction of motion; not a number where the fit logs
-    have not been.
+    the force is gone at standstill. curves: by direction of motion; not a number where no
+    training log has been.
     """
 
     over: Coordinate

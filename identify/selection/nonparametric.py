@@ -4,7 +4,7 @@ A nonparametric effect (an Effect with ``parts``) is linear in its strengths. Be
 physics of a fitted base, each part gets the smoothing with the least cross-validated error, or is
 left out. Then the whole model is refitted. The physical effects have a prior at their values in the
 base, so that a force that both could explain stays with them. The nonparametric effect is kept if
-evidence and held-out logs support it.
+evidence and selection logs support it.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ BETTER = 0.95  # another round must lower the error below this part
 
 
 def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
-    """Fit a nonparametric effect beside the physics of a base, and judge it on the held-out logs.
+    """Fit a nonparametric effect beside the physics of a base, and judge it on the selection logs.
 
-    Without held-out logs it is judged by cross-validation. The curves cover the motion of the fit
+    Without selection logs it is judged by cross-validation. The curves cover the motion of the fit
     logs only. The evidence counts the effective degrees of freedom.
     """
     covered = effect.starts(excitation([log.motion for log in dataset.fit], None))

@@ -390,11 +390,8 @@ def _together(
     """
 
     def may_help(t: Tried) -> bool:
-        found = t.candidate
-        return bool(
-            found.score and not found.doubt
-            and found.part > RULE.promise * RULE.least_part and found.score.t > 0.0
-        )  # fmt: skip
+        score, enough = t.candidate.score, RULE.promise * RULE.least_part
+        return score is not None and score.t > 0.0 and score.part > enough and not t.candidate.doubt
 
     ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[:LEADERS]
     for way in ways:

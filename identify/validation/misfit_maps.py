@@ -134,7 +134,7 @@ def compare_axis(
     position_floor: Mapping[str, float],
     floor: float | None = None,
 ) -> AxisComparison:
-    """Force errors of one axis over the dataset's fit logs, with maps of where they are.
+    """Force errors of one axis over the dataset's training logs, with maps of where they are.
 
     floor: noise floor, N RMS; as the model and what it leaves tell it where None.
     """

@@ -11,7 +11,7 @@ from twin.model.units import LINEAR
 class HistoryStep:
     """One step of the model's growth.
 
-    Errors are RMS force errors in ``unit``; None where not measured. The held-out logs may have
+    Errors are RMS force errors in ``unit``; None where not measured. The selection logs may have
     taken part in the choice of the effect; on the test logs nothing was decided.
     """
 
