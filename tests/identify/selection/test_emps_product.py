@@ -124,9 +124,6 @@ def test_the_answer_among_the_whole_catalogue_is_the_same(model, emps, found):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True, reason="a free curve of the friction holds what asymmetry makes, and stays"
-)
 def test_without_a_window_the_answer_is_the_same(model, emps):
     assert diagnose(model, *emps, catalogue=CATALOGUE).effect is CATALOGUE["asymmetric_friction"]
 
