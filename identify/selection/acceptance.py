@@ -210,7 +210,7 @@ def parts(before: Array, after: Array, count: Array, quiet: float) -> tuple[floa
         return float(np.exp(np.log(squares + quiet).mean())) - quiet
 
     first, second = ((of(before), of(after)) for of in (whole, typical))
-    return _part(*first, quiet), _part(*second, quiet)
+    return part_of(*first, quiet), part_of(*second, quiet)
 
 
 def larger(whole: float, typical: float) -> float:
@@ -218,7 +218,8 @@ def larger(whole: float, typical: float) -> float:
     return max(whole, typical) if whole > 0.0 else whole
 
 
-def _part(before: float, after: float, quiet: float) -> float:
+def part_of(before: float, after: float, quiet: float) -> float:
+    """Part that is taken of a mean square N^2 above the squared noise floor (N^2), at most 1."""
     # No less is ever left above a floor than that by which it is uncertain.
     left = max(before - quiet, (RULE.at_floor**2 - 1.0) * quiet, TINY)
     return min((before - after) / left, 1.0)

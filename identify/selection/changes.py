@@ -19,7 +19,7 @@ from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sti
 from identify.estimation.fit import Fit, fit_axis, fit_roughly
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import Start, starts
-from identify.selection.acceptance import Judged, parts
+from identify.selection.acceptance import Judged, part_of
 from identify.selection.bends import held_bends
 from identify.selection.controls import Columns, Trial, change_of, with_unit_penalty
 from identify.selection.curves import Shape, columns_of, shapes_of, sticking
@@ -90,19 +90,17 @@ class Added:
         axes = tuple(fit.axis.with_effect(s.fitted) for s in found)
         # Of the training logs: where a period is only scanned, others tell little of it.
         left = max(1.0 - found[0].share(fit), 0.0) * fit.error**2
-        promise, _ = parts(np.array([fit.error**2]), np.array([left]), np.ones(1), fit.floor**2)
-        return Look(self, promise, axes)
+        return Look(self, part_of(fit.error**2, left, fit.floor**2), axes)
 
     def _on_heads(self, judged: Judged, found: Sequence[Start]) -> Look:
         """Another friction, which no linear step puts in the place of one: a fit on the heads."""
         fit, heads = judged.fit, judged.dataset.heads
-        old = _on_heads(fit, judged.dataset)
+        old = _refitted_to_heads(fit, judged.dataset)
         fits = [fit_roughly(fit.axis.with_effect(s.fitted), heads, HEAD_EVALUATIONS) for s in found]
         best = sorted(fits, key=lambda f: f.error)
         both = moving(heads, sticks(old.axis) or sticks(best[0].axis))
         before, after = (float(np.mean(residual(f.axis, heads)[both] ** 2)) for f in (old, best[0]))
-        promise, _ = parts(np.array([before]), np.array([after]), np.ones(1), old.floor**2)
-        return Look(self, promise, tuple(f.axis for f in best))
+        return Look(self, part_of(before, after, old.floor**2), tuple(f.axis for f in best))
 
     def refit(self, judged: Judged, look: Look) -> Fit:
         return simplified(fit_axis(look.axes[0], judged.dataset.fit), judged.dataset, self.effect)
@@ -265,6 +263,6 @@ def _resting(without: Judged, fit: Judged) -> bool:
 
 
 @lru_cache(maxsize=4)  # every other friction is looked at beside the same fit
-def _on_heads(fit: Fit, dataset: Dataset) -> Fit:
+def _refitted_to_heads(fit: Fit, dataset: Dataset) -> Fit:
     """The axis of a fit, fitted to the heads alone."""
     return fit_axis(fit.axis, dataset.heads)
