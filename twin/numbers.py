@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.errors import InputError
 
@@ -17,6 +18,12 @@ def is_number(value: Any) -> bool:
         return False
     size: Any = abs(value)
     return bool(size <= sys.float_info.max)
+
+
+def first_not_finite(values: NDArray[Any]) -> int | None:
+    """Index of the first of these values (n,) that is not a finite number; None where all are."""
+    finite = np.isfinite(values)
+    return None if finite.all() else int(np.argmin(finite))
 
 
 def require_seed(seed: int) -> None:

@@ -18,6 +18,7 @@ from twin.importers.table import Table, numbers
 from twin.logs.container import reading
 from twin.logs.log import Array, AxisLog, Log
 from twin.logs.series import instant, is_calendar
+from twin.numbers import first_not_finite
 
 Read = Callable[[Path, ImportMap], tuple[Mapping[str, Array], Array, str]]
 """Columns by name, their times (n,) in s, and the sha256 of a file."""
@@ -257,12 +258,10 @@ def _sample_rate(table: Table, mapping: ImportMap, columns: Mapping[str, Array])
 
 
 def _require_finite(name: str, values: Array, rate: float) -> None:
-    finite = np.isfinite(values)
-    if not finite.all():
-        k = int(np.argmin(finite))
+    if (k := first_not_finite(values)) is not None:
         raise InputError(
             f"column '{name}' is {values[k]} in row {k + 1} of {len(values)} ({k / rate:.6g} s), "
-            f"{len(values) - np.count_nonzero(finite)} such rows in all; cut them out or leave "
+            f"{np.count_nonzero(~np.isfinite(values))} such rows in all; cut them out or leave "
             "the signal out of the map"
         )
 

@@ -24,6 +24,7 @@ from twin.logs.schema import (
 )
 from twin.logs.series import seconds
 from twin.logs.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_units
+from twin.numbers import first_not_finite
 
 SERIES = "twin.Series"  # the message of a topic that no log of a machine has
 _TRUTH_UNITS = ("position", "velocity")  # truth columns of these names have the axis' units
@@ -200,9 +201,7 @@ def _check_columns(signals: Signals, count: int, sample_rate: float, first: int)
             )
         if np.asarray(column).dtype.kind not in "fiu":
             raise InputError(f"{name} holds {np.asarray(column).dtype} values; give real numbers")
-        finite = np.isfinite(column)
-        if not finite.all():
-            i = int(np.argmin(finite))
+        if (i := first_not_finite(column)) is not None:
             raise InputError(
                 f"{name} is {column[i]} at {seconds((first + i) * 1e9 / sample_rate)} "
                 f"(sample {first + i}); "

@@ -11,6 +11,7 @@ from twin.errors import InputError
 from twin.logs.layout import Block, sample_times
 from twin.logs.log import Array
 from twin.logs.topics import Topic
+from twin.numbers import first_not_finite
 
 EARLIEST, LATEST = 5e8, 5e9  # s since 1970, between which a time is that of a calendar
 
@@ -146,9 +147,7 @@ def _misplaced(name: str, sample: int, before: float, time: float, rate: float) 
 def require_finite(topic: str, block: Block, name: str, count: int) -> None:
     """Raise InputError where a column of the samples behind ``count`` others is not a number."""
     column = block.columns[name]
-    finite = np.isfinite(column)
-    if not finite.all():
-        i = int(np.argmin(finite))
+    if (i := first_not_finite(column)) is not None:
         raise InputError(
             f"{topic}: {name} is {column[i]} at {seconds(float(block.log_time[i]))} "
             f"(sample {count + i}); leave out a signal that was not recorded, "
