@@ -23,7 +23,7 @@ from identify.estimation.replay import simulated_error
 from identify.estimation.simulated_motion import fit_simulated_motion
 from identify.experiment_design.plan import next_experiments, plan
 from identify.output.text import diagnose_text as diagnose_text  # with it results print themselves
-from identify.output.words.diagnosis import axis_in_words, notes_in_words
+from identify.output.words.addition import axis_in_words, notes_in_words
 from identify.results.addition import Addition, addition
 from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
 from identify.results.told import Told, told_of

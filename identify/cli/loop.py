@@ -68,7 +68,7 @@ def fit(
     from identify.output import as_json
     from identify.output import text as as_text
     from identify.output.as_json import simulation_fit_json
-    from identify.output.words.objectives import objectives_in_words
+    from identify.output.words.fit import objectives_in_words
     from twin.model.file import save_model
 
     if out:

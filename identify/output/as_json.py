@@ -17,23 +17,15 @@ from identify.experiment_design.plan import Plan
 from identify.output.machine import pick, plain
 from identify.output.words.diagnosis import (
     Said,
-    advice,
     model_change_in_words,
     not_named_in_words,
     said_of,
-    together_in_words,
     why_not,
 )
-from identify.output.words.fit import (
-    MOTION_OUTCOMES,
-    gap_in_words,
-    in_order,
-    loop_in_words,
-    no_interval_in_words,
-    not_run_in_words,
-    outcome_in_words,
-    region_in_words,
-)
+from identify.output.words.findings import advice, together_in_words
+from identify.output.words.fit import MOTION_OUTCOMES, OUTCOMES, no_interval_in_words
+from identify.output.words.plan import gap_in_words, in_order, not_run_in_words
+from identify.output.words.residual import loop_in_words, region_in_words
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
 from identify.selection.candidates import Candidate
@@ -60,7 +52,7 @@ def fit_json(result: FitResult) -> Json:
     for axis, fit in result.fits.items():
         dataset = result.datasets[axis]
         axes[axis] = {
-            "outcome": fit.axis.units.words(outcome_in_words(fit.ended)),
+            "outcome": fit.axis.units.words(OUTCOMES[fit.ended]),
             "converged": fit.ended.name != "NOT_CONVERGED",
             **pick(fit, "at_bound", force_error="error", noise_floor="floor"),
             "holdout_force_error": result.holdout_error[axis],

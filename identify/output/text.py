@@ -8,39 +8,37 @@ from identify.dataset.given_logs import Role
 from identify.estimation.fit import Fit
 from identify.experiment_design.plan import Plan
 from identify.output.numbers import Scale, arrow, number, quantity
+from identify.output.words.addition import errors_of_step, proved_in_words, step_in_words
 from identify.output.words.diagnosis import (
     all_found,
-    errors_of_step,
     named_errors_in_words,
     named_in_words,
-    nonparametric_in_words,
-    proved_in_words,
-    refit_in_words,
     said_of,
-    step_in_words,
     tested_on,
     why_not,
 )
 from identify.output.words.fit import (
+    OUTCOMES,
     agreement_in_words,
     causes_in_words,
     common_reason,
-    correlation_in_words,
     difference_in_words,
     estimate_in_words,
+    motion_fit_in_words,
+    no_interval_in_words,
+    nonparametric_in_words,
+    prepared_in_words,
+    refit_in_words,
+)
+from identify.output.words.plan import (
     experiment_in_words,
     gap_in_words,
     in_order,
-    loop_in_words,
-    motion_fit_in_words,
-    no_interval_in_words,
     not_run_in_words,
-    outcome_in_words,
-    prepared_in_words,
     question_in_words,
-    region_in_words,
     supposed_in_words,
 )
+from identify.output.words.residual import correlation_in_words, loop_in_words, region_in_words
 from identify.results.addition import Addition
 from identify.results.printed import text_of
 from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
@@ -81,7 +79,7 @@ def _fitted(result: FitResult, axis: str, fit: Fit) -> Iterator[str]:
         f"axis {axis}: {words('force error')} {', '.join(errors)}, "
         f"{over_floor(fit.error, fit.floor, unit)}"
     )
-    yield f"  {words(outcome_in_words(fit.ended))}"
+    yield f"  {words(OUTCOMES[fit.ended])}"
     yield from (f"  at its bound: {label}" for label in fit.at_bound)
     yield from (f"  {said}" for said in prepared_in_words(result.datasets[axis]))
     if still:

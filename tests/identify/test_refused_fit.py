@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import twin
-from identify.output.words.objectives import objectives_in_words
+from identify.output.words.fit import objectives_in_words
 from identify.results.results import SimulationFit
 from twin.logs import Log, write_log
 

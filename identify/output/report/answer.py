@@ -7,16 +7,10 @@ from identify.estimation.decision import RULE
 from identify.output.numbers import arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import Answer, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.diagnosis import (
-    Said,
-    also_chose_in_words,
-    errors_of_step,
-    proved_in_words,
-    refit_in_words,
-    tested_on,
-    why_not,
-)
-from identify.output.words.fit import next_step_in_words
+from identify.output.words.addition import also_chose_in_words, errors_of_step, proved_in_words
+from identify.output.words.diagnosis import Said, tested_on, why_not
+from identify.output.words.fit import refit_in_words
+from identify.output.words.plan import next_step_in_words
 from identify.results.addition import Addition
 from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis, Verdict

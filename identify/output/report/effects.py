@@ -43,15 +43,15 @@ from identify.output.report.page import (
     Tone,
 )
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.diagnosis import (
-    advice,
-    errors_of_step,
+from identify.output.words.addition import errors_of_step
+from identify.output.words.diagnosis import tested_on, why_not
+from identify.output.words.findings import advice, shape_in_words
+from identify.output.words.fit import (
+    common_reason,
+    estimate_in_words,
+    no_interval_in_words,
     nonparametric_in_words,
-    shape_in_words,
-    tested_on,
-    why_not,
 )
-from identify.output.words.fit import common_reason, estimate_in_words, no_interval_in_words
 from identify.results.addition import Addition
 from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis

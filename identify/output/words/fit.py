@@ -1,4 +1,4 @@
-"""Sentences about fits and comparisons of fits, about residuals, and about planned experiments."""
+"""Sentences about fits: how they ended, values with intervals, what they changed, agreement."""
 
 from __future__ import annotations
 
@@ -17,19 +17,22 @@ from identify.estimation.intervals import (
     OpenSided,
 )
 from identify.estimation.simulated_motion import MotionFit
-from identify.experiment_design.candidate_experiments import NotRun
-from identify.experiment_design.discrimination import SimulatedExperiment
-from identify.experiment_design.missing_excitation import Gap
-from identify.experiment_design.plan import Plan
-from identify.experiment_design.rival_hypotheses import STRENGTH
-from identify.output.numbers import Scale, change, number, percent, quantity, spaced, span
+from identify.output.numbers import (
+    Scale,
+    arrow,
+    change,
+    number,
+    percent,
+    quantity,
+)
+from identify.results.results import SimulationFit
+from identify.selection.confounded import Change, MovedParameter, Refit
+from identify.selection.nonparametric import followed
 from identify.validation.agreement import AxisAgreement, Difference
-from identify.validation.misfit_maps import Region
-from identify.validation.whiteness import Correlation, Loop
-from twin.experiments.file import in_short
+from twin.model.machine import Fitted
 from twin.model.units import AxisUnits, units_of
 
-# --- how a fit ended -------------------------------------------------------------------------
+# --- how a fit ended --------------------------------------------------------------------------
 
 OUTCOMES = {
     Outcome.CONVERGED: "The fit converged: no parameter change lowers the force error further.",
@@ -50,11 +53,6 @@ HELD_OUT_GREW = (
     "the measured command or what the model lacks adds up to a drift, and the parameters have "
     "followed it."
 )
-
-
-def outcome_in_words(outcome: Outcome) -> str:
-    """How a fit ended."""
-    return OUTCOMES[outcome]
 
 
 def motion_fit_in_words(axis: str, fit: MotionFit, held: tuple[float, float] | None) -> list[str]:
@@ -83,7 +81,23 @@ def motion_fit_in_words(axis: str, fit: MotionFit, held: tuple[float, float] | N
     ]
 
 
-# --- values and intervals --------------------------------------------------------------------
+def objectives_in_words(result: SimulationFit) -> list[str]:
+    """A sentence for each parameter that the two objectives give far apart."""
+    said = []
+    for axis, label, before, after in result.disagreeing:
+        own = result.axes[axis].axis
+        effect, _, name = label.rpartition(".")
+        unit = own.parameter_units(effect)[name] if effect else own.units.mass
+        said.append(
+            f"alarm: axis {axis}: {label} is {after:.4g} {unit}, and {before:.4g} {unit} by the "
+            "fit of the force; where two objectives disagree so, the model lacks something or "
+            "the logs do not tell the parameter: use neither value before `twin diagnose` has "
+            "said which"
+        )
+    return said
+
+
+# --- values and intervals ---------------------------------------------------------------------
 
 
 def common_reason(found: Sequence[Estimate]) -> NoInterval | None:
@@ -124,7 +138,17 @@ def estimate_in_words(e: Estimate, common: NoInterval | None = None) -> tuple[st
     return f"{value} {scale.unit}".rstrip(), f"{low} to {high}"
 
 
-# --- what was done to the logs ---------------------------------------------------------------
+def nonparametric_in_words(fitted: Fitted) -> str:
+    """What a nonparametric effect depends on, and that it is no physical law."""
+    used = followed(fitted)
+    what = f"depends on {', '.join(used)}" if used else "found nothing to depend on"
+    return (
+        f"{fitted.effect.name} is a fitted curve, not a physical law: it {what}, and is valid only "
+        "within the motion of the training logs"
+    )
+
+
+# --- what was done to the logs ----------------------------------------------------------------
 
 WORTH_SAYING = 0.05  # part of a log beyond the training logs that a reader should know of
 HALF = 0.15  # samples, within which a shift of half a sample is told as such
@@ -132,35 +156,29 @@ HALF = 0.15  # samples, within which a shift of half a sample is told as such
 
 def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
     """What was done to the logs before they were fitted, that a reader should know."""
-    shifted, words = channel_delay_in_words(dataset), dataset.units.words
-    own = dataset.force_noise
-    noise = (
-        f"axis {dataset.axis}: the noise floor holds {quantity(own, dataset.units.force)} of "
-        f"{words('force')} that nothing measured foretells, beside what sensors make: noise of the "
-        "drive or of what surrounds it"
-    )
-    return (
-        *((shifted,) if shifted else ()),
-        *((noise,) if own else ()),
-        *(
-            f"{log}: the first {quantity(end, 's')} of axis {dataset.axis} are left out, as its "
-            f"{words('force')} there fits nothing that follows: the axis did not yet move freely. "
-            "Cut the log, or begin it in motion"
-            for log, end in dataset.begun.items()
-        ),
-        *(
-            f"{log}: a {_role_of(log, dataset)} log, but {percent(part)} of it lies at positions "
-            f"of axis {dataset.axis} where no training log has been; there it tests nothing and is "
-            "left out"
-            for log, part in dataset.beyond.items()
-            if part > WORTH_SAYING
-        ),
-    )
-
-
-def _role_of(log: str, dataset: Dataset) -> str:
-    """What a log beside the training logs is given for."""
-    return "test" if log in [own.motion.name for own in dataset.test] else "selection"
+    axis, words = dataset.axis, dataset.units.words
+    said = [channel_delay_in_words(dataset)]
+    if own := dataset.force_noise:
+        said.append(
+            f"axis {axis}: the noise floor holds {quantity(own, dataset.units.force)} of "
+            f"{words('force')} that nothing measured foretells, beside what sensors make: noise of "
+            "the drive or of what surrounds it"
+        )
+    said += [
+        f"{log}: the first {quantity(end, 's')} of axis {axis} are left out, as its "
+        f"{words('force')} there fits nothing that follows: the axis did not yet move freely. "
+        "Cut the log, or begin it in motion"
+        for log, end in dataset.begun.items()
+    ]
+    tests = {log.motion.name for log in dataset.test}
+    said += [
+        f"{log}: a {'test' if log in tests else 'selection'} log, but {percent(part)} of it lies "
+        f"at positions of axis {axis} where no training log has been; there it tests nothing and "
+        "is left out"
+        for log, part in dataset.beyond.items()
+        if part > WORTH_SAYING
+    ]
+    return tuple(text for text in said if text)
 
 
 def channel_delay_in_words(dataset: Dataset) -> str | None:
@@ -197,156 +215,42 @@ def aliasing_in_words(noise: NoiseFloor, units: AxisUnits) -> str | None:
     )
 
 
-# --- where a model fails, and whether its residual is noise ----------------------------------
-
-_WHITENESS = (
-    " Only the force residual is tested for whiteness: a simulated-position residual is coloured "
-    "even when the model is right"
-)
-_ONE_STEP = ", and a one-step-ahead residual is small even when the model is wrong."
-
-LOOPS = {
-    Loop.CLOSED: (
-        "Closed loop: feedback carries position noise into the force. The free run therefore uses "
-        "the logged command, and the residual is tested only against earlier values of command "
-        f"and speed.{_WHITENESS}{_ONE_STEP}"
-    ),
-    Loop.OPEN: (
-        "Open loop: the command does not depend on the measurement noise, so the residual is "
-        f"tested against it at all lags.{_WHITENESS}{_ONE_STEP}"
-    ),
-    Loop.UNKNOWN: (
-        "The logs hold no setpoint, so the loop is assumed to be closed: feedback may carry "
-        "position noise into the force, and the residual is tested only against earlier values of "
-        f"command and speed.{_WHITENESS}."
-    ),
-}
+# --- what a fit changed -----------------------------------------------------------------------
 
 
-def loop_in_words(loop: Loop) -> str:
-    """Which residual is tested against what, and why."""
-    return LOOPS[loop]
-
-
-def region_in_words(region: Region) -> str:
-    """E.g. "position between 12.3 and 25.7 mm: 121 mN RMS, 14.3 times the noise floor, ..."."""
+def change_in_words(change: Change) -> str:
+    """E.g. "mass 15 -> 15.6 kg changes the force by 0.57 N (payload_mass gives the same force)"."""
+    force = units_of(change.force_unit).words("force")
+    same = ""
+    if change.alike:
+        verb = "give" if len(change.alike) > 1 else "gives"
+        same = f" ({' and '.join(change.alike)} {verb} the same {force})"
     return (
-        f"{place_in_words(region)}: {quantity(region.rms, region.force_unit)} RMS, "
-        f"{number(region.ratio)} times the noise floor, {percent(region.share)} of the squared "
-        "error"
+        f"{change.label} {arrow(change.before, change.after, change.unit)} changes the {force} by "
+        f"{quantity(change.force, change.force_unit)}{same}"
     )
 
 
-def place_in_words(region: Region) -> str:
-    """Where a region is."""
-    if region.coordinate == "standstill":
-        return "at standstill" if region.low > 0.0 else "in motion"
-    if region.coordinate == "direction":
-        return "moving forwards" if region.low > -0.5 else "moving backwards"
-    coordinate = units_of(region.unit).words(spaced(region.coordinate))
-    return f"{coordinate} between {span(region.low, region.high, region.unit)}"
-
-
-def correlation_in_words(correlation: Correlation) -> str:
-    """E.g. "force residual against command: 12 % of the lags beyond the 90 % bounds, ..."."""
-    other = "its own past" if correlation.signal == "residual" else correlation.signal
-    reach = f"±{correlation.limit:.2g} that chance can reach"
-    verdict = (
-        f"none beyond the {reach}"
-        if correlation.passes
-        else f"some beyond the {reach}, so the residual is not noise"
-    )
-    return (
-        f"force residual against {other}: {percent(correlation.outside)} of the lags beyond the "
-        f"90 % bounds of ±{correlation.bound:.2g}, {verdict}"
-    )
-
-
-# --- planned experiments ---------------------------------------------------------------------
-
-
-def in_order(plan: Plan) -> list[SimulatedExperiment]:
-    """The chosen experiment, then those that can be run, by falling evidence."""
-    chosen, *others = plan.ranking
-    runnable = (t for t in others if t.not_run is None)
-    return [chosen, *sorted(runnable, key=lambda t: -t.gain)]
-
-
-def question_in_words(plan: Plan) -> str:
-    """What an experiment is to decide, and whether one can."""
-    what = " or ".join(plan.between)
-    if len(plan.between) < 2:
-        return f"the parameters of {what}, best constrained by"
-    if plan.decides:
-        return f"{what}, decided by"
-    return f"{what}, not decided by any experiment of this length; the nearest is"
-
-
-def experiment_in_words(t: SimulatedExperiment, plan: Plan) -> str:
-    """Which experiment it is, how long it takes, and what it is expected to show.
-
-    Only the leading ones are refitted, and the best of these is chosen: one with more evidence than
-    the chosen has it from one linear step.
-    """
-    tail = f"{number(t.gain)} nats of information on the parameters"
-    if len(plan.between) > 1:
-        linear = " by one linear step" if t.gain > plan.chosen.gain else ""
-        what = "expected evidence (difference of BIC)" if t is plan.chosen else "evidence"
-        tail = f"{what} {number(t.gain)}{linear}, {_rival(t)}"
-    return f"{in_short(t.experiment, t.units)}; takes {quantity(t.duration, 's')}: {tail}"
-
-
-def _rival(t: SimulatedExperiment) -> str:
-    """What the explanation that is wrong would leave."""
-    return (
-        f"the rival leaves {quantity(t.difference, t.units.force)} RMS unexplained, "
-        f"{number(t.difference / t.floor)} times the noise floor"
-    )
-
-
-def next_step_in_words(plan: Plan) -> str:
-    """The experiment that an ambiguous diagnosis asks for, in one paragraph."""
-    what = "decides" if plan.decides else "comes nearest to deciding, but is too short"
-    return (
-        f"The experiment that {what} (twin plan writes it): "
-        f"{in_short(plan.chosen.experiment, plan.chosen.units)}; "
-        f"takes {quantity(plan.chosen.duration, 's')}. There {_rival(plan.chosen)}; "
-        f"{gap_in_words(plan.gap)}."
-    )
-
-
-def supposed_in_words(plan: Plan) -> str | None:
-    """What is assumed of the explanations where there are no logs; None where there are some."""
-    if not plan.supposed or len(plan.between) < 2:
+def refit_in_words(refit: Refit) -> str | None:
+    """What fitting changed of the given model, or None where its values were good."""
+    if not refit.changes:
         return None
-    if any(name in plan.excited_by for name in plan.between):
-        return (
-            "no logs given: each effect that the model lacks is assumed at "
-            f"{STRENGTH:g} times the noise floor"
-        )
-    return "no logs given: the models are compared with the values in their files"
+    error = units_of(refit.unit).words("force error")
+    return (
+        f"with the given values the {error} is {quantity(refit.given, refit.unit)}, after the fit "
+        f"{quantity(refit.refitted, refit.unit)}: {', '.join(map(change_in_words, refit.changes))}"
+    )
 
 
-def gap_in_words(gap: Gap) -> str:
-    """Which motion the logs lack."""
-    scale = Scale.of(gap.unit, [gap.low, gap.high])
-    low, high = (number(value / scale.size) for value in (gap.low, gap.high))
-    where = f"{gap.feature} {low} to {high} {scale.unit}".rstrip()
-    if gap.share is None:
-        return f"the explanations differ most at {where}"
-    held = f"{100.0 * gap.share:.1f} % of the data is there"
-    if gap.missing:
-        return f"missing motion: {where}; {held}"
-    return f"no motion is missing, but more of it is needed at {where}; {held}"
+def moved_in_words(moved: MovedParameter) -> str:
+    """How a parameter of the base changed when an effect was added."""
+    values = f"from {' to '.join(change(moved.before, moved.after, moved.unit))}"
+    if moved.collapsed:
+        return f"{moved.label} collapsed {values}: it had taken over the missing effect's force"
+    return f"{moved.label} moved {values}: more than its uncertainty"
 
 
-def not_run_in_words(not_run: NotRun) -> str:
-    """Which experiment cannot be run, and why."""
-    truth = f" (with {not_run.truth})" if not_run.truth else ""
-    return f"{in_short(not_run.experiment, not_run.units)}: {not_run.reason}{truth}"
-
-
-# --- whether two fits agree ------------------------------------------------------------------
+# --- whether two fits agree -------------------------------------------------------------------
 
 
 def agreement_in_words(axis: str, found: AxisAgreement) -> str:

@@ -18,7 +18,7 @@ from identify.experiment_design.missing_excitation import (
     _weighted_quantiles,
     gap,
 )
-from identify.output.words.fit import gap_in_words
+from identify.output.words.plan import gap_in_words
 from twin.model.units import LINEAR
 
 LOG = windowed(SHORT)

@@ -18,7 +18,7 @@ from identify.experiment_design.discrimination import (
 )
 from identify.output.as_json import plan_json
 from identify.output.text import plan_text
-from identify.output.words.fit import not_run_in_words
+from identify.output.words.plan import not_run_in_words
 from twin.effects import load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment

@@ -19,14 +19,9 @@ from identify.output.as_json import (
     plan_json,
 )
 from identify.output.machine import check_json, effect_json
-from identify.output.words.fit import (
-    aliasing_in_words,
-    gap_in_words,
-    loop_in_words,
-    no_interval_in_words,
-    outcome_in_words,
-    region_in_words,
-)
+from identify.output.words.fit import OUTCOMES, aliasing_in_words, no_interval_in_words
+from identify.output.words.plan import gap_in_words
+from identify.output.words.residual import loop_in_words, region_in_words
 from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.model.units import LINEAR
 
@@ -52,7 +47,7 @@ def test_a_fit():
         told = found[axis]
         parameters, refit = told.pop("parameters"), told.pop("refit")
         assert told == {
-            "outcome": outcome_in_words(fit.ended), "converged": True, "at_bound": [],
+            "outcome": OUTCOMES[fit.ended], "converged": True, "at_bound": [],
             "left_out": [], "force_noise": 0.0,
             "beginnings_left_out": {}, "beginnings_left_out_unit": "s",
             "force_error": pytest.approx(fit.error), "noise_floor": fit.floor, "unit": "N",

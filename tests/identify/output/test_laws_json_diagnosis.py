@@ -15,7 +15,8 @@ from strict_json import expected_refit, strict
 from identify.output.as_json import _finding, add_json, diagnose_json, estimate_json, plan_json
 from identify.output.report import sections
 from identify.output.report.drawing import drawing_style
-from identify.output.words.diagnosis import SEVERAL, advice, remarks_on
+from identify.output.words.diagnosis import SEVERAL, remarks_on
+from identify.output.words.findings import advice
 from identify.selection.bends import Bend
 from identify.selection.diagnosis import Verdict
 

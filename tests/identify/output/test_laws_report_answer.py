@@ -18,16 +18,11 @@ from identify.output.report.drawing import drawing_style
 from identify.output.report.page import Answer, Picture, Section, Tile, Tone, page
 from identify.output.report.residual import regions
 from identify.output.report.subject import Subject
-from identify.output.words.diagnosis import (
-    SEVERAL,
-    VERDICTS,
-    advice,
-    finding_in_words,
-    refit_in_words,
-    remarks_on,
-    shares_in_words,
-)
-from identify.output.words.fit import next_step_in_words, region_in_words
+from identify.output.words.diagnosis import SEVERAL, VERDICTS, remarks_on
+from identify.output.words.findings import SHARES, advice, finding_in_words
+from identify.output.words.fit import refit_in_words
+from identify.output.words.plan import next_step_in_words
+from identify.output.words.residual import region_in_words
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 
@@ -68,7 +63,7 @@ def test_the_answer_for_an_ambiguity():
     findings = [spaced(". ".join(finding_in_words(f))) for f in made.FOUND]
     assert first.remarks == [
         *map(capitalised, findings),
-        capitalised(shares_in_words(made.diagnosis_of())[0]),
+        capitalised(SHARES),
         "Runner-up: quadratic drag, evidence (difference of BIC) 423, selection error 7.34 -> "
         "2.38 N, proved too.",
         next_step_in_words(made.plan_of("cogging", "quadratic_drag")),

@@ -26,7 +26,7 @@ from identify.output.report.residual import (
     whiteness,
 )
 from identify.output.report.subject import Subject
-from identify.output.words.fit import correlation_in_words, loop_in_words
+from identify.output.words.residual import correlation_in_words, loop_in_words
 from twin.model.machine import Fitted
 from twin.model.units import LINEAR
 

@@ -18,7 +18,7 @@ from identify.output.as_json import agree_json, simulation_fit_json
 from identify.output.machine import laws_json, laws_text, plain
 from identify.output.numbers import Scale
 from identify.output.text import agree_text, simulation_fit_text
-from identify.output.words.diagnosis import notes_in_words, step_in_words
+from identify.output.words.addition import notes_in_words, step_in_words
 from identify.output.words.fit import HELD_OUT_GREW, MOTION_OUTCOMES, motion_fit_in_words
 from identify.results.addition import Addition
 from identify.results.results import SimulationFit

@@ -23,14 +23,10 @@ from identify.output.text import (
     in_short,
     plan_text,
 )
-from identify.output.words.diagnosis import axis_in_words, moved_in_words, refit_in_words
-from identify.output.words.fit import (
-    gap_in_words,
-    in_order,
-    loop_in_words,
-    no_interval_in_words,
-    outcome_in_words,
-)
+from identify.output.words.addition import axis_in_words
+from identify.output.words.fit import OUTCOMES, moved_in_words, no_interval_in_words, refit_in_words
+from identify.output.words.plan import gap_in_words, in_order
+from identify.output.words.residual import loop_in_words
 from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.experiments.kinds import Rests
 
@@ -48,7 +44,7 @@ def test_a_fit():
         "axis y: force error on the training logs 31.7 mN, on the test logs 73.3 mN, noise floor "
         "13.1 mN (ratio 2.42)"
     )
-    assert lines[1].strip() == outcome_in_words(Outcome.AT_BOUND)
+    assert lines[1].strip() == OUTCOMES[Outcome.AT_BOUND]
     x, y = lines[:second], lines[second:]
     assert any("acts 217 µs (0.22 samples)" in line for line in x)
     assert not any("samples)" in line for line in y)

@@ -14,24 +14,23 @@ from identify.output.as_json import diagnose_json
 from identify.output.text import diagnose_text, plan_text
 from identify.output.words.diagnosis import (
     SEVERAL,
-    advice,
-    change_in_words,
-    finding_in_words,
-    moved_in_words,
     named_errors_in_words,
-    next_command,
     not_named_in_words,
-    refit_in_words,
     remarks_on,
-    repeat_in_words,
-    shares_in_words,
     step_lines,
     ties_in_words,
-    together_in_words,
     verdict_in_words,
     why_not,
 )
-from identify.output.words.fit import outcome_in_words, region_in_words
+from identify.output.words.findings import (
+    SHARES,
+    advice,
+    finding_in_words,
+    next_command,
+    together_in_words,
+)
+from identify.output.words.fit import OUTCOMES, change_in_words, moved_in_words, refit_in_words
+from identify.output.words.residual import region_in_words, repeat_in_words
 from identify.selection.confounded import Change, Refit
 
 COGGING, LUGRE = made.FOUND
@@ -57,7 +56,7 @@ def test_a_diagnosis():
     planned = [f"  {line}" for line in plan_text(result.next_experiments["x"]).splitlines()]
     assert lines[4 : 4 + len(planned)] == planned
     rest = [" ".join(line.split()) for line in lines[4 + len(planned) :]]
-    found = [*finding_in_words(COGGING), *finding_in_words(LUGRE), *shares_in_words(x)]
+    found = [*finding_in_words(COGGING), *finding_in_words(LUGRE), SHARES]
     assert rest[: len(found)] == found
     assert rest[len(found) :] == [
         "What remains beside the named effects is 3.19 N on the training logs, 1.6 times the "
@@ -154,9 +153,9 @@ def test_nothing_is_said_of_held_out_logs_where_there_are_none():
 
 
 def test_shares_of_several_are_said_to_be_no_parts_of_a_whole():
-    (said,) = shares_in_words(made.diagnosis_of())
-    assert "the shares need not sum to 100 %" in said
-    assert shares_in_words(made.diagnosis_of(findings=made.FOUND[:1])) == []
+    assert "the shares need not sum to 100 %" in SHARES
+    assert f"  {SHARES}" in told_of_x(made.diagnosis_of())
+    assert f"  {SHARES}" not in told_of_x(made.diagnosis_of(findings=made.FOUND[:1]))
 
 
 def test_every_named_effect_is_in_the_headline():
@@ -233,8 +232,8 @@ def test_remarks_are_about_what_a_reader_must_know():
     )  # fmt: skip
     found = remarks_on(replace(made.diagnosed(x), refits={}), "x")
     assert found[:3] == (
-        outcome_in_words(Outcome.NOT_CONVERGED),
-        f"with cogging: {outcome_in_words(Outcome.AT_BOUND)}",
+        OUTCOMES[Outcome.NOT_CONVERGED],
+        f"with cogging: {OUTCOMES[Outcome.AT_BOUND]}",
         repeat_in_words(made.REPEAT),
     )
     assert "no selection log" in found[3]

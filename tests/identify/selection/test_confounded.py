@@ -8,7 +8,7 @@ from functools import cache
 import pytest
 
 from identify import workflow
-from identify.output.words.diagnosis import refit_in_words
+from identify.output.words.fit import refit_in_words
 from identify.results.results import FitResult
 from identify.selection.confounded import Refit
 from twin.effects import load_catalogue

@@ -20,7 +20,7 @@ from identify.estimation.smoothed import (
     choose_stiffness,
     solve,
 )
-from identify.output.words.diagnosis import nonparametric_in_words
+from identify.output.words.fit import nonparametric_in_words
 from identify.selection.nonparametric import (
     _filled,
     fit_nonparametric,

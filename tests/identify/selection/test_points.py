@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from planted_logs import HARDWARE, NOISE, RATE, RUBS, SLIDE, Ride, asked, begun, few, having, logged
 from scipy.signal import lfilter
 
-from identify.output.words.diagnosis import finding_in_words, next_command, verdict_in_words
+from identify.output.words.diagnosis import verdict_in_words
+from identify.output.words.findings import finding_in_words, next_command
 from identify.selection.curves import shapes_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, diagnose_axis
 from identify.selection.findings import FindingKind

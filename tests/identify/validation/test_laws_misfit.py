@@ -12,7 +12,7 @@ from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.force_balance import residual
 from identify.estimation.residual_dependence import UNITS
-from identify.output.words.fit import region_in_words
+from identify.output.words.residual import region_in_words
 from identify.validation.error_spectrum import bands
 from identify.validation.misfit_maps import (
     ABOVE_FLOOR,

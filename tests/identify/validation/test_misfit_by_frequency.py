@@ -8,7 +8,7 @@ from machines import one_axis
 
 from identify.output import as_json
 from identify.output.machine import plain
-from identify.output.words.fit import region_in_words
+from identify.output.words.residual import region_in_words
 from identify.validation.error_spectrum import bands
 from identify.workflow import compare, fit
 from twin.effects import load_catalogue

@@ -13,7 +13,7 @@ from identify.estimation.force_balance import residual
 from identify.output import as_json
 from identify.output import text as as_text
 from identify.output.machine import plain
-from identify.output.words.fit import loop_in_words
+from identify.output.words.residual import loop_in_words
 from identify.results.results import Comparison
 from identify.validation.whiteness import Loop, correlation, loop_of, residual_tests
 from identify.workflow import compare, fit

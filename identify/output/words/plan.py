@@ -1,0 +1,96 @@
+"""Sentences about planned experiments."""
+
+from __future__ import annotations
+
+from identify.experiment_design.candidate_experiments import NotRun
+from identify.experiment_design.discrimination import SimulatedExperiment
+from identify.experiment_design.missing_excitation import Gap
+from identify.experiment_design.plan import Plan
+from identify.experiment_design.rival_hypotheses import STRENGTH
+from identify.output.numbers import (
+    Scale,
+    number,
+    quantity,
+)
+from twin.experiments.file import in_short
+
+
+def in_order(plan: Plan) -> list[SimulatedExperiment]:
+    """The chosen experiment, then those that can be run, by falling evidence."""
+    chosen, *others = plan.ranking
+    runnable = (t for t in others if t.not_run is None)
+    return [chosen, *sorted(runnable, key=lambda t: -t.gain)]
+
+
+def question_in_words(plan: Plan) -> str:
+    """What an experiment is to decide, and whether one can."""
+    what = " or ".join(plan.between)
+    if len(plan.between) < 2:
+        return f"the parameters of {what}, best constrained by"
+    if plan.decides:
+        return f"{what}, decided by"
+    return f"{what}, not decided by any experiment of this length; the nearest is"
+
+
+def experiment_in_words(t: SimulatedExperiment, plan: Plan) -> str:
+    """Which experiment it is, how long it takes, and what it is expected to show.
+
+    Only the leading ones are refitted, and the best of these is chosen: one with more evidence than
+    the chosen has it from one linear step.
+    """
+    tail = f"{number(t.gain)} nats of information on the parameters"
+    if len(plan.between) > 1:
+        linear = " by one linear step" if t.gain > plan.chosen.gain else ""
+        what = "expected evidence (difference of BIC)" if t is plan.chosen else "evidence"
+        tail = f"{what} {number(t.gain)}{linear}, {_rival(t)}"
+    return f"{in_short(t.experiment, t.units)}; takes {quantity(t.duration, 's')}: {tail}"
+
+
+def _rival(t: SimulatedExperiment) -> str:
+    """What the explanation that is wrong would leave."""
+    return (
+        f"the rival leaves {quantity(t.difference, t.units.force)} RMS unexplained, "
+        f"{number(t.difference / t.floor)} times the noise floor"
+    )
+
+
+def next_step_in_words(plan: Plan) -> str:
+    """The experiment that an ambiguous diagnosis asks for, in one paragraph."""
+    what = "decides" if plan.decides else "comes nearest to deciding, but is too short"
+    return (
+        f"The experiment that {what} (twin plan writes it): "
+        f"{in_short(plan.chosen.experiment, plan.chosen.units)}; "
+        f"takes {quantity(plan.chosen.duration, 's')}. There {_rival(plan.chosen)}; "
+        f"{gap_in_words(plan.gap)}."
+    )
+
+
+def supposed_in_words(plan: Plan) -> str | None:
+    """What is assumed of the explanations where there are no logs; None where there are some."""
+    if not plan.supposed or len(plan.between) < 2:
+        return None
+    if any(name in plan.excited_by for name in plan.between):
+        return (
+            "no logs given: each effect that the model lacks is assumed at "
+            f"{STRENGTH:g} times the noise floor"
+        )
+    return "no logs given: the models are compared with the values in their files"
+
+
+def gap_in_words(gap: Gap) -> str:
+    """Which motion the logs lack."""
+    scale = Scale.of(gap.unit, [gap.low, gap.high])
+    low, high = (number(value / scale.size) for value in (gap.low, gap.high))
+    where = f"{gap.feature} {low} to {high} {scale.unit}".rstrip()
+    if gap.share is None:
+        return f"the explanations differ most at {where}"
+    held = f"{100.0 * gap.share:.1f} % of the data is there"
+    if gap.missing:
+        return f"missing motion: {where}; {held}"
+    return f"no motion is missing, but more of it is needed at {where}; {held}"
+
+
+def not_run_in_words(not_run: NotRun) -> str:
+    """Which experiment cannot be run, and why."""
+    truth = f" (with {not_run.truth})" if not_run.truth else ""
+    return f"{in_short(not_run.experiment, not_run.units)}: {not_run.reason}{truth}"

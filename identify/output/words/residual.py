@@ -1,0 +1,105 @@
+"""Sentences about the force residual: where it is, on what it depends, whether it is noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identify.estimation.repeating_force import Repeat
+from identify.estimation.residual_dependence import Dependence
+from identify.output.numbers import (
+    number,
+    percent,
+    quantity,
+    spaced,
+    span,
+)
+from identify.validation.misfit_maps import Region
+from identify.validation.whiteness import Correlation, Loop
+from twin.model.units import units_of
+
+
+def region_in_words(region: Region) -> str:
+    """E.g. "position between 12.3 and 25.7 mm: 121 mN RMS, 14.3 times the noise floor, ..."."""
+    return (
+        f"{place_in_words(region)}: {quantity(region.rms, region.force_unit)} RMS, "
+        f"{number(region.ratio)} times the noise floor, {percent(region.share)} of the squared "
+        "error"
+    )
+
+
+def place_in_words(region: Region) -> str:
+    """Where a region is."""
+    if region.coordinate == "standstill":
+        return "at standstill" if region.low > 0.0 else "in motion"
+    if region.coordinate == "direction":
+        return "moving forwards" if region.low > -0.5 else "moving backwards"
+    coordinate = units_of(region.unit).words(spaced(region.coordinate))
+    return f"{coordinate} between {span(region.low, region.high, region.unit)}"
+
+
+def dependence_in_words(dependence: Dependence) -> str:
+    """On which coordinate an unexplained error depends, and its period where it has one."""
+    period = ""
+    if dependence.period is not None:
+        period = f", with a period of {quantity(dependence.period, dependence.unit)}"
+    on = units_of(dependence.unit).words(spaced(dependence.depends_on))
+    return (
+        f"The error depends most on {on}, which accounts for "
+        f"{percent(dependence.share_of_error)} of the squared error{period}."
+    )
+
+
+def repeat_in_words(repeat: Repeat) -> str:
+    """E.g. "a force repeats every 2.5 mm: 1.0 N in run, 0.9 N in pulses; ..."."""
+    units, words = repeat.units, repeat.units.words
+    sizes = ", ".join(f"{quantity(a, units.force)} in {n}" for n, a in repeat.amplitude.items())
+    turns = np.degrees(np.ptp(np.unwrap(list(repeat.phase.values()))))
+    return (
+        f"a {words('force')} repeats every {quantity(repeat.period, units.position)} of travel "
+        f"({sizes}), but its phase differs between the logs by {turns:.0f} degrees: it is present "
+        f"in each log, but no function of {words('position')} holds for all of them, so no effect "
+        "is named"
+    )
+
+
+_WHITENESS = (
+    " Only the force residual is tested for whiteness: a simulated-position residual is coloured "
+    "even when the model is right"
+)
+_ONE_STEP = ", and a one-step-ahead residual is small even when the model is wrong."
+LOOPS = {
+    Loop.CLOSED: (
+        "Closed loop: feedback carries position noise into the force. The free run therefore uses "
+        "the logged command, and the residual is tested only against earlier values of command "
+        f"and speed.{_WHITENESS}{_ONE_STEP}"
+    ),
+    Loop.OPEN: (
+        "Open loop: the command does not depend on the measurement noise, so the residual is "
+        f"tested against it at all lags.{_WHITENESS}{_ONE_STEP}"
+    ),
+    Loop.UNKNOWN: (
+        "The logs hold no setpoint, so the loop is assumed to be closed: feedback may carry "
+        "position noise into the force, and the residual is tested only against earlier values of "
+        f"command and speed.{_WHITENESS}."
+    ),
+}
+
+
+def loop_in_words(loop: Loop) -> str:
+    """Which residual is tested against what, and why."""
+    return LOOPS[loop]
+
+
+def correlation_in_words(correlation: Correlation) -> str:
+    """E.g. "force residual against command: 12 % of the lags beyond the 90 % bounds, ..."."""
+    other = "its own past" if correlation.signal == "residual" else correlation.signal
+    reach = f"±{correlation.limit:.2g} that chance can reach"
+    verdict = (
+        f"none beyond the {reach}"
+        if correlation.passes
+        else f"some beyond the {reach}, so the residual is not noise"
+    )
+    return (
+        f"force residual against {other}: {percent(correlation.outside)} of the lags beyond the "
+        f"90 % bounds of ±{correlation.bound:.2g}, {verdict}"
+    )
