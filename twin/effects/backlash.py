@@ -9,25 +9,13 @@ Int. J. Adaptive Control and Signal Processing 11 (1997), who show why damping m
 the dead zone. The step is that of a load on a spring (flexible mode) but for the play.
 """
 
-from math import expm1, pi, sin, sqrt
-
-from twin.effect import ACC, DT, LEAST, MOST, MOVED, OUT, WHEN, Effect, Kind, Parameter
+from twin.effect import LEAST, MOST, Effect, Kind, Parameter
+from twin.law_parts import hung_load
 
 
 def law(p, s, io):
-    angle = min(2.0 * pi * p[2] * io[DT], 3.0)
-    rate = 1.0 / io[DT]
-    grown = expm1(p[3] * angle)
-    half = sin(0.5 * sqrt(1.0 - p[3] * p[3]) * angle)
-    spring = min(grown * grown + 4.0 * (1.0 + grown) * half * half, 2.0 * (1.0 - p[0]))
-    damper = grown * (2.0 + grown)
     depth = s[0] - min(max(s[0], -0.5 * p[1]), 0.5 * p[1])
-    pull = (spring * depth * rate + damper * s[1]) * rate
-    acceleration = -(pull + io[ACC]) / (1.0 + damper)
-    if io[WHEN] > 0.0:
-        s[1] += io[DT] * acceleration
-        s[0] += io[DT] * s[1]
-    io[OUT] = -p[0] * io[MOVED] * acceleration
+    hung_load(s, io, p[0], p[2], p[3], depth)
 
 
 def attach(mount, values):

@@ -13,18 +13,15 @@ which the whole, axis held, oscillates and decays over a sample exactly as the e
 (J. L. Cieslinski, B. Ratkiewicz, Adv. Difference Eq. 2006).
 """
 
-from math import expm1, log, pi, sin, sqrt
+from math import log
 
 from twin.effect import DT, MOVED, NET, OUT, WHEN, Effect, Excitation, Kind, Parameter
+from twin.law_parts import oscillator
 
 
 def law(p, s, io):
-    angle = min(2.0 * pi * p[1] * io[DT], 3.0)
+    spring, damper = oscillator(p[1], p[2], p[0], io[DT])
     rate = 1.0 / io[DT]
-    grown = expm1(p[2] * angle)
-    half = sin(0.5 * sqrt(1.0 - p[2] * p[2]) * angle)
-    spring = min(grown * grown + 4.0 * (1.0 + grown) * half * half, 2.0 * (1.0 - p[0]))
-    damper = grown * (2.0 + grown)
     pull = (spring * s[0] * rate + damper * s[1]) * rate
     acceleration = -(pull + p[0] * io[NET]) / (1.0 - p[0] + damper)
     if io[WHEN] > 0.0:

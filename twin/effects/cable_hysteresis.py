@@ -10,7 +10,7 @@ and exact for motion in one direction within a sample.
 """
 
 from twin.effect import Effect, Kind
-from twin.one_law import LAYERS, on_a_cable, slipping_layers
+from twin.law_parts import LAYERS, on_a_cable, slipping_layers
 
 
 def law(p, s, io):

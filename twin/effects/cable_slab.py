@@ -7,7 +7,7 @@ choice: the thesis prints a measured curve, no formula.
 
 from twin.curve import Coordinate, Curve
 from twin.effect import MOST, OUT, Effect, Kind, Parameter, X
-from twin.one_law import on_a_cable
+from twin.law_parts import on_a_cable
 
 
 def law(p, s, io):

@@ -6,10 +6,12 @@ freedom dynamics", 1988): HOLD is the friction that would stop the axis within t
 level allows it, exactly that force acts and the axis is at rest to rounding, so it never creeps.
 """
 
+from dataclasses import replace
 from math import copysign
 
 from twin.curve import FRICTION_CURVES
-from twin.effect import DRY, HOLD, INDEX, MOST, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
+from twin.effect import DRY, HOLD, INDEX, OUT, STATIC, VISCOUS, Effect, Kind, V
+from twin.law_parts import COULOMB_LEVEL, STATIC_LEVEL, VISCOUS_PART
 
 
 def law(p, s, io):
@@ -33,15 +35,9 @@ EFFECT = Effect(
     equation="F = Fc sgn(v) + sigma2 v;  |F| <= Fs at rest",
     source="L. Jia 2023, eq. 2.1-2.2, section 2.1.3",
     parameters=(
-        Parameter(
-            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
-            start_rule=lambda e: e.dry_level,
-        ),
-        Parameter(
-            "Fs", "N", 0.3, 0.0, MOST, "static friction", strength=True, dry=True, fixed=True,
-            at_least="Fc", start_rule=lambda e: e.dry_level,
-        ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
+        COULOMB_LEVEL,
+        replace(STATIC_LEVEL, start=0.3, fixed=True, start_rule=lambda e: e.dry_level),
+        VISCOUS_PART,
     ),
     states=("at_rest",),
     sticks=True,
@@ -49,4 +45,4 @@ EFFECT = Effect(
     curves=FRICTION_CURVES,
     fingerprint="force steps at every reversal, and grows in proportion to speed",
     excited_by="constant-speed passes in both directions at several speeds",
-)  # fmt: skip
+)

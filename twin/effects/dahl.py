@@ -11,7 +11,8 @@ r falls along the path as dr/d|x| = -sigma0/Fc r^n, which is integrated exactly 
 from math import copysign, exp, expm1, log, log1p
 
 from twin.curve import FRICTION_CURVES
-from twin.effect import DRY, DT, LEAST, MOST, OUT, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, OUT, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.law_parts import COULOMB_LEVEL, VISCOUS_PART, stiffness_at_rest
 
 
 def law(p, s, io):
@@ -41,16 +42,9 @@ EFFECT = Effect(
     equation="dF/dx = sigma0 sgn(r) |r|^n,  r = 1 - F sgn(v)/Fc;  friction = F + sigma2 v",
     source="Dahl 1968; Dahl 1976; with the viscous part added",
     parameters=(
-        Parameter(
-            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
-            start_rule=lambda e: e.dry_level,
-        ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
-        Parameter(
-            "sigma0", "N/m", 300.0, LEAST, MOST, "stiffness at F = 0",
-            start_rule=lambda e: 300.0 * e.dry_level / e.travel,
-            scan=lambda e: tuple(e.dry_level / (z * e.travel) for z in (0.03, 3e-3, 3e-4, 3e-5)),
-        ),
+        COULOMB_LEVEL,
+        VISCOUS_PART,
+        stiffness_at_rest("stiffness at F = 0", (0.03, 3e-3, 3e-4, 3e-5)),
         Parameter("n", "1", 1.0, 0.0, 4.0, "shape of the yield", fixed=True),
     ),
     states=("F",),
@@ -58,4 +52,4 @@ EFFECT = Effect(
     curves=FRICTION_CURVES,
     fingerprint="residual after every reversal over a fixed distance, the same at every speed",
     excited_by="reversals at several speeds, with travel of micrometres to millimetres after each",
-)  # fmt: skip
+)

@@ -21,6 +21,7 @@ from typing import Any
 
 from twin.curve import Part
 from twin.effect import DT, LEAST, MOST, OUT, TIME, WHEN, Effect, Kind, Parameter, V, X
+from twin.law_parts import COVERED_MOTION, smooth
 
 KNOTS = 11  # where the knots' parameters begin
 SPEEDS = 17
@@ -70,13 +71,6 @@ def law(p, s, io):
     )
 
 
-def smooth(knots: int) -> Any:
-    """Second differences, and the values over their number: rows (2 knots - 2, knots)."""
-    import numpy as np  # the catalogue is listed without it
-
-    return np.vstack([np.diff(np.eye(knots), 2, axis=0), np.eye(knots) / knots])
-
-
 def smooth_ring(knots: int) -> Any:
     """The same for a closed curve."""
     import numpy as np
@@ -122,18 +116,7 @@ def of_size(elements: int) -> Effect:
 def _shared(elements: int) -> tuple[Parameter, ...]:
     return (
         Parameter("elements", "1", elements, elements, elements, "number of intervals in x"),
-        Parameter(
-            "start", "m", -0.15, -MOST, MOST, "where the covered travel begins", fixed=True,
-            start_rule=lambda e: e.position_low,
-        ),
-        Parameter(
-            "length", "m", 0.3, LEAST, MOST, "length of the covered travel", fixed=True,
-            start_rule=lambda e: e.travel,
-        ),
-        Parameter(
-            "speed", "m/s", 0.2, LEAST, MOST, "highest speed covered", fixed=True,
-            start_rule=lambda e: e.speed_max,
-        ),
+        *COVERED_MOTION,
         Parameter(
             "turn", "m", 3e-4, LEAST, MOST, "travel after which a reversal is forgotten",
             fixed=True, start_rule=lambda e: 1e-3 * e.travel,

@@ -5,24 +5,12 @@ A dead time, as the actuator's (K. J. Astrom, B. Wittenmark, Computer-Controlled
 section 2.3, where the input is held instead); the straight line is a choice.
 """
 
-from twin.effect import DT, INDEX, READING, Effect, Kind, Parameter
-
-SLOTS = 64  # past positions kept; the longest delay is SLOTS - 2 samples
+from twin.effect import READING, Effect, Kind, Parameter
+from twin.law_parts import PAST_STATES, delayed
 
 
 def law(p, s, io):
-    if io[INDEX] == 0.0:  # before the log began the axis stood where it is at its start
-        for i in range(SLOTS):
-            s[i] = io[READING]
-    now = int(io[INDEX]) % SLOTS
-    s[now] = io[READING]
-    samples = min(p[0] / io[DT], SLOTS - 2.0)
-    whole = int(samples)
-    part = samples - whole
-    if samples > 0.0:
-        newer = s[(now - whole + SLOTS) % SLOTS]
-        older = s[(now - whole - 1 + SLOTS) % SLOTS]
-        io[READING] = newer + part * (older - newer)
+    io[READING] = delayed(s, io, READING, p[0])
 
 
 EFFECT = Effect(
@@ -31,7 +19,7 @@ EFFECT = Effect(
     equation="reading(t) = x(t - tau)",
     source="Astrom and Wittenmark, Computer-Controlled Systems, section 2.3",
     parameters=(Parameter("tau", "s", 0.0, 0.0, 6e-3, "age of the reading", strength=True),),
-    states=tuple(f"past_{i}" for i in range(SLOTS)),
+    states=PAST_STATES,
     law=law,
     fingerprint="residual follows the jerk: the force comes before the acceleration it causes",
     dead_time=True,

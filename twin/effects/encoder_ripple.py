@@ -7,35 +7,19 @@ interferometers", Applied Optics 20 (1981), 3382-3384, to first order in the err
 of a phase error is left out, a shift of zero.
 """
 
-from math import cos, pi, sin
-
-from twin.effect import COLUMNS, LEAST, MOST, READING, Effect, Excitation, Kind, Parameter
+from twin.effect import LEAST, MOST, READING, Effect, Kind, Parameter
+from twin.law_parts import columns_of, harmonic_terms, harmonics
 
 SCALES = (2e-6, 4e-6, 8e-6, 1e-5, 1.6e-5, 2e-5, 4e-5, 1e-4)  # m; longer ones show as ripples
 
 
-def waves(p, io):
-    """Sine and cosine of each harmonic, in the order of the strengths."""
-    phase = 2.0 * pi * io[READING] / p[0]
-    sine = sin(phase)
-    cosine = cos(phase)
-    return sine, cosine, 2.0 * sine * cosine, cosine * cosine - sine * sine
-
-
 def law(p, s, io):
-    sine, cosine, sine2, cosine2 = waves(p, io)
+    sine, cosine, sine2, cosine2, _, _ = harmonics(io[READING], p[0])
     io[READING] += p[1] * sine + p[2] * cosine + p[3] * sine2 + p[4] * cosine2
 
 
 def columns(p, s, io):
-    io[COLUMNS] = 4
-    for j, wave in enumerate(waves(p, io)):
-        io[COLUMNS + 1 + 2 * j], io[COLUMNS + 2 + 2 * j] = j, wave
-
-
-def periods(e: Excitation) -> tuple[float, ...]:
-    """Signal periods of common scales, and those at which this log repeats."""
-    return (*SCALES, *e.ripples)
+    columns_of(io, harmonics(io[READING], p[0])[:4])
 
 
 EFFECT = Effect(
@@ -45,17 +29,10 @@ EFFECT = Effect(
     source="Heydemann 1981, quadrature errors to first order",
     parameters=(
         Parameter(
-            "period", "m", 2e-5, LEAST, MOST, "signal period of the scale", scan=periods,
-            period=True,
+            "period", "m", 2e-5, LEAST, MOST, "signal period of the scale", period=True,
+            scan=lambda e: (*SCALES, *e.ripples),  # and those at which this log repeats
         ),
-        *(
-            Parameter(
-                f"{c}{k}", "m", 0.0, -MOST, MOST, f"{f} term of harmonic {k}", strength=True,
-                screened=k == 1,
-            )
-            for k in (1, 2)
-            for c, f in (("a", "sine"), ("b", "cosine"))
-        ),
+        *harmonic_terms(2, "m"),
     ),
     law=law,
     columns=columns,

@@ -14,24 +14,14 @@ equations", Adv. Difference Eq. 2006); above a third of the sampling rate they a
 step is stable.
 """
 
-from math import expm1, log, pi, sin, sqrt
+from math import log
 
-from twin.effect import ACC, DT, MOVED, OUT, WHEN, Effect, Excitation, Kind, Parameter
+from twin.effect import Effect, Excitation, Kind, Parameter
+from twin.law_parts import hung_load
 
 
 def law(p, s, io):
-    angle = min(2.0 * pi * p[1] * io[DT], 3.0)
-    rate = 1.0 / io[DT]
-    grown = expm1(p[2] * angle)
-    half = sin(0.5 * sqrt(1.0 - p[2] * p[2]) * angle)
-    spring = min(grown * grown + 4.0 * (1.0 + grown) * half * half, 2.0 * (1.0 - p[0]))
-    damper = grown * (2.0 + grown)
-    pull = (spring * s[0] * rate + damper * s[1]) * rate
-    acceleration = -(pull + io[ACC]) / (1.0 + damper)
-    if io[WHEN] > 0.0:
-        s[1] += io[DT] * acceleration
-        s[0] += io[DT] * s[1]
-    io[OUT] = -p[0] * io[MOVED] * acceleration
+    hung_load(s, io, p[0], p[1], p[2], s[0])
 
 
 def attach(mount, values):

@@ -6,30 +6,18 @@ it: C. Rohrig, A. Jochheim, "Identification and compensation of force ripple in 
 magnet motors", Proc. American Control Conference 2001.
 """
 
-from math import cos, pi, sin
+from dataclasses import replace
 
-from twin.effect import LEAST, MOST, Effect, Excitation, Kind, Parameter, U, X
+from twin.effect import LEAST, MOST, Effect, Kind, Parameter, U, X
+from twin.law_parts import harmonic_terms, harmonics, pitches_to_try
 
 CYCLES = 70  # most over the travel that are tried before a model tells them
 
 
 def law(p, s, io):
-    phase = 2.0 * pi * io[X] / p[0]
-    sine = sin(phase)
-    cosine = cos(phase)
-    twice = 2.0 * sine * cosine
-    ripple = p[1] * sine + p[2] * cosine + p[3] * twice + p[4] * (cosine * cosine - sine * sine)
+    sine, cosine, sine2, cosine2, _, _ = harmonics(io[X], p[0])
+    ripple = p[1] * sine + p[2] * cosine + p[3] * sine2 + p[4] * cosine2
     io[U] += io[U] * ripple
-
-
-def pitches(e: Excitation) -> tuple[float, ...]:
-    """Pitches to try: those at which force over thrust repeats, which may be those of a harmonic.
-
-    Before a model tells them, half a cycle apart over the travel, from three cycles on.
-    """
-    if e.thrust_pitches:
-        return tuple(k * pitch for pitch in e.thrust_pitches for k in (1, 2))
-    return tuple(2.0 * e.travel / k for k in range(6, 2 * CYCLES + 1))
 
 
 EFFECT = Effect(
@@ -38,15 +26,14 @@ EFFECT = Effect(
     equation="u_actual = u (1 + sum_{k=1,2} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p))",
     source="Rohrig, Jochheim 2001, force ripple in proportion to current",
     parameters=(
-        Parameter("p", "m", 0.024, LEAST, MOST, "magnet pitch", scan=pitches, period=True),
-        *(
-            Parameter(f"{c}{k}", "1", 0.0, -0.5, 0.5, f"{f} term of harmonic {k}", strength=True)
-            for k in (1, 2)
-            for c, f in (("a", "sine"), ("b", "cosine"))
+        Parameter(
+            "p", "m", 0.024, LEAST, MOST, "magnet pitch", period=True,
+            scan=lambda e: pitches_to_try(e.thrust_pitches, e.travel, 2, CYCLES),
         ),
+        *(replace(term, screened=True) for term in harmonic_terms(2, "1", 0.5)),
     ),
     law=law,
     several=True,
     fingerprint="residual repeats along the track in proportion to the motor force there",
     excited_by="strong accelerations both ways at many places, over many magnet pitches",
-)
+)  # fmt: skip

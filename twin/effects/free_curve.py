@@ -17,27 +17,13 @@ Sci. 11, 1996).
 
 from collections.abc import Mapping
 from functools import cache
-from math import copysign, expm1, floor, sqrt
-from typing import Any
+from math import floor, sqrt
 
 from twin.curve import Coordinate, Curve, FreeShape, Part
-from twin.effect import (
-    COLUMNS,
-    DT,
-    LEAST,
-    MOST,
-    OUT,
-    WHEN,
-    Effect,
-    Excitation,
-    Kind,
-    Parameter,
-    V,
-    X,
-)
+from twin.effect import COLUMNS, LEAST, MOST, OUT, Effect, Excitation, Kind, Parameter, V, X
+from twin.law_parts import smooth, turned
 
 KNOTS = 9  # where the knots' parameters begin
-TURNED = 1e-12  # less of a turn than this is left when it is over
 
 
 def place(p, s, io):
@@ -45,13 +31,7 @@ def place(p, s, io):
     count = int(p[0])
     closed = p[4] > 0.5
     speed = abs(io[V])
-    direction = s[0]
-    if io[V] != 0.0:
-        change = copysign(1.0, io[V]) - s[0]
-        if abs(change) > TURNED:
-            change *= -expm1(-speed * io[DT] / p[5])
-        direction += io[WHEN] * change
-        s[0] += change
+    direction = turned(s, io, p[5])
     q = p[1] * io[X] + sqrt(p[2] * speed) - p[3]
     q = q - floor(q) if closed else min(max(q, 0.0), 1.0)
     left = min(int(q * count), count - 1)
@@ -108,13 +88,6 @@ def knots(values: Mapping[str, float]) -> tuple[list[float], list[int]]:
     if values["per_speed"]:
         return [q * q / values["per_speed"] for q in along], index
     return [(q + values["offset"]) / values["per_metre"] for q in along], index
-
-
-def smooth(knots: int) -> Any:
-    """Second differences, and the values over their number: rows (2 knots - 2, knots)."""
-    import numpy as np  # the catalogue is listed without it
-
-    return np.vstack([np.diff(np.eye(knots), 2, axis=0), np.eye(knots) / knots])
 
 
 @cache

@@ -22,19 +22,20 @@ from functools import cache
 from math import copysign, exp, expm1, log
 
 from twin.curve import STRIBECK_CURVES
-from twin.effect import DRY, DT, LEAST, MOST, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.effect import DT, LEAST, MOST, OUT, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.law_parts import (
+    SPREAD,
+    STRIBECK_CURVE,
+    STRIBECK_EXPONENT,
+    VISCOUS_PART,
+    of_elements,
+    relative_parts,
+    stiffness_at_rest,
+    stribeck_level,
+    sums_of_parts,
+)
 
 SHARES = 9  # where the elements' own parameters begin
-
-
-def totals(p, count, ratio):
-    """Sums that share_i and the tapered stiff_i are parts of."""
-    shares, springs, taper = 0.0, 0.0, 1.0
-    for i in range(count):
-        shares += p[SHARES + i]
-        springs += p[SHARES + count + i] * taper
-        taper *= ratio
-    return shares, springs
 
 
 def advance(p, s, io, level):
@@ -42,7 +43,7 @@ def advance(p, s, io, level):
     count, moves = int(p[0]), io[V] != 0.0
     direction = copysign(1.0, io[V])
     ratio = exp(-log(p[6]) / (count - 1)) if count > 1 else 1.0
-    shares, springs = totals(p, count, ratio)
+    shares, springs = sums_of_parts(p, SHARES, count, ratio)
     settled = -expm1(-p[7] * io[DT] / level)  # part of the way to the curve gone while slipping
     stretch = p[5] / springs * io[V] * io[DT]
     force = 0.0
@@ -63,9 +64,7 @@ def advance(p, s, io, level):
 
 
 def law(p, s, io):
-    q = abs(io[V]) / p[3]
-    fall = exp(-q * q) if p[8] == 2.0 else exp(-(q ** p[8]))
-    level = io[DRY] * (p[1] + (p[2] * io[STATIC] - p[1]) * fall)
+    level = stribeck_level(io, p[1], p[2], p[3], p[8])
     io[OUT] = p[4] * io[VISCOUS] * io[V]
     if level > 0.0:
         io[OUT] += advance(p, s, io, level)
@@ -86,9 +85,17 @@ def of_size(elements: int) -> Effect:
         "g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n)",
         source="Al-Bender, Lampaert, Swevers 2005; L. Jia 2023, eq. 2.16-2.18",
         parameters=(
-            *_shared(elements),
-            *_own("share", "force", numbers),
-            *_own("stiff", "stiffness", numbers),
+            of_elements(elements),
+            *STRIBECK_CURVE,
+            VISCOUS_PART,
+            stiffness_at_rest("stiffness of all elements together"),
+            SPREAD,
+            Parameter(
+                "C", "N/s", 30.0, LEAST, MOST, "attraction to the Stribeck curve",
+                start_rule=lambda e: 100.0 * e.dry_level,
+            ),
+            STRIBECK_EXPONENT,
+            *relative_parts(elements),
         ),
         states=(*(f"F_{i}" for i in numbers), *(f"slip_{i}" for i in numbers)),
         law=law,
@@ -96,49 +103,6 @@ def of_size(elements: int) -> Effect:
         fingerprint="residual after a reversal that depends on where the axis turned before",
         excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
         of_size=of_size,
-    )
-
-
-def _shared(elements: int) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "elements", "1", elements, elements, elements, "number N, from the model file"
-        ),
-        Parameter(
-            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
-            start_rule=lambda e: e.dry_level,
-        ),
-        Parameter(
-            "Fs", "N", 0.35, 0.0, MOST, "static friction", strength=True, dry=True, at_least="Fc",
-            start_rule=lambda e: 1.15 * e.dry_level,
-        ),
-        Parameter(
-            "v0", "m/s", 0.01, LEAST, MOST, "Stribeck velocity",
-            start_rule=lambda e: 0.05 * e.speed_max,
-            scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
-        ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
-        Parameter(
-            "sigma0", "N/m", 300.0, LEAST, MOST, "stiffness of all elements together",
-            start_rule=lambda e: 300.0 * e.dry_level / e.travel,
-            scan=lambda e: tuple(e.dry_level / (z * e.travel) for z in (3e-3, 3e-4, 3e-5)),
-        ),
-        Parameter("spread", "1", 10.0, 1.0, 1e6, "last yield deflection over the first"),
-        Parameter(
-            "C", "N/s", 30.0, LEAST, MOST, "attraction to the Stribeck curve",
-            start_rule=lambda e: 100.0 * e.dry_level,
-        ),
-        Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
-    )  # fmt: skip
-
-
-def _own(part: str, what: str, numbers: range) -> tuple[Parameter, ...]:
-    return tuple(
-        Parameter(
-            f"{part}_{i}", "1", 1.0, 1e-6, 1e6, f"element {i}: relative part of the {what}",
-            fixed=True,
-        )
-        for i in numbers
     )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from typing import Any
 
 from twin.curve import Part
 from twin.effect import DT, LEAST, MOST, OUT, WHEN, Effect, Kind, Parameter, V, X
+from twin.law_parts import COVERED_MOTION
 
 OWN = 6  # where the coefficients begin
 CROSS = 24
@@ -81,18 +82,7 @@ EFFECT = Effect(
     "(1+i)(1+j)(1+a)(1+b) <= 24;  dz/dt = (v - |v| z)/reach",
     source="none; basis after Dung, Temlyakov, Ullrich, Hyperbolic Cross Approximation, 2018",
     parameters=(
-        Parameter(
-            "start", "m", -0.15, -MOST, MOST, "where the covered travel begins", fixed=True,
-            start_rule=lambda e: e.position_low,
-        ),
-        Parameter(
-            "length", "m", 0.3, LEAST, MOST, "length of the covered travel", fixed=True,
-            start_rule=lambda e: e.travel,
-        ),
-        Parameter(
-            "speed", "m/s", 0.2, LEAST, MOST, "highest speed covered", fixed=True,
-            start_rule=lambda e: e.speed_max,
-        ),
+        *COVERED_MOTION,
         Parameter(
             "reach1", "m", 3e-4, LEAST, MOST, "short memory of a reversal", fixed=True,
             start_rule=lambda e: 1e-3 * e.travel,

@@ -25,7 +25,15 @@ at the mean of the rates at both ends of the step: any stiffness is stable.
 from math import copysign, exp, expm1, log1p
 
 from twin.curve import STRIBECK_CURVES
-from twin.effect import DRY, DT, LEAST, MOST, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.law_parts import (
+    BRISTLE_DAMPING,
+    STRIBECK_CURVE,
+    STRIBECK_EXPONENT,
+    VISCOUS_PART,
+    stiffness_at_rest,
+    stribeck_level,
+)
 
 TURNS = 16  # reversals remembered
 FULL = 1.0 - 1e-12  # part of a gap that counts as all of it
@@ -94,9 +102,7 @@ def advance(p, s, io, level):
 
 def law(p, s, io):
     v = io[V]
-    q = abs(v) / p[2]
-    fall = exp(-q * q) if p[8] == 2.0 else exp(-(q ** p[8]))
-    level = io[DRY] * (p[0] + (p[1] * io[STATIC] - p[0]) * fall)
+    level = stribeck_level(io, p[0], p[1], p[2], p[8])
     io[OUT] = p[3] * io[VISCOUS] * v
     if level > 0.0:
         if v != 0.0:
@@ -117,36 +123,17 @@ EFFECT = Effect(
     "g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n)",
     source="Swevers et al. 2000; L. Jia 2023, eq. 2.10-2.12",
     parameters=(
-        Parameter(
-            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
-            start_rule=lambda e: e.dry_level,
-        ),
-        Parameter(
-            "Fs", "N", 0.35, 0.0, MOST, "static friction", strength=True, dry=True, at_least="Fc",
-            start_rule=lambda e: 1.15 * e.dry_level,
-        ),
-        Parameter(
-            "v0", "m/s", 0.01, LEAST, MOST, "Stribeck velocity",
-            start_rule=lambda e: 0.05 * e.speed_max,
-            scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
-        ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
-        Parameter(
-            "sigma0", "N/m", 300.0, LEAST, MOST, "stiffness after a reversal",
-            start_rule=lambda e: 300.0 * e.dry_level / e.travel,
-            scan=lambda e: tuple(e.dry_level / (z * e.travel) for z in (3e-3, 3e-4, 3e-5)),
-        ),
-        Parameter(
-            "sigma1", "N s/m", 0.5, LEAST, MOST, "bristle damping",
-            start_rule=lambda e: 0.5 * e.dry_level / e.speed_max,
-        ),
+        *STRIBECK_CURVE,
+        VISCOUS_PART,
+        stiffness_at_rest("stiffness after a reversal"),
+        BRISTLE_DAMPING,
         Parameter("b", "1", 1.5, 0.0, 10.0, "log of the factor the stiffness falls by up to Fs"),
         Parameter("m", "1", 16.0, 1.0, 50.0, "sharpness of the onset of sliding", fixed=True),
-        Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
+        STRIBECK_EXPONENT,
     ),
     states=("F_h", "direction", "depth", *(f"turn_{i + 1}" for i in range(TURNS))),
     law=law,
     curves=STRIBECK_CURVES,
     fingerprint="residual after a reversal that depends on where the axis turned before",
     excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
-)  # fmt: skip
+)

@@ -10,7 +10,14 @@ v, so any stiffness is stable.
 from math import copysign, exp, expm1
 
 from twin.curve import STRIBECK_CURVES
-from twin.effect import DRY, DT, LEAST, MOST, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, V
+from twin.law_parts import (
+    BRISTLE_DAMPING,
+    STRIBECK_CURVE,
+    STRIBECK_EXPONENT,
+    VISCOUS_PART,
+    stiffness_at_rest,
+)
 
 GONE = 40.0  # exp(-40) is below the rounding of what it is added to
 SHORT = 0.05  # below it the series of 1 - exp(-a) to a^8 is exact to rounding
@@ -48,34 +55,15 @@ EFFECT = Effect(
     "g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n)",
     source="Canudas de Wit et al. 1995, as in L. Jia 2023, eq. 2.6-2.9",
     parameters=(
-        Parameter(
-            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
-            start_rule=lambda e: e.dry_level,
-        ),
-        Parameter(
-            "Fs", "N", 0.35, 0.0, MOST, "static friction", strength=True, dry=True, at_least="Fc",
-            start_rule=lambda e: 1.15 * e.dry_level,
-        ),
-        Parameter(
-            "v0", "m/s", 0.01, LEAST, MOST, "Stribeck velocity",
-            start_rule=lambda e: 0.05 * e.speed_max,
-            scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
-        ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
-        Parameter(
-            "sigma0", "N/m", 300.0, LEAST, MOST, "bristle stiffness",
-            start_rule=lambda e: 300.0 * e.dry_level / e.travel,
-            scan=lambda e: tuple(e.dry_level / (z * e.travel) for z in (3e-3, 3e-4, 3e-5)),
-        ),
-        Parameter(
-            "sigma1", "N s/m", 0.5, LEAST, MOST, "bristle damping",
-            start_rule=lambda e: 0.5 * e.dry_level / e.speed_max,
-        ),
-        Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
+        *STRIBECK_CURVE,
+        VISCOUS_PART,
+        stiffness_at_rest("bristle stiffness"),
+        BRISTLE_DAMPING,
+        STRIBECK_EXPONENT,
     ),
     states=("z",),
     law=law,
     curves=STRIBECK_CURVES,
     fingerprint="residual after every reversal over a few bristle deflections of travel",
     excited_by="slow reversals of a few micrometres to millimetres, and a velocity staircase",
-)  # fmt: skip
+)

@@ -22,21 +22,23 @@ from functools import cache
 from math import copysign, exp, expm1, log, log1p
 
 from twin.curve import STRIBECK_CURVES
-from twin.effect import DRY, DT, LEAST, MOST, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
+from twin.law_parts import (
+    BRISTLE_DAMPING,
+    SPREAD,
+    STRIBECK_CURVE,
+    STRIBECK_EXPONENT,
+    VISCOUS_PART,
+    of_elements,
+    relative_parts,
+    stiffness_at_rest,
+    stribeck_level,
+    sums_of_parts,
+)
 
 SHARES = 11  # where the elements' own parameters begin
 FULL = 1.0 - 1e-12  # part of a limit, or of a gap, that counts as all of it
 NEAR = 1e-7  # gap below which its slope is that at its end
-
-
-def totals(p, count, ratio):
-    """Sums that share_i and the tapered stiff_i are parts of."""
-    shares, springs, taper = 0.0, 0.0, 1.0
-    for i in range(count):
-        shares += p[SHARES + i]
-        springs += p[SHARES + count + i] * taper
-        taper *= ratio
-    return shares, springs
 
 
 def deflect(p, s, count, share, spring, ratio, step):
@@ -75,7 +77,7 @@ def advance(p, s, io, level):
     """Step the bristle; its spring's force at the wanted instant, N, and its mean speed, m/s."""
     count = int(p[0])
     ratio = exp(-log(p[7]) / (count - 1)) if count > 1 else 1.0
-    shares, springs = totals(p, count, ratio)
+    shares, springs = sums_of_parts(p, SHARES, count, ratio)
     share = p[9] * io[DRY] * max(p[2] * io[STATIC], p[1]) / shares
     spring = p[5] / springs
     direction = copysign(1.0, io[V])
@@ -106,9 +108,7 @@ def advance(p, s, io, level):
 
 
 def law(p, s, io):
-    q = abs(io[V]) / p[3]
-    fall = exp(-q * q) if p[10] == 2.0 else exp(-(q ** p[10]))
-    level = io[DRY] * (p[1] + (p[2] * io[STATIC] - p[1]) * fall)
+    level = stribeck_level(io, p[1], p[2], p[3], p[10])
     io[OUT] = p[4] * io[VISCOUS] * io[V]
     if level > 0.0:
         force, bristle_speed = advance(p, s, io, level)
@@ -121,7 +121,6 @@ def law(p, s, io):
 @cache
 def of_size(elements: int) -> Effect:
     """Modified Leuven friction with that many elements."""
-    numbers = range(1, elements + 1)
     return Effect(
         kind=Kind.FRICTION,
         summary="bristle with Maxwell-slip elements: hysteresis with memory, smooth into sliding",
@@ -130,62 +129,26 @@ def of_size(elements: int) -> Effect:
         "g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n)",
         source="Lampaert, Swevers, Al-Bender 2002; L. Jia 2023, eq. 2.13-2.14",
         parameters=(
-            *_shared(elements),
-            *_own("share", "force", numbers),
-            *_own("stiff", "stiffness", numbers),
+            of_elements(elements),
+            *STRIBECK_CURVE,
+            VISCOUS_PART,
+            stiffness_at_rest("stiffness of all elements together"),
+            BRISTLE_DAMPING,
+            SPREAD,
+            Parameter("m", "1", 16.0, 1.0, 50.0, "sharpness of the onset of sliding", fixed=True),
+            Parameter(
+                "reserve", "1", 1.2, 1.0, 10.0, "sum of the W_i over max(Fs, Fc)", fixed=True
+            ),
+            STRIBECK_EXPONENT,
+            *relative_parts(elements),
         ),
-        states=tuple(f"F_{i}" for i in numbers),
+        states=tuple(f"F_{i}" for i in range(1, elements + 1)),
         law=law,
         curves=STRIBECK_CURVES,
         fingerprint="residual after a reversal that depends on where the axis turned before",
         excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
         of_size=of_size,
     )
-
-
-def _shared(elements: int) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "elements", "1", elements, elements, elements, "number N, from the model file"
-        ),
-        Parameter(
-            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
-            start_rule=lambda e: e.dry_level,
-        ),
-        Parameter(
-            "Fs", "N", 0.35, 0.0, MOST, "static friction", strength=True, dry=True, at_least="Fc",
-            start_rule=lambda e: 1.15 * e.dry_level,
-        ),
-        Parameter(
-            "v0", "m/s", 0.01, LEAST, MOST, "Stribeck velocity",
-            start_rule=lambda e: 0.05 * e.speed_max,
-            scan=lambda e: (0.02 * e.speed_max, 0.1 * e.speed_max),
-        ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
-        Parameter(
-            "sigma0", "N/m", 300.0, LEAST, MOST, "stiffness of all elements together",
-            start_rule=lambda e: 300.0 * e.dry_level / e.travel,
-            scan=lambda e: tuple(e.dry_level / (z * e.travel) for z in (3e-3, 3e-4, 3e-5)),
-        ),
-        Parameter(
-            "sigma1", "N s/m", 0.5, LEAST, MOST, "bristle damping",
-            start_rule=lambda e: 0.5 * e.dry_level / e.speed_max,
-        ),
-        Parameter("spread", "1", 10.0, 1.0, 1e6, "last yield deflection over the first"),
-        Parameter("m", "1", 16.0, 1.0, 50.0, "sharpness of the onset of sliding", fixed=True),
-        Parameter("reserve", "1", 1.2, 1.0, 10.0, "sum of the W_i over max(Fs, Fc)", fixed=True),
-        Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
-    )  # fmt: skip
-
-
-def _own(part: str, what: str, numbers: range) -> tuple[Parameter, ...]:
-    return tuple(
-        Parameter(
-            f"{part}_{i}", "1", 1.0, 1e-6, 1e6, f"element {i}: relative part of the {what}",
-            fixed=True,
-        )
-        for i in numbers
-    )  # fmt: skip
 
 
 EFFECT = of_size(4)

@@ -7,7 +7,7 @@ F. Al-Bender et al., IEEE TAC 50 (2005). The layers of a cable are the same law.
 """
 
 from twin.effect import Effect, Kind
-from twin.one_law import LAYERS, slipping_layers, without_a_cable
+from twin.law_parts import LAYERS, slipping_layers, without_a_cable
 
 
 def law(p, s, io):

@@ -8,26 +8,20 @@ force has no jump at rest. L. Jia 2023: rollers 34 mm apart make force spikes ev
 bump's form (1 - r^2)^2 is this project's choice.
 """
 
-from math import copysign, expm1, floor
+from math import floor
 
 from twin.curve import Coordinate, Curve
-from twin.effect import DT, LEAST, MOST, OUT, WHEN, Effect, Kind, Parameter, V, X
+from twin.effect import LEAST, MOST, OUT, Effect, Kind, Parameter, X
+from twin.law_parts import turned
 
 TURN = 5e-3  # of a bump's width, the travel over which a reversal turns the braking part round
 PITCH = 0.1  # of the travel, where no design tells it
 WIDTHS = (0.06, 0.18, 0.44)  # of the pitch
-TURNED = 1e-12  # less of a turn than this is left when it is over
 
 
 def law(p, s, io):
     pitch = p[0]
-    direction = s[0]
-    if io[V] != 0.0:
-        change = copysign(1.0, io[V]) - s[0]
-        if abs(change) > TURNED:
-            change *= -expm1(-abs(io[V]) * io[DT] / (TURN * p[1]))
-        direction += io[WHEN] * change
-        s[0] += change
+    direction = turned(s, io, TURN * p[1])
     turns = (io[X] - p[2]) / pitch
     distance = (turns - floor(turns + 0.5)) * pitch
     r = 2.0 * distance / p[1]

@@ -7,7 +7,7 @@ veranderlicher Eigenfrequenz (1918). The force of a cable slab is the same law.
 
 from twin.curve import Coordinate, Curve
 from twin.effect import MOST, OUT, Effect, Kind, Parameter, X
-from twin.one_law import without_a_cable
+from twin.law_parts import without_a_cable
 
 
 def law(p, s, io):

@@ -9,16 +9,23 @@ L. C. Bo, D. Pavelescu, Wear 82 (1982), as surveyed by B. Armstrong-Helouvry et 
 allows it, exactly that force acts, so the axis is at rest to rounding and never creeps.
 """
 
-from math import copysign, exp
+from dataclasses import replace
+from math import copysign
 
 from twin.curve import STRIBECK_CURVES
-from twin.effect import DRY, HOLD, LEAST, MOST, OUT, STATIC, VISCOUS, Effect, Kind, Parameter, V
+from twin.effect import HOLD, OUT, VISCOUS, Effect, Kind, V
+from twin.law_parts import (
+    COULOMB_LEVEL,
+    STATIC_LEVEL,
+    STRIBECK_EXPONENT,
+    STRIBECK_VELOCITY,
+    VISCOUS_PART,
+    stribeck_level,
+)
 
 
 def law(p, s, io):
-    q = abs(io[V]) / p[2]
-    fall = exp(-q * q) if p[4] == 2.0 else exp(-(q ** p[4]))
-    level = max(io[DRY] * (p[0] + (p[1] * io[STATIC] - p[0]) * fall), 0.0)
+    level = max(stribeck_level(io, p[0], p[1], p[2], p[4]), 0.0)
     viscous = p[3] * io[VISCOUS] * io[V]
     needed = io[HOLD] - viscous
     if abs(needed) <= level:
@@ -36,21 +43,14 @@ EFFECT = Effect(
     "|F| <= Fs at rest",
     source="Tustin 1947 (n = 1); Bo, Pavelescu 1982 (n); L. Jia 2023, eq. 2.4-2.5",
     parameters=(
-        Parameter(
-            "Fc", "N", 0.3, 0.0, MOST, "Coulomb friction", strength=True, dry=True,
-            start_rule=lambda e: e.dry_level,
-        ),
-        Parameter(
-            "Fs", "N", 0.35, 0.0, MOST, "static friction", strength=True, dry=True, at_least="Fc",
-            start_rule=lambda e: 1.15 * e.dry_level,
-        ),
-        Parameter(
-            "v0", "m/s", 0.01, LEAST, MOST, "Stribeck velocity",
-            start_rule=lambda e: 0.05 * e.speed_max,
+        COULOMB_LEVEL,
+        STATIC_LEVEL,
+        replace(
+            STRIBECK_VELOCITY,
             scan=lambda e: tuple(share * e.speed_max for share in (0.01, 0.03, 0.1, 0.3)),
         ),
-        Parameter("sigma2", "N s/m", 0.0, 0.0, MOST, "viscous friction", strength=True),
-        Parameter("n", "1", 2.0, 0.5, 4.0, "Stribeck exponent", fixed=True),
+        VISCOUS_PART,
+        STRIBECK_EXPONENT,
     ),
     states=("at_rest",),
     sticks=True,
@@ -58,4 +58,4 @@ EFFECT = Effect(
     curves=STRIBECK_CURVES,
     fingerprint="residual rises below the Stribeck velocity, with the sign of the direction",
     excited_by="constant-speed passes in both directions, most of them slow",
-)  # fmt: skip
+)
