@@ -23,7 +23,7 @@ from identify.output.report import write_report
 from identify.selection import diagnosis
 from identify.selection.candidates import absent_effects
 from identify.selection.trying import try_effect
-from twin.core.calling import law_address
+from twin.core.compiled import law_address
 from twin.effects import load_catalogue
 from twin.logs import Log, read_log
 from twin.parallel import parallel

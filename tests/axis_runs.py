@@ -11,7 +11,7 @@ from effect_runs import CATALOGUE
 from twin.core.control import Controller
 from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
 from twin.experiments.trajectory import Setpoint
-from twin.laws.motion import Array
+from twin.laws.trials import Array
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 

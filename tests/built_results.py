@@ -27,8 +27,7 @@ from identify.selection.findings import Finding
 from identify.validation.misfit_maps import AxisComparison, MisfitMap, Region
 from identify.validation.whiteness import Correlation, Loop, ResidualTests
 from twin.experiments.kinds import Passes, Tracking
-from twin.model.history import HistoryStep
-from twin.model.machine import MachineModel
+from twin.model.machine import HistoryStep, MachineModel
 
 DATASET = replace(built_dataset("run 1", "run 2", held=("held 1",)), channel_delay=0.000217)
 RNG = np.random.default_rng(9)

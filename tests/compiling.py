@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from twin.core.calling import law_address
+from twin.core.compiled import law_address
 from twin.core.walks import walk, walk_sensing
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate

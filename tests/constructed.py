@@ -15,7 +15,7 @@ from identify.estimation.fit import Fit, finished
 from identify.estimation.fit import Outcome as Ended
 from twin.effect import Excitation
 from twin.effects import load_catalogue
-from twin.laws.values import companion
+from twin.laws.trials import companion
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted
 

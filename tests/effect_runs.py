@@ -6,7 +6,7 @@ import numpy as np
 
 from twin.effect import Kind
 from twin.effects import load_catalogue
-from twin.laws.values import moderate
+from twin.laws.trials import moderate
 from twin.model.machine import Fitted, MachineModel
 
 CATALOGUE = load_catalogue()

@@ -12,7 +12,7 @@ from twin.core.control import Controller
 from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
 from twin.core.walks import walk
 from twin.experiments.trajectory import Setpoint
-from twin.laws.motion import Array
+from twin.laws.trials import Array
 from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 

@@ -134,7 +134,7 @@ class Effect:
     fingerprint: the trace in the residual when the effect is missing. excited_by: the motion that
     excites it. of_size: for a law of any number of elements, the effect with that many; its
     parameter ``elements``, whose bounds are both that number, tells the law. attach: of a structure
-    effect, builds its bodies in MuJoCo, given a twin.mujoco.bodies.Mount and the values by name;
+    effect, builds its bodies in MuJoCo, given a twin.mujoco.mjcf.Mount and the values by name;
     its first two states are then the position (m) and speed (m/s) of the joint built. added_mass:
     values by name -> what the effect adds to the moved mass, as a part of it. sticks: whether it is
     a friction that holds the axis at rest with any force up to a level. simplest: the same force

@@ -118,7 +118,7 @@ class MujocoSimulator:
 
     def run(self, first: int, shared: tuple, setpoints: Array, noise: Array, out: tuple) -> None:
         """See Stepper."""
-        from twin.mujoco.warnings import collected_warnings
+        from twin.mujoco.callback import collected_warnings
 
         with passive_callback(), collected_warnings(self.data) as warnings:
             run_mujoco(

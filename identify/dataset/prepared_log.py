@@ -15,9 +15,9 @@ from identify.dataset.motion import Motion
 from identify.dataset.test_function import TestFunction
 from twin.core.native import Table
 from twin.core.walks import walk_sets
-from twin.dimension import Scale
 from twin.effect import Kind
 from twin.model.machine import AxisModel, axis_table
+from twin.model.units import Scale
 
 Array = NDArray[np.float64]
 

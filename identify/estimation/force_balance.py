@@ -22,14 +22,14 @@ from identify.dataset.prepared_log import (
     total_force,
     total_forces,
 )
-from twin.core.calling import P_AT
-from twin.core.columns import averaged_columns, reading_columns
+from twin.core.compiled import P_AT
 from twin.core.native import Table
-from twin.dimension import Scale, has_size
+from twin.core.walks import averaged_columns, reading_columns
 from twin.effect import RUBBING, Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
 from twin.model.parameters import ParameterReference, read, write
+from twin.model.units import Scale, has_size
 from twin.parallel import spread
 from twin.signals import between
 

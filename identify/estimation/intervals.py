@@ -28,7 +28,7 @@ from identify.estimation.evidence import left_out
 from identify.estimation.fit import Fit
 from identify.estimation.fit_problem import is_linear
 from identify.estimation.force_balance import changes
-from twin.model.intervals import AxisIntervals
+from twin.model.machine import AxisIntervals
 from twin.model.parameters import ParameterReference, read, write
 
 Array = NDArray[np.float64]

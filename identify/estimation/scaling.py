@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog, scale_of
-from twin.dimension import Scale, dimension, has_size
 from twin.effect import Parameter
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters, read, write
+from twin.model.units import Scale, dimension, has_size
 
 Array = NDArray[np.float64]
 Limits = tuple[float, float]

@@ -15,8 +15,7 @@ from identify.selection.candidates import Candidate
 from identify.selection.changes import Reshaped
 from identify.selection.confounded import MovedParameter, moved_parameters
 from identify.validation.free_run import errors_of_both
-from twin.model.history import HistoryStep
-from twin.model.machine import MachineModel
+from twin.model.machine import HistoryStep, MachineModel
 from twin.model.units import AxisUnits
 
 

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.core.calling import borrow, doubles_at
-from twin.core.compiled import compiled
+from twin.core.compiled import borrow, compiled, doubles_at
 from twin.core.control import RESOLUTION, command, measure
 from twin.core.native import LAST_ACCELERATION, axis_force, sense
 from twin.effect import (

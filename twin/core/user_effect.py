@@ -9,7 +9,7 @@ import math
 import random
 from pathlib import Path
 
-from twin.core.calling import law_address
+from twin.core.compiled import law_address
 from twin.effect import (
     ACC,
     DRY,

@@ -15,9 +15,22 @@ import numpy as np
 from twin import effect as slots
 from twin.core.user_effect import RESULT, Guarded, Outside, outside_words
 from twin.effect import DRY, OUT, READING, STATIC, VISCOUS, Effect, Kind, U
-from twin.laws.motion import Array, Motion
-from twin.laws.stepping import Trace, Values, forces, sampled, trace
-from twin.laws.values import absent, action, companion, extremes, legal, moderate, of_kind
+from twin.laws.trials import (
+    Array,
+    Motion,
+    Trace,
+    Values,
+    absent,
+    action,
+    companion,
+    extremes,
+    forces,
+    legal,
+    moderate,
+    of_kind,
+    sampled,
+    trace,
+)
 from twin.model.machine import Fitted
 from twin.model.units import LINEAR
 

@@ -9,10 +9,45 @@ from dataclasses import dataclass, field, replace
 from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, LEAST, MOST, Effect, Kind, Parameter
 from twin.errors import CannotRun, InputError
-from twin.model.history import HistoryStep
-from twin.model.intervals import AxisIntervals
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 from twin.numbers import is_number
+
+
+@dataclass(frozen=True)
+class HistoryStep:
+    """One step of the model's growth.
+
+    Errors are RMS force errors in ``unit``; None where not measured. The selection logs may have
+    taken part in the choice of the effect; on the test logs nothing was decided.
+    """
+
+    action: str
+    effect: str
+    axis: str
+    fit_error_before: float
+    fit_error_after: float
+    holdout_error_before: float | None
+    holdout_error_after: float | None
+    unit: str = LINEAR.force
+    notes: tuple[str, ...] = ()
+    test_error_before: float | None = None
+    test_error_after: float | None = None
+
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class AxisIntervals:
+    """Low and high ends (90 %) by parameter label, in the parameters' units.
+
+    above_floor: force error of the fit over its noise floor. Where it is more than noise the model
+    is wrong, and a fit's file has no ends.
+    """
+
+    ends: Mapping[str, Interval]
+    above_floor: float
+
 
 MASS = Parameter(LINEAR.mass_name, LINEAR.mass, 1.0, LEAST, MOST, "moved mass")
 # Declared linear as all parameters are.

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, ConfigDict, Field
 
 from twin.effect import LEAST, MOST, Effect
 from twin.entries import Entries
-from twin.model.history import HistoryStep
+from twin.model.machine import HistoryStep
 from twin.model.units import ROTARY
 
 AXIS_NAME = r"^[A-Za-z_][A-Za-z0-9_]*$"

@@ -1,4 +1,4 @@
-"""MuJoCo's side of the native core: the passive-force callback and how it finds its model.
+"""MuJoCo's side of the native core: the passive-force callback, how it finds its model, warnings.
 
 The table of a machine is stored in the mjModel itself, as the last custom numeric, so model copies
 and worker threads need nothing else. Its last number is a magic value; the callback
@@ -11,8 +11,9 @@ first sample, as INDEX is computed from it; the time origin is beside the states
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -22,8 +23,7 @@ from numba import carray, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from twin.core.calling import doubles_at
-from twin.core.compiled import callback, compiled
+from twin.core.compiled import callback, compiled, doubles_at
 from twin.core.native import LAST_ACCELERATION, Table, axis_force
 from twin.effect import (
     A_OTHER,
@@ -303,3 +303,56 @@ def passive_callback() -> Iterator[None]:
     finally:
         clock.value = ticking
         mujoco.set_mjcb_passive(before)
+
+
+# --- warnings: left alone MuJoCo resets a bad state to zero, goes on, and writes a file -----------
+
+
+class Warned(NamedTuple):
+    """A warning: what MuJoCo says, and the simulated time, s."""
+
+    text: str
+    time: float
+
+
+# Of this thread's simulation.
+_KEEP: ContextVar[Callable[[str], None] | None] = ContextVar("keep", default=None)
+
+
+@contextmanager
+def collected_warnings(data: mujoco.MjData) -> Iterator[list[Warned]]:
+    """The warnings of one simulation while it runs, instead of MUJOCO_LOG.TXT."""
+    found: list[Warned] = []
+
+    def keep(text: str) -> None:
+        found.append(Warned(" ".join(text.split()), float(data.time)))
+
+    with _handler():
+        token = _KEEP.set(keep)
+        try:
+            yield found
+        finally:
+            _KEEP.reset(token)
+
+
+@entered_once
+@contextmanager
+def _handler() -> Iterator[None]:
+    """Hand each warning to the simulation of its thread; MuJoCo has one handler for all.
+
+    One of a thread that simulates nothing of ours goes to the handler that was there before.
+    """
+    import mujoco
+
+    before = mujoco.get_mju_user_warning()
+
+    def hand_on(text: str) -> None:
+        keep = _KEEP.get() or before
+        if keep is not None:
+            keep(text)
+
+    mujoco.set_mju_user_warning(hand_on)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)

@@ -15,7 +15,7 @@ from identify.output.report.subject import Subject
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis
 from twin.files import require_writable, write_atomically
-from twin.model.history import HistoryStep
+from twin.model.machine import HistoryStep
 
 SECTIONS = (
     Part("answer", "Answer", answer.cards),

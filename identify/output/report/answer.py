@@ -14,7 +14,7 @@ from identify.output.words.plan import next_step_in_words
 from identify.results.addition import Addition
 from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from twin.model.history import HistoryStep
+from twin.model.machine import HistoryStep
 
 
 def cards(view: AxisView) -> list[Block]:

@@ -58,8 +58,7 @@ from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.found_shape import BEHIND, FoundShape
 from identify.selection.nonparametric import nonparametric_labels
 from twin.effect import Effect
-from twin.model.history import HistoryStep
-from twin.model.machine import AxisModel
+from twin.model.machine import AxisModel, HistoryStep
 from twin.model.units import units_of
 
 Array = NDArray[np.float64]

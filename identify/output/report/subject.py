@@ -17,8 +17,7 @@ from identify.results.results import Comparison, Diagnosis
 from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.misfit_maps import AxisComparison
-from twin.model.history import HistoryStep
-from twin.model.machine import AxisModel
+from twin.model.machine import AxisModel, HistoryStep
 from twin.model.units import AxisUnits
 
 Array = NDArray[np.float64]

@@ -35,7 +35,7 @@ from identify.estimation.force_balance import (
     residual,
 )
 from twin.effect import Kind
-from twin.laws.values import legal
+from twin.laws.trials import legal
 from twin.model.machine import AxisModel, Fitted
 from twin.model.parameters import free_parameters, read, write
 

@@ -20,10 +20,10 @@ from identify.dataset.prepared_log import total_force
 from identify.estimation.fit import Fit, at_bounds, fit_axis
 from identify.estimation.scaling import limits_of
 from identify.estimation.variable_projection import starts
-from twin.dimension import Scale, dimension
 from twin.effect import Effect, Kind
-from twin.laws.values import moderate
+from twin.laws.trials import moderate
 from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
+from twin.model.units import Scale, dimension
 
 RATE = 1000.0  # Hz
 UNITS = [(0.01, 1.0), (100.0, 1.0), (1.0, 0.01), (1.0, 100.0), (0.01, 0.01), (100.0, 100.0)]

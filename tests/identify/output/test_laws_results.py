@@ -26,7 +26,7 @@ from identify.selection.confounded import MovedParameter
 from identify.validation.agreement import Agreement, AxisAgreement, Cause, Difference
 from twin.effect import Kind
 from twin.laws import verdict
-from twin.model.history import HistoryStep
+from twin.model.machine import HistoryStep
 from twin.model.parameters import free_parameters, read, write
 
 # --- a fit of simulated motion -------------------------------------------------------------

@@ -22,8 +22,7 @@ from identify.workflow import add, fit
 from twin.effect import Effect
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
-from twin.laws.motion import Motion
-from twin.laws.stepping import forces
+from twin.laws.trials import Motion, forces
 from twin.logs import Log
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, Fitted, MachineModel

@@ -8,8 +8,7 @@ from effect_runs import CATALOGUE
 
 from twin.effect import Effect
 from twin.experiments.trajectory import Setpoint
-from twin.laws.motion import Array
-from twin.laws.values import moderate
+from twin.laws.trials import Array, moderate
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 

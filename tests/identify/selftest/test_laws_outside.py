@@ -9,8 +9,7 @@ import pytest
 
 from identify.selftest.laws import BUMPS, CABLES, NOISE, OUTSIDE
 from twin.effect import OUT, Effect
-from twin.laws.motion import Array, Motion
-from twin.laws.stepping import trace
+from twin.laws.trials import Array, Motion, trace
 
 Values = dict[str, float]
 EFFECTS = {e.name: e for e in (*BUMPS, *CABLES, NOISE, *OUTSIDE.values())}

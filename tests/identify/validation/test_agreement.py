@@ -15,8 +15,7 @@ from identify.validation.agreement import agreement
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.model.file import load_model, save_model
-from twin.model.intervals import AxisIntervals
-from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, MachineModel
 from twin.model.parameters import free_parameters, read, write
 
 FEW = Catalogue(

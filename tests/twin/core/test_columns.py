@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from twin.core.columns import averaged_columns, reading_columns
 from twin.core.native import build_table
-from twin.core.walks import walk_sensing, walk_sets
+from twin.core.walks import averaged_columns, reading_columns, walk_sensing, walk_sets
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
 

@@ -55,7 +55,7 @@ print(json.dumps({
 
 CHANGES = {
     "effects/quadratic_drag.py": ("io[OUT] = -", "io[OUT] = -2.0 * "),
-    "core/attached_masses.py": (
+    "core/native.py": (
         "now = slope(velocity, k, block)",
         "now = 2.0 * slope(velocity, k, block)",
     ),

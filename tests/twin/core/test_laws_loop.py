@@ -24,7 +24,7 @@ from twin.core.control import (
 )
 from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
 from twin.experiments.trajectory import Setpoint
-from twin.laws.motion import Array
+from twin.laws.trials import Array
 from twin.model.machine import AxisModel, Hardware, MachineModel
 from twin.simulator import FineSimulator, MujocoSimulator, ReducedSimulator, run
 

@@ -10,9 +10,9 @@ import pytest
 from axis_runs import BOTH, RATE, Stepper, effect, pushed, shoves
 from effect_runs import CATALOGUE
 
-from twin.core.attached_masses import slope
+from twin.core.native import slope
 from twin.core.walks import walk
-from twin.laws.motion import Array
+from twin.laws.trials import Array
 from twin.model.machine import AxisModel, Fitted, axis_table
 from twin.simulator import MujocoSimulator, ReducedSimulator
 

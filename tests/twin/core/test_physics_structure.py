@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from twin.core.control import Controller
 from twin.core.loop import POSITION_COLUMN
 from twin.experiments.trajectory import Setpoint
-from twin.laws.motion import Array
+from twin.laws.trials import Array
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.mujoco.mjcf import machine_spec

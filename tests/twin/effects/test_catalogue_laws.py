@@ -16,7 +16,7 @@ from twin.effect import DRY, INDEX, OUT, READING, TIME, VISCOUS, Effect, Kind, P
 from twin.experiments.named import simulate
 from twin.laws import checks, physics
 from twin.laws.checks import LawBroken
-from twin.laws.values import absent, moderate
+from twin.laws.trials import absent, moderate
 from twin.laws.verdict import LAWS, Law
 from twin.logs import Log
 from twin.model.file import load_model

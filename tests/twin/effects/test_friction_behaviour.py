@@ -13,7 +13,7 @@ from friction_runs import (
     time,
 )
 
-from twin.laws.motion import Array
+from twin.laws.trials import Array
 from twin.model.machine import Fitted
 from twin.simulator import MujocoSimulator, ReducedSimulator
 

@@ -13,7 +13,7 @@ from friction_runs import (
 )
 from scipy.integrate import solve_ivp
 
-from twin.laws.motion import Array
+from twin.laws.trials import Array
 
 
 def bristle(p: dict[str, float], force: float, v: float, reach: float) -> float:

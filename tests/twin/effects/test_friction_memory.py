@@ -6,8 +6,8 @@ from effect_runs import CATALOGUE
 from friction_runs import MEMORY, PAPER, at_turns, friction
 
 from twin.effect import Effect
-from twin.laws.motion import Motion as Given
-from twin.laws.stepping import trace
+from twin.laws.trials import Motion as Given
+from twin.laws.trials import trace
 
 A, B, D = 9e-6, 5e-6, 12e-6  # m; turning points within the pre-sliding
 CLOSES = pytest.mark.parametrize("name", MEMORY)

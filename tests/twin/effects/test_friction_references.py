@@ -18,7 +18,7 @@ from friction_runs import (
 )
 from scipy.integrate import solve_ivp
 
-from twin.laws.motion import Array
+from twin.laws.trials import Array
 
 # --- Dahl -----------------------------------------------------------------------------------------
 

@@ -11,8 +11,8 @@ import pytest
 from effect_runs import CATALOGUE, FRICTIONS
 
 from twin.curve import Coordinate, Curve, Part
-from twin.dimension import Scale, has_size
 from twin.effect import Effect, Excitation, Kind, Parameter, V
+from twin.model.units import Scale, has_size
 
 LOG = Excitation(
     position_low=-0.13, position_high=0.21, speed_max=0.37, dry_level=0.83, duration=47.0,

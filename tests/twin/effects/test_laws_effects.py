@@ -13,8 +13,7 @@ from references import REFERENCES
 
 from twin import effect as slots
 from twin.effect import IO_SIZE, OUT, Effect, Kind, V
-from twin.laws.motion import Array
-from twin.laws.stepping import compiled
+from twin.laws.trials import Array, compiled
 
 SINGLE = ("dt", "when", "mass", "moved")
 WHENS = pytest.mark.parametrize("when", [1.0, 0.5])

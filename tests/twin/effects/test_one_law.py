@@ -5,9 +5,7 @@ import pytest
 from effect_runs import CATALOGUE, FRICTIONS
 
 from twin.effect import Effect
-from twin.laws.motion import Motion
-from twin.laws.stepping import forces
-from twin.laws.values import moderate
+from twin.laws.trials import Motion, forces, moderate
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted
 

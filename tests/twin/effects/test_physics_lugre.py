@@ -13,8 +13,7 @@ from twin.core.control import Controller
 from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
 from twin.effect import OUT
 from twin.experiments.trajectory import Setpoint
-from twin.laws.motion import Array, Motion
-from twin.laws.stepping import forces, trace
+from twin.laws.trials import Array, Motion, forces, trace
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 

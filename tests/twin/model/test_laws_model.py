@@ -8,8 +8,7 @@ import pytest
 from twin.effect import Effect, Kind, Parameter
 from twin.effects import load_catalogue
 from twin.errors import InputError
-from twin.model.history import HistoryStep
-from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.model.machine import AxisModel, Fitted, Hardware, HistoryStep, MachineModel
 from twin.model.parameters import free_parameters, read, write
 
 CATALOGUE = load_catalogue()

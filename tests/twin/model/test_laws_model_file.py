@@ -16,8 +16,7 @@ from twin.model.file import (
     parse_model,
     save_model,
 )
-from twin.model.history import HistoryStep
-from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.model.machine import AxisModel, Fitted, Hardware, HistoryStep, MachineModel
 
 CATALOGUE = load_catalogue()
 HARDWARE = Hardware(

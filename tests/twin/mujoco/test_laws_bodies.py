@@ -8,8 +8,7 @@ import pytest
 
 from twin.errors import InputError
 from twin.model.machine import AxisModel, Hardware, MachineModel
-from twin.mujoco.bodies import Mount, Spring
-from twin.mujoco.mjcf import DIRECTIONS, attached_joint, machine_spec
+from twin.mujoco.mjcf import DIRECTIONS, Mount, Spring, attached_joint, machine_spec
 
 PERIOD = 2e-4
 MASS, INERTIA = 4.0, 0.3

@@ -11,7 +11,7 @@ from effect_runs import CATALOGUE, with_all
 from mujoco.batch import Batch
 
 from twin.experiments.named import simulate
-from twin.laws.motion import Array
+from twin.laws.trials import Array
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import Offsets, offsets, passive_callback

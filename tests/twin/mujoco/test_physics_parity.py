@@ -12,7 +12,7 @@ from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, VELOCITY_COLUMN
 from twin.effect import Effect
 from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
-from twin.laws.values import moderate
+from twin.laws.trials import moderate
 from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
