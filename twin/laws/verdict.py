@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.effect import RUBBING, Effect, Kind
-from twin.laws import checks, physics, stated
+from twin.laws import checks, physics
 from twin.laws.checks import LawBroken
 
-EVERY = frozenset(Kind)
+EVERY, FORCES = frozenset(Kind), frozenset({Kind.FORCE})
 
 
 @dataclass(frozen=True)
@@ -31,26 +31,22 @@ LAWS = (
     Law("is finite at every bound, speed and sample period", checks.check_finite),
     Law("is the same compiled and as plain Python", checks.check_compiled_equals_python),
     Law("is the same however often it is sampled", physics.check_sample_rate),
-    Law(
-        "takes energy in every closed cycle",
-        physics.check_takes_energy,
-        frozenset(RUBBING),
-    ),
+    Law("takes energy in every closed cycle", physics.check_takes_energy, frozenset(RUBBING)),
     Law(
         "leaves no work around a loop, where it depends on position alone",
         physics.check_of_position_alone,
-        frozenset({Kind.FORCE}),
+        FORCES,
     ),
-    Law("is the same in other units of force, length and time", stated.check_units),
+    Law("is the same in other units of force, length and time", physics.check_units),
     Law(
         "is its equation, where that is a formula of x, v, t and its parameters",
-        stated.check_equation,
-        frozenset({Kind.FORCE}),
+        physics.check_equation,
+        FORCES,
     ),
     Law(
         "gives no energy, where it is a force of speed with one sign",
-        stated.check_takes_speed,
-        frozenset({Kind.FORCE}),
+        physics.check_takes_speed,
+        FORCES,
     ),
 )
 
