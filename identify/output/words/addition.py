@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from identify.dataset.given_logs import Role
 from identify.output.words.fit import moved_in_words, nonparametric_in_words
 from identify.results.addition import Addition
-from twin.model.history import HistoryStep
+from twin.model.machine import HistoryStep
 
 
 def step_in_words(step: HistoryStep) -> str:
