@@ -14,7 +14,7 @@ from twin.core.control import Controller, gain_table
 from twin.core.loop import N_SIGNALS, run_mujoco, run_reduced
 from twin.core.native import Table
 from twin.errors import CannotRun, InputError
-from twin.experiments.trajectory.setpoint import AnySetpoint, Setpoint
+from twin.experiments.trajectory import AnySetpoint, Setpoint
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import USER_HEADER, attach, offsets, passive_callback, step_address
 

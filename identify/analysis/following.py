@@ -16,8 +16,8 @@ from identify.dataset.motion import motion_of
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.intervals import scatter
 from twin.core.control import Controller
-from twin.experiments.replay import replay
-from twin.experiments.trajectory.setpoint import Setpoint
+from twin.experiments.follow import replay
+from twin.experiments.trajectory import Setpoint
 from twin.logs import Log
 from twin.model.machine import MachineModel
 from twin.signals import Array, local_parabola, rate

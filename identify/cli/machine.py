@@ -50,10 +50,9 @@ def simulate(
     """
     from functools import partial
 
-    from twin.experiments.file import SUFFIX, load_experiment
+    from twin.experiments.file import SUFFIX, load_experiment, write_setpoints
     from twin.experiments.lasting import missed
     from twin.experiments.named import DURATION, Reach, find_experiment, simulate_parts
-    from twin.experiments.setpoint_csv import write_setpoints
     from twin.logs import record_log
 
     for file in (out, setpoints):

@@ -57,8 +57,7 @@ def plan(
     from identify import workflow
     from identify.output import as_json
     from identify.output import text as as_text
-    from twin.experiments.file import SUFFIX, save_experiment
-    from twin.experiments.setpoint_csv import ENDING, write_setpoints
+    from twin.experiments.file import ENDING, SUFFIX, save_experiment, write_setpoints
 
     if out.suffix != SUFFIX:
         raise InputError(f"{out}: an experiment is a {SUFFIX} file; give such a name")

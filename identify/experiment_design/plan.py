@@ -36,7 +36,7 @@ from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.file import in_short
-from twin.experiments.trajectory.setpoint import require_length
+from twin.experiments.trajectory import require_length
 from twin.logs import GivenLogs, logs_by_name
 from twin.model.file import as_model
 from twin.model.machine import MachineModel

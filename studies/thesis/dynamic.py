@@ -33,8 +33,7 @@ from studies.thesis import study
 from studies.thesis.study import Array, Found, Numbers, friction_of
 from twin.core.control import Controller
 from twin.effect import Kind
-from twin.experiments.kinds import Reversals
-from twin.experiments.trajectory import open_loop_sine
+from twin.experiments.kinds import OpenLoopSine, Reversals
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters, read, write
@@ -121,10 +120,10 @@ def sine(
     """The thesis's open-loop sine, which carries the cable's force as well (chapter "cable")."""
     cable = replace(model.axes[name], effects=study.of_position(model.axes[name]))
     force = force_along(cable, np.array([place]), np.zeros(1), 1.0, Kind.FORCE)
-    setpoint = open_loop_sine(
-        list(model.axes).index(name), amplitude=AMPLITUDE, period=PERIOD, offset=-float(force[0]),
-        duration=LATE + duration, at=(place,), sample_rate=model.sample_rate,
-    )  # fmt: skip
+    pure = OpenLoopSine(name, LATE + duration, AMPLITUDE, PERIOD, at=(place,))
+    setpoint = pure.setpoint(model, rng)
+    setpoint = setpoint.part(0, len(setpoint))
+    setpoint = replace(setpoint, force=setpoint.force - force)
     return study.followed(model, setpoint, rng, {axis: Controller() for axis in model.axes})
 
 

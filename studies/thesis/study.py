@@ -18,10 +18,11 @@ from twin.core.control import Controller
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
 from twin.experiments.experiment import Experiment
-from twin.experiments.follow import follow
+from twin.experiments.follow import follow_parts
 from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
 from twin.logs import Log
+from twin.logs.log import joined
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import FineSimulator
@@ -123,9 +124,11 @@ def followed(
 ) -> Log:  # fmt: skip
     """The same of a setpoint. controllers: the model's own where None."""
     noise, current = rng.spawn(2)
-    return follow(
-        model, setpoint, (noise, current), name="setpoint", seed=0, simulator=FineSimulator,
-        controllers=controllers,
+    return joined(
+        follow_parts(
+            model, setpoint, (noise, current), name="setpoint", seed=0, simulator=FineSimulator,
+            controllers=controllers,
+        )
     )  # fmt: skip
 
 

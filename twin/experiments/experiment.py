@@ -14,12 +14,18 @@ from typing import Any, ClassVar
 import numpy as np
 
 from twin.errors import CannotRun, InputError
-from twin.experiments import trajectory
-from twin.experiments.trajectory import Limits
-from twin.experiments.trajectory.limits import require_count
-from twin.experiments.trajectory.setpoint import AnySetpoint, Setpoint
+from twin.experiments.trajectory import (
+    AnySetpoint,
+    FloatArray,
+    Limits,
+    Setpoint,
+    point_to_point,
+    travel_box,
+)
 from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits, rotary_unit
+
+TURN_REST = 0.1  # s of rest of the other axis at each end, as of moves by default
 
 
 def given(unit: str, meaning: str, default: Any = ..., *, zero: bool = False) -> Any:
@@ -49,7 +55,11 @@ class Experiment(ABC):
             if "zero" in f.metadata:
                 _require(f.name, getattr(self, f.name), f.metadata["unit"], f.metadata["zero"])
             elif f.metadata.get("unit") == "":
-                require_count(f.name, getattr(self, f.name))
+                value = getattr(self, f.name)
+                if not (isinstance(value, int | np.integer) and value >= 1):
+                    raise InputError(
+                        f"{f.name} {value!r} is not allowed: give a whole number of at least 1"
+                    )
 
     @abstractmethod
     def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
@@ -83,7 +93,7 @@ def machine_limits(model: MachineModel) -> list[Limits]:
         if h.travel is None:
             unit = axis.units.position
             raise CannotRun(f"axis {name} has no travel; give travel = [low, high] in {unit}")
-        limits.append(Limits(h.travel, h.velocity, h.acceleration, h.jerk, axis.units))
+        limits.append(Limits(h.travel, h.velocity, h.acceleration, h.jerk, axis.units, name))
     return limits
 
 
@@ -114,18 +124,22 @@ class OneAxis(Experiment):
         model.axis(self.axis)
         if self.effort > 1.0:
             raise InputError(f"effort = {self.effort:g}: give a part of the limit, above 0 up to 1")
-        place = self.at
-        if place is None:
-            place = tuple(sum(limit.travel) / 2.0 for limit in machine_limits(model))
-        limits = [gentle(limit, self.effort) for limit in machine_limits(model)]
-        alone = self.on(limits, list(model.axes).index(self.axis), place, model)
+        limits = machine_limits(model)
+        place = np.mean(travel_box(limits), axis=0) if self.at is None else np.array(self.at)
+        if place.shape != (len(limits),) or not np.isfinite(place).all():
+            unit = " or ".join(dict.fromkeys(limit.units.position for limit in limits))
+            raise InputError(
+                f"at = {self.at}: give {len(limits)} positions in {unit}, one per axis"
+            )
+        allowed = [gentle(limit, self.effort) for limit in limits]
+        alone = self.on(allowed, list(model.axes).index(self.axis), place, model)
         if not self.other:
             return alone
         return _with_other(alone, model, self.axis, place, self.other)
 
     @abstractmethod
     def on(
-        self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
+        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
     ) -> AnySetpoint:
         """The setpoint with the other axis at rest. axis: index; place: m, one per axis."""
 
@@ -136,7 +150,7 @@ def gentle(limit: Limits, effort: float) -> Limits:
 
 
 def _with_other(
-    alone: AnySetpoint, model: MachineModel, axis: str, place: tuple[float, ...], span: float
+    alone: AnySetpoint, model: MachineModel, axis: str, place: FloatArray, span: float
 ) -> Setpoint:
     """The setpoint with the other axis going back and forth over the span (m) about its place."""
     names = list(model.axes)
@@ -144,25 +158,17 @@ def _with_other(
         which = "has no second axis" if len(names) < 2 else f"has {len(names)} axes, not two"
         raise CannotRun(f"other = {span:g}: the machine {which}; leave it out")
     index = 1 - names.index(axis)
-    unit = model.axes[names[index]].units.position
     ends = np.tile(place, (4, 1))
     ends[1:3, index] += 0.5 * span, -0.5 * span
-    cycle = trajectory.point_to_point(machine_limits(model), ends, sample_rate=model.sample_rate)
-    samples = len(cycle.position)
-    count = len(alone.position) // samples
+    cycle = point_to_point(machine_limits(model), ends, TURN_REST, model.sample_rate)
+    count = len(alone) // len(cycle)
     if count == 0:
         raise CannotRun(
-            f"other = {span:g} {unit}: one round takes {cycle.duration:.3g} s, the experiment "
-            f"lasts {alone.duration:.3g} s; give a smaller span or a longer experiment"
+            f"other = {span:g} {model.axes[names[index]].units.position}: one round takes "
+            f"{cycle.duration:.3g} s, the experiment lasts {alone.duration:.3g} s; give a smaller "
+            "span or a longer experiment"
         )
-    parts = []
-    for own, added in zip(_columns(alone), _columns(cycle), strict=True):
-        column = own.copy()
-        column[: count * samples, index] = np.tile(added[:, index], count)
-        parts.append(column)
-    position, velocity, acceleration = parts
-    return Setpoint(position, velocity, acceleration, alone.force, alone.sample_rate)
-
-
-def _columns(setpoint: AnySetpoint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return setpoint.position, setpoint.velocity, setpoint.acceleration
+    both = alone.part(0, len(alone)).copied()
+    for column, added in zip(both.columns[:3], cycle.whole.columns[:3], strict=True):
+        column[: count * len(cycle), index] = np.tile(added[:, index], count)
+    return both

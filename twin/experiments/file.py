@@ -1,24 +1,32 @@
-"""Experiments as TOML files: one table, each parameter with its unit in a comment."""
+"""Experiments as TOML files, and their setpoints as CSV for the controller of a machine.
+
+The TOML has one table, each parameter with its unit in a comment; the CSV time and the motion of
+each axis.
+"""
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomlkit
 
-from twin.entries import read_toml, shown
+from twin.entries import near, read_toml, shown
 from twin.errors import InputError
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, kind_of
-from twin.files import write_atomically
+from twin.experiments.trajectory import AnySetpoint, Setpoint
+from twin.files import replacing, write_atomically
+from twin.model.machine import MachineModel
 from twin.model.units import LINEAR, AxisUnits
 from twin.numbers import is_number
 
 SUFFIX = ".toml"
+ENDING = ".setpoints.csv"
+ROWS = 100_000  # of a CSV, made at once: some 10 MB
 
 
 def format_experiment(experiment: Experiment, *comments: str, units: AxisUnits = LINEAR) -> str:
@@ -75,12 +83,12 @@ def parse_experiment(table: Mapping[str, Any]) -> Experiment:
     """An experiment from its table. Raises InputError for an unknown kind or entry."""
     name = table.get("kind")
     if not isinstance(name, str) or name not in KINDS:
-        raise InputError(f"unknown kind {shown(name)} of experiment{_near(name, KINDS)}")
+        raise InputError(f"unknown kind {shown(name)} of experiment; {_known(name, KINDS)}")
     known = {f.name: f for f in fields(KINDS[name])}
     given = {key: value for key, value in table.items() if key != "kind"}
     for key, value in given.items():
         if key not in known:
-            raise InputError(f"unknown entry '{key}' of kind {name}{_near(key, known)}")
+            raise InputError(f"unknown entry '{key}' of kind {name}; {_known(key, known)}")
         _require_form(known[key], value)
     for key, f in known.items():
         if f.default is MISSING and key not in given:
@@ -109,10 +117,8 @@ def _wanted(f: Field[Any]) -> str:
     return f"a list of numbers in {unit}" if _several(f) else f"a number in {unit}"
 
 
-def _near(key: Any, known: Mapping[str, Any]) -> str:
-    near = difflib.get_close_matches(str(key), known, n=1, cutoff=0.4)
-    hint = f"; did you mean '{near[0]}'?" if near else ";"
-    return f"{hint} there are {', '.join(known)}"
+def _known(name: object, known: Mapping[str, Any]) -> str:
+    return f"{near(str(name), known, cutoff=0.4)}there are {', '.join(known)}"
 
 
 def in_short(experiment: Experiment, units_of: AxisUnits = LINEAR) -> str:
@@ -126,3 +132,42 @@ def _plain(value: object) -> str:
     if isinstance(value, tuple):
         return " ".join(f"{v:g}" for v in value)
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def setpoint_of(experiment: Experiment, model: MachineModel, seed: int) -> AnySetpoint:
+    """The setpoint that ``twin simulate`` runs with this seed. Raises CannotRun, InputError."""
+    return experiment.setpoint(model, np.random.default_rng(seed).spawn(3)[0])
+
+
+def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path: Path) -> None:
+    """Write time, position, velocity and acceleration of each axis, units in the header.
+
+    An experiment that adds a force has a column for it. In closed loop the position is followed;
+    in open loop the force alone drives the axis. Raises InputError where it cannot be written.
+    """
+    setpoint = setpoint_of(experiment, model, seed)
+    driven = [i for i in range(len(model.axes)) if _drives(setpoint, i)]
+    names = ["time [s]"]
+    for i, (name, axis) in enumerate(model.axes.items()):
+        u = axis.units
+        names += [f"{name} position [{u.position}]", f"{name} velocity [{u.velocity}]"]
+        names += [f"{name} acceleration [{u('m/s^2')}]"]
+        names += [f"{name} force [{u.force}]"] if i in driven else []
+    with replacing(path) as stream:
+        stream.write((",".join(names) + "\n").encode())
+        for first in range(0, len(setpoint), ROWS):
+            part = setpoint.part(first, min(first + ROWS, len(setpoint)))
+            np.savetxt(stream, _table(part, first, driven), fmt="%.9g", delimiter=",")
+
+
+def _drives(setpoint: AnySetpoint, axis: int) -> bool:
+    return isinstance(setpoint, Setpoint) and bool(setpoint.force[:, axis].any())
+
+
+def _table(part: Setpoint, first: int, driven: list[int]) -> np.ndarray:
+    """(n, columns) of some samples, of which the first has that number."""
+    columns = [np.arange(first, first + len(part)) / part.sample_rate]
+    for i in range(part.position.shape[1]):
+        columns += [part.position[:, i], part.velocity[:, i], part.acceleration[:, i]]
+        columns += [part.force[:, i]] if i in driven else []
+    return np.column_stack(columns)

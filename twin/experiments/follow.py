@@ -1,4 +1,8 @@
-"""The twin follows a setpoint, and what its machine would record becomes a log, part by part."""
+"""The twin follows a setpoint, and what its machine would record becomes a log, part by part.
+
+The setpoint is a planned one, or the reference that a log recorded: the thesis prints no generator
+of its motion platform, so planned moves are this project's own.
+"""
 
 from __future__ import annotations
 
@@ -10,38 +14,17 @@ import numpy as np
 
 from twin.core.control import Controller
 from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
-from twin.experiments.trajectory.setpoint import AnySetpoint, Setpoint
+from twin.errors import InputError
+from twin.experiments.trajectory import AnySetpoint, Setpoint
 from twin.logs import AxisLog, Log
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS, joined
 from twin.logs.writer import software_version
 from twin.model.file import format_model
 from twin.model.machine import AxisModel, MachineModel
+from twin.signals import Array, rate
 from twin.simulator import MujocoSimulator, Progress, ReducedSimulator, Run, run_parts
 
-DRAWN = 1 << 16  # numbers at once
-
-
-def follow(
-    model: MachineModel,
-    setpoint: AnySetpoint,
-    noise: tuple[np.random.Generator, np.random.Generator],
-    *,
-    name: str,
-    seed: int,
-    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
-    controllers: Mapping[str, Controller] | None = None,
-    progress: Progress | None = None,
-) -> Log:
-    """The log of the twin that follows a setpoint. noise: draws that of encoders and currents.
-
-    name, seed: for the log's metadata. controllers: by axis; the model's own where None.
-    """
-    return joined(
-        follow_parts(
-            model, setpoint, noise, name=name, seed=seed, simulator=simulator,
-            controllers=controllers, progress=progress,
-        )
-    )  # fmt: skip
+DRAWN = 1 << 16  # numbers drawn at once, to be thrown away
 
 
 def follow_parts(
@@ -55,7 +38,11 @@ def follow_parts(
     controllers: Mapping[str, Controller] | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Log]:
-    """``follow`` in parts, one after the other."""
+    """The log of the twin that follows a setpoint, in parts that come one after the other.
+
+    noise: draws that of encoders and currents. name, seed: for the log's metadata. controllers: by
+    axis; the model's own where None.
+    """
     head = Log(model.sample_rate, {}, _metadata(name, seed), {}, _attachments(model))
     currents = _one_after_the_other(noise[1], len(model.axes), len(setpoint))
     first = 0
@@ -106,7 +93,7 @@ def _recorded(
     )
 
 
-def _truth(name: str, part: Run, index: int) -> dict[str, np.ndarray]:
+def _truth(name: str, part: Run, index: int) -> dict[str, Array]:
     signals = part.signals[:, index]
     return {
         "position": signals[:, POSITION_COLUMN].copy(),
@@ -133,7 +120,68 @@ def _attachments(model: MachineModel) -> dict[str, bytes]:
     return attachments
 
 
-def _of_axis(
-    axis: str, names: tuple[tuple[str, str], ...], columns: np.ndarray
-) -> dict[str, np.ndarray]:
+def _of_axis(axis: str, names: tuple[tuple[str, str], ...], columns: Array) -> dict[str, Array]:
     return {n: columns[:, i].copy() for i, (a, n) in enumerate(names) if a == axis}
+
+
+def recorded_setpoint(model: MachineModel, log: Log) -> Setpoint:
+    """The reference of a log, for the axes of a model; InputError where the log has none.
+
+    Velocity and acceleration are those of the log, or the rates of its reference position. An axis
+    that is not in the log rests at zero.
+    """
+    if not set(model.axes) & set(log.axes):
+        raise InputError(
+            f"the log has {', '.join(log.axes)}, the model {', '.join(model.axes)}; name the axes "
+            "alike"
+        )
+    columns = [_reference(log, name) for name in model.axes]
+    position, velocity, acceleration = np.stack(columns, axis=2)
+    return Setpoint(position, velocity, acceleration, np.zeros_like(position), log.sample_rate)
+
+
+def _reference(log: Log, name: str) -> Array:
+    """Position, velocity and acceleration of one axis, (3, n)."""
+    if name not in log.axes:
+        return np.zeros((3, len(log)))
+    recorded: AxisLog = log.axes[name]
+    position = recorded.columns.get("setpoint_position")
+    if position is None:
+        raise InputError(
+            f"axis {name}: the log has no setpoint_position, so there is nothing to follow; record "
+            "it, or name its column in the import map"
+        )
+    velocity = recorded.columns.get("setpoint_velocity", rate(position, log.period))
+    acceleration = recorded.columns.get("setpoint_acceleration", rate(velocity, log.period))
+    return np.stack([position, velocity, acceleration])
+
+
+def replay(
+    model: MachineModel,
+    log: Log,
+    *,
+    setpoint: Setpoint | None = None,
+    controllers: Mapping[str, Controller] | None = None,
+    seed: int = 0,
+    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    progress: Progress | None = None,
+) -> Log:
+    """The log of the twin that follows the reference of another log, at that log's sample rate.
+
+    setpoint: in place of the reference of the log, where its controller uses another. controllers:
+    by axis; the model's own where None. Raises InputError for a log without a reference, and where
+    the rates differ.
+    """
+    if log.sample_rate != model.sample_rate:
+        raise InputError(
+            f"the log is sampled at {log.sample_rate:g} Hz, the model at {model.sample_rate:g} Hz; "
+            "set sample_rate in the model"
+        )
+    followed = recorded_setpoint(model, log) if setpoint is None else setpoint
+    first, second = np.random.default_rng(seed).spawn(2)
+    return joined(
+        follow_parts(
+            model, followed, (first, second), name="replay", seed=seed, simulator=simulator,
+            controllers=controllers, progress=progress,
+        )
+    )  # fmt: skip

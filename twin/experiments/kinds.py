@@ -1,7 +1,8 @@
-"""The kinds of experiment.
+"""The kinds of experiment, each with the setpoint that it makes.
 
-Passes, staircases, reversals and open-loop sines are those of L. Jia (2023); tracking is the rich
-motion on which models are fitted. Steps, sweeps and rests excite effects that those do not.
+Every setpoint starts and ends at rest. Passes, staircases, reversals and open-loop sines are those
+of L. Jia, Friction Identification on the Gantry Stage, TU Delft 2023; tracking is the rich motion
+on which models are fitted. Steps, sweeps and rests excite effects that those do not.
 """
 
 from __future__ import annotations
@@ -14,18 +15,41 @@ from itertools import pairwise
 import numpy as np
 
 from twin.errors import CannotRun, InputError
-from twin.experiments import trajectory
 from twin.experiments.experiment import Experiment, OneAxis, counted, gentle, given, machine_limits
-from twin.experiments.trajectory import Limits
-from twin.experiments.trajectory.setpoint import AnySetpoint
+from twin.experiments.trajectory import (
+    AnySetpoint,
+    FloatArray,
+    Limits,
+    Phases,
+    PlannedSetpoint,
+    Setpoint,
+    concatenate,
+    inside_travel,
+    join,
+    move,
+    point_to_point,
+    require_length,
+    rest,
+    travel_box,
+    whole_motion,
+)
 from twin.model.machine import AxisModel, MachineModel
 
 RANDOM_ENDS = (0.02, 0.98)  # parts of the travel between which random places lie
+CRUISE = 1.0  # s, about the longest time at one speed of tracking; it bounds slow moves
+LONGEST_PAUSE = 0.2  # s, of tracking
+CLOSING_REST = 0.05  # s at the end of tracking, too short for another move
 
 
 @dataclass(frozen=True)
 class Tracking(Experiment):
-    """Random moves of all axes over the whole travel, at all speeds and accelerations."""
+    """Random straight moves of all axes over the whole travel, from rest to rest.
+
+    Each draws its speed from the slowest to the limit (uniform in the logarithm, one in five at the
+    limit), its acceleration and jerk from a tenth of the limit to the limit (likewise), and its
+    target within reach from an arcsine distribution, which favours the ends of the travel. Half of
+    the moves are followed by a pause. The last ones are shortened to fit.
+    """
 
     summary = "random moves of all axes over the whole travel"
 
@@ -34,10 +58,51 @@ class Tracking(Experiment):
 
     def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
         """See Experiment."""
-        return trajectory.random_tracking(
-            machine_limits(model), self.duration, rng, slowest=self.slowest,
-            sample_rate=model.sample_rate,
-        )  # fmt: skip
+        limits, rate = machine_limits(model), model.sample_rate
+        require_length(self.duration, rate)
+        for axis in limits:
+            if self.slowest > axis.velocity:
+                unit = axis.units.velocity
+                raise CannotRun(
+                    f"slowest speed {self.slowest:g} {unit} is above the limit of axis "
+                    f"{axis.name}, {axis.velocity:g} {unit}: give a lower one"
+                )
+        samples = round(self.duration * rate)
+        left, place = (samples - 1) / rate, np.mean(travel_box(limits), axis=0)
+        parts: list[Phases] = []
+        while left > CLOSING_REST:
+            drawn = self._drawn(limits, rng)
+            target = _within_reach(drawn, place, rng)
+            while (step := move(drawn, place, target)).total > left:
+                target = (place + target) / 2.0
+            # At least one sample, so that the loop ends whatever is drawn.
+            pause = rest(target, max(LONGEST_PAUSE * rng.uniform(-1.0, 1.0), 1.0 / rate))
+            parts += [step, pause]
+            left -= step.total + pause.total
+            place = target
+        return PlannedSetpoint(join([*parts, rest(place, 0.0)]), samples, rate)
+
+    def _drawn(self, limits: Sequence[Limits], rng: np.random.Generator) -> list[Limits]:
+        """Limits of a move; all axes share the draws, so that none slows down the others."""
+        pace = min(1.0, 1.25 * rng.random())
+        effort = 10.0 ** rng.uniform(-1.0, 0.0)
+        return [
+            replace(
+                gentle(axis, effort), velocity=self.slowest * (axis.velocity / self.slowest) ** pace
+            )
+            for axis in limits
+        ]
+
+
+def _within_reach(
+    limits: Sequence[Limits], place: FloatArray, rng: np.random.Generator
+) -> FloatArray:
+    """A place in the travel that each axis reaches in about CRUISE."""
+    low, high = travel_box(limits)
+    reach = CRUISE * np.array([axis.velocity for axis in limits])
+    low, high = np.maximum(low, place - reach), np.minimum(high, place + reach)
+    target: FloatArray = low + (high - low) * rng.beta(0.5, 0.5, place.size)
+    return target
 
 
 @dataclass(frozen=True)
@@ -53,18 +118,16 @@ class Moves(Experiment):
     def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
         """See Experiment."""
         limits = machine_limits(model)
-        low, high = np.array([limit.travel for limit in limits]).T
+        low, high = travel_box(limits)
         places = low + (high - low) * rng.uniform(*RANDOM_ENDS, (self.count, len(limits)))
         count, dwell = self._in_time(limits, places) if self.duration else (len(places), self.dwell)
-        return trajectory.point_to_point(
-            limits, places[:count], dwell=dwell, sample_rate=model.sample_rate
-        )
+        return point_to_point(limits, places[:count], dwell, model.sample_rate)
 
     def _in_time(self, limits: Sequence[Limits], places: np.ndarray) -> tuple[int, float]:
         """How many of the places fit into the time, two at least, and the rest at each, s."""
         total, count = self.dwell, 1
         for start, target in pairwise(places):
-            longer = total + trajectory.move(limits, start, target).total + self.dwell
+            longer = total + move(limits, start, target).total + self.dwell
             if longer > self.duration and count > 1:
                 break
             total, count = longer, count + 1
@@ -83,18 +146,20 @@ class Passes(OneAxis):
     dwell: float = given("s", "rest at each end", 0.1, zero=True)
 
     def on(
-        self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
+        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
     ) -> AnySetpoint:
         """See OneAxis."""
-        return trajectory.constant_speed_passes(
-            limits, axis, span=self.span, speed=self.speed, repeats=self.repeats, at=place,
-            dwell=self.dwell, sample_rate=model.sample_rate,
-        )  # fmt: skip
+        cycle = _passes(limits, axis, place, self.span, self.speed, self.dwell)
+        return _repeated(cycle, self.repeats, model.sample_rate)
 
 
 @dataclass(frozen=True)
 class Staircase(OneAxis):
-    """Velocity map: one axis there and back at each of several speeds."""
+    """Velocity map: one axis there and back at each of several speeds.
+
+    Every move is centred on the place, because friction depends on position, and holds its speed
+    over at least half of its length.
+    """
 
     summary = "one axis at a staircase of speeds, both ways"
 
@@ -104,13 +169,20 @@ class Staircase(OneAxis):
     dwell: float = given("s", "rest before and after each move", 0.1, zero=True)
 
     def on(
-        self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
+        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
     ) -> AnySetpoint:
         """See OneAxis."""
-        return trajectory.velocity_staircase(
-            limits, axis, self.speeds, span=self.span, longest_plateau=self.longest_plateau,
-            at=place, dwell=self.dwell, sample_rate=model.sample_rate,
-        )  # fmt: skip
+        parts: list[Phases] = []
+        for speed in self.speeds:
+            limits[axis].require_plateau(speed, self.span)
+            ramp = limits[axis].ramp_time(speed)
+            length = min(self.span, speed * (max(self.longest_plateau, ramp) + ramp))
+            cycle = _there_and_back(limits, axis, place, length / 2.0, speed, self.dwell)
+            begin = cycle[-1]  # the rest where it starts and ends
+            if parts:
+                parts.append(move(limits, parts[-1].position[-1], begin.position[0]))
+            parts += [begin, *cycle]
+        return whole_motion(parts, model.sample_rate)
 
 
 @dataclass(frozen=True)
@@ -124,13 +196,11 @@ class Reversals(OneAxis):
     dwell: float = given("s", "rest at each reversal", 0.1, zero=True)
 
     def on(
-        self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
+        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
     ) -> AnySetpoint:
         """See OneAxis."""
-        return trajectory.micro_reversals(
-            limits, axis, amplitude=self.amplitude, repeats=self.repeats, at=place,
-            dwell=self.dwell, sample_rate=model.sample_rate,
-        )  # fmt: skip
+        cycle = _there_and_back(limits, axis, place, self.amplitude, math.inf, self.dwell)
+        return _repeated(cycle, self.repeats, model.sample_rate)
 
 
 @dataclass(frozen=True)
@@ -145,13 +215,20 @@ class OpenLoopSine(OneAxis):
     period: float = given("s", "of the sine", 3.0)
 
     def on(
-        self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
+        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
     ) -> AnySetpoint:
         """See OneAxis."""
-        return trajectory.open_loop_sine(
-            axis, amplitude=self.amplitude, period=self.period, duration=self.duration, at=place,
-            sample_rate=model.sample_rate,
-        )  # fmt: skip
+        rate = model.sample_rate
+        require_length(self.duration, rate)
+        if self.period < 2.0 / rate:
+            raise InputError(
+                f"period {self.period:g} s is not a sine at {rate:g} Hz: give at least "
+                f"{2.0 / rate:g} s"
+            )
+        samples = round(self.duration * rate)
+        still = PlannedSetpoint(rest(place, self.duration), samples, rate).whole
+        angle = 2.0 * np.pi / self.period * (np.arange(samples) / rate)
+        return _with_force(still, axis, self.amplitude * np.sin(angle))
 
 
 @dataclass(frozen=True)
@@ -169,7 +246,7 @@ class Steps(OneAxis):
     dwell: float = given("s", "rest after each step", 0.05, zero=True)
 
     def on(
-        self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
+        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
     ) -> AnySetpoint:
         """See OneAxis."""
         if max(self.efforts) > 1.0:
@@ -177,17 +254,16 @@ class Steps(OneAxis):
                 f"efforts = {max(self.efforts):g}: give parts of the limit, above 0 up to 1"
             )
         count = max(round(self.span / self.step), 1)
-        way = np.tile(np.asarray(place, dtype=float), (2 * count + 1, 1))
+        way = np.tile(place, (2 * count + 1, 1))
         there = np.linspace(-0.5 * self.span, 0.5 * self.span, count + 1)
         way[:, axis] += np.concatenate([there, there[-2::-1]])
         rounds = [
-            trajectory.point_to_point(
-                [gentle(limit, effort) for limit in limits], way, dwell=self.dwell,
-                sample_rate=model.sample_rate,
+            point_to_point(
+                [gentle(lim, part) for lim in limits], way, self.dwell, model.sample_rate
             )
-            for effort in self.efforts
-        ]  # fmt: skip
-        return trajectory.concatenate(*rounds)
+            for part in self.efforts
+        ]
+        return concatenate(rounds)
 
 
 @dataclass(frozen=True)
@@ -201,17 +277,17 @@ class Rests(OneAxis):
     rests: tuple[float, ...] = given("s", "before each pair of moves")
 
     def on(
-        self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
+        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
     ) -> AnySetpoint:
         """See OneAxis."""
         rounds = [
-            trajectory.constant_speed_passes(
-                limits, axis, span=self.span, speed=self.speed, repeats=1, at=place,
-                dwell=0.5 * rest, sample_rate=model.sample_rate,
+            _repeated(
+                _passes(limits, axis, place, self.span, self.speed, 0.5 * seconds), 1,
+                model.sample_rate,
             )
-            for rest in self.rests
+            for seconds in self.rests
         ]  # fmt: skip
-        return trajectory.concatenate(*rounds)
+        return concatenate(rounds)
 
 
 @dataclass(frozen=True)
@@ -233,7 +309,7 @@ class Sweep(OneAxis):
     dwell: float = given("s", "rest at each end", 0.05, zero=True)
 
     def on(
-        self, limits: Sequence[Limits], axis: int, place: tuple[float, ...], model: MachineModel
+        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
     ) -> AnySetpoint:
         """See OneAxis."""
         driven = list(model.axes.values())[axis]
@@ -248,13 +324,10 @@ class Sweep(OneAxis):
                 f"lowest = {self.lowest:g} Hz, highest = {self.highest:g} Hz: give them in rising "
                 f"order, below half the sample rate of {model.sample_rate:g} Hz"
             )
-        passes = trajectory.constant_speed_passes(
-            limits, axis, span=self.span, speed=self.speed, repeats=self.repeats, at=place,
-            dwell=self.dwell, sample_rate=model.sample_rate,
-        )  # fmt: skip
-        force = passes.force.copy()
-        force[:, axis] = self.amplitude * np.sin(self._phase(passes.duration, len(force)))
-        return replace(passes.part(0, len(passes)), force=force)
+        cycle = _passes(limits, axis, place, self.span, self.speed, self.dwell)
+        passes = _repeated(cycle, self.repeats, model.sample_rate)
+        phase = self._phase(passes.duration, len(passes))
+        return _with_force(passes.whole, axis, self.amplitude * np.sin(phase))
 
     def most_force(self, axis: AxisModel) -> float:
         """Largest amplitude in N that stays within what the moves leave of the axis' limits."""
@@ -267,6 +340,41 @@ class Sweep(OneAxis):
         growth = math.log(self.highest / self.lowest)
         cycles = self.lowest * duration / growth * np.expm1(growth * np.arange(samples) / samples)
         return 2.0 * np.pi * cycles
+
+
+def _there_and_back(
+    limits: Sequence[Limits], axis: int, place: FloatArray, half: float, speed: float, dwell: float
+) -> list[Phases]:
+    """From `half` (m) below the place to as far above it and back, with a rest after each move.
+
+    speed: m/s, that no axis passes.
+    """
+    ends = np.tile(inside_travel(limits, place), (2, 1))
+    ends[:, axis] += -half, half
+    low, high = inside_travel(limits, ends)
+    slow = [replace(limit, velocity=min(limit.velocity, speed)) for limit in limits]
+    return [move(slow, low, high), rest(high, dwell), move(slow, high, low), rest(low, dwell)]
+
+
+def _passes(
+    limits: Sequence[Limits], axis: int, place: FloatArray, span: float, speed: float, dwell: float
+) -> list[Phases]:
+    """Once there and back, the speed held over at least half of the span."""
+    limits[axis].require_plateau(speed, span)
+    return _there_and_back(limits, axis, place, span / 2.0, speed, dwell)
+
+
+def _repeated(cycle: list[Phases], repeats: int, sample_rate: float) -> PlannedSetpoint:
+    """The rest that ends the cycle, then the cycle `repeats` times."""
+    require_length(repeats * sum(part.total for part in cycle), sample_rate)
+    return whole_motion([cycle[-1], *cycle * repeats], sample_rate)
+
+
+def _with_force(setpoint: Setpoint, axis: int, force: FloatArray) -> Setpoint:
+    """The setpoint with a force (n,), N, on one axis."""
+    columns = setpoint.force.copy()
+    columns[:, axis] = force
+    return replace(setpoint, force=columns)
 
 
 KINDS: Mapping[str, type[Experiment]] = {

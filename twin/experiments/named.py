@@ -15,7 +15,7 @@ from twin.core.control import Controller
 from twin.entries import near
 from twin.errors import InputError
 from twin.experiments.experiment import Experiment, driven_units, machine_limits
-from twin.experiments.file import format_experiment
+from twin.experiments.file import format_experiment, setpoint_of
 from twin.experiments.follow import follow_parts
 from twin.experiments.kinds import (
     Moves,
@@ -27,9 +27,7 @@ from twin.experiments.kinds import (
     kind_of,
 )
 from twin.experiments.lasting import lasting
-from twin.experiments.setpoint_csv import setpoint_of
-from twin.experiments.trajectory import Limits
-from twin.experiments.trajectory.setpoint import require_length
+from twin.experiments.trajectory import Limits, require_length
 from twin.logs import Log
 from twin.logs.log import joined
 from twin.model.machine import AxisModel, MachineModel

@@ -20,7 +20,7 @@ from identify.testing import assert_agree
 from identify.workflow import agree
 from twin.core.control import Controller
 from twin.effects import load_catalogue
-from twin.experiments.replay import recorded_setpoint
+from twin.experiments.follow import recorded_setpoint
 from twin.importers import import_log, load_mapping
 from twin.logs import Log
 from twin.model.file import load_model

@@ -1,18 +1,26 @@
-"""Experiment files, and the command that plans one and simulates it."""
+"""Experiment files, setpoints as CSV, and the command that plans one and simulates it."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import fields
+from pathlib import Path
 
+import numpy as np
 import pytest
 from cli_runs import in_small, refusal, twin
 
 from identify.cli.shared import app
 from twin.effects import load_catalogue
 from twin.errors import InputError
-from twin.experiments.file import format_experiment, load_experiment, parameters, save_experiment
-from twin.experiments.kinds import Passes, Rests, Steps, Sweep
+from twin.experiments.file import (
+    format_experiment,
+    load_experiment,
+    parameters,
+    save_experiment,
+    write_setpoints,
+)
+from twin.experiments.kinds import Moves, OpenLoopSine, Passes, Rests, Steps, Sweep
 from twin.experiments.named import simulate
 from twin.logs import read_log
 from twin.model.file import load_model
@@ -129,3 +137,49 @@ def test_bad_input_of_the_commands_is_refused(arguments, said, tmp_path, monkeyp
 
 def test_a_refusal_is_one_line_with_exit_code_two(tmp_path):
     assert "s" in refusal("plan", "proton_xy", "--duration", "0", folder=tmp_path)
+
+
+# Setpoints as CSV
+
+
+def read(path: Path) -> dict[str, np.ndarray]:
+    head, *rows = path.read_text().splitlines()
+    return dict(zip(head.split(","), np.loadtxt(rows, delimiter=",").T, strict=True))
+
+
+@pytest.mark.parametrize("experiment", [Moves(40, duration=2.0), Passes("y", 0.02, 0.05, 1)])
+@pytest.mark.parametrize("seed", [0, 3])
+def test_the_table_is_the_setpoint_of_the_simulation_of_that_seed(experiment, seed, tmp_path):
+    write_setpoints(experiment, PROTON, seed, tmp_path / "s.csv")
+    log = simulate(PROTON, experiment, seed=seed)
+    table = read(tmp_path / "s.csv")
+    assert list(table) == ["time [s]"] + [
+        f"{axis} {name}"
+        for axis in ("x", "y")
+        for name in ("position [m]", "velocity [m/s]", "acceleration [m/s^2]")
+    ]
+    n = len(log)
+    np.testing.assert_allclose(table["time [s]"][:n], log.time, atol=1e-9)
+    for axis, own in log.axes.items():
+        for name, unit in (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2")):
+            wanted = own.columns[f"setpoint_{name}"]
+            np.testing.assert_allclose(table[f"{axis} {name} [{unit}]"][:n], wanted, atol=1e-8)
+
+
+def test_a_force_has_a_column_of_its_own(tmp_path):
+    write_setpoints(OpenLoopSine("x", 3.0), PROTON, 0, tmp_path / "s.csv")
+    table = read(tmp_path / "s.csv")
+    assert np.abs(table["x force [N]"]).max() == pytest.approx(0.21)
+    assert "y force [N]" not in table
+
+
+def test_a_long_table_is_written_in_parts_without_a_gap(tmp_path):
+    write_setpoints(Moves(400, duration=25.0), PROTON, 1, tmp_path / "s.csv")
+    time = read(tmp_path / "s.csv")["time [s]"]
+    assert len(time) > 2.4e5
+    np.testing.assert_allclose(np.diff(time), 1e-4, atol=1e-7)
+
+
+def test_a_folder_that_is_not_there_is_one_line(tmp_path):
+    with pytest.raises(InputError, match="its folder does not exist"):
+        write_setpoints(Moves(2), PROTON, 0, tmp_path / "none" / "s.csv")

@@ -13,7 +13,7 @@ import pytest
 
 from twin.effect import OUT, Effect, Kind, Parameter, X
 from twin.errors import CannotRun
-from twin.experiments.trajectory.setpoint import Setpoint
+from twin.experiments.trajectory import Setpoint
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.mujoco.callback import collected_warnings
 from twin.simulator import MujocoSimulator, ReducedSimulator, run

@@ -1,4 +1,4 @@
-"""What a machine would record of a run: each signal in its own column, part by part the same."""
+"""What a machine would record of a run, and of one that follows a recorded reference."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ import pytest
 from constructed import CATALOGUE, effect
 
 from twin import simulator
-from twin.experiments.follow import follow
+from twin.errors import InputError
+from twin.experiments.follow import follow_parts, recorded_setpoint, replay
+from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
-from twin.logs import LINEAR_UNITS, ROTARY_UNITS
-from twin.model.file import parse_model
+from twin.logs import LINEAR_UNITS, ROTARY_UNITS, AxisLog, Log
+from twin.logs.log import joined
+from twin.model.file import load_model, parse_model
 from twin.model.machine import AxisModel, Hardware, MachineModel
 from twin.simulator import ReducedSimulator
 
@@ -39,9 +42,14 @@ def noise(seed: int = 3):
     return one, other
 
 
+def follow(model: MachineModel, wanted: Setpoint, seed: int = 0) -> Log:
+    parts = follow_parts(model, wanted, noise(), name="n", seed=seed, simulator=ReducedSimulator)
+    return joined(parts)
+
+
 def test_every_column_is_the_signal_that_it_names():
     model, wanted = model_of(), setpoint()
-    log = follow(model, wanted, noise(), name="n", seed=9, simulator=ReducedSimulator)
+    log = follow(model, wanted)
     run = simulator.run(model, wanted, noise()[0], simulator=ReducedSimulator)
     assert log.sample_rate == RATE
     for i, (name, axis) in enumerate(log.axes.items()):
@@ -69,7 +77,7 @@ def test_every_column_is_the_signal_that_it_names():
 
 def test_what_made_a_log_is_written_into_it():
     model = model_of()
-    log = follow(model, setpoint(), noise(), name="n", seed=9, simulator=ReducedSimulator)
+    log = follow(model, setpoint(), seed=9)
     assert log.metadata["source"] == "simulation"
     assert (log.metadata["experiment"], log.metadata["seed"]) == ("n", "9")
     assert log.metadata["software"].startswith("proton-twin ")
@@ -81,8 +89,8 @@ def test_what_made_a_log_is_written_into_it():
 
 def test_the_noise_of_a_current_is_its_own_and_rides_on_the_force():
     loud = replace(QUIET, current_noise=0.02)
-    still = follow(model_of(), setpoint(), noise(), name="n", seed=0, simulator=ReducedSimulator)
-    log = follow(model_of(loud), setpoint(), noise(), name="n", seed=0, simulator=ReducedSimulator)
+    still = follow(model_of(), setpoint())
+    log = follow(model_of(loud), setpoint())
     added = [log.axes[a].columns["current"] - still.axes[a].columns["current"] for a in "xy"]
     for part, axis in zip(added, "xy", strict=True):
         assert np.std(part) == pytest.approx(0.02, rel=0.2)
@@ -99,5 +107,41 @@ def test_a_rotary_axis_is_logged_in_its_units(rotary, units):
     both = setpoint()
     one = Setpoint(*(c[:, :1] for c in (both.position, both.velocity, both.acceleration,
                                         both.force)), RATE)  # fmt: skip
-    log = follow(model, one, noise(), name="n", seed=0, simulator=ReducedSimulator)
+    log = follow(model, one)
     assert log.axes["x"].units == units
+
+
+# A recorded reference
+
+STAGE = replace(load_model("proton_xy", CATALOGUE), sample_rate=2000.0)
+
+
+@pytest.fixture(scope="module")
+def log() -> Log:
+    return simulate(STAGE, "moves", seed=3, duration=2.0, simulator=ReducedSimulator)
+
+
+def test_a_replay_of_a_log_of_the_twin_is_that_log_but_for_the_noise(log: Log) -> None:
+    again = replay(STAGE, log, simulator=ReducedSimulator)
+    for axis in STAGE.axes:
+        assert np.abs(again.axes[axis].position - log.axes[axis].position).max() < 1e-6
+        assert again.axes[axis].columns.keys() == log.axes[axis].columns.keys()
+    assert again.metadata["experiment"] == "replay"
+
+
+def test_rates_that_the_log_lacks_are_those_of_its_reference(log: Log) -> None:
+    full = recorded_setpoint(STAGE, log)
+    place = {"setpoint_position": log.axes["x"].columns["setpoint_position"]}
+    poor = recorded_setpoint(STAGE, replace(log, axes={"x": AxisLog(place)}))
+    assert poor.velocity[:, 0] == pytest.approx(full.velocity[:, 0], abs=1e-3)
+    assert not poor.position[:, 1].any()
+
+
+def test_what_cannot_be_followed_is_refused(log: Log) -> None:
+    bare = Log(2000.0, {"x": AxisLog({"position": np.zeros(9), "force": np.zeros(9)})})
+    with pytest.raises(InputError, match="no setpoint_position"):
+        replay(STAGE, bare)
+    with pytest.raises(InputError, match="name the axes alike"):
+        replay(STAGE, replace(bare, axes={"z": bare.axes["x"]}))
+    with pytest.raises(InputError, match="set sample_rate"):
+        replay(replace(STAGE, sample_rate=1000.0), log)
