@@ -13,8 +13,7 @@ from benchmarks.figures import Figure
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.given_logs import Role
 from identify.estimation.channel_delay import fit_aligned
-from identify.estimation.errors import error_if_any
-from identify.estimation.fit import Fit
+from identify.estimation.fit import Fit, error_if_any
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding, FindingKind

@@ -17,7 +17,7 @@ from dataclasses import fields
 import numpy as np
 
 from benchmarks.figures import Figure, Target
-from identify.estimation.decision import RULE
+from identify.rules import RULE
 from identify.selftest import FULL, TrialResult, rates
 from identify.selftest.case import Case
 from identify.selftest.laws import OUTSIDE

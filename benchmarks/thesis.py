@@ -14,9 +14,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
 from benchmarks.figures import Figure, Target
-from identify.analysis.dynamic_friction import DYNAMIC
+from identify.analysis.dynamic_friction import DYNAMIC, dynamic_part_free, fit_bristles
 from identify.dataset.dataset import datasets
-from identify.estimation.presliding import Presliding
 from studies.thesis.models import overall
 from studies.thesis.reproduction import reproduce
 from studies.thesis.study import friction_of, machine
@@ -81,9 +80,7 @@ def _dynamic() -> list[Figure]:
     def ours() -> Array:
         prepared = datasets(model, {"sine": log}, {}, TEST_FUNCTION)[name].fit
         rng = np.random.default_rng(SEED)
-        return read(
-            Presliding(*references).fit(axis, prepared, friction.values["Fs"], rng), references
-        )
+        return read(fit_bristles(dynamic_part_free(axis), prepared, rng), references)
 
     ours()  # what is compiled is compiled
     begun = process_time()

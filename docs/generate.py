@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from identify.dataset.motion import Motion
-from identify.experiment_design.signature import signature
+from identify.experiment_design.planting import signature
 from identify.output.machine import draw
 from twin.checks.report import Fault
 from twin.effect import Effect, Kind

@@ -7,19 +7,19 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from identify.analysis.cable_force import cable_force
 from identify.analysis.dynamic_friction import dynamic_friction
-from identify.analysis.maps import along_track, cable_force, friction_map, velocity_map
+from identify.analysis.velocity_map import along_track, friction_map, velocity_map
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.given_logs import Role
 from identify.dataset.prepared_log import sticks
 from identify.dataset.silent_logs import telling
 from identify.estimation.channel_delay import aligned, fit_aligned
-from identify.estimation.errors import error_if_any
-from identify.estimation.fit import Fit
+from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.force_balance import require_finite, require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
-from identify.estimation.remainder import noise_known, with_own_noise
-from identify.estimation.replay import simulated_error
+from identify.estimation.open_loop import simulated_error
+from identify.estimation.residual_noise import noise_known, with_own_noise
 from identify.estimation.simulated_motion import fit_simulated_motion
 from identify.experiment_design.plan import next_experiments, plan
 from identify.output.text import diagnose_text as diagnose_text  # with it results print themselves

@@ -9,11 +9,9 @@ import numpy as np
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted, step
 
 from identify.dataset.given_logs import Role
-from identify.estimation.errors import Errors
-from identify.estimation.fit import Outcome
+from identify.estimation.fit import Errors, Outcome
 from identify.estimation.intervals import Estimate, NotExcited
-from identify.estimation.repeating_force import Repeat
-from identify.estimation.residual_dependence import Dependence
+from identify.estimation.residual_dependence import Dependence, Repeat
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan

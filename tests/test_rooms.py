@@ -17,13 +17,13 @@ from twin.effects import load_catalogue
 IDENTIFY, TWIN = (Path(package.__file__).parent for package in (identify, twin))
 # In the order in which data pass them: a room imports only from those before it.
 ROOMS = (
-    "dataset", "estimation", "selection", "validation", "experiment_design", "selftest",
-    "analysis", "results", "output", "workflow", "testing", "demo", "cli", "start",
+    "rules", "dataset", "estimation", "analysis", "selection", "validation", "experiment_design",
+    "selftest", "results", "output", "workflow", "testing", "demo", "cli", "start",
 )  # fmt: skip
 LOG_ROOMS = {"logs", "importers", "checks"}
 MOST_FLOORS = 10
 # Functions that tell what a model or a result holds, without its logs.
-READING = {"followed", "nonparametric_labels", "speeds_of"}
+READING = {"followed", "nonparametric_labels"}
 ONE_OF_EACH = re.compile(r"np\.gradient|savgol|0\.6745|np\.diff\([^)]*\) / ")
 UNIT_SELECTORS = re.compile(r"""\bunit\s*(==|!=|in|not in)\s*[(\[{]?["'](?!1["'])""")
 

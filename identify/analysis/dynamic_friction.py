@@ -1,9 +1,11 @@
 """The dynamic part of a friction from open-loop logs, the rest of the model being known.
 
 Stiffness and damping of the bristles make little force in closed loop; a slow sine of force below
-the break-away shows both (L. Jia 2023). The search begins at a fit of the force residual and goes
-on with the simulated motion, for which it estimates where each log begins: a simulation from rest
-misses the bend that the bristles have there.
+the break-away shows both (L. Jia 2023). The search begins at a fit of the force residual: the start
+rule, stiffness = Fs / largest deflection and a damping drawn below it, is far off where the
+reversals are small, so it is tried at several parts of that stiffness. It goes on with the
+simulated motion, for which it estimates where each log begins: a simulation from rest misses the
+bend that the bristles have there.
 """
 
 from __future__ import annotations
@@ -13,17 +15,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.analysis.maps import only_axis
+from identify.analysis.velocity_map import only_axis
 from identify.dataset.dataset import datasets
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.presliding import Presliding
+from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.least_squares import minimise
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
 from twin.effect import Kind
 from twin.errors import InputError
 from twin.logs import GivenLogs, logs_by_name
 from twin.model.machine import AxisModel, MachineModel
-from twin.model.parameters import free_parameters
+from twin.model.parameters import free_parameters, write
+from twin.signals import Array
 
+PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of the stiffness of the start rule
+HEAD = 3.0  # s of each log, on which the start is chosen
+FIRST_EVALUATIONS = 3  # of the search from each, after which the best goes on with all
+MOST_EVALUATIONS = 200
+TOLERANCE = 1e-6  # relative fall of the squared error, at which the search ends
 DYNAMIC = ("sigma0", "sigma1")  # N/m, N s/m: stiffness and damping of a friction's bristles
 STATIC = "Fs"  # N, the force that they break away at
 TEST_FUNCTION = 0.1  # s
@@ -69,6 +78,29 @@ def fit_dynamic_part(
 
     known: of ``dynamic_part_free``. rng draws the damping to start from.
     """
-    stiffness, damping = free_parameters(known)
-    static = known[stiffness.effect].values[STATIC]
-    return fit_simulated_motion(Presliding(stiffness, damping).fit(known, logs, static, rng), logs)
+    return fit_simulated_motion(fit_bristles(known, logs, rng), logs)
+
+
+def fit_bristles(
+    known: AxisModel, logs: Sequence[PreparedLog], rng: np.random.Generator
+) -> AxisModel:
+    """The same axis with stiffness and damping of its friction fitted to the force residual."""
+    where = free_parameters(known)
+    low, high = np.array([[c.parameter.lower, c.parameter.upper] for c in where]).T
+
+    def left(x: Array, logs: Sequence[PreparedLog]) -> Array:
+        return residual(write(known, where, x), logs)
+
+    def search(logs: Sequence[PreparedLog], start: Array, evaluations: int) -> Array:
+        return minimise(
+            lambda x: left(x, logs), lambda x: jacobian(write(known, where, x), logs, where),
+            start, (low, high), tolerance=TOLERANCE, most_evaluations=evaluations,
+        ).x  # fmt: skip
+
+    deflection = max(float(np.ptp(log.motion.position)) for log in logs) / 2.0
+    first = known[where[0].effect].values[STATIC] / deflection
+    starts = [np.array([p * first, rng.uniform(0.0, p * first)]) for p in PARTS]
+    heads = [PreparedLog.of(w.motion.head(HEAD), w.test_function.length) for w in logs]
+    tried = [search(heads, start, FIRST_EVALUATIONS) for start in starts]
+    best = min(tried, key=lambda x: float(np.sum(left(x, heads) ** 2)))
+    return write(known, where, search(logs, best, MOST_EVALUATIONS))

@@ -1,17 +1,23 @@
-"""A model to begin with, from logs alone: mass, the simplest friction, a constant force."""
+"""A model to begin with, from logs alone: mass, the simplest friction, a constant force.
+
+The values are of one linear regression: the force by test functions in motion, on acceleration,
+direction, speed, 1 and what the place does: a spring, or gravity where an axis turns. Each is
+believed by its t-value over blocks of the logs, as what so rough a model leaves is coloured.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from identify.dataset.excitation import excitation
 from identify.dataset.given_logs import require_samples
 from identify.dataset.motion import Motion, motion_of
+from identify.dataset.prepared_log import at_rest
 from identify.dataset.reading_ripple import ripples_of_widest
 from identify.dataset.test_function import TestFunction
-from identify.estimation.first_values import FirstValues, first_values
 from twin.checks import moves
 from twin.effect import Effect, Excitation, Kind
 from twin.effects import Catalogue
@@ -19,6 +25,165 @@ from twin.errors import InputError
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.units import AxisUnits
+from twin.signals import Array
+
+LENGTHS = (0.1, 0.05, 0.02)  # s, of the test functions: the first that tells the mass
+BLOCKS = 30
+SURE = 3.0  # t-value from which a value is the logs', and no accident of one of their parts
+LEAST_INERTIAL = 0.005  # of the force's RMS; below, friction that is not known hides the inertia
+ROWS = 4 * BLOCKS  # test functions in motion, that tell the values and how sure they are
+AT_REST = 0.02  # part of a test function, from which what static friction holds is in its force
+TURNS = 1.0  # rad, from which gravity is a sine of the angle, and no spring
+STOOD = 0.05  # s at rest before a motion begins from rest
+NEARLY = (
+    1.5  # times what viscous friction leaves, up to which Coulomb's is believed: drives have it
+)
+ONE_WAY = 0.8  # mean direction from which nine tenths of the motion go one way
+ROUNDING = 1e-9  # of the force: smaller gains of columns of unit size are none
+SMOOTHED = 5  # blocks, over which the force at rest is averaged before its peak is taken
+MORE = 1.05  # times the Coulomb friction, from which static friction is more than a peak's noise
+BREAKAWAYS = 5  # that tell a static friction
+NAMES = ("mass", "coulomb", "viscous", "constant")  # of the first columns; others are of the place
+
+
+@dataclass(frozen=True)
+class FirstValues:
+    """mass kg, None where the logs do not tell it; coulomb N, viscous N s/m, 0 where there is none.
+
+    constant: N that the command takes beside the others, 0 where the logs do not ask for it.
+    static: N, None where the axis does not break away from rest by more than its Coulomb friction.
+    """
+
+    mass: float | None
+    coulomb: float
+    viscous: float
+    constant: float
+    static: float | None
+
+
+@dataclass(frozen=True)
+class Regression:
+    """Gains of columns (k, n) in a force (n,), their t-values, and what is left, N RMS."""
+
+    gains: Array
+    t: Array
+    left: float
+
+    def sure(self, name: str) -> float:
+        """A gain that is believed, else 0."""
+        at = NAMES.index(name)
+        return float(self.gains[at]) if abs(self.t[at]) > SURE else 0.0
+
+
+def first_values(motions: Sequence[Motion]) -> FirstValues:
+    """The values that the logs of an axis tell."""
+    place = _place(motions)
+    for length in LENGTHS:
+        columns, force = _rows(motions, length, place)
+        if abs(np.mean(np.sign(columns[1]))) > ONE_WAY:
+            columns = _without(columns, "constant")  # it would be the friction of that way
+        found = _with_friction(columns, force)
+        inertial = found.sure("mass") * float(np.std(columns[0]))
+        told = inertial > LEAST_INERTIAL * float(np.std(force))
+        if told:
+            break
+    coulomb = found.sure("coulomb")
+    static = _static(motions, found, place)
+    return FirstValues(
+        mass=found.sure("mass") if told else None,
+        coulomb=coulomb,
+        viscous=found.sure("viscous"),
+        constant=found.sure("constant"),
+        static=static if static is not None and static > MORE * coulomb > 0.0 else None,
+    )
+
+
+def _place(motions: Sequence[Motion]) -> tuple[float, bool]:
+    """The middle of the positions, m, and whether the axis turns."""
+    position = np.concatenate([m.position for m in motions])
+    return float(position.mean()), motions[0].units.rotary and np.ptp(position) > TURNS
+
+
+def _of_place(position: Array, place: tuple[float, bool]) -> Array:
+    """(2, n) what forces of the place follow."""
+    middle, turns = place
+    if turns:
+        return np.stack([np.sin(position), np.cos(position)])
+    return np.stack([position - middle, np.zeros_like(position)])
+
+
+def _rows(
+    motions: Sequence[Motion], length: float, place: tuple[float, bool]
+) -> tuple[Array, Array]:
+    """The columns (6, n) and the force (n,) N by test functions, of those without a rest.
+
+    Of all, where the axis comes to rest within nearly every one.
+    """
+    columns, going = [], []
+    for m in motions:
+        w = TestFunction.at_least(length, m.period)
+        along = [np.sign(m.velocity), m.velocity, np.ones_like(m.velocity)]
+        means = w.mean(np.stack([*along, *_of_place(m.position, place), m.command]))
+        columns.append(np.concatenate([w.acceleration(m.velocity)[None], means]))
+        going.append(w.mean(at_rest(m.velocity).astype(float)) < AT_REST)
+    rows, kept = np.hstack(columns), np.concatenate(going)
+    rows = rows[:, kept] if np.count_nonzero(kept) >= ROWS else rows
+    return rows[:-1], rows[-1]
+
+
+def _with_friction(columns: Array, force: Array) -> Regression:
+    """With both kinds of friction where both are sure, else with one, Coulomb's where it may be."""
+    both = _regressed(columns, force)
+    if min(both.sure("coulomb"), both.sure("viscous")) > 0.0:
+        return both
+    dry = _regressed(_without(columns, "viscous"), force)
+    wet = _regressed(_without(columns, "coulomb"), force)
+    if dry.sure("coulomb") > 0.0 and dry.left < NEARLY * wet.left:
+        return dry
+    if wet.sure("viscous") > 0.0:
+        return wet
+    return _regressed(_without(_without(columns, "coulomb"), "viscous"), force)
+
+
+def _without(columns: Array, name: str) -> Array:
+    kept = columns.copy()
+    kept[NAMES.index(name)] = 0.0
+    return kept
+
+
+def _regressed(columns: Array, force: Array) -> Regression:
+    """Least squares, with the scatter between blocks of time."""
+    size = np.linalg.norm(columns, axis=1)
+    size = np.where(size > 0.0, size, 1.0)
+    scaled = columns / size[:, None]
+    inverse = np.linalg.pinv(scaled @ scaled.T, rcond=1e-10, hermitian=True)
+    gains = inverse @ scaled @ force
+    left = force - gains @ scaled
+    scores = np.stack([part.sum(axis=1) for part in np.array_split(scaled * left, BLOCKS, axis=1)])
+    variance = np.diag(inverse @ (scores.T @ scores) @ inverse)
+    error = np.sqrt(np.maximum(variance, 0.0)) + ROUNDING * float(np.linalg.norm(force))
+    return Regression(gains / size, gains / error, float(np.sqrt(np.mean(left**2))))
+
+
+def _static(
+    motions: Sequence[Motion], found: Regression, place: tuple[float, bool]
+) -> float | None:
+    """The friction (N) at which the axis breaks away from rest; None where it seldom does."""
+    needed = []
+    for m in motions:
+        rest = at_rest(m.velocity)
+        edges = np.flatnonzero(np.diff(rest, prepend=False, append=False))
+        driven = m.command - found.gains[0] * m.acceleration - found.gains[3]
+        driven = driven - found.gains[4:] @ _of_place(m.position, place)
+        driven = np.convolve(driven, np.ones(SMOOTHED) / SMOOTHED, "same")
+        stood = max(round(STOOD / m.period), SMOOTHED)
+        needed += [
+            float(np.max(driven[last - stood : last] * np.sign(m.velocity[last])))
+            for first, last in zip(edges[::2], edges[1::2], strict=True)
+            if last - first >= stood and last < len(rest)
+        ]
+    return float(np.median(needed)) if len(needed) >= BREAKAWAYS else None
+
 
 TEST_FUNCTION = 0.02  # s, over which the acceleration that was reached is averaged
 MARGIN = 0.05  # of the way that was covered, beyond its ends

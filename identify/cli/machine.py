@@ -236,7 +236,7 @@ def effects(
     if name is not None:
         chosen = catalogue[name]
         if plot is not None:
-            from identify.experiment_design.signature import signature
+            from identify.experiment_design.planting import signature
             from identify.output.machine import draw
 
             require_folder(plot)

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.decision import RULE
 from identify.estimation.evidence import evidence, rms
 from identify.estimation.fit import Fit, Outcome, error_on, finished, fit_axis
-from identify.estimation.subspace import unabsorbed
-from identify.estimation.thorough_fit import fit_thoroughly
+from identify.estimation.least_squares import unabsorbed
 from identify.estimation.time_origin import depends_on_time_origin, synchronised, with_time_origins
+from identify.estimation.variable_projection import fit_thoroughly
+from identify.rules import RULE
 from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Fit an axis model to logs: least squares on the force residual.
+"""Fit an axis model to logs: least squares on the force residual, and its errors on other logs.
 
 Weak priors keep parameters that the data do not determine near their start values.
 """
@@ -13,21 +13,22 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.dataset import Dataset
 from identify.dataset.drive import forces_lessened
 from identify.dataset.floor import NoiseFloor, noise_beside
+from identify.dataset.given_logs import Role
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.dataset.spectral_lines import lines_in_time
-from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit_problem import FitProblem
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.pitches import pitches
+from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.estimation.scaling import AT_EDGE, Scaling
-from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.spatial_periods import pitches
+from identify.rules import RULE
 from twin.model.machine import AxisModel
 from twin.model.parameters import read
-
-Array = NDArray[np.float64]
+from twin.signals import Array
 
 MOST_EVALUATIONS = 40
 ROUGHLY = 1e-3  # relative fall of the squared error, at which the priors are weighed again
@@ -249,3 +250,34 @@ def at_bounds(fit: Fit, effect: str) -> tuple[str, ...]:
 def error_on(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
     """Force residual (n,) N of a model on other logs, without refitting."""
     return residual(axis, logs)[moving(logs, sticks(axis))]
+
+
+@dataclass(frozen=True)
+class Errors:
+    """RMS force errors (N) without a change of a model and with it, on the logs of a role."""
+
+    before: float
+    after: float
+    on: Role
+
+    @classmethod
+    def of(cls, before: Fit, after: Fit, dataset: Dataset, on: Role) -> Errors:
+        """The errors of two fits."""
+        first = error_in(on, before, dataset)
+        return cls(first, first if after is before else error_in(on, after, dataset), on)
+
+
+def error_in(role: Role, fit: Fit, dataset: Dataset) -> float:
+    """RMS force error (N) on the logs of a role; no number where there are none."""
+    return fit.error if role is Role.TRAINING else rms(error_on(fit.axis, dataset.having(role)))
+
+
+def error_if_any(role: Role, fit: Fit, dataset: Dataset) -> float | None:
+    """The same, or None where there are none, or none that say anything of this model."""
+    logs = dataset.having(role)
+    return error_in(role, fit, dataset) if logs and moving(logs, sticks(fit.axis)).any() else None
+
+
+def holdout_error(fit: Fit, dataset: Dataset) -> float | None:
+    """RMS force error on the selection logs in N, or None where there are none."""
+    return error_if_any(Role.SELECTION, fit, dataset)

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.levenberg_marquardt import minimise
+from identify.estimation.least_squares import minimise
 from identify.estimation.scaling import Scaling
-from identify.estimation.smoothing import has_nonparametric, smoothing
+from twin.curve import Part
 from twin.effect import Kind
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference
-
-Array = NDArray[np.float64]
+from twin.signals import Array
 
 PRIOR_FORCE = 0.1  # expected force of an effect beside the friction, over the force to explain
 UNSEEN = 1e-3  # of the force of another strength of the effect, below which one is not excited
@@ -160,3 +159,30 @@ class FitProblem:
             tolerance=tolerance, most_evaluations=self.most_evaluations,
         )  # fmt: skip
         return solution.x, solution.converged
+
+
+def has_nonparametric(axis: AxisModel) -> bool:
+    """Whether the axis has a nonparametric effect."""
+    return any(f.effect.is_nonparametric for f in axis.effects)
+
+
+def part_rows(part: Part, effect: str, where: Sequence[ParameterReference]) -> Array:
+    """Rows (m, len(where)) of a part at unit stiffness; zero for what is not among ``where``."""
+    index = {c.parameter.name: i for i, c in enumerate(where) if c.effect == effect}
+    own = [index.get(name) for name in part.strengths]
+    rows = part.rows(len(own))
+    out = np.zeros((len(rows), len(where)))
+    for column, at in zip(rows.T, own, strict=True):
+        if at is not None:
+            out[:, at] = column
+    return out
+
+
+def smoothing(axis: AxisModel, where: Sequence[ParameterReference], samples: int) -> Array:
+    """Penalty rows (m, len(where)), N per unit, weighted for ``samples`` residuals in N."""
+    rows = [
+        np.sqrt(samples) * f.values[part.stiffness] * part_rows(part, f.effect.name, where)
+        for f in axis.effects
+        for part in f.effect.parts
+    ]
+    return np.vstack([np.zeros((0, len(where))), *rows])

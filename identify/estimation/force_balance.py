@@ -9,7 +9,6 @@ from itertools import product
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import actual_force, parts_of, reading_error, true_motion
@@ -31,9 +30,8 @@ from twin.model.machine import AxisModel, axis_table
 from twin.model.parameters import ParameterReference, read, write
 from twin.model.units import Scale, has_size
 from twin.parallel import spread
-from twin.signals import between
+from twin.signals import Array, between
 
-Array = NDArray[np.float64]
 _Along: TypeAlias = Callable[[PreparedLog], Array]
 _Walk: TypeAlias = tuple[list[int], _Along]
 
@@ -274,3 +272,40 @@ def difference_step(c: ParameterReference, value: float, scale: Scale) -> float:
     usual = scale.size(p.unit) if has_size(p.unit) else min(p.upper - p.lower, 1.0)
     size = STEP * (abs(value) if p.lower > 0.0 else max(abs(value), LEAST_PART * usual))
     return size if value + size <= p.upper else -size
+
+
+STEADY_TRAVEL, STEADY_STEPS = 0.1, 2000  # m and steps over which a law settles at one place
+
+
+def force_along(
+    axis: AxisModel, position: Array, velocity: Array, period: float, *kinds: Kind
+) -> Array:
+    """Force (n,) N of the axis' effects of these kinds, under no command.
+
+    position m and velocity m/s (n,) at the middle of samples that are ``period`` s long.
+    """
+    signals = np.stack([position, velocity, np.zeros_like(velocity)])
+    motion = Motion(
+        name="", axis="", signals=signals, others=np.zeros_like(signals), period=period, start=0.0,
+        sample_period=period, position_noise=0.0, raw=signals[1:],
+    )  # fmt: skip
+    return total_force(axis_table({"": parts_of(axis, *kinds)}), motion)
+
+
+def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
+    """Friction (N, positive where it opposes the motion) after a long way at one place.
+
+    place: m; velocity: m/s, not zero.
+    """
+    rubbing = tuple(f for f in axis.effects if f.effect.kind in RUBBING)
+    return float(-np.sign(velocity) * steady_force(replace(axis, effects=rubbing), place, velocity))
+
+
+def steady_force(axis: AxisModel, place: float, velocity: float) -> float:
+    """Force (N) of an axis' forces and friction after a long way at one place.
+
+    place: m; velocity: m/s, not zero.
+    """
+    period = STEADY_TRAVEL / STEADY_STEPS / abs(velocity)
+    places, velocities = np.repeat([[place], [velocity]], STEADY_STEPS, axis=1)
+    return float(force_along(axis, places, velocities, period, Kind.FORCE, *RUBBING)[-1])

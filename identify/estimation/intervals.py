@@ -14,24 +14,22 @@ of the model in the interval.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identify.estimation.decision import RULE
 from identify.estimation.evidence import left_out
 from identify.estimation.fit import Fit
 from identify.estimation.fit_problem import is_linear
 from identify.estimation.force_balance import changes
-from twin.model.machine import AxisIntervals
+from identify.rules import RULE
+from twin.model.machine import AxisIntervals, AxisModel
 from twin.model.parameters import ParameterReference, read, write
-
-Array = NDArray[np.float64]
+from twin.signals import Array
 
 BLOCKS = 30
 RIDGE = 1e-6  # keeps a fit without one block finite
@@ -294,3 +292,23 @@ def _held(fit: Fit) -> list[Estimate]:
             if label not in free:
                 out.append(Estimate(label, f.values[p.name], units(p.unit), None, None, False))
     return out
+
+
+BAND_STEP = 0.1  # of a half width, the step of a difference
+
+
+def with_band(
+    fit: Fit, curve: Callable[[AxisModel], Array], among: Collection[ParameterReference]
+) -> tuple[Array, Array]:
+    """The curve (k,) of a fitted axis, and half the width (k,) of its 90 % band, in its unit.
+
+    among: the free parameters that the curve depends on.
+    """
+    where, half = fit.scaling.where, half_widths(fit)
+    centre, values = curve(fit.axis), read(fit.axis, where)
+    slopes = np.zeros((len(where), len(centre)))
+    for i in np.flatnonzero(np.isfinite(half)):
+        if where[i] in among:
+            step = BAND_STEP * half[i]
+            slopes[i] = (curve(write(fit.axis, [where[i]], [values[i] + step])) - centre) / step
+    return centre, half_widths_of(fit, slopes)

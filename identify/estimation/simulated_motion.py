@@ -2,26 +2,29 @@
 
 L. Ljung, System Identification (1999), section 4.3: least squares on simulated less measured
 position, without a restart. An integrating axis sums every force error up, so the search begins at
-a fit of the force residual, and again from places around it. Where the model lacks something, that
-error is rough, and a population goes on from there (identify.estimation.rough_search). Where each
-log begins (position, velocity, states of the friction) is estimated as well, with its first
-readings as a prior: left free altogether, it would take over what the model lacks.
+a fit of the force residual, and again from places around it. Where each log begins (position,
+velocity, states of the friction) is estimated as well, with its first readings as a prior: left
+free altogether, it would take over what the model lacks.
+
+A model that is wrong comes to rest at other instants than the machine. Each such instant makes a
+dent in the error, and a search along slopes ends in the first one; there a population goes on, then
+a simplex. R. Storn, K. Price, "Differential evolution", J. Global Optim. 11 (1997); J. Nelder,
+R. Mead, "A simplex method for function minimization", Comput. J. 7 (1965), as in the thesis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Outcome
-from identify.estimation.levenberg_marquardt import Solution, minimise
-from identify.estimation.replay import (
+from identify.estimation.least_squares import Solution, minimise
+from identify.estimation.open_loop import (
     LEAST_READING,
     Beginning,
     Replay,
@@ -29,13 +32,11 @@ from identify.estimation.replay import (
     motion_error,
     simulated_error,
 )
-from identify.estimation.rough_search import rough_minimum
 from identify.estimation.scaling import Scaling
 from twin.errors import InputError
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference
-
-Array = NDArray[np.float64]
+from twin.signals import Array
 
 STARTS = 4  # of the search: the axis as given, and places around it
 AROUND = 0.1  # standard deviation of those, in parts of each value
@@ -293,3 +294,45 @@ def _require_alone(axis: AxisModel, logs: Sequence[PreparedLog]) -> None:
                 f"axis {logs[0].motion.axis}: '{f.effect.name}' depends on the other axis, whose "
                 "motion a simulation of this axis alone does not hold; use --objective force"
             )
+
+
+POPULATION, MOST_POPULATION = 12, 72  # for each variable, and of all
+GENERATIONS = 60  # at most
+ALIKE = 1e-3  # scatter of the population's errors, in parts of their mean, at which it ends
+REACH = 5.0  # standard deviations of the population, beyond which nothing is tried
+SIMPLEX_EVALUATIONS = 600  # at most
+
+
+def rough_minimum(
+    error: Callable[[Array], float],
+    start: Array,
+    spread: Array,
+    bounds: tuple[Array, Array],
+    rng: np.random.Generator,
+) -> Array:
+    """Variables (k,) with the least error that is found, never larger than at the start (k,).
+
+    spread (k,): standard deviation of the population around the start. Where the error is not
+    finite the variables are not taken.
+    """
+    from scipy.optimize import differential_evolution, minimize
+
+    def finite(x: Array) -> float:
+        found = error(x)
+        return found if np.isfinite(found) else np.inf
+
+    low = np.maximum(bounds[0], start - REACH * spread)
+    high = np.minimum(bounds[1], start + REACH * spread)
+    size = (min(POPULATION * len(start), MOST_POPULATION), len(start))
+    first = np.clip(start + spread * rng.standard_normal(size), low, high)
+    first[0] = start
+    found = differential_evolution(
+        finite, list(zip(low, high, strict=True)), init=first, maxiter=GENERATIONS, tol=ALIKE,
+        polish=False, rng=rng,
+    ).x  # fmt: skip
+    options = {"maxfev": SIMPLEX_EVALUATIONS}
+    polished = minimize(
+        finite, found, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)),
+        options=options,
+    ).x  # fmt: skip
+    return min((start, found, polished), key=finite)

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.spectral_lines import lines_in_time
-from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import averaged_force, residual
+from identify.rules import RULE
 from twin.effect import Kind
 from twin.model.machine import AxisModel
 

@@ -25,7 +25,7 @@ from identify.dataset.time_scale import choose_test_function
 from identify.estimation.evidence import effective_samples, evidence, rms
 from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.experiment_design.candidate_experiments import NotRun
 from twin.checks import moves
 from twin.effect import Kind

@@ -10,7 +10,6 @@ from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.given_logs import Role
 from identify.dataset.test_function import require_test_function
 from identify.estimation.channel_delay import fit_aligned
-from identify.estimation.decision import RULE
 from identify.experiment_design.candidate_experiments import NotRun, proposals
 from identify.experiment_design.discrimination import (
     Arena,
@@ -28,6 +27,7 @@ from identify.experiment_design.rival_hypotheses import (
     require_different,
     simulated_dataset,
 )
+from identify.rules import RULE
 from identify.selection.candidates import Candidate, usable
 from identify.selection.changes import Added
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis

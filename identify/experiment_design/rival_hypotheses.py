@@ -12,7 +12,7 @@ from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.noise_floor import floor_of
 from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import residual
-from identify.estimation.thorough_fit import fit_thoroughly
+from identify.estimation.variable_projection import fit_thoroughly
 from identify.estimation.variable_projection import starts as start_values
 from identify.experiment_design.discrimination import Explanation
 from identify.experiment_design.planting import strength_for

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.given_logs import Role
-from identify.estimation.errors import error_if_any
-from identify.estimation.fit import Fit
+from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.results.printed import Printed
 from identify.selection.candidates import Candidate

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from identify.dataset.floor import NoiseFloor
 from identify.dataset.given_logs import Role
 from identify.dataset.noise_floor import floor_of
-from identify.estimation.errors import Errors, error_in
+from identify.estimation.fit import Errors, error_in
 from identify.estimation.intervals import Estimate, estimates
 from identify.selection.acceptance import Judged
 from identify.selection.confounded import MovedParameter, moved_parameters

@@ -26,12 +26,12 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import moving, sticks
-from identify.estimation.decision import RULE
 from identify.estimation.evidence import blocks_of, effective_samples, left_out, rms
 from identify.estimation.fit import Fit
+from identify.estimation.fit_problem import has_nonparametric, smoothing
 from identify.estimation.force_balance import residual
-from identify.estimation.smoothed import solve
-from identify.estimation.smoothing import has_nonparametric, smoothing
+from identify.estimation.splines import solve
+from identify.rules import RULE
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.curve_band import with_band
 from identify.estimation.fit import Fit
-from identify.estimation.prescribed_motion import steady_force
+from identify.estimation.force_balance import steady_force
+from identify.estimation.intervals import with_band
 from identify.selection.found_shape import AHEAD, BEHIND, UNITS, Drawn, FoundShape
 from twin.curve import Coordinate
 from twin.effect import RUBBING

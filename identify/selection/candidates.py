@@ -12,7 +12,6 @@ from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.dataset.noise_floor import floor_of, unrounded_floor_of
-from identify.estimation.decision import RULE
 from identify.estimation.evidence import (
     Evidence,
     Gain,
@@ -24,8 +23,9 @@ from identify.estimation.evidence import (
 )
 from identify.estimation.fit import Fit, at_bounds, error_on
 from identify.estimation.force_balance import averaged_force
-from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.estimation.time_origin import depends_on_time_origin, phases_found
+from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, Taken, score
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue

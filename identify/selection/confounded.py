@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.decision import RULE
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit
 from identify.estimation.fit_problem import is_linear
 from identify.estimation.force_balance import changes, jacobian, residual
 from identify.estimation.intervals import half_widths
-from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.least_squares import orthonormal, unabsorbed
+from identify.rules import RULE
 from identify.selection.candidates import absent_effects
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
-from identify.estimation.decision import RULE
 from identify.estimation.evidence import blocks_of, by_blocks
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.subspace import orthonormal
+from identify.estimation.least_squares import orthonormal
+from identify.rules import RULE
 from identify.selection.acceptance import Judged, larger, parts
 from twin.parallel import spread
 

@@ -7,11 +7,9 @@ from enum import Enum
 from functools import cached_property
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.errors import Errors
-from identify.estimation.fit import Fit, finished, fit_axis
-from identify.estimation.remainder import with_own_noise
-from identify.estimation.repeating_force import Repeat, not_general
-from identify.estimation.residual_dependence import Dependence, find_dependence
+from identify.estimation.fit import Errors, Fit, finished, fit_axis
+from identify.estimation.residual_dependence import Dependence, Repeat, find_dependence, not_general
+from identify.estimation.residual_noise import with_own_noise
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added

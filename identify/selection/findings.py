@@ -8,8 +8,7 @@ from enum import Enum
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.given_logs import Role
-from identify.estimation.errors import Errors, error_in
-from identify.estimation.fit import Fit, finished, fit_axis
+from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.bends import Bend
 from identify.selection.bent_curve import bent_curve

@@ -12,7 +12,7 @@ from identify.dataset.prepared_log import moving
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import averaged_force
-from identify.estimation.smoothed import Linearised, solve
+from identify.estimation.splines import Linearised, solve
 from identify.selection.curves import Shape, sticking
 from twin.curve import Coordinate
 from twin.model.units import LINEAR

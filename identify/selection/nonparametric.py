@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.excitation import excitation
 from identify.estimation.fit import Fit, finished, fit_axis
-from identify.estimation.smoothed import Linearised, choose_stiffness
-from identify.estimation.thorough_fit import fit_without
+from identify.estimation.splines import Linearised, choose_stiffness
+from identify.estimation.variable_projection import fit_without
 from identify.selection.acceptance import Judged, score
 from identify.selection.candidates import Candidate, candidate_of
 from identify.selection.controls import change_control

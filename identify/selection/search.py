@@ -17,14 +17,13 @@ import numpy as np
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.estimation.channel_delay import moved_by, realigned
-from identify.estimation.decision import RULE
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, finished, fit_axis
+from identify.estimation.least_squares import unabsorbed
 from identify.estimation.scaling import Scaling
-from identify.estimation.subspace import unabsorbed
-from identify.estimation.thorough_fit import fit_thoroughly
 from identify.estimation.time_origin import synchronised, time_origins, with_given_origins
-from identify.estimation.variable_projection import starts
+from identify.estimation.variable_projection import fit_thoroughly, starts
+from identify.rules import RULE
 from identify.selection.acceptance import Judged, least_t, score
 from identify.selection.candidates import (
     Candidate,

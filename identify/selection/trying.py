@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.estimation.fit import Fit
-from identify.estimation.thorough_fit import fit_thoroughly
+from identify.estimation.variable_projection import fit_thoroughly
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, Reshaped, from_all_starts

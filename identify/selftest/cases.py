@@ -13,7 +13,7 @@ from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.force_balance import residual
-from identify.estimation.subspace import unabsorbed
+from identify.estimation.least_squares import unabsorbed
 from identify.experiment_design.planting import (
     added_force,
     hidden_part,

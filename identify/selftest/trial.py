@@ -12,12 +12,11 @@ import numpy as np
 from identify.dataset.dataset import Dataset
 from identify.dataset.given_logs import Role
 from identify.estimation.channel_delay import fit_aligned
-from identify.estimation.errors import error_in
-from identify.estimation.fit import Fit
+from identify.estimation.fit import Fit, error_in
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates, half_widths
+from identify.estimation.least_squares import unabsorbed
 from identify.estimation.residual_dependence import dependences
-from identify.estimation.subspace import unabsorbed
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.findings import Finding, FindingKind
 from identify.selftest.case import Case

@@ -19,7 +19,7 @@ from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import BLOCKS, LARGEST_RATIO, QUANTILE
-from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.selection.candidates import usable
 from identify.selection.confounded import linear_bases
 from twin.effects import Catalogue

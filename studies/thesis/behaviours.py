@@ -11,8 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.motion import motion_of
-from identify.estimation.velocity_map import velocity_map
 from studies.thesis.study import Array, Numbers, followed, seed_of
 from twin.core.control import Controller
 from twin.experiments.kinds import Staircase
@@ -59,7 +59,7 @@ def traits(model: MachineModel, logs: Mapping[str, Log], rng: np.random.Generato
     ((name, axis),) = model.axes.items()
     (friction,) = axis.names
     truth = {key: log.truth[name] for key, log in logs.items()}
-    found = velocity_map(axis, motion_of(logs["velocity map"], name, "map")).towards(1.0).friction
+    found = VelocityMap.of(axis, motion_of(logs["velocity map"], name, "map")).towards(1.0).friction
     push = np.abs(truth["break-away"][friction])
     creep = followed(model, pushed(oscillation(LONG)), rng, {name: Controller()})
     moved = creep.truth[name]["position"]

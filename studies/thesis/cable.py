@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from identify import cable_force
-from identify.estimation.cable_force import CableForce
+from identify.analysis.cable_force import CableForce
 from identify.estimation.evidence import rms
 from identify.output.report.drawing import BLUE, GREY, ORANGE
 from identify.output.report.page import Picture

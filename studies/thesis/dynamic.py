@@ -23,9 +23,9 @@ from identify.dataset.dataset import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Outcome, finished, fit_axis
+from identify.estimation.force_balance import force_along
 from identify.estimation.intervals import half_widths
-from identify.estimation.prescribed_motion import force_along
-from identify.estimation.replay import Beginning, Replay, measured_beginning
+from identify.estimation.open_loop import Beginning, Replay, measured_beginning
 from identify.output.report.drawing import BLUE, GREY, ORANGE
 from identify.output.report.page import Picture
 from studies.telling import Line, Panel, picture

@@ -16,13 +16,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.motion import motion_of
 from identify.estimation.evidence import evidence, rms
 from identify.estimation.fit import Fit, error_on, fit_axis
+from identify.estimation.force_balance import steady_friction
 from identify.estimation.intervals import half_widths
-from identify.estimation.prescribed_motion import steady_friction
-from identify.estimation.velocity_map import velocity_map
 from identify.output.numbers import spaced
 from identify.output.report.drawing import BLUE, GREY, ORANGE
 from identify.output.report.page import Picture
@@ -120,7 +120,7 @@ def near_zero(small: bool, rng: np.random.Generator) -> Numbers:
         label = f"{speed:g} m/s"
         logs[label] = study.recorded(model, moves, rng)
         motion = motion_of(logs[label], name, label, ripples=())  # a simulated reading has none
-        mapped.append(float(velocity_map(axis, motion).towards(1.0).friction.mean()))
+        mapped.append(float(VelocityMap.of(axis, motion).towards(1.0).friction.mean()))
     dataset = datasets(model, logs, {})[name]
     fit = fit_axis(study.begun(axis, dataset, friction_of(axis).effect), dataset.fit)
     planted, fitted = (

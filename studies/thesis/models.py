@@ -20,7 +20,7 @@ from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.noise_floor import floor_of
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis
-from identify.estimation.prescribed_motion import force_along
+from identify.estimation.force_balance import force_along
 from identify.output.numbers import spaced
 from identify.output.report.drawing import BLUE
 from identify.output.report.page import Block

@@ -14,15 +14,14 @@ from dataclasses import astuple, replace
 
 import numpy as np
 
-from identify.analysis.dynamic_friction import DYNAMIC, dynamic_part_free
+from identify.analysis.dynamic_friction import DYNAMIC, dynamic_part_free, fit_bristles
+from identify.analysis.friction_curve import StribeckCurve, fit_stribeck
+from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
-from identify.estimation.presliding import Presliding
-from identify.estimation.stribeck_curve import StribeckCurve, fit_stribeck
-from identify.estimation.velocity_map import VelocityMap, velocity_map
 from identify.output.report.drawing import BLUE, ORANGE
 from identify.output.report.page import Picture
 from studies.telling import Line, Panel, picture
@@ -71,7 +70,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
     for speed in speeds:
         moves = Staircase(name, speeds=(speed,), span=span, longest_plateau=1e4)
         moved = motion_of(simulate(model, moves, simulator=simulator), name, "moves", ripples=())
-        maps.append(velocity_map(axis, moved))
+        maps.append(VelocityMap.of(axis, moved))
     found = VelocityMap.joined(maps)
     reversals = Reversals(name, repeats=repeats, amplitude=AMPLITUDE, effort=GENTLE, dwell=0.02)
     log = simulate(model, reversals, simulator=simulator)
@@ -139,8 +138,7 @@ def dynamic_of(
     """Stiffness and damping from the reversals, with these static parameters."""
     effect = friction_of(axis).effect
     known = [ParameterReference(effect.name, effect.parameter(p)) for p in STATIC]
-    part = Presliding(*free_parameters(dynamic_part_free(axis)))
-    fitted = part.fit(write(axis, known, static), logs, static[STATIC.index("Fs")], rng)
+    fitted = fit_bristles(dynamic_part_free(write(axis, known, static)), logs, rng)
     return [friction_of(fitted).values[p] for p in DYNAMIC]
 
 

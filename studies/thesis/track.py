@@ -17,14 +17,13 @@ from functools import partial
 
 import numpy as np
 
+from identify.analysis.friction_curve import NAMES, fit_stribeck, stribeck_through
+from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.dataset import datasets
 from identify.dataset.motion import motion_of
-from identify.estimation.curve_band import with_band
 from identify.estimation.fit import Fit, fit_axis
-from identify.estimation.map_curve import NAMES, stribeck_through
-from identify.estimation.prescribed_motion import steady_friction
-from identify.estimation.stribeck_curve import fit_stribeck
-from identify.estimation.velocity_map import VelocityMap, velocity_map
+from identify.estimation.force_balance import steady_friction
+from identify.estimation.intervals import with_band
 from identify.output.report.drawing import BLUE, GREY, ORANGE
 from identify.output.report.page import Picture
 from studies.telling import Line, Panel, picture
@@ -60,7 +59,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
         logs = moves(model, name, place, small, rng)
         # Simulated readings have no ripple that would have to be sought.
         motions = [motion_of(log, name, label, ripples=()) for label, log in logs.items()]
-        found = VelocityMap.joined([velocity_map(axis, motion) for motion in motions])
+        found = VelocityMap.joined([VelocityMap.of(axis, motion) for motion in motions])
         speeds = np.array(sorted({round(float(abs(v)), 6) for v in found.velocity}))
         fit = local_fit(model, name, logs, found)
         for way, side in SIDES.items():
@@ -103,7 +102,7 @@ def moves(
 
 def through(one_way: VelocityMap) -> tuple[list[float], list[float]]:
     """The curve through a map: parameters (4,), half widths (4,) of their 90 % intervals."""
-    found = stribeck_through(one_way)
+    found = stribeck_through(np.abs(one_way.velocity), one_way.friction, one_way.samples)
     return [found.values[n] for n in NAMES], [found.half[n] for n in NAMES]
 
 
@@ -119,7 +118,7 @@ def local_fit(model: MachineModel, name: str, logs: Mapping[str, Log], found: Ve
     Of what varies along the track the first term alone is free: over one place it is a slope.
     """
     axis, dataset = model.axes[name], datasets(model, logs, {})[name]
-    start = stribeck_through(replace(found, velocity=np.abs(found.velocity))).values
+    start = stribeck_through(np.abs(found.velocity), found.friction, found.samples).values
     effects = []
     for f in axis.effects:
         if f.effect.kind is Kind.FRICTION:

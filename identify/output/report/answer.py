@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from identify.dataset.given_logs import Role
-from identify.estimation.decision import RULE
 from identify.output.numbers import arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import Answer, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
@@ -13,6 +12,7 @@ from identify.output.words.fit import refit_in_words
 from identify.output.words.plan import next_step_in_words
 from identify.results.addition import Addition
 from identify.results.told import Told
+from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.model.machine import HistoryStep
 

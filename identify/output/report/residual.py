@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from identify.estimation.decision import RULE
 from identify.estimation.residual_dependence import Dependence
 from identify.output.numbers import (
     Scale,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from identify.estimation.decision import RULE
 from identify.estimation.fit import Outcome
 from identify.output.numbers import (
     arrow,
@@ -34,6 +33,7 @@ from identify.output.words.fit import (
 from identify.output.words.residual import dependence_in_words, region_in_words, repeat_in_words
 from identify.results.results import Diagnosis
 from identify.results.told import Told
+from identify.rules import RULE
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, Freed
 from identify.selection.changes import Change as ModelChange

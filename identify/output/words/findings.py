@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.given_logs import Role
-from identify.estimation.decision import RULE
 from identify.output.numbers import (
     change,
     percent,
     quantity,
 )
+from identify.rules import RULE
 from identify.selection.bends import Bend
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding, FindingKind

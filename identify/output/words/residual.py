@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identify.estimation.repeating_force import Repeat
-from identify.estimation.residual_dependence import Dependence
+from identify.estimation.residual_dependence import Dependence, Repeat
 from identify.output.numbers import (
     number,
     percent,

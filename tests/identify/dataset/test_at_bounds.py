@@ -7,7 +7,7 @@ from constructed import effect, held, log_of, waves, windowed
 
 from identify.dataset.motion import motion_of
 from identify.estimation.fit import Fit, Outcome, fit_axis
-from identify.estimation.levenberg_marquardt import minimise
+from identify.estimation.least_squares import minimise
 from twin.model.machine import AxisModel, Fitted
 
 RATE = 2000.0  # Hz

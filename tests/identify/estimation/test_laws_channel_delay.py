@@ -8,9 +8,9 @@ from constructed import dataset_of, effect, fit_of, log_of, waves, windowed
 
 from identify.dataset.motion import motion_of
 from identify.estimation.channel_delay import fit_aligned, misalignment, moved_by, realigned
-from identify.estimation.decision import RULE
 from identify.estimation.fit import fit_axis
 from identify.output.words.fit import channel_delay_in_words
+from identify.rules import RULE
 from twin.model.machine import AxisModel
 
 RATE, MASS = 1000.0, 1.7

@@ -8,7 +8,6 @@ from constructed import dataset_of, log_of, moved, windowed
 
 from identify.dataset.coordinates import coordinates_of
 from identify.dataset.motion import _follows, motion_of
-from identify.estimation.decision import RULE
 from identify.estimation.residual_dependence import (
     BINS,
     _shares,
@@ -17,6 +16,7 @@ from identify.estimation.residual_dependence import (
     line,
     share,
 )
+from identify.rules import RULE
 from identify.validation.whiteness import Loop, correlation, loop_of
 
 RNG = np.random.default_rng(51)

@@ -7,7 +7,6 @@ import pytest
 from constructed import effect, fit_of, moved, windowed
 
 from identify.dataset.prepared_log import moving
-from identify.estimation.decision import RULE
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import (
     Outcome,
@@ -16,9 +15,9 @@ from identify.estimation.fit import (
     fit_axis,
     rms,
 )
-from identify.estimation.fit_problem import PRIOR_SPREAD, FitProblem
+from identify.estimation.fit_problem import PRIOR_SPREAD, FitProblem, has_nonparametric
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.smoothing import has_nonparametric
+from identify.rules import RULE
 from twin.model.machine import AxisModel
 from twin.model.parameters import free_parameters, read
 

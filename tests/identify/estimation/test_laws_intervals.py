@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from built_fits import known_floor
+from built_fits import PLAIN, built_fit, known_floor
 from constructed import effect, fit_of, moved, windowed
 from linear_cases import cut, linear, without
 from scipy.stats import t as student
@@ -17,8 +17,10 @@ from identify.estimation.intervals import (
     ModelWrong,
     estimates,
     half_widths,
+    half_widths_of,
     inseparable,
     refusal,
+    with_band,
 )
 from identify.estimation.scaling import Scaling
 from identify.output.words.fit import no_interval_in_words
@@ -156,3 +158,27 @@ def test_estimates_are_the_values_with_their_intervals_within_the_bounds():
     assert all(e.low is None and e.high is None for e in estimates(fit))
     unmoved = fit_of(replace(axis, mass_fixed=True), log)
     assert next(e.label for e in estimates(unmoved) if not e.free) == "mass"
+
+
+def test_what_two_estimates_have_in_common_is_surer_than_either() -> None:
+    """Two columns that are nearly one: their sum is known where neither of them is."""
+    rng = np.random.default_rng(5)
+    one = rng.standard_normal(600)
+    columns = np.stack([one, one + 1e-3 * rng.standard_normal(600)], axis=1)
+    fit = SimpleNamespace(jacobian=columns, residual=rng.standard_normal(600))
+    alone, (both,) = half_widths_of(fit, np.eye(2)), half_widths_of(fit, np.ones((2, 1)))
+    assert both < 0.01 * alone.min()
+    assert both == pytest.approx(1.7 / np.sqrt(600), rel=0.5)
+
+
+def test_the_band_of_a_curve_follows_from_what_each_parameter_does_to_it() -> None:
+    """Of one that is linear in the parameters it is that of its slopes."""
+    rng, where = np.random.default_rng(3), free_parameters(PLAIN)
+    columns, slopes = rng.standard_normal((600, len(where))), rng.standard_normal((len(where), 4))
+    fit = built_fit(0.1, residual=0.1 * rng.standard_normal(600), jacobian=columns)
+    curve, half = with_band(fit, lambda axis: read(axis, where) @ slopes, where)
+    np.testing.assert_allclose(curve, read(PLAIN, where) @ slopes)
+    np.testing.assert_allclose(half, half_widths_of(fit, slopes), rtol=1e-6)
+    _, one = with_band(fit, lambda axis: read(axis, where) @ slopes, where[:1])
+    alone = np.where(np.arange(len(where))[:, None] == 0, slopes, 0.0)
+    np.testing.assert_allclose(one, half_widths_of(fit, alone), rtol=1e-6)

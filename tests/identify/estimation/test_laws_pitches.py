@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identify.estimation.pitches import MOST_LINES, MOST_PEAKS, pitches
+from identify.estimation.spatial_periods import MOST_LINES, MOST_PEAKS, pitches
 
 RNG = np.random.default_rng(11)
 N = 2000

@@ -7,7 +7,7 @@ import pytest
 from constructed import dataset_of, effect, fit_of, ridden, windowed
 
 from identify.dataset.spectrum import Record
-from identify.estimation.repeating_force import Repeat, _strongest, _term, not_general
+from identify.estimation.residual_dependence import Repeat, _strongest, _term, not_general
 from identify.output.words.residual import repeat_in_words
 from twin.model.machine import AxisModel
 

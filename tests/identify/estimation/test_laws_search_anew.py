@@ -21,13 +21,17 @@ from built_fits import (
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
-from identify.estimation.thorough_fit import (
+from identify.estimation.variable_projection import (
+    Start,
+    _Ground,
     _is_nearest,
     _promises,
+    _try,
+    _unlike,
     fit_thoroughly,
     fit_without,
+    starts,
 )
-from identify.estimation.variable_projection import Start, _Ground, _try, _unlike, starts
 from twin.effect import Excitation
 
 # The rules as they were decided.

@@ -5,9 +5,8 @@ import pytest
 from constructed import effect
 from scipy.optimize import least_squares
 
-from identify.estimation.levenberg_marquardt import minimise
+from identify.estimation.least_squares import minimise, orthonormal, unabsorbed
 from identify.estimation.scaling import Scaling
-from identify.estimation.subspace import orthonormal, unabsorbed
 from twin.model.machine import AxisModel
 from twin.model.parameters import free_parameters, read
 

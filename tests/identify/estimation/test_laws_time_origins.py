@@ -5,9 +5,9 @@ import pytest
 from constructed import dataset_of, effect, fit_of, moved, windowed
 
 from identify.dataset.spectral_lines import lines_in_time
-from identify.estimation.decision import RULE
 from identify.estimation.force_balance import residual
 from identify.estimation.time_origin import _common_line, synchronised, time_origins
+from identify.rules import RULE
 from twin.model.machine import AxisModel
 
 LOGS = [windowed(moved(np.random.default_rng(s), 6.0, 1000.0), 0.02) for s in range(4)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from built_fits import HARDWARE, axis_of, fitted
 
-from identify.estimation.prescribed_motion import force_along, steady_friction
+from identify.estimation.force_balance import force_along, steady_friction
 from twin.effect import Kind
 from twin.model.machine import AxisModel
 

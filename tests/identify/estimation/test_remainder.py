@@ -9,10 +9,10 @@ import pytest
 from built_fits import PLAIN, built_dataset
 
 from identify.estimation.fit import Outcome, finished
-from identify.estimation.remainder import (
+from identify.estimation.residual_noise import (
     is_noise as noise_is_left,
 )
-from identify.estimation.remainder import (
+from identify.estimation.residual_noise import (
     noise_known,
     with_own_noise,
 )

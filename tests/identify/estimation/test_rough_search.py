@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identify.estimation.rough_search import rough_minimum
+from identify.estimation.simulated_motion import rough_minimum
 
 OPEN = np.full(2, -np.inf), np.full(2, np.inf)
 

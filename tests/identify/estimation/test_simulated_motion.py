@@ -14,7 +14,7 @@ import identify
 from identify.dataset.dataset import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import Outcome
-from identify.estimation.replay import (
+from identify.estimation.open_loop import (
     Beginning,
     measured_beginning,
     motion_error,

@@ -9,7 +9,6 @@ from machines import one_axis
 
 import identify.experiment_design.discrimination
 from identify import diagnose, plan
-from identify.estimation.decision import RULE
 from identify.experiment_design.candidate_experiments import proposals
 from identify.experiment_design.discrimination import (
     Arena,
@@ -21,6 +20,7 @@ from identify.output.report import sections
 from identify.output.report.drawing import drawing_style
 from identify.output.report.subject import Subject
 from identify.output.text import diagnose_text, plan_text
+from identify.rules import RULE
 from identify.selection.diagnosis import Verdict
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError

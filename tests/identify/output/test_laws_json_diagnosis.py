@@ -23,7 +23,7 @@ from identify.selection.diagnosis import Verdict
 # What runs compiled laws over logs, fits, or tells a noise floor.
 COMPUTES = (
     "identify.estimation.force_balance", "identify.estimation.fit_problem",
-    "identify.estimation.curve_band", "identify.dataset.noise_floor",
+    "identify.estimation.intervals", "identify.dataset.noise_floor",
     "identify.validation.free_run", "identify.selection.confounded", "twin.core",
 )  # fmt: skip
 

@@ -11,9 +11,9 @@ import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted
 
 from identify.estimation.fit import Outcome
-from identify.estimation.replay import Beginning
+from identify.estimation.open_loop import Beginning
 from identify.estimation.simulated_motion import MotionFit
-from identify.experiment_design.signature import FORCE, MASS, exemplary_motion, signature
+from identify.experiment_design.planting import FORCE, MASS, exemplary_motion, signature
 from identify.output.as_json import agree_json, simulation_fit_json
 from identify.output.machine import laws_json, laws_text, plain
 from identify.output.numbers import Scale

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from identify.estimation.errors import holdout_error
+from identify.estimation.fit import holdout_error
 from identify.selection.diagnosis import Verdict
 from identify.workflow import add, diagnose
 from twin.effects import load_catalogue

@@ -21,7 +21,7 @@ from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog, split_by_log, sticks
 from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import jacobian
-from identify.estimation.subspace import unabsorbed
+from identify.estimation.least_squares import unabsorbed
 from identify.estimation.variable_projection import tried_shapes
 from identify.selection.acceptance import Judged, score
 from identify.selection.controls import Columns, Trial, change_control, with_unit_penalty

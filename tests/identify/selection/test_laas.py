@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from identify.estimation.evidence import rms
-from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.workflow import diagnose, fit
 from twin.effects import Catalogue, load_catalogue
 from twin.importers import import_log, load_mapping

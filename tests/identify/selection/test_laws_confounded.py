@@ -24,8 +24,8 @@ from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.experiment_design import rival_hypotheses as explanations
 from identify.experiment_design.discrimination import Explanation
+from identify.experiment_design.planting import FORCE, exemplary_motion, signature
 from identify.experiment_design.rival_hypotheses import differing_axis, explained, require_different
-from identify.experiment_design.signature import FORCE, exemplary_motion, signature
 from identify.output.machine import draw
 from identify.selection import confounded as given
 from twin.effects import Catalogue

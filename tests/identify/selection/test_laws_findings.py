@@ -8,7 +8,7 @@ import pytest
 from built_fits import built_dataset, built_fit
 
 from identify.dataset.given_logs import Role
-from identify.estimation.errors import Errors
+from identify.estimation.fit import Errors
 from identify.selection.findings import share_explained
 
 

@@ -12,7 +12,7 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, built_machine, 
 from identify.estimation.evidence import BLOCKS, effective_samples
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import jacobian
-from identify.estimation.smoothed import (
+from identify.estimation.splines import (
     RIDGE,
     ROUNDING,
     STIFFNESS,

@@ -7,7 +7,7 @@ import pytest
 from constructed import windowed
 from noisy_motion import MASS, PUSH, RATE, noisy
 
-from identify.validation.error_spectrum import _edges, bands
+from identify.validation.misfit_maps import _edges, bands
 from twin.model.machine import AxisModel
 
 

@@ -13,11 +13,11 @@ from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.force_balance import residual
 from identify.estimation.residual_dependence import UNITS
 from identify.output.words.residual import region_in_words
-from identify.validation.error_spectrum import bands
 from identify.validation.misfit_maps import (
     ABOVE_FLOOR,
     LEAST_SHARE,
     MisfitMap,
+    bands,
     compare_axis,
     misfit_by_frequency,
     misfit_map,

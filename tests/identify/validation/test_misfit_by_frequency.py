@@ -9,7 +9,7 @@ from machines import one_axis
 from identify.output import as_json
 from identify.output.machine import plain
 from identify.output.words.residual import region_in_words
-from identify.validation.error_spectrum import bands
+from identify.validation.misfit_maps import bands
 from identify.workflow import compare, fit
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from built_fits import CATALOGUE, HARDWARE, axis_of, fitted
 
+from identify.analysis.friction_curve import StribeckCurve
+from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.motion import motion_of
-from identify.estimation.prescribed_motion import force_along
-from identify.estimation.stribeck_curve import StribeckCurve
-from identify.estimation.velocity_map import VelocityMap, velocity_map
+from identify.estimation.force_balance import force_along
 from studies.thesis import (
     behaviours,
     cable,
@@ -303,7 +303,7 @@ def test_at_one_place_friction_and_its_direction_are_fitted_and_the_rest_is_know
     logs = track.moves(TRACK, "x", 0.0, True, np.random.default_rng(0))
     assert list(logs) == [f"{v:g} m/s" for v in track.FEW]
     motions = [motion_of(log, "x", label, ripples=()) for label, log in logs.items()]
-    found = VelocityMap.joined([velocity_map(STAGE, motion) for motion in motions])
+    found = VelocityMap.joined([VelocityMap.of(STAGE, motion) for motion in motions])
     assert len(found) == 2 * (2 * 1 + 4 * 2)
     assert found.position == pytest.approx(0.0, abs=0.006)
     axis = track.local_fit(TRACK, "x", logs, found).axis

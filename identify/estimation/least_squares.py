@@ -1,4 +1,4 @@
-"""Levenberg-Marquardt within bounds, for many residuals and few variables.
+"""Least squares: Levenberg-Marquardt within bounds, and what the span of some columns holds.
 
 K. Levenberg (1944), D. W. Marquardt (1963), with the damping schedule of L. Jia (2023): 0.01 to
 start, a tenth on success, tenfold on failure; after a step that keeps too little of what it
@@ -18,10 +18,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from twin.signals import Array
 
 FIRST_DAMPING = 1e-2
 MOST_DAMPING = 1e8
@@ -62,7 +60,7 @@ def minimise(
         return Solution(x, False)
     columns, exact = jacobian(x), True
     for _ in range(most_evaluations):
-        step = _step(columns, force, damping, np.less_equal(x, low), np.greater_equal(x, high))
+        step = _step(columns, force, damping, x, bounds)
         moved = np.clip(x + step, low, high)
         trial = residual(moved)
         trial_cost = float(trial @ trial)
@@ -111,9 +109,11 @@ def _secant(columns: Array, step: Array, change: Array) -> Array:
     return out
 
 
-def _step(columns: Array, force: Array, damping: float, at_low: Mask, at_high: Mask) -> Array:
+def _step(
+    columns: Array, force: Array, damping: float, x: Array, bounds: tuple[Array, Array]
+) -> Array:
     gradient = columns.T @ force
-    held = (at_low & (gradient > 0)) | (at_high & (gradient < 0))
+    held = ((x <= bounds[0]) & (gradient > 0)) | ((x >= bounds[1]) & (gradient < 0))
     free = ~held & (np.einsum("ij,ij->j", columns, columns) > 0)
     step = np.zeros(len(gradient))
     if not free.any():
@@ -123,3 +123,17 @@ def _step(columns: Array, force: Array, damping: float, at_low: Mask, at_high: M
     normal = (own.T @ own) / np.outer(scale, scale) + damping * np.eye(len(scale))
     step[free] = -np.linalg.solve(normal, gradient[free] / scale) / scale
     return step
+
+
+def orthonormal(columns: Array) -> Array:
+    """Orthonormal basis (n, r) of the columns' span."""
+    norms = np.linalg.norm(columns, axis=0)
+    scaled = columns[:, norms > 0] / norms[norms > 0]
+    power, directions = np.linalg.eigh(scaled.T @ scaled)
+    kept = power > 1e-12 * power.max(initial=1.0)
+    return scaled @ (directions[:, kept] / np.sqrt(power[kept]))
+
+
+def unabsorbed(force: Array, basis: Array) -> Array:
+    """The part of forces (n,) or (n, k), N, outside the span of an orthonormal basis (n, r)."""
+    return np.asarray(force - basis @ (basis.T @ force))

@@ -27,7 +27,7 @@ from identify.dataset.spectrum import Record
 from identify.estimation.evidence import blocks_of, by_blocks, effective_samples, rms
 from identify.estimation.fit import Fit, Outcome, error_on, finished
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.least_squares import orthonormal, unabsorbed
 from twin.model.machine import AxisModel
 from twin.signals import Array
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.spectral_lines import find_lines
 from identify.dataset.spectrum import FINEST_CYCLES, Record
-from identify.estimation.subspace import orthonormal, unabsorbed
+from identify.estimation.least_squares import orthonormal, unabsorbed
 
 Array = NDArray[np.float64]
 

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import identify
+from identify.analysis.friction_curve import StribeckCurve
+from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.dataset import datasets
+from identify.dataset.motion import motion_of
 from twin.effects import load_catalogue
 from twin.errors import InputError
-from twin.experiments.kinds import Passes, Staircase
+from twin.experiments.kinds import Reversals, Staircase
 from twin.experiments.named import simulate
 from twin.importers import import_log, load_mapping
 from twin.logs import Log
@@ -23,6 +27,8 @@ CATALOGUE = load_catalogue()
 LOCAL = Fitted.at_start(CATALOGUE["position_dependent_friction"], {"c1": 0.06})
 STAGE = load_model("proton_xy", CATALOGUE)
 ONE = MachineModel("slide", {"x": STAGE.axes["x"].with_effect(LOCAL)}, 1000.0)
+SLIDE = MachineModel("slide", {"x": STAGE.axes["x"]}, 2000.0)
+CURVE = StribeckCurve(0.285, 0.335, 0.01, 0.018)
 
 
 def moves(place: float) -> dict[str, Log]:
@@ -69,16 +75,6 @@ def test_the_axis_must_be_one_that_moves(logs) -> None:
         identify.velocity_map(STAGE, {"run": both})
 
 
-def test_passes_of_a_machine_give_its_cable_and_its_pitch() -> None:
-    passes = Passes("x", span=0.3, speed=0.1, repeats=2)
-    log = simulate(STAGE, passes, seed=1, simulator=ReducedSimulator)
-    found = identify.cable_force(STAGE, {"passes": log}, axis="x")
-    assert found.pitch is not None
-    assert found.pitch.value == pytest.approx(0.034, abs=1e-4)
-    with pytest.raises(InputError, match="no stretch of the track in common"):
-        identify.cable_force(ONE, {**moves(0.102), **moves(-0.102)})
-
-
 def test_the_map_of_a_real_drive_shows_its_direction_dependent_viscosity(shared_data) -> None:
     """Published: Fv 166.7 and 240.4 N s/m, Fc 20.1 and 20.6 N (IDIM-LS by direction)."""
     mapping = load_mapping(EXAMPLES / "import_emps.toml")
@@ -88,3 +84,24 @@ def test_the_map_of_a_real_drive_shows_its_direction_dependent_viscosity(shared_
     assert found.curves[1.0].values == pytest.approx({"Fc": 20.1, "sigma2": 166.7}, rel=0.06)
     assert found.curves[-1.0].values == pytest.approx({"Fc": 20.6, "sigma2": 240.4}, rel=0.06)
     assert "sigma2" in found.differing
+
+
+def test_friction_of_a_machine_with_a_cable_lies_on_its_curve() -> None:
+    """Between two rollers; the cable's force is taken off, so both directions are alike."""
+    speeds = (0.004, 0.02)
+    log = simulate(
+        SLIDE, Staircase("x", speeds=speeds, span=0.024, at=(0.023,)), simulator=ReducedSimulator
+    )
+    found = VelocityMap.of(SLIDE.axes["x"], motion_of(log, "x", "log"))
+    assert np.sign(found.velocity).tolist() == [1.0, -1.0, 1.0, -1.0]
+    assert np.abs(found.velocity) == pytest.approx(np.repeat(speeds, 2), rel=1e-3)
+    assert found.friction == pytest.approx(CURVE(np.abs(found.velocity)), abs=1.5e-3)
+    whole = identify.velocity_map(SLIDE, {"log": log})
+    assert whole.friction.tolist() == found.friction.tolist()
+    assert np.all(np.diff(np.abs(found.towards(-1.0).velocity)) > 0.0)
+
+
+def test_a_log_without_constant_speed_is_refused() -> None:
+    log = simulate(SLIDE, Reversals("x", repeats=8), simulator=ReducedSimulator)
+    with pytest.raises(InputError, match="no constant speed"):
+        VelocityMap.of(SLIDE.axes["x"], motion_of(log, "x", "log"))

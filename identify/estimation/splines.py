@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.estimation.evidence import blocks_of, by_blocks
 from identify.estimation.fit import Fit
+from identify.estimation.fit_problem import part_rows, smoothing
 from identify.estimation.force_balance import jacobian
-from identify.estimation.smoothing import part_rows, smoothing
 from twin.curve import Part
 from twin.model.machine import Fitted
 from twin.model.parameters import ParameterReference

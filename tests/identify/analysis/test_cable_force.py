@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import identify
-from identify.estimation.cable_force import cable_force
-from identify.estimation.passes import Passes, smoother
-from identify.estimation.spikes import Spike, find_spikes, pitch_of
+from identify.analysis.cable_force import CableForce, Passes, Spike, find_spikes, pitch_of, smoother
 from twin.effects import load_catalogue
 from twin.errors import InputError
+from twin.experiments import kinds
 from twin.experiments.named import simulate
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
@@ -74,13 +73,12 @@ def test_passes_part_what_turns_with_the_direction_from_what_does_not() -> None:
     np.testing.assert_allclose(both.alike, force)
 
 
-def test_no_force_is_told_beyond_a_spike_at_the_end_and_its_band_holds_the_truth(monkeypatch):
+def test_no_force_is_told_beyond_a_spike_at_the_end_and_its_band_holds_the_truth() -> None:
     """Where the grid begins 2.2 mm before a bump of 4 mm, nothing is known before the bump."""
     whole = made(0.05, 0.05, np.random.default_rng(3))
     first = int(np.searchsorted(PLACE, 0.004 - 0.12 - 0.0022))
     begun = whole.part(slice(first, None))
-    monkeypatch.setattr("identify.estimation.cable_force.passes", lambda axis, logs: begun)
-    found = cable_force(ONE.axes["x"], [])
+    found = CableForce.of(begun)
     assert found.spikes[0].centre == pytest.approx(0.004 - 0.12, abs=2e-4)
     assert found.position[0] > found.spikes[0].centre + 0.002
     assert found.position[-1] == PLACE[-1]
@@ -88,3 +86,15 @@ def test_no_force_is_told_beyond_a_spike_at_the_end_and_its_band_holds_the_truth
     true = np.interp(found.position, PLACE, CABLE)
     assert found.force == pytest.approx(true, abs=2e-3)
     assert 0.75 < np.mean(np.abs(found.force - true) < found.band) < 0.99
+
+
+def test_passes_of_a_machine_give_its_cable_and_its_pitch() -> None:
+    passes = kinds.Passes("x", span=0.3, speed=0.1, repeats=2)
+    log = simulate(STAGE, passes, seed=1, simulator=ReducedSimulator)
+    found = identify.cable_force(STAGE, {"passes": log}, axis="x")
+    assert found.pitch is not None
+    assert found.pitch.value == pytest.approx(0.034, abs=1e-4)
+    apart = {f"{at}": simulate(ONE, kinds.Staircase("x", speeds=(0.06,) * 2, span=0.01, at=(at,)),
+                               simulator=ReducedSimulator) for at in (0.102, -0.102)}  # fmt: skip
+    with pytest.raises(InputError, match="no stretch of the track in common"):
+        identify.cable_force(ONE, apart)
