@@ -39,6 +39,7 @@ from identify.output.report.drawing import (
 from identify.output.report.page import Block, Column, Listing, Picture, Row, Table
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.residual import correlation_in_words, loop_in_words, region_in_words
+from identify.rules import RULE
 from identify.validation.free_run import HORIZON
 from identify.validation.misfit_maps import MisfitMap
 from identify.validation.whiteness import Correlation, ResidualTests
