@@ -13,7 +13,7 @@ endif
 # What Python compiles is kept for its next start: the tests start it fifty times.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo check test bench thesis docs clean
+.PHONY: demo check test bench selftest thesis docs clean
 
 demo: $(VENV)/runtime
 	$(BIN)/twin demo --out demo
@@ -34,6 +34,10 @@ check: $(VENV)/tests
 bench: $(VENV)/benchmarks
 	$(BIN)/python -m benchmarks
 	$(BIN)/python -m pytest -n 2 -m slow
+
+# Effects planted in ten machines, two minutes; `python -m benchmarks selftest --help` for more.
+selftest: $(VENV)/runtime
+	$(BIN)/python -m benchmarks selftest
 
 # The study of the thesis (studies/thesis), in five minutes; its report and numbers into thesis/.
 thesis: $(VENV)/runtime

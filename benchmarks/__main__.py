@@ -1,46 +1,56 @@
-"""Run the benchmarks named, or all; bring RESULTS.md and RESULTS.json up to date.
+"""`python -m benchmarks`: measure all, or what is named; `python -m benchmarks NAME --help`.
 
-Exit code 1 where a target is missed.
+Names alone bring their figures in RESULTS.md and RESULTS.json up to date. With options of its own,
+such as `foreign --seeds 3`, one is a run whose figures are printed; so are `selftest` and `size`
+unless `--results` follows. Exit code 1 where a target is missed.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 from time import perf_counter
+from types import ModuleType
 
-from benchmarks.figures import Figure, write_results
-from benchmarks.judgement import told
+from benchmarks.figures import Figure, told, write_results
+from twin.errors import InputError
 
 # Each is loaded when it runs: some need packages that the others do without.
-ALL = (
+MEASURED = (
     "simulation", "second_start", "peer_fits", "diagnosis", "passes", "kinds", "stages",
     "mcap_logs", "effect_cost", "import_time", "emps", "withheld", "foreign", "thesis", "selftest",
-    "rule", "fuzz",
-    "mutation.noticed",
+    "rule", "fuzz", "mutation",
 )  # fmt: skip
+# What takes options, or half an hour, by its name alone, and the module.
+RUNS = {
+    "selftest": "selftest", "confidence": "selftest.confidence", "intervals": "selftest.intervals",
+}  # fmt: skip
+RESULTS = "--results"
 
 
 def main(given: Sequence[str]) -> int:
-    """Measure, print and write; 0 where every target is met.
-
-    A name that is followed by options, such as ``foreign --seeds 3``, is a run of its own: its
-    figures are printed, not written.
-    """
-    results: dict[str, list[Figure]] = {}
-    known = {name.rpartition(".")[2]: name for name in ALL}
-    names, options = given[:1], given[1:]
-    if not (options and options[0].startswith("-")):
-        names, options = given, ()
-    if unknown := set(names) - known.keys():
-        print(f"no benchmark {', '.join(unknown)}; there are {', '.join(known)}", file=sys.stderr)
+    """Measure, print and write; 0 where every target is met, 2 where what was given is wrong."""
+    places = {name: name for name in MEASURED} | {"mutation": "mutation.noticed"} | RUNS
+    first, *options = given or [""]
+    is_run = RESULTS not in given and (first in RUNS or any(o.startswith("-") for o in options))
+    names = [first] if is_run else [name for name in given if name != RESULTS] or MEASURED
+    if unknown := [name for name in names if name not in places]:
+        print(f"no benchmark {', '.join(unknown)}; there are {', '.join(places)}", file=sys.stderr)
         return 2
-    if options:
-        return int(import_module(f"benchmarks.{known[names[0]]}").main(options))
-    for name in names or known:
-        benchmark = import_module(f"benchmarks.{known[name]}")
+    modules = (import_module(f"benchmarks.{places[name]}") for name in names)
+    try:
+        return int(next(modules).main(options)) if is_run else measured(modules)
+    except InputError as error:
+        print(f"benchmarks: {error}", file=sys.stderr)
+        return 2
+
+
+def measured(benchmarks: Iterable[ModuleType]) -> int:
+    """Bring the figures of some benchmarks up to date; 0 where every target is met."""
+    results: dict[str, list[Figure]] = {}
+    for benchmark in benchmarks:
         print(benchmark.TITLE, file=sys.stderr, flush=True)
         begun = perf_counter()
         results[benchmark.TITLE] = benchmark.measure()

@@ -83,6 +83,14 @@ def write_results(results: Mapping[str, Sequence[Figure]], folder: Path) -> None
     _replace(folder / "RESULTS.json", json.dumps(content, indent=1) + "\n")
 
 
+def told(figures: Sequence[Figure]) -> int:
+    """Print figures; 0 where every target is met."""
+    for f in figures:
+        value = "" if f.value is None else f"{f.value:.3g}"
+        print(f"{f.verdict:7} {value:>6}  {f.what}{'; ' if f.note else ''}{f.note}")
+    return int(any(f.passed is False for f in figures))
+
+
 def _kept(path: Path) -> dict[str, list[dict[str, Any]]]:
     return json.loads(path.read_text(encoding="utf-8"))["benchmarks"] if path.is_file() else {}
 

@@ -7,7 +7,6 @@ the catalogue does not know.
 from __future__ import annotations
 
 import argparse
-import sys
 import zlib
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
@@ -17,8 +16,8 @@ from time import process_time
 
 import numpy as np
 
-from benchmarks.figures import Figure, Target
-from benchmarks.judgement import Expected, Row, fitted, judged, row_of, stated_wrong, told
+from benchmarks.figures import Figure, Target, told
+from benchmarks.judgement import Expected, Row, fitted, judged, row_of, stated_wrong
 from benchmarks.second_simulator.effects import INSIDE, OUTSIDE, Planted
 from benchmarks.second_simulator.machine import (
     AHEAD,
@@ -254,7 +253,3 @@ def main(arguments: Sequence[str]) -> int:
     jobs: dict[str, Callable[[], Row]] = {empty_name(s): partial(empty_row, s) for s in seeds}
     jobs |= jobs_of(given.effects, given.forms, given.floors, given.seeds)
     return told(figures(judged(jobs, given.out)))
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.figures import Figure
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.given_logs import Role
 from identify.estimation.channel_delay import fit_aligned
@@ -191,11 +190,3 @@ def judged(jobs: Mapping[str, Callable[[], Row]], out: Path | None) -> list[Row]
         if out:
             out.write_text("".join(json.dumps(r) + "\n" for r in rows), encoding="utf-8")
     return rows
-
-
-def told(figures: Sequence[Figure]) -> int:
-    """Print figures; 0 where every target is met."""
-    for f in figures:
-        value = "" if f.value is None else f"{f.value:.3g}"
-        print(f"{f.verdict:7} {value:>6}  {f.what}{'; ' if f.note else ''}{f.note}")
-    return int(any(f.passed is False for f in figures))

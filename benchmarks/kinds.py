@@ -16,11 +16,11 @@ import numpy as np
 from benchmarks import workload
 from benchmarks.figures import Figure, Target
 from benchmarks.processes import twin
+from benchmarks.selftest.laws import BUMPS
+from benchmarks.selftest.variations import drawn_values
 from benchmarks.workload import AXIS, HIDDEN, Workload, saved
 from identify.estimation.force_balance import residual
 from identify.experiment_design.planting import added_force, strength_for
-from identify.selftest.drawing import drawn_values
-from identify.selftest.laws import BUMPS
 from identify.workflow import diagnose, fit
 from twin.effects import load_catalogue
 from twin.logs import Log

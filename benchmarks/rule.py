@@ -17,11 +17,12 @@ from dataclasses import fields
 import numpy as np
 
 from benchmarks.figures import Figure, Target
+from benchmarks.selftest.design import FULL
+from benchmarks.selftest.laws import OUTSIDE
+from benchmarks.selftest.machines import Case
+from benchmarks.selftest.tally import rates
+from benchmarks.selftest.trial import TrialResult, run
 from identify.rules import RULE
-from identify.selftest import FULL, TrialResult, rates
-from identify.selftest.case import Case
-from identify.selftest.laws import OUTSIDE
-from identify.selftest.trial import run
 
 TITLE = "The rule's numbers, each halved and doubled"
 MACHINES, SEED = 24, 3111

@@ -16,7 +16,7 @@ from pathlib import Path
 from time import process_time
 
 from benchmarks import real_machines
-from benchmarks.figures import Figure, Target
+from benchmarks.figures import Figure, Target, told
 from benchmarks.judgement import (
     EQUIVALENT,
     RIGHT,
@@ -27,7 +27,6 @@ from benchmarks.judgement import (
     judged,
     row_of,
     stated_wrong,
-    told,
 )
 from benchmarks.real_machines import EXAMPLES, Given
 from identify.selection.candidates import usable
@@ -229,7 +228,3 @@ def main(arguments: Sequence[str]) -> int:
     given = parser.parse_args(arguments)
     cases = [c for c in CASES if c.name.startswith(given.case)]
     return told(figures(judge(cases, given.data, given.out)))
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

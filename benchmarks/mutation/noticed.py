@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.figures import Figure, Target
+from benchmarks.figures import Figure, Target, told
 from benchmarks.mutation.faults import LEAST, draw
 from benchmarks.mutation.trial import Trial, folders, trials
 
@@ -48,3 +49,14 @@ def _tell(trial: Trial) -> None:
     f = trial.fault
     how = f"noticed by {trial.by}" if trial.noticed else f"NOT NOTICED by {trial.tests} tests"
     print(f"  {f.path}:{f.line}: {trial.shown}: {how}", file=sys.stderr, flush=True)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Try the faults asked for; 0 where every target is met."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks mutation", description=__doc__)
+    parser.add_argument("--seed", type=int, help="draws the lines; another each time if left out")
+    parser.add_argument("--count", type=int, default=COUNT, help="faults")
+    parser.add_argument("--least", type=int, default=LEAST, help="faults in each folder, at least")
+    parser.add_argument("--root", type=Path, default=ROOT, help="another checkout of the project")
+    given = parser.parse_args(arguments)
+    return told(measure(given.seed, given.count, given.root, given.least))

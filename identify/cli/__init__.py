@@ -9,25 +9,31 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from identify.cli import agree, doctor, example, logs, loop, machine, plan, selftest
+from identify.cli import agree, doctor, example, logs, loop, machine, plan
 from identify.cli.shared import app
 from twin.errors import InputError
 from twin.threads import VARIABLES
 
-__all__ = ["agree", "doctor", "example", "logs", "loop", "machine", "main", "plan", "selftest"]
+__all__ = ["agree", "doctor", "example", "logs", "loop", "machine", "main", "plan"]
 
 OBJECTS = 100_000  # that may be made before cycles among them are sought
 INTERRUPTED = 130  # exit code that typer makes of Ctrl-C, without a word
 ANYTHING = {"ignore_unknown_options": True, "allow_extra_args": True}
 
 
-@app.command(hidden=True, add_help_option=False, context_settings=ANYTHING)
-def reproduce() -> None:
-    """Say where it went."""
-    raise InputError(
-        "reproduce is no command any more; run the thesis's study from the source folder with "
-        "`make thesis` or `python -m studies.thesis`"
-    )
+def _moved(command: str, what: str, how: str) -> None:
+    """A command that says where it went."""
+
+    @app.command(command, hidden=True, add_help_option=False, context_settings=ANYTHING)
+    def gone() -> None:
+        """Say where it went."""
+        raise InputError(
+            f"{command} is no command any more; run {what} from the source folder with {how}"
+        )
+
+
+_moved("reproduce", "the thesis's study", "`make thesis` or `python -m studies.thesis`")
+_moved("selftest", "the self-test", "`make selftest` or `python -m benchmarks selftest`")
 
 
 def main() -> None:

@@ -20,9 +20,10 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_the_same_seed_draws_the_same_faults_and_each_changes_the_code(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "identify/selftest/laws", tmp_path / "identify/selftest/laws")
-    (tmp_path / "twin").mkdir()
-    shutil.copy(ROOT / "twin/curve.py", tmp_path / "twin")
+    (tmp_path / "twin/effects").mkdir(parents=True)
+    for name in ("twin/curve.py", "twin/effects/cogging.py", "twin/effects/wear.py"):
+        shutil.copy(ROOT / name, tmp_path / name)
+    (tmp_path / "identify").mkdir()
     drawn = draw(tmp_path, 7, seed=6, least=3)
     assert draw(tmp_path, 7, seed=6, least=3) == drawn
     assert len(drawn) == 7

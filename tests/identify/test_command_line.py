@@ -130,8 +130,15 @@ def test_adding_what_the_data_do_not_support_is_said_with_exit_code_one(folder):
     assert json.loads(result.stdout)["kept"] is False
 
 
-@pytest.mark.parametrize("more", [(), ("--help",), ("--chapter", "cable", "--log", "a", "b")])
-def test_the_study_that_was_a_command_is_told_where_it_went(tmp_path, more):
-    said = refusal("reproduce", *more, folder=tmp_path)
-    assert "`make thesis` or `python -m studies.thesis`" in said
-    assert "reproduce" not in twin("--help", folder=tmp_path).stdout
+@pytest.mark.parametrize(
+    ("command", "where"),
+    [
+        (("reproduce",), "`make thesis` or `python -m studies.thesis`"),
+        (("reproduce", "--chapter", "cable", "--log", "a", "b"), "`python -m studies.thesis`"),
+        (("selftest", "--help"), "`make selftest` or `python -m benchmarks selftest`"),
+        (("selftest", "--case", "cogging@5/cable/17"), "`python -m benchmarks selftest`"),
+    ],
+)
+def test_what_was_a_command_is_told_where_it_went(tmp_path, command, where):
+    assert where in refusal(*command, folder=tmp_path)
+    assert command[0] not in twin("--help", folder=tmp_path).stdout

@@ -86,7 +86,7 @@ def test_a_traceback_is_shown_where_it_is_asked_for(monkeypatch):
     "command",
     [
         ("fit", "m", "a"), ("add", "wear", "m", "a"), ("simulate", "moves"), ("recover", "a"),
-        ("plan", "m"), ("selftest",),
+        ("plan", "m"),
     ],
 )  # fmt: skip
 def test_a_missing_folder_is_said_before_the_work(cli, command):

@@ -10,12 +10,10 @@ import pytest
 from cli_runs import twin
 from planted_logs import SLIDE, Ride, having, logged
 
-import identify.selftest
 from identify import workflow
 from identify.output import as_json
 from identify.output import text as as_text
 from identify.output.machine import plain
-from identify.selftest import FULL, QUICK, Case, TrialResult, release_seed
 from twin.effects import load_catalogue
 from twin.experiments.file import load_experiment
 from twin.experiments.named import simulate
@@ -134,25 +132,3 @@ def test_a_check_ends_with_one_where_a_log_is_unfit(folder, hole, code):
     assert (done.returncode, told["ok"], list(told["logs"])) == (
         code, not hole, ["h.mcap", "b.mcap"],
     )  # fmt: skip
-
-
-def test_a_selftest_runs_what_it_is_asked(monkeypatch, tmp_path):
-    ran = []
-
-    def run_all(cases, progress):
-        ran.append(list(cases))
-        return [TrialResult(c, "NOTHING_MISSING") for c in cases]
-
-    monkeypatch.setattr(identify.selftest, "run_all", run_all)
-    pictures = ("-o", "p.svg", "--reliability", "r.svg")
-    done = twin("selftest", "--seed", "4", "--only", "wear", *pictures, folder=tmp_path)
-    assert done.stdout.startswith("seed 4, 10 machines")
-    assert all("<svg" in (tmp_path / p).read_text() for p in ("p.svg", "r.svg"))
-    told = json.loads(twin("selftest", "--json", folder=tmp_path).stdout)
-    assert told["seed"] == 1
-    twin("selftest", "--full", folder=tmp_path)
-    twin("selftest", "--case", "wear@5/bumps/17", folder=tmp_path)
-    assert ran == [
-        QUICK.cases(4, ["wear"]), QUICK.cases(1), FULL.cases(release_seed()),
-        [Case(("wear",), 5.0, 17, "bumps")],
-    ]  # fmt: skip

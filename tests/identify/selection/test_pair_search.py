@@ -2,15 +2,14 @@
 
 import zlib
 from dataclasses import replace
-from unittest.mock import patch
 
 import numpy as np
 import pytest
 
+from benchmarks.selftest.machines import AXIS, machine
 from identify.dataset.dataset import datasets
 from identify.estimation.fit import fit_axis
 from identify.selection.diagnosis import Verdict, diagnose_axis
-from identify.selftest.cases import AXIS, machine
 from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model
 
@@ -23,8 +22,7 @@ def drawn(seed):
     """A fit and its dataset of a machine with both."""
     rng = np.random.default_rng([seed, *(zlib.crc32(name.encode()) for name in PLANTED)])
     stage = replace(load_model("proton_xy", CATALOGUE), sample_rate=2500.0)
-    with patch("identify.selftest.cases.DURATION", 8.0):
-        built = machine(stage, [CATALOGUE[e] for e in PLANTED], 5.0, "plain", rng)
+    built = machine(stage, [CATALOGUE[e] for e in PLANTED], 5.0, "plain", rng, 8.0)
     dataset = datasets(built.model, built.logs, built.holdout)[AXIS]
     return fit_axis(built.model.axes[AXIS], dataset.fit), dataset
 

@@ -116,7 +116,6 @@ BAD_INPUT = (
     ),
     (("simulate", "moves", "--seed", "-1"), "seed -1: is not allowed; give a whole number of 0 or"),
     (("demo", "--seed", "-1", "-o", "d"), "seed -1: is not allowed"),
-    (("selftest", "--seed", "-1"), "seed -1: is not allowed"),
     (("plan", "proton_xy", "--test-function", "nan"), "a test function of nan s: give a length"),
     (("plan", "proton_xy", "-o", "next.mcap"), ".toml"),
     (("plan", "proton_xy", "-o", "no/where.toml"), "no/where.toml"),

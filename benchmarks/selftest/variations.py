@@ -1,6 +1,8 @@
-"""How a machine departs from the laws of its model, and how its logs from good ones.
+"""How a machine departs from its model: values, laws, and logs that are not so good.
 
-One variation changes one thing, so that a self-test shows where a diagnosis fails.
+Values are drawn without a look at what a diagnosis scans: over a range in which such a value lies
+on machines, continuously, and so that the logs can show it. One variation changes one thing, so
+that a self-test shows where a diagnosis fails.
 """
 
 from __future__ import annotations
@@ -10,15 +12,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.selftest.laws import BUMPS, CABLES, NOISE
 from identify.dataset.drive import is_noise
-from identify.selftest.drawing import other_exponents
-from identify.selftest.laws import BUMPS, CABLES, NOISE
-from twin.effect import Effect, Kind
+from twin.effect import Effect, Excitation, Kind, Parameter
 from twin.effects import load_catalogue
 from twin.model.machine import AxisModel, Fitted, MachineModel
 
 FOLD = (0.7, 1.4)  # of the start of the travel over which the stiffness of a cable changes
 MASS_OFF = 0.1  # of the model's
+ABOUT = 4.0  # factor to either side of the start of a value
+DAMPING = (0.005, 0.2)  # of structures; the damping ratio of a steel frame, and of a rubber mount
+ASIDE = 0.1  # of the travel, to either side of the start of a place
+LEAST_PITCHES = 3.0  # in the travel
 
 
 @dataclass(frozen=True)
@@ -112,3 +117,53 @@ def _in_place(drawn: Drawn, axis: str, form: Effect, own: Mapping[str, float]) -
     new = Fitted.at_start(form, {p.name: known[p.name] for p in form.parameters if p.name in known})
     out = drawn.on(axis, lambda a: a.without(old.effect.name).with_effect(new))
     return replace(out, reshaped=out.reshaped | {old.effect.name})
+
+
+# --- values ----------------------------------------------------------------------------------
+
+
+def drawn_values(effect: Effect, seen: Excitation, rng: np.random.Generator) -> dict[str, float]:
+    """The values of an effect by name: nonlinear parameters drawn, strengths at their start.
+
+    What a model knows by design (a pitch between rollers) stays; a damping ratio never does.
+    """
+    out = effect.starts(seen)
+    for p in effect.parameters:
+        if not p.strength and p.lower < p.upper and (not p.fixed or _is_damping(p)):
+            out[p.name] = _drawn(p, out[p.name], seen, rng)
+    return out
+
+
+def other_exponents(fitted: Fitted, rng: np.random.Generator) -> Fitted:
+    """The effect with the ratios that a model holds by design drawn anew, such as an exponent.
+
+    Only those whose bounds lie within a factor of ten: they are what a law leaves open.
+    """
+    open_to = [
+        p
+        for p in fitted.effect.parameters
+        if p.fixed and p.unit == "1" and 0.0 < p.lower < p.upper <= 10.0 * p.lower
+    ]
+    drawn = {p.name: _log_uniform(1.5 * p.lower, p.upper / 1.5, rng) for p in open_to}
+    return Fitted.at_start(fitted.effect, {**fitted.values, **drawn})
+
+
+def _drawn(p: Parameter, start: float, seen: Excitation, rng: np.random.Generator) -> float:
+    if _is_damping(p):
+        return _log_uniform(*DAMPING, rng)
+    if p.lower < 0.0:  # a place
+        return float(
+            np.clip(start + ASIDE * seen.travel * rng.uniform(-1.0, 1.0), p.lower, p.upper)
+        )
+    high = min(start * ABOUT, p.upper)
+    if p.period:
+        high = min(high, seen.travel / LEAST_PITCHES)
+    return _log_uniform(max(start / ABOUT, p.lower), high, rng)
+
+
+def _is_damping(p: Parameter) -> bool:
+    return p.unit == "1" and not p.strength and p.upper < 1.0
+
+
+def _log_uniform(low: float, high: float, rng: np.random.Generator) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))

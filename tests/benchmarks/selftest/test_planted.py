@@ -1,19 +1,25 @@
-"""Laws that only the self-test knows: each against its equation, written again in NumPy."""
+"""What only the self-test knows: laws, against their equations in NumPy, values and variations."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from built_fits import CATALOGUE
 
-from identify.selftest.laws import BUMPS, CABLES, NOISE, OUTSIDE
-from twin.effect import OUT, Effect
+from benchmarks.selftest.laws import BUMPS, CABLES, NOISE, OUTSIDE
+from benchmarks.selftest.variations import DAMPING, VARIATIONS, Drawn, drawn_values
+from twin.effect import OUT, Effect, Excitation, Kind
 from twin.laws.trials import Array, Motion, trace
+from twin.model.file import load_model
 
 Values = dict[str, float]
 EFFECTS = {e.name: e for e in (*BUMPS, *CABLES, NOISE, *OUTSIDE.values())}
 MOTION = Motion.random(np.random.default_rng(5), samples=300, dt=0.037)
+SEEN = Excitation(-0.15, 0.15, 0.2, 0.3, 12.0, 1e-3, lines=(7.0,), pitches=(0.02,))
+STAGE = load_model("proton_xy", CATALOGUE)
 T = MOTION.dt * np.arange(len(MOTION))
 
 
@@ -109,3 +115,69 @@ def test_noise_has_its_size_its_memory_and_four_uniform_numbers_a_sample() -> No
     assert found[0] == pytest.approx(0.4 * np.sqrt(3.0 * (1.0 - kept**2)) * total)
     other = trace(NOISE, {**values, "seed": 8.0}, still, law=NOISE.law).after[:, OUT]
     assert abs(np.corrcoef(found, other)[0, 1]) < 0.1
+
+
+@pytest.mark.parametrize("effect", EFFECTS.values(), ids=EFFECTS)
+def test_a_law_of_the_self_test_is_in_no_catalogue_and_gone_at_no_strength(effect) -> None:
+    assert effect.name not in CATALOGUE
+    values = values_of(effect)
+    absent = {**values, **{p.name: 0.0 for p in effect.strengths}}
+    assert not trace(effect, absent, MOTION, law=effect.law).after[:, OUT].any()
+    there = trace(effect, values, MOTION, law=effect.law).after[:, OUT]
+    assert np.isfinite(there).all()
+    assert there.any()
+
+
+# --- values ----------------------------------------------------------------------------------
+
+
+def unscanned(effect: Effect) -> Effect:
+    return replace(effect, parameters=tuple(replace(p, scan=None) for p in effect.parameters))
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_values_are_drawn_without_a_look_at_the_scan(name) -> None:
+    effect = CATALOGUE[name]
+    drawn = drawn_values(effect, SEEN, np.random.default_rng(6))
+    assert drawn == drawn_values(unscanned(effect), SEEN, np.random.default_rng(6))
+    for p in effect.parameters:
+        assert p.lower <= drawn[p.name] <= p.upper
+        if p.scan and not p.fixed and p.lower < p.upper:
+            assert drawn[p.name] not in p.scan(SEEN)
+
+
+def test_damping_is_log_uniform_and_drawn_where_a_model_holds_it() -> None:
+    draws, source = [], np.random.default_rng(6)
+    for _ in range(400):
+        for name in ("flexible_mode", "backlash"):
+            draws.append(drawn_values(CATALOGUE[name], SEEN, source)["damping"])
+    low, high = np.log(DAMPING)
+    parts = np.histogram(np.log(draws), bins=4, range=(low, high))[0]
+    assert parts.sum() == 800
+    # Four standard deviations of a binomial of 800 and 1/4.
+    assert np.abs(parts - 200).max() < 4.0 * np.sqrt(800 * 0.25 * 0.75)
+
+
+# --- variations ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", VARIATIONS)
+def test_a_variation_changes_the_machine_and_leaves_its_model_the_laws_of_the_stage(name) -> None:
+    model = replace(STAGE, axes={"x": STAGE.axes["x"]})
+    drawn = VARIATIONS[name](Drawn(model, STAGE), "x", np.random.default_rng(6))
+    own = drawn.model.axes["x"]
+    assert own.effects == STAGE.axes["x"].effects
+    changed = drawn.true != STAGE
+    assert changed is (name != "plain")
+    assert drawn.model.sample_rate == drawn.true.sample_rate
+    assert own.hardware == drawn.true.axes["x"].hardware
+    assert drawn.reshaped <= set(own.names)
+    frictions = [f for f in drawn.true.axes["x"].effects if f.effect.kind is Kind.FRICTION]
+    assert len(frictions) == 1
+
+
+def test_each_form_takes_the_place_of_what_the_model_has() -> None:
+    drawn = VARIATIONS["everything"](Drawn(STAGE, STAGE), "x", np.random.default_rng(6))
+    assert drawn.reshaped == set(STAGE.axes["x"].names)
+    left = set(drawn.true.axes["x"].names) & set(STAGE.axes["x"].names)
+    assert left == {"lugre"}

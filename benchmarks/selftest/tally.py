@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from scipy.special import betaincinv
 
+from benchmarks.selftest.design import STRONG, WEAK
+from benchmarks.selftest.laws import OUTSIDE
+from benchmarks.selftest.machines import NOTHING
+from benchmarks.selftest.trial import Answer, TrialResult
 from identify.selection.findings import FindingKind
-from identify.selftest.case import NOTHING
-from identify.selftest.design import STRONG, WEAK
-from identify.selftest.laws import OUTSIDE
-from identify.selftest.trial import TrialResult
 
 Range = tuple[float, float]
 
@@ -21,6 +22,8 @@ WRONG_INSIDE, WRONG_OUTSIDE, HELD = (0.0, 0.01), (0.0, 0.03), (0.85, 1.0)
 CONFIDENT = 0.9  # stated confidence from which an engineer acts on a name
 LEVEL = 0.95  # of the interval of a rate
 NEAR_FLOOR = 1.3  # test error over what noise leaves
+TENTHS = 10
+SHAPE, UNEXPLAINED, AMBIGUOUS = "wrong shape", "unexplained", "ambiguous with it"
 
 
 @dataclass(frozen=True)
@@ -48,61 +51,60 @@ class Rate:
         return low, float(betaincinv(k + 1, n - k, 1.0 - tail)) if k < n else 1.0
 
 
+@dataclass(frozen=True)
+class Tenth:
+    """The answers whose stated confidence lies in one tenth. stated: its mean, 0..1."""
+
+    stated: float
+    right: Rate
+
+
 def rates(results: Sequence[TrialResult]) -> list[Rate]:
     """All rates of a self-test; those without trials are left out."""
     shown = [o for o in results if o.shown]
     empty = [o for o in shown if not o.case.effects]
     inside = [o for o in shown if o.case.effects and not _outside(o)]
-    one = [o for o in inside if len(o.case.effects) == 1]
-    out = [_named(one, strength) for strength in sorted({o.case.strength for o in one})]
-    out += [
-        _rate("false findings, nothing planted", empty, _wrong, ALARMS),
-        _rate("both of two named", [o for o in inside if len(o.case.effects) == 2], _right, PAIRS),
-    ]
     outside = [o for o in shown if o.case.known and _outside(o)]
-    for where, trials, asked in (
-        ("inside", inside, WRONG_INSIDE),
-        ("outside", outside, WRONG_OUTSIDE),
-    ):
-        text = f"planted {where} the catalogue"
-        out.append(_rate(f"wrong names, {text}", trials, _wrong_name))
-        out.append(_rate(f"confident wrong names, {text}", trials, _confident, asked))
-    out.append(
-        _rate("outside the catalogue: no wrong name, and the right coordinate",
-              outside, _honest, COORDINATE)
-    )  # fmt: skip
     # No target: some laws contain that of another, and some motions of the stage part no two.
     left_out = [o for o in shown if not o.case.known]
-    out.append(
-        _rate("another name for an effect taken out of the catalogue", left_out, _wrong_name)
-    )
-    out.append(
+    one = [o for o in inside if len(o.case.effects) == 1]
+    by_strength = _by_strength(one)
+    out = [
+        *(_rate(f"named or in a declared ambiguity, force {s:g} times the noise floor", own,
+                _right, NAMED.get(s)) for s, own in by_strength.items()),
+        _rate("false findings, nothing planted", empty, _wrong, ALARMS),
+        _rate("both of two named", [o for o in inside if len(o.case.effects) == 2], _right, PAIRS),
+        *_wrong_names("inside", inside, WRONG_INSIDE),
+        *_wrong_names("outside", outside, WRONG_OUTSIDE),
+        _rate("outside the catalogue: no wrong name, and the right coordinate", outside, _honest,
+              COORDINATE),
+        _rate("another name for an effect taken out of the catalogue", left_out, _wrong_name),
         _rate("test error within 1.3 of what noise leaves, where the answer is right",
-              [o for o in one if o.right], lambda o: o.tested < NEAR_FLOOR)
-    )  # fmt: skip
-    out.append(coverage(empty, "90 % intervals that hold the truth, nothing missing", COVERED))
-    out += [_beside(one, strength) for strength in sorted({o.case.strength for o in one})]
+              [o for o in one if o.right], lambda o: o.tested < NEAR_FLOOR),
+        coverage(empty, "90 % intervals that hold the truth, nothing missing", COVERED),
+        *(coverage(own, f"90 % intervals that hold the truth beside a missing effect of {s:g} "
+                   "floors", HELD) for s, own in by_strength.items()),
+    ]  # fmt: skip
     return [r for r in out if r.trials]
 
 
 def by_stratum(results: Sequence[TrialResult]) -> dict[str, list[Rate]]:
     """For each variation its rates of right and of wrong answers."""
-    shown = [o for o in results if o.shown]
     groups: dict[str, list[TrialResult]] = {}
-    for o in shown:
-        groups.setdefault(o.case.variation, []).append(o)
+    for o in results:
+        if o.shown:
+            groups.setdefault(o.case.variation, []).append(o)
     return {name: _of_group(groups[name]) for name in sorted(groups)}
 
 
 def _of_group(group: Sequence[TrialResult]) -> list[Rate]:
     one = [o for o in group if len(o.case.effects) == 1 and not _outside(o)]
     found = [
-        *(_rate(f"named at {s:g}", [o for o in one if o.case.strength == s], _right)
-          for s in sorted({o.case.strength for o in one})),
+        *(_rate(f"named at {s:g}", own, _right) for s, own in _by_strength(one).items()),
         _rate("false", [o for o in group if not o.case.effects], _wrong),
         _rate("wrong inside", one, _wrong_name),
         _rate("wrong outside", [o for o in group if o.case.known and _outside(o)], _wrong_name),
-    ]  # fmt: skip
+    ]
     return [r for r in found if r.trials]
 
 
@@ -129,48 +131,67 @@ def coverage_by_parameter(results: Sequence[TrialResult]) -> dict[str, Rate]:
     return {k: Rate(k, sum(v), len(v), COVERED) for k, v in found.items()}
 
 
+def answers_of(results: Sequence[TrialResult]) -> list[Answer]:
+    """The answers that confidence speaks of.
+
+    Less those where an effect was taken out of the catalogue: some laws contain that of another, so
+    that another name need not be wrong.
+    """
+    return [a for o in results if o.case.known for a in o.answers]
+
+
+def reliability(results: Sequence[TrialResult]) -> list[Tenth]:
+    """Stated confidence against how often right, by tenths of it; empty tenths are left out."""
+    answers = [a for a in answers_of(results) if np.isfinite(a.confidence)]  # no test contradicts
+    out = []
+    for i in range(TENTHS):
+        inside = [a for a in answers if min(int(a.confidence * TENTHS), TENTHS - 1) == i]
+        if inside:
+            what = f"{100 * i // TENTHS} to {100 * (i + 1) // TENTHS} %"
+            rate = Rate(what, sum(a.right for a in inside), len(inside))
+            out.append(Tenth(float(np.mean([a.confidence for a in inside])), rate))
+    return out
+
+
 def confusion(results: Sequence[TrialResult]) -> dict[str, dict[str, float]]:
     """Planted effect -> answer -> part of the trials: a name, "ambiguous", or none.
 
     An ambiguity that holds the planted effect counts for it, in a column of its own.
     """
-    one = [o for o in results if o.shown and o.case.known and len(o.case.effects) <= 1]
     table: dict[str, dict[str, float]] = {}
-    for o in one:
-        row = table.setdefault(_planted(o), {})
-        row[_answer(o)] = row.get(_answer(o), 0.0) + 1.0
+    for o in results:
+        if o.shown and o.case.known and len(o.case.effects) <= 1:
+            planted = o.case.effects[0] if o.case.effects else NOTHING
+            row, answer = table.setdefault(planted, {}), _answer(o, planted)
+            row[answer] = row.get(answer, 0.0) + 1.0
     return {
         name: {answer: n / sum(row.values()) for answer, n in row.items()}
         for name, row in table.items()
     }
 
 
-SHAPE, UNEXPLAINED, AMBIGUOUS = "wrong shape", "unexplained", "ambiguous with it"
-
-
-def _answer(o: TrialResult) -> str:
+def _answer(o: TrialResult, planted: str) -> str:
     missing = [a.names for a in o.answers if a.kind is FindingKind.MISSING]
     if not missing:
         silent = UNEXPLAINED if o.verdict == "UNEXPLAINED" else NOTHING
         return SHAPE if o.answers else silent
-    planted = _planted(o)
     if any(names[0] == planted for names in missing):
         return planted
     return AMBIGUOUS if any(planted in names for names in missing) else missing[0][0]
 
 
-def _planted(o: TrialResult) -> str:
-    return o.case.effects[0] if o.case.effects else NOTHING
+def _by_strength(results: Sequence[TrialResult]) -> dict[float, list[TrialResult]]:
+    strengths = sorted({o.case.strength for o in results})
+    return {s: [o for o in results if o.case.strength == s] for s in strengths}
 
 
-def _named(one: Sequence[TrialResult], strength: float) -> Rate:
-    what = f"named or in a declared ambiguity, force {strength:g} times the noise floor"
-    return _rate(what, [o for o in one if o.case.strength == strength], _right, NAMED.get(strength))
-
-
-def _beside(one: Sequence[TrialResult], strength: float) -> Rate:
-    what = f"90 % intervals that hold the truth beside a missing effect of {strength:g} floors"
-    return coverage([o for o in one if o.case.strength == strength], what, HELD)
+def _wrong_names(where: str, trials: Sequence[TrialResult], asked: Range) -> list[Rate]:
+    text = f"planted {where} the catalogue"
+    return [
+        _rate(f"wrong names, {text}", trials, _wrong_name),
+        _rate(f"confident wrong names, {text}", trials,
+              lambda o: any(a.confidence >= CONFIDENT for a in o.wrong), asked),
+    ]  # fmt: skip
 
 
 def _rate(
@@ -196,10 +217,6 @@ def _wrong(o: TrialResult) -> bool:
 
 def _wrong_name(o: TrialResult) -> bool:
     return any(a.kind is FindingKind.MISSING for a in o.wrong)
-
-
-def _confident(o: TrialResult) -> bool:
-    return any(a.confidence >= CONFIDENT for a in o.wrong)
 
 
 def _honest(o: TrialResult) -> bool:

@@ -1,4 +1,4 @@
-"""Coverage of the 90 % intervals: python -m benchmarks.intervals --seed 6303.
+"""Coverage of the 90 % intervals: python -m benchmarks intervals --seed 6303.
 
 Machines of the self-test are made and their models fitted, with nothing missing, beside a missing
 effect of 2 floors and beside one of 5; none is diagnosed, so that each takes some seconds. Of the
@@ -13,11 +13,10 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
-from identify.output.selftest import rate_in_words
-from identify.selftest import TrialResult
-from identify.selftest.design import Design
-from identify.selftest.tally import coverage
-from identify.selftest.trial import fitted
+from benchmarks.selftest.design import Design
+from benchmarks.selftest.tally import coverage
+from benchmarks.selftest.trial import TrialResult, fitted
+from benchmarks.selftest.words import rate_in_words
 
 SEED = 6303  # judges; the intervals were made with others
 
@@ -36,20 +35,17 @@ def table(results: Sequence[TrialResult]) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
+def main(arguments: Sequence[str]) -> int:
     """Make the machines, fit their models and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks intervals", description=__doc__)
     parser.add_argument("--seed", type=int, default=SEED)
     for name, count in (("empty", 36), ("weak", 56), ("strong", 90)):
         parser.add_argument(f"--{name}", type=int, default=count, help="machines")
-    asked = parser.parse_args()
+    asked = parser.parse_args(arguments)
     design = Design(empty=asked.empty, weak=asked.weak, strong=asked.strong, outside=0)
     results = []
     for case in design.cases(asked.seed):
         results.append(fitted(case))
         print(f"{len(results)}: {case}", file=sys.stderr, flush=True)
     print(table(results))
-
-
-if __name__ == "__main__":
-    main()
+    return 0

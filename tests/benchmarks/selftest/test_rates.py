@@ -1,4 +1,4 @@
-"""The self-test counts: each outcome exactly once, in its own row."""
+"""The self-test counts: each outcome exactly once, in its own row; confidence holds on others."""
 
 from __future__ import annotations
 
@@ -9,16 +9,10 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from identify.output.selftest import (
-    failure_in_words,
-    rate_in_words,
-    target_in_words,
-    trial_in_words,
-)
-from identify.selection.findings import FindingKind
-from identify.selftest.case import Case
-from identify.selftest.laws import OUTSIDE
-from identify.selftest.tally import (
+from benchmarks.selftest.confidence import LEAST_ANSWERS, MOST_LEVELS, levels
+from benchmarks.selftest.laws import OUTSIDE
+from benchmarks.selftest.machines import Case
+from benchmarks.selftest.tally import (
     CONFIDENT,
     COVERED,
     Rate,
@@ -28,8 +22,17 @@ from identify.selftest.tally import (
     coverage_by_parameter,
     failures,
     rates,
+    reliability,
 )
-from identify.selftest.trial import Answer, Held, TrialResult
+from benchmarks.selftest.trial import Answer, Held, TrialResult
+from benchmarks.selftest.words import (
+    failure_in_words,
+    rate_in_words,
+    target_in_words,
+    trial_in_words,
+)
+from identify.selection.confidence import LEVELS, Level
+from identify.selection.findings import FindingKind
 
 FOREIGN = next(iter(OUTSIDE))
 
@@ -203,5 +206,52 @@ def test_an_outcome_in_words():
     assert trial_in_words(SHAPED) == "a@5/bumps/1: a (60 %) and s of another shape (60 %)"
     assert trial_in_words(QUIET) == "nothing@0/plain/1: nothing missing"
     assert "a@5/plain/1: cannot reach 5 times the noise floor" in trial_in_words(HIDDEN)
-    assert failure_in_words(LEFT_OUT) == "wrong: twin selftest --case a@5/plain/1/out: b (60 %)"
-    assert failure_in_words(MISSED) == "missed: twin selftest --case a@5/plain/1: unexplained"
+    assert failure_in_words(LEFT_OUT) == (
+        "wrong: python -m benchmarks selftest --case a@5/plain/1/out: b (60 %)"
+    )
+    assert (
+        failure_in_words(MISSED)
+        == "missed: python -m benchmarks selftest --case a@5/plain/1: unexplained"
+    )
+
+
+# --- confidence ------------------------------------------------------------------------------
+
+
+def answers(count: int, seed: int) -> list[Answer]:
+    """Right with a chance that is the part they took."""
+    rng = np.random.default_rng(seed)
+    return [
+        Answer(("a",), FindingKind.MISSING, bool(rng.random() < part), part)
+        for part in rng.random(count)
+    ]
+
+
+def test_the_table_that_is_shipped_falls_and_has_no_end() -> None:
+    right = [level.right for level in LEVELS]
+    assert right == sorted(right, reverse=True)
+    assert all(0.0 < r < 1.0 for r in right)
+    assert LEVELS[-1].part == 0.0
+
+
+def test_levels_fall_and_are_as_many_as_the_answers_allow() -> None:
+    few, some, many = (levels(answers(n, 3)) for n in (LEAST_ANSWERS - 1, 65, 4000))
+    assert len(few) == 1
+    assert len(some) <= 2
+    assert len(many) == MOST_LEVELS
+    assert [v.right for v in many] == sorted((v.right for v in many), reverse=True)
+    assert levels([]) == (Level(0.0, 0.5),)
+
+
+def test_a_table_of_some_answers_holds_on_others() -> None:
+    table = levels(answers(4000, 1))
+    judged = [
+        replace(a, confidence=next(v.right for v in table if a.part >= v.part))
+        for a in answers(4000, 2)
+    ]
+    found = reliability([TrialResult(Case(("a",), 5.0, 1), answers=tuple(judged))])
+    assert sum(t.right.trials for t in found) == 4000
+    for tenth in found:
+        # Both tables are of a sample: four standard deviations of each.
+        allowed = 4.0 * 0.5 * np.sqrt(1.0 / 800 + 1.0 / tenth.right.trials)
+        assert abs(tenth.stated - tenth.right.value) < allowed

@@ -1,4 +1,4 @@
-"""The table of confidence: python -m benchmarks.confidence --seed N [--rows FILE...].
+"""The table of confidence: python -m benchmarks confidence --seed N [--rows FILE...].
 
 Answers of the self-test, and rows that `benchmarks foreign` and `benchmarks withheld` wrote with
 -o, are halved machine by machine. The table is fitted on one half and judged on the other, and the
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,14 +16,15 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.judgement import WRONG
-from identify.output.selftest import trial_in_words
+from benchmarks.selftest.design import DEVELOPMENT, FULL, run_all
+from benchmarks.selftest.tally import answers_of
+from benchmarks.selftest.trial import Answer, TrialResult
+from benchmarks.selftest.words import tell
 from identify.selection.confidence import Level
 from identify.selection.findings import FindingKind
-from identify.selftest import TrialResult, levels, run_all
-from identify.selftest.calibration import answers_of
-from identify.selftest.design import DEVELOPMENT, FULL
-from identify.selftest.trial import Answer
 
+LEAST_ANSWERS = 30  # to a level: a rate of them is known to some 10 points
+MOST_LEVELS = 5
 SPLIT = 1  # seed of the halves
 
 
@@ -51,6 +51,30 @@ def of_rows(lines: Iterable[str], source: str) -> list[Machine]:
         )
         out.append(Machine(source, answers))
     return out
+
+
+def levels(answers: Sequence[Answer]) -> tuple[Level, ...]:
+    """How often answers were right by the part they took: a falling staircase of a few levels.
+
+    Levels hold equally many answers, at least LEAST_ANSWERS; one that is not below the one before
+    is joined with it (isotonic regression: pool adjacent violators, R. E. Barlow et al.,
+    Statistical Inference under Order Restrictions, 1972). The rate of a level is (right + 1) /
+    (answers + 2), Laplace's rule, so that none is certain. The last has no end.
+    """
+    ordered = sorted(answers, key=lambda a: -a.part)
+    count = min(max(len(ordered) // LEAST_ANSWERS, 1), MOST_LEVELS)
+    pooled: list[list[Answer]] = []
+    for part in np.array_split(np.arange(len(ordered)), count):
+        pooled.append([ordered[i] for i in part])
+        while len(pooled) > 1 and _rate(pooled[-1]) >= _rate(pooled[-2]):
+            last = pooled.pop()
+            pooled[-1] += last
+    ends = [group[-1].part for group in pooled[:-1]] + [0.0]
+    return tuple(Level(end, _rate(part)) for end, part in zip(ends, pooled, strict=True))
+
+
+def _rate(answers: Sequence[Answer]) -> float:
+    return (sum(a.right for a in answers) + 1) / (len(answers) + 2)
 
 
 def judged(fitted: Sequence[Machine], others: Sequence[Machine]) -> list[str]:
@@ -86,21 +110,14 @@ def report(machines: Sequence[Machine]) -> str:
     return "\n".join((*judged(first, second), *judged(second, first), table_of(machines)))
 
 
-def main() -> None:
+def main(arguments: Sequence[str]) -> int:
     """Run the machines of a seed, read the rows, and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks confidence", description=__doc__)
     parser.add_argument("--seed", type=int, default=DEVELOPMENT)
     parser.add_argument("--rows", type=Path, nargs="*", default=[])
-    given = parser.parse_args()
-
-    def tell(result: TrialResult, done: int, total: int) -> None:
-        print(f"{done} of {total}: {trial_in_words(result)}", file=sys.stderr, flush=True)
-
+    given = parser.parse_args(arguments)
     machines = of_selftest(run_all(FULL.cases(given.seed), progress=tell))
     for path in given.rows:
         machines += of_rows(path.read_text().splitlines(), path.stem)
     print(report(machines))
-
-
-if __name__ == "__main__":
-    main()
+    return 0

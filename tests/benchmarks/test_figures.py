@@ -1,4 +1,4 @@
-"""The self-test's picture and the benchmark's figures: targets, files, and no NaN in JSON."""
+"""The figures of the benchmarks: targets, files, and no NaN in JSON."""
 
 from __future__ import annotations
 
@@ -9,60 +9,6 @@ import numpy as np
 import pytest
 
 from benchmarks.figures import Figure, Target, write_results
-from identify.selection.findings import FindingKind
-from identify.selftest.case import Case
-from identify.selftest.picture import _shares, draw
-from identify.selftest.trial import Answer, TrialResult
-from twin.errors import InputError
-
-
-def named(effect: str) -> tuple[Answer, ...]:
-    return (Answer((effect,), FindingKind.MISSING, True, confidence=0.9),)
-
-
-EVERY = [
-    TrialResult(Case(("a",), 5.0, 1), "MISSING_EFFECTS", named("a")),
-    TrialResult(Case(("a",), 5.0, 2), "UNEXPLAINED"),
-    TrialResult(Case((), 0.0, 1), "NOTHING_MISSING"),
-]
-
-
-# --- picture and figures --------------------------------------------------------------------
-
-
-def test_the_picture_has_the_share_of_each_answer(tmp_path):
-    table = {"a": {"b": 0.25, "a": 0.75}, "nothing": {"nothing": 1.0}}
-    np.testing.assert_array_equal(
-        _shares(table, ["a", "nothing"], ["a", "b", "nothing"]), [[0.75, 0.25, 0], [0, 0, 1]]
-    )
-    draw(EVERY, tmp_path / "m.svg")
-    assert "<svg" in (tmp_path / "m.svg").read_text(encoding="utf-8")
-    with pytest.raises(InputError, match="ends in"):
-        draw(EVERY, tmp_path / "m.txt")
-
-
-def test_the_share_of_an_answer_stands_in_its_row_and_column(tmp_path, monkeypatch):
-    from matplotlib.figure import Figure as Drawing
-
-    drawn = []
-    monkeypatch.setattr(Drawing, "savefig", lambda self, out, format: drawn.append((self, format)))
-    other = TrialResult(Case(("b",), 5.0, 3), "MISSING_EFFECTS", named("c"))
-    draw([*EVERY, *EVERY[:2], other, EVERY[0]], tmp_path / "m.pdf")
-    ((figure, kind),) = drawn
-    (axes,) = figure.axes
-    rows = [t.get_text() for t in axes.get_yticklabels()]
-    columns = [t.get_text() for t in axes.get_xticklabels()]
-    assert (rows, kind) == (["a", "b", "nothing"], "pdf")
-    assert columns == [
-        "a", "b", "c", "ambiguous with it", "wrong shape", "unexplained", "nothing",
-    ]  # fmt: skip
-    found = {(rows[y], columns[x]): t.get_text() for t in axes.texts for x, y in [t.get_position()]}
-    assert found == {
-        ("a", "a"): "60", ("a", "unexplained"): "40", ("b", "c"): "100",
-        ("nothing", "nothing"): "100",
-    }  # fmt: skip
-    shares = axes.get_images()[0].get_array()
-    assert (shares[0, 0], shares[0, 5], shares[1, 2], shares[2, 6]) == (0.6, 0.4, 1.0, 1.0)
 
 
 @pytest.mark.parametrize(

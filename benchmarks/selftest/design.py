@@ -13,11 +13,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from identify.selftest.case import Case
-from identify.selftest.cases import AXIS
-from identify.selftest.laws import OUTSIDE
-from identify.selftest.trial import STAGE, TrialResult, run
-from identify.selftest.variations import VARIATIONS
+from benchmarks.selftest.laws import OUTSIDE
+from benchmarks.selftest.machines import AXIS, STAGE, Case
+from benchmarks.selftest.trial import TrialResult, run
+from benchmarks.selftest.variations import VARIATIONS
 from twin.effect import Kind
 from twin.effects import Catalogue, load_catalogue
 from twin.logs.writer import software_version

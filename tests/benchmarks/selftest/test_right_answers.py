@@ -1,4 +1,4 @@
-"""Which answers count as right: a wrong shape over the coordinate of what has no better name."""
+"""Which answers of a trial count as right, and how far the truth lies from a value."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from built_fits import CATALOGUE, axis_of, fitted
+from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, fitted
 from built_results import errors, score_of
 
+from benchmarks.selftest.laws import OUTSIDE
+from benchmarks.selftest.machines import Case
+from benchmarks.selftest.trial import answer_of, held
+from identify.estimation.fit import Outcome, finished
+from identify.estimation.intervals import half_widths
 from identify.selection.findings import Finding, FindingKind
-from identify.selftest.case import Case
-from identify.selftest.laws import OUTSIDE
-from identify.selftest.trial import _answer, _is_another
 from twin.curve import Coordinate
 from twin.model.machine import Fitted
 
@@ -38,7 +40,7 @@ def is_right(
     finding = Finding(told, (), 0.9, *errors(2.0, 1.0), "N", {}, SCORE)
     shape = SimpleNamespace(over=over)
     finding = replace(finding, kind=FindingKind.WRONG_SHAPE, shape=shape)
-    answer = _answer(finding, built, Case((planted,), 5.0, 1, "plain", known))
+    answer = answer_of(finding, built, Case((planted,), 5.0, 1, "plain", known))
     assert (answer.names, answer.part) == ((told,), finding.score.part)
     return answer.right
 
@@ -76,19 +78,38 @@ def test_another_shape_is_right_where_the_law_of_the_machine_has_one():
 
 
 @pytest.mark.parametrize(
-    ("told", "n", "right"),
-    [("dahl", 1.0, False), ("dahl", 0.7, True), ("lugre", 0.7, False)],
+    ("told", "planted", "right"),
+    [
+        ("dahl", fitted("dahl", n=1.0), False),
+        ("dahl", fitted("dahl", n=0.7), True),
+        ("lugre", fitted("dahl", n=0.7), False),
+        # A start by the travel, and a strength that is held, make no other law.
+        (
+            "position_dependent_friction",
+            fitted("position_dependent_friction", start=-0.07),
+            False,
+        ),
+        ("coulomb_viscous", fitted("coulomb_viscous", Fs=0.3), False),
+    ],
 )
-def test_what_resembles_is_right_where_the_machine_has_another_exponent(told, n, right):
-    built = SimpleNamespace(planted=(fitted("dahl", n=n),))
+def test_what_resembles_is_right_where_the_machine_has_another_exponent(told, planted, right):
+    built = SimpleNamespace(planted=(planted,))
     finding = Finding(told, (), 0.9, *errors(2.0, 1.0), "N", {}, SCORE)
     finding = replace(finding, kind=FindingKind.RESEMBLES)
-    assert _answer(finding, built, Case(("dahl",), 5.0, 1)).right is right
+    assert answer_of(finding, built, Case((planted.effect.name,), 5.0, 1)).right is right
 
 
-@pytest.mark.parametrize(
-    ("planted", "values"),
-    [("position_dependent_friction", {"start": -0.07}), ("coulomb_viscous", {"Fs": 0.3})],
-)
-def test_a_start_by_the_travel_or_a_held_strength_is_no_other_law(planted, values):
-    assert not _is_another(fitted(planted, **values))
+def test_the_truth_lies_so_many_half_widths_from_a_value():
+    dataset = built_dataset("run")
+    fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
+    half = dict(zip([c.label for c in fit.scaling.where], half_widths(fit), strict=True))
+    assert list(half) == ["mass", "coulomb_viscous.Fc", "coulomb_viscous.sigma2"]
+    true = replace(fit.axis, mass=fit.axis.mass + 0.5 * half["mass"])
+    machine = SimpleNamespace(
+        true=SimpleNamespace(axes={"x": true}), reshaped=frozenset({"coulomb_viscous"})
+    )
+    (mass,) = held(machine, fit)  # a reshaped law has no true values
+    assert mass.label == "mass"
+    assert mass.off == pytest.approx(0.5, rel=1e-6)
+    machine.reshaped = frozenset()
+    assert [h.label for h in held(machine, fit)] == list(half)

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass
 from itertools import permutations
 from time import process_time
 
 import numpy as np
 
+from benchmarks.selftest.laws import OUTSIDE
+from benchmarks.selftest.machines import (
+    AXIS,
+    Case,
+    Machine,
+    NotShown,
+    Setting,
+    machine_of,
+    own_error,
+    prepared,
+)
 from identify.dataset.dataset import Dataset
 from identify.dataset.given_logs import Role
 from identify.estimation.channel_delay import fit_aligned
@@ -19,17 +29,12 @@ from identify.estimation.least_squares import unabsorbed
 from identify.estimation.residual_dependence import dependences
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.findings import Finding, FindingKind
-from identify.selftest.case import Case
-from identify.selftest.cases import AXIS, Machine, NotShown, machine, own_error, prepared
-from identify.selftest.laws import OUTSIDE
 from twin.curve import Coordinate
 from twin.effect import Effect, Kind
-from twin.effects import Catalogue, load_catalogue
-from twin.model.file import load_model
+from twin.effects import Catalogue
 from twin.model.machine import Fitted
 from twin.model.parameters import read
 
-STAGE = "proton_xy"
 OVER = {Coordinate.POSITION: "position", Coordinate.SPEED: "velocity"}  # what a curve tells
 NEARLY = 0.8  # part of the strongest dependence from which a coordinate counts as right
 
@@ -113,29 +118,27 @@ class TrialResult:
         return self.named and not self.wrong
 
 
-def run(case: Case) -> TrialResult:
+def run(case: Case, setting: Setting | None = None) -> TrialResult:
     """Make the machine, diagnose it with one thread, and compare with what was planted."""
-    catalogue = load_catalogue()
     begun = process_time()
+    setting = setting or Setting.standard()
     try:
-        built = _built(case, catalogue)
-        dataset = prepared(built, case.strength)
+        made, dataset, base = _fitted(case, setting)
     except NotShown:
         return TrialResult(case, shown=False, seconds=process_time() - begun)
-    known = [e for e in catalogue.values() if case.known or e.name not in case.effects]
-    dataset, base = fit_aligned(built.model.axes[AXIS], dataset)
-    found = diagnose_axis(base, dataset, Catalogue(known))
+    offered = [e for e in setting.catalogue.values() if case.known or e.name not in case.effects]
+    found = diagnose_axis(base, dataset, Catalogue(offered))
     return TrialResult(
         case=case,
         verdict=found.verdict.name,
-        answers=tuple(_answer(f, built, case) for f in found.findings),
+        answers=tuple(answer_of(f, made, case) for f in found.findings),
         ranking=tuple((c.effect.name, c.delta_bic) for c in found.ranking[:4]),
         ratio=base.ratio,
         left=found.final.ratio,
-        tested=_tested(found, built),
+        tested=_tested(found, made),
         depends_on=found.unexplained.depends_on if found.unexplained else None,
-        coordinates=_right_coordinates(built, base, dataset),
-        held=_held(built, base),
+        coordinates=_right_coordinates(made, base, dataset),
+        held=held(made, base),
         seconds=process_time() - begun,
     )
 
@@ -143,23 +146,20 @@ def run(case: Case) -> TrialResult:
 def fitted(case: Case) -> TrialResult:
     """Make the machine and fit its model, without a diagnosis: where the truth of it lies."""
     try:
-        built = _built(case, load_catalogue())
-        dataset = prepared(built, case.strength)
+        made, _, base = _fitted(case, Setting.standard())
     except NotShown:
         return TrialResult(case, shown=False)
-    _, base = fit_aligned(built.model.axes[AXIS], dataset)
-    return TrialResult(case, ratio=base.ratio, held=_held(built, base))
+    return TrialResult(case, ratio=base.ratio, held=held(made, base))
 
 
-def _built(case: Case, catalogue: Catalogue) -> Machine:
-    """The machine that a case names. Raises NotShown."""
-    stage = load_model(STAGE, catalogue)
-    rng = np.random.default_rng([case.seed, *(zlib.crc32(e.encode()) for e in case.effects)])
-    effects = [OUTSIDE[e] if e in OUTSIDE else catalogue[e] for e in case.effects]
-    return machine(stage, effects, case.strength, case.variation, rng)
+def _fitted(case: Case, setting: Setting) -> tuple[Machine, Dataset, Fit]:
+    """A machine and the fit that its diagnosis starts from. Raises NotShown."""
+    made = machine_of(case, setting)
+    dataset, base = fit_aligned(made.model.axes[AXIS], prepared(made, case.strength))
+    return made, dataset, base
 
 
-def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
+def answer_of(finding: Finding, made: Machine, case: Case) -> Answer:
     """A finding as an answer.
 
     Right is a wrong shape where the machine's law has another, and so over the coordinate of what
@@ -170,15 +170,15 @@ def _answer(finding: Finding, built: Machine, case: Case) -> Answer:
     names = (finding.effect, *finding.tied)
     match finding.kind:
         case FindingKind.MISSING:
-            right = not {*case.effects, *built.right}.isdisjoint(names)
-            right |= not {*built.reshaped}.isdisjoint(finding.tied)
+            right = not {*case.effects, *made.right}.isdisjoint(names)
+            right |= not {*made.reshaped}.isdisjoint(finding.tied)
         case FindingKind.WRONG_SHAPE:
-            right = not {*built.reshaped}.isdisjoint(names)
-            right |= any(_is_shape_of(f.effect, finding, built, case) for f in built.planted)
+            right = not {*made.reshaped}.isdisjoint(names)
+            right |= any(_is_shape_of(f.effect, finding, made, case) for f in made.planted)
             right |= not {*case.effects}.isdisjoint(finding.tied)
         case FindingKind.RESEMBLES:
             right = any(e in OUTSIDE for e in case.effects)
-            right |= any(f.effect.name in names and _is_another(f) for f in built.planted)
+            right |= any(f.effect.name in names and _is_another(f) for f in made.planted)
     over = OVER[finding.shape.over] if finding.shape else None
     sure = np.nan if finding.confidence is None else finding.confidence
     return Answer(names, finding.kind, right, finding.score.part, sure, over)
@@ -190,7 +190,7 @@ def _is_another(planted: Fitted) -> bool:
     return any(p.start_rule is None and planted.values[p.name] != p.start for p in held)
 
 
-def _is_shape_of(planted: Effect, finding: Finding, built: Machine, case: Case) -> bool:
+def _is_shape_of(planted: Effect, finding: Finding, made: Machine, case: Case) -> bool:
     """Whether another shape of a law that the model has is a right thing to say of an effect.
 
     Of one with no name in the catalogue, over its own coordinate; of a friction, where the friction
@@ -199,22 +199,22 @@ def _is_shape_of(planted: Effect, finding: Finding, built: Machine, case: Case) 
     over = finding.shape.over if finding.shape else None
     if planted.name in OUTSIDE or not case.known:
         return over in {c.over for c in planted.curves}
-    axis = built.model.axes[AXIS]
+    axis = made.model.axes[AXIS]
     told = finding.effect in axis.names and axis[finding.effect].effect.kind is Kind.FRICTION
     return planted.kind is Kind.FRICTION and told and over is Coordinate.SPEED
 
 
-def _tested(found: AxisDiagnosis, built: Machine) -> float:
+def _tested(found: AxisDiagnosis, made: Machine) -> float:
     """Error of what was found on a log that decided nothing, over what noise leaves there."""
-    own = own_error(built.true.axes[AXIS], found.dataset.test)
+    own = own_error(made.true.axes[AXIS], found.dataset.test)
     return error_in(Role.TEST, found.final, found.dataset) / own
 
 
-def _right_coordinates(built: Machine, base: Fit, dataset: Dataset) -> tuple[str, ...]:
+def _right_coordinates(made: Machine, base: Fit, dataset: Dataset) -> tuple[str, ...]:
     """Coordinates that the planted force depends on about as much as on the best of them."""
-    if not built.planted:
+    if not made.planted:
         return ()
-    force = _planted_force(built.planted, base, dataset)
+    force = _planted_force(made.planted, base, dataset)
     if not force.any():  # noise alone
         return ()
     shares = dependences(force, base, dataset)
@@ -229,13 +229,13 @@ def _planted_force(planted: tuple[Fitted, ...], base: Fit, dataset: Dataset) -> 
     return unabsorbed(force, base.basis)
 
 
-def _held(built: Machine, fit: Fit) -> tuple[Held, ...]:
+def held(made: Machine, fit: Fit) -> tuple[Held, ...]:
     """Where the truth lies of the parameters whose law the machine has too."""
-    true = built.true.axes[AXIS]
+    true = made.true.axes[AXIS]
     where = [
         c
         for c in fit.scaling.where
-        if not c.effect or (c.effect in true.names and c.effect not in built.reshaped)
+        if not c.effect or (c.effect in true.names and c.effect not in made.reshaped)
     ]
     truth = dict(zip([c.label for c in where], read(true, where), strict=True))
     half = dict(zip([c.label for c in fit.scaling.where], half_widths(fit), strict=True))

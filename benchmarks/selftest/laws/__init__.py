@@ -5,7 +5,7 @@ The diagnosis never sees them. A file is one law, as in the catalogue.
 
 from __future__ import annotations
 
-from identify.selftest.laws import (
+from benchmarks.selftest.laws import (
     bulging_bumps,
     chirp,
     coloured_force,

@@ -1,12 +1,25 @@
-"""Machines for the self-test: drawn values, planted effects, and logs from a finer simulation."""
+"""Machines of the self-test: drawn values, planted effects, and logs from a finer simulation.
+
+A ``Case`` names a machine; the same name makes the same machine again.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+import zlib
+from collections.abc import Collection, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.selftest.laws import NOISE, OUTSIDE
+from benchmarks.selftest.variations import (
+    MASS_OFF,
+    VARIATIONS,
+    Drawn,
+    drawn_values,
+    other_exponents,
+)
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.drive import is_noise
 from identify.dataset.prepared_log import PreparedLog
@@ -21,27 +34,79 @@ from identify.experiment_design.planting import (
     strength_for,
     visible_force,
 )
-from identify.selftest.drawing import drawn_values, other_exponents
-from identify.selftest.laws import NOISE
-from identify.selftest.variations import MASS_OFF, VARIATIONS, Drawn
 from twin.effect import Effect, Kind
-from twin.effects import load_catalogue
+from twin.effects import Catalogue, load_catalogue
+from twin.errors import InputError
+from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import Moves, Tracking
 from twin.experiments.named import simulate
 from twin.logs import Log
+from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.simulator import FineSimulator, ReducedSimulator
 
-AXIS = "x"
-DURATION = 12.0  # s of random moves
+STAGE, AXIS = "proton_xy", "x"
+DURATION = 12.0  # s of tracking
 MOVES = 8  # places of a log of fastest moves
-TRAINING, SELECTION, TEST = ("tracking", "moves"), "tracking", "moves"  # what is run for each role
+TRAINING = 2  # logs, of tracking and of moves; one more of each is for selection and for the test
 HIDDEN = 0.9  # part of an effect's force, absorbed by a fit, from which the mass is held fixed
 ROUNDS = 2  # corrections of a friction's level
 LEVELS = (0.1, 10.0)  # times the machine's own friction, within which the level is sought
 OWN = 0.999  # of an effect's force, absorbed by a fit, from which the model has it by itself
+Run = tuple[Experiment, int]  # what is commanded, and the seed of its log
 REACHED = 0.7  # part of the wanted force that an effect must reach within its bounds
 TRIES = 6  # draws of an effect's values until it shows
+
+
+NOTHING = "nothing"
+_FORM = re.compile(
+    r"(?P<effects>[a-z_+]+)@(?P<strength>[0-9.]+)/(?P<variation>[a-z]+)/(?P<seed>\d+)(?P<out>/out)?"
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is planted: effect names, their force over the noise floor, and the seed.
+
+    variation: how machine and logs depart from the model besides. known: whether the planted
+    effects stay in the catalogue of the analysis.
+    """
+
+    effects: tuple[str, ...]
+    strength: float
+    seed: int
+    variation: str = "plain"
+    known: bool = True
+
+    def __str__(self) -> str:
+        planted = "+".join(self.effects) or NOTHING
+        out = "" if self.known else "/out"
+        return f"{planted}@{self.strength:g}/{self.variation}/{self.seed}{out}"
+
+
+def parse_case(text: str, effects: Container[str], variations: Collection[str]) -> Case:
+    """The case of a name such as "cogging@5/bumps/17"; InputError for any other text.
+
+    effects, variations: those there are.
+    """
+    found = _FORM.fullmatch(text)
+    if found is None:
+        raise InputError(
+            f"case '{text:.60}': give EFFECT@STRENGTH/VARIATION/SEED as the self-test prints it, "
+            f"such as {Case((), 0.0, 17)}"
+        )
+    names = () if found["effects"] == NOTHING else tuple(found["effects"].split("+"))
+    for name in names:
+        if name not in effects:
+            raise InputError(f"case '{text:.60}': no effect '{name}'; `twin effects` lists them")
+    if found["variation"] not in variations:
+        raise InputError(
+            f"case '{text:.60}': no variation '{found['variation']}'; there are "
+            f"{', '.join(variations)}"
+        )
+    return Case(
+        names, float(found["strength"]), int(found["seed"]), found["variation"], not found["out"]
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +132,35 @@ class NotShown(Exception):
     """The effect cannot reach the wanted force on this stage's motion within its bounds."""
 
 
+@dataclass(frozen=True)
+class Setting:
+    """Where machines are made: the stage that they are about, the catalogue, and s of a log."""
+
+    stage: MachineModel
+    catalogue: Catalogue
+    duration: float = DURATION
+
+    @classmethod
+    def standard(cls) -> Setting:
+        """The stage of the product with the whole catalogue."""
+        catalogue = load_catalogue()
+        return cls(load_model(STAGE, catalogue), catalogue)
+
+
+def machine_of(case: Case, setting: Setting) -> Machine:
+    """The machine that a case names. Raises NotShown."""
+    rng = np.random.default_rng([case.seed, *(zlib.crc32(e.encode()) for e in case.effects)])
+    effects = [OUTSIDE[e] if e in OUTSIDE else setting.catalogue[e] for e in case.effects]
+    return machine(setting.stage, effects, case.strength, case.variation, rng, setting.duration)
+
+
 def machine(
     stage: MachineModel,
     effects: Sequence[Effect],
     strength: float,
     variation: str,
     rng: np.random.Generator,
+    duration: float = DURATION,
 ) -> Machine:
     """Draw a machine about a stage, plant effects of ``strength`` times the noise floor, log it.
 
@@ -82,22 +170,20 @@ def machine(
     """
     drawn = _about(stage, rng)
     drawn = VARIATIONS[variation](drawn, AXIS, rng)
-    runs = (*TRAINING, SELECTION, TEST)
-    seeds = [int(s) for s in rng.integers(1, 1 << 31, size=len(runs))]
+    experiments = 2 * (Tracking(duration), Moves(MOVES))
+    seeds = rng.integers(1, 1 << 31, size=len(experiments))
+    runs = [(e, int(seed)) for e, seed in zip(experiments, seeds, strict=True)]
     planted: list[Fitted] = []
     # Friction first, as its level is found with a model that lacks nothing else.
     for effect in sorted(effects, key=lambda e: e.kind is not Kind.FRICTION):
         put = _with_friction if effect.kind is Kind.FRICTION else _with_planted
-        drawn, fitted = put(drawn, effect, strength, seeds, rng)
+        drawn, fitted = put(drawn, effect, strength, runs[:TRAINING], rng)
         planted.append(fitted)
     held = drawn.model.axes[AXIS].mass_fixed
     if held:  # a mass that is not fitted was weighed
         own = replace(drawn.model.axes[AXIS], mass=drawn.true.axes[AXIS].mass)
         drawn = replace(drawn, model=drawn.model.with_axis(AXIS, own))
-    logs = {
-        f"log {i}": _logged(drawn.true, run, seed, FineSimulator)
-        for i, (run, seed) in enumerate(zip(runs, seeds, strict=True), start=1)
-    }
+    logs = _logged(drawn.true, runs, FineSimulator)
     test, selection = dict([logs.popitem()]), dict([logs.popitem()])
     return Machine(
         drawn.model, drawn.true, tuple(planted), drawn.reshaped, drawn.right, logs, selection, test
@@ -138,14 +224,17 @@ def _about(stage: MachineModel, rng: np.random.Generator) -> Drawn:
     return Drawn(replace(stage, axes={AXIS: stage.axes[AXIS]}), true)
 
 
-def _logged(true: MachineModel, run: str, seed: int, simulator: type[ReducedSimulator]) -> Log:
-    """A log of the machine; its force noise begins anew in each."""
-    axis = true.axes[AXIS]
-    if NOISE.name in axis.names:
-        noise = Fitted.at_start(NOISE, {**axis[NOISE.name].values, "seed": float(seed - 1 or 1)})
-        true = true.with_axis(AXIS, axis.with_effect(noise))
-    experiment = Tracking(DURATION) if run == "tracking" else Moves(MOVES)
-    return simulate(true, experiment, seed=seed, simulator=simulator)
+def _logged(
+    true: MachineModel, runs: Sequence[Run], simulator: type[ReducedSimulator]
+) -> dict[str, Log]:
+    """Logs of the machine; its force noise begins anew in each."""
+    axis, logs = true.axes[AXIS], {}
+    for i, (experiment, seed) in enumerate(runs, start=1):
+        if NOISE.name in axis.names:
+            values = {**axis[NOISE.name].values, "seed": float(seed - 1 or 1)}
+            true = true.with_axis(AXIS, axis.with_effect(Fitted.at_start(NOISE, values)))
+        logs[f"log {i}"] = simulate(true, experiment, seed=seed, simulator=simulator)
+    return logs
 
 
 def _quiet(true: AxisModel) -> AxisModel:
@@ -161,10 +250,9 @@ class _Trial:
     floor: float
 
     @classmethod
-    def of(cls, drawn: Drawn, seeds: Sequence[int]) -> _Trial:
-        """On the motions of the training logs, by their seeds: an end may be met in some alone."""
-        pairs = zip(TRAINING, seeds, strict=False)
-        logs = {run: _logged(drawn.true, run, seed, ReducedSimulator) for run, seed in pairs}
+    def of(cls, drawn: Drawn, runs: Sequence[Run]) -> _Trial:
+        """On the motions of all training logs, as an end may be met in some alone."""
+        logs = _logged(drawn.true, runs, ReducedSimulator)
         dataset = datasets(drawn.model, logs, {})[AXIS]
         base = fit_axis(drawn.model.axes[AXIS], dataset.fit)
         return cls(dataset, base, own_error(drawn.true.axes[AXIS], dataset.fit))
@@ -186,7 +274,7 @@ def plain_friction(stage: MachineModel, other: Effect) -> Fitted:
 
 
 def _with_friction(
-    drawn: Drawn, effect: Effect, strength: float, seeds: Sequence[int], rng: np.random.Generator
+    drawn: Drawn, effect: Effect, strength: float, runs: Sequence[Run], rng: np.random.Generator
 ) -> tuple[Drawn, Fitted]:
     """A machine with another friction, scaled until the model falls short by that strength.
 
@@ -202,7 +290,7 @@ def _with_friction(
     )
     free = {p.name for p in effect.parameters if not p.fixed}
     shared = {name: own.values[name] for name in free if name in own.values}
-    seen = _Trial.of(drawn, seeds).dataset.excitation
+    seen = _Trial.of(drawn, runs).dataset.excitation
     fitted = Fitted.at_start(effect, {**drawn_values(effect, seen, rng), **shared})
     fitted = other_exponents(fitted, rng)
 
@@ -211,7 +299,7 @@ def _with_friction(
 
     def left(new: Fitted) -> float:
         """Error of the model beyond that of one with the right friction, in noise floors."""
-        trial = _Trial.of(having(new), seeds)
+        trial = _Trial.of(having(new), runs)
         best = fit_axis(trial.base.axis.with_effect(new), trial.dataset.fit).error
         beyond = max(trial.base.error**2 - max(best, trial.floor) ** 2, 1e-4 * trial.floor**2)
         return float(np.sqrt(beyond) / trial.floor)
@@ -227,10 +315,10 @@ def _with_friction(
 
 
 def _with_planted(
-    drawn: Drawn, effect: Effect, strength: float, seeds: Sequence[int], rng: np.random.Generator
+    drawn: Drawn, effect: Effect, strength: float, runs: Sequence[Run], rng: np.random.Generator
 ) -> tuple[Drawn, Fitted]:
     """The machine with one more effect; its mass is held where a fit would absorb the effect."""
-    trial = _Trial.of(drawn, seeds)
+    trial = _Trial.of(drawn, runs)
     for _ in range(TRIES):
         values = drawn_values(effect, trial.dataset.excitation, rng)
         fitted = _scaled(effect, values, strength, trial, rng)
