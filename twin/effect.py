@@ -92,33 +92,36 @@ RUBBING = (Kind.FRICTION, Kind.MODIFIER)  # what makes friction together
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a law.
-
-    unit: SI unit text ("1" for a ratio) on a linear axis; on a rotary one it is shown as its
-    counterpart (twin.model.units). start: value before anything is known; start_rule gives a
-    better one from the data. lower, upper: bounds, same unit. strength: the effect is absent when
-    every strength is zero; strengths are linear parameters, the others nonlinear. fixed: known by
-    design, not fitted. at_least: name of a parameter of the same effect that is a lower bound of
-    this one. scan: values that a diagnosis tries, computed from the data. screened: whether a
-    strength is fitted during that scan; a strength of minor weight need not be.
-    period: whether it is a length at which the force repeats along the track. dry: whether it is a
-    level of dry friction.
-    """
+    """One number of a law, in the unit that it has on a linear axis (see twin.model.units)."""
 
     name: str
+    """Name within the effect, as in a model file."""
     unit: str
+    """SI unit, such as "N s/m"; "1" for a ratio."""
     start: float
+    """Value before anything is known, in ``unit``."""
     lower: float
+    """Least value allowed, in ``unit``."""
     upper: float
+    """Largest value allowed, in ``unit``."""
     meaning: str
+    """What it is, in a few words; the comment beside it in a model file."""
     strength: bool = False
+    """Whether the force is linear in it; where all strengths are zero the effect is absent."""
     fixed: bool = False
+    """Whether it is known by design: a fit holds it, unless the model file says otherwise."""
     at_least: str | None = None
+    """Name of a parameter of the same effect that it may not fall below."""
     start_rule: Callable[[Excitation], float] | None = None
+    """A better start value, in ``unit``, from the motion of the logs."""
     scan: Callable[[Excitation], Sequence[float]] | None = None
+    """Values (k,), in ``unit``, that a diagnosis tries, from the motion of the logs."""
     screened: bool = True
+    """Whether a strength is fitted while shapes are scanned; one of minor weight need not be."""
     period: bool = False
+    """Whether it is a length (m) after which the force repeats along the track."""
     dry: bool = False
+    """Whether it is a level (N) of dry friction."""
 
     def start_from(self, excitation: Excitation) -> float:
         """Start value for this motion, inside the bounds."""
@@ -130,53 +133,65 @@ class Parameter:
 class Effect:
     """One physical effect, or a nonparametric effect: a curve with no physical law.
 
-    equation and source: as printed in `twin effects NAME`. states: names of internal states.
-    fingerprint: the trace in the residual when the effect is missing. excited_by: the motion that
-    excites it. of_size: for a law of any number of elements, the effect with that many; its
-    parameter ``elements``, whose bounds are both that number, tells the law. attach: of a structure
-    effect, builds its bodies in MuJoCo, given a twin.mujoco.mjcf.Mount and the values by name;
-    its first two states are then the position (m) and speed (m/s) of the joint built. added_mass:
-    values by name -> what the effect adds to the moved mass, as a part of it. sticks: whether it is
-    a friction that holds the axis at rest with any force up to a level. simplest: the same force
-    with simpler values, such as a shorter pitch where only harmonics were used. parts: the curves
-    of a nonparametric effect, whose force is linear in its strengths; such an effect is never the
-    answer of a diagnosis. columns: for one of many strengths, of which few act at a time or which
-    share what is dear, a function as the law is that writes those which act to ``io`` from COLUMNS
-    on, so that all columns take one walk; the law is their sum (of a force, or what a sensing
-    effect adds to the reading). free_shape: of one that stands in the place of a law, and stays
-    where other nonparametric effects are set aside. curves: those which the law assumes, where a
-    diagnosis may ask whether a free curve does better. several: whether an axis may have the effect
-    more than once, as cogging of poles and of slots; number: which of these it is. is_itself:
-    (values by name, the motion covered) -> whether the law with these values is the effect, and not
-    some other force that it imitates. dead_time: whether it does nothing but delay the force
-    against the reading; which of the two is late, no log of both can tell. suits: (effects that an
-    axis has, whether it turns) -> whether a diagnosis offers this one beside them, and not the same
-    law by another name; None: beside all.
+    Its name is that of the file that defines its law. Raises ValueError, in one line, for a
+    declaration that makes no sense.
     """
 
     kind: Kind
+    """What the law acts on, and when in a sample it is computed."""
     summary: str
+    """What it is, in a few words."""
     equation: str
+    """The law as `twin effects NAME` prints it; where it is a formula, the law is checked by it."""
     source: str
+    """Where the equation is from."""
     parameters: tuple[Parameter, ...]
+    """Its numbers, in the order in which the law reads them from ``p``."""
     law: Law
+    """The function law(p, s, io); see the top of this module."""
     fingerprint: str
+    """The trace that the effect leaves in the force residual of a model that lacks it."""
     excited_by: str
+    """The motion that shows the effect."""
     states: tuple[str, ...] = ()
+    """Names of the internal states, in the order of ``s``."""
     of_size: Callable[[int], Effect] | None = None
+    """Of a law of any number of elements: the effect with that many. Its parameter ``elements``,
+    whose bounds are both that number, tells the law."""
     attach: Callable[[Any, Mapping[str, float]], None] | None = None
+    """Of a structure effect: builds its bodies in MuJoCo, given a twin.mujoco.mjcf.Mount and the
+    values by name. Its first two states are position (m) and speed (m/s) of the joint built."""
     added_mass: Callable[[Mapping[str, float]], float] | None = None
+    """Values by name -> what the effect adds to the moved mass, as a part of it (1)."""
     sticks: bool = False
+    """Whether it is a friction that holds the axis at rest with any force up to a level."""
     simplest: Callable[[Mapping[str, float]], dict[str, float]] | None = None
+    """Values by name -> simpler ones of the same force, such as a shorter pitch where only a
+    higher harmonic was used."""
     parts: tuple[Part, ...] = ()
+    """The curves of a nonparametric effect, whose force is linear in its strengths. A diagnosis
+    never answers with such an effect."""
     columns: Law | None = None
+    """For many strengths of which few act at a time, or which share what takes long: a function
+    like the law that writes each strength's own force (or change of a reading) to ``io`` from
+    COLUMNS on, so that all columns take one walk. The law is their sum."""
     free_shape: FreeShape | None = None
+    """Of a nonparametric effect that stands in the place of a law, and stays where others go."""
     curves: tuple[Curve, ...] = ()
+    """Curves that the law assumes; a diagnosis asks whether a free one does better."""
     several: bool = False
+    """Whether an axis may have the effect more than once, as cogging of poles and of slots."""
     number: int = 1
+    """Which of several it is."""
     is_itself: Callable[[Mapping[str, float], Excitation], bool] | None = None
+    """(values by name, the motion covered) -> whether the law with these values is the effect, and
+    not some other force that it imitates; None: always."""
     dead_time: bool = False
+    """Whether it only delays the force against the reading. Which of the two is late, no log of
+    both can tell."""
     suits: Callable[[Collection[Effect], bool], bool] | None = None
+    """(effects that an axis has, whether it turns) -> whether a diagnosis offers this one there,
+    and not the same law by another name; None: always."""
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.breakdown import require_sound
+from twin.core.compiled import S_AT
 from twin.core.control import Controller, gain_table
 from twin.core.loop import N_SIGNALS, run_mujoco, run_reduced
 from twin.core.native import Table
 from twin.errors import CannotRun, InputError
-from twin.experiments.trajectory import AnySetpoint, Setpoint
+from twin.experiments.trajectory import AnySetpoint
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import USER_HEADER, attach, offsets, passive_callback, step_address
 
@@ -27,20 +28,26 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The recorded signals of a simulation.
-
-    signals (n, n_axes, 4): encoder reading m, command N, true position m, true velocity m/s.
-    forces (n, n_entries): N, by the table's labels. states (n, n_watched), by ``state_names``.
-    """
+    """The recorded signals of a simulation of n samples."""
 
     signals: Array
+    """(n, n_axes, 4): encoder reading m, command N, true position m, true velocity m/s."""
     forces: Array
+    """(n, n_entries): force of each effect, N, in the order of the table's labels."""
     states: Array
+    """(n, n_watched): states of the effects that have few."""
     table: Table
+    """The model that was run."""
     state_names: tuple[tuple[str, str], ...]
+    """(axis, effect and state) of each watched state."""
 
     def __len__(self) -> int:
         return len(self.signals)
+
+    @property
+    def arrays(self) -> tuple[Array, Array, Array]:
+        """What the compiled loop fills."""
+        return self.signals, self.forces, self.states
 
 
 class Stepper(Protocol):
@@ -77,30 +84,29 @@ class MujocoSimulator:
         self.model = spec.compile()
         self._machine, self._table = model, table
         self.data = mujoco.MjData(self.model)
+        joints = [self.model.joint(a) for a in axes]
         self._where = np.array(
             [
-                (
-                    self.model.joint(a).qposadr[0],
-                    self.model.joint(a).dofadr[0],
-                    self.model.actuator(f"motor_{a}").id,
-                )
-                for a in axes
+                (joint.qposadr[0], joint.dofadr[0], self.model.actuator(f"motor_{a}").id)
+                for a, joint in zip(axes, joints, strict=True)
             ]
         )
-        self._attached = self._attached_joints(table)
+        self._attached = self._attached_joints()
         self._step = step_address()
 
-    def _attached_joints(self, table: Table) -> NDArray[np.int64]:
+    def _attached_joints(self) -> NDArray[np.int64]:
         """For each joint that a structure effect built: qpos, dof, the effect's first state."""
+        import mujoco
+
         from twin.mujoco.mjcf import attached_joint
 
-        joints = {self.model.joint(i).name for i in range(self.model.njnt)}
-        rows = []
-        for (axis, effect), entry in zip(table.labels, table.entries, strict=True):
-            name = attached_joint(axis, effect)
-            if name in joints:
-                joint = self.model.joint(name)
-                rows.append((joint.qposadr[0], joint.dofadr[0], int(entry[3])))
+        rows, kind = [], mujoco.mjtObj.mjOBJ_JOINT
+        for label, entry in zip(self._table.labels, self._table.entries, strict=True):
+            joint = mujoco.mj_name2id(self.model, kind, attached_joint(*label))
+            if joint >= 0:
+                rows.append(
+                    (self.model.jnt_qposadr[joint], self.model.jnt_dofadr[joint], entry[S_AT])
+                )
         return np.array(rows, dtype=np.int64).reshape(-1, 3)
 
     def place(
@@ -182,10 +188,17 @@ def run(
     rng draws the encoder noise. controllers: by axis; the model's own bandwidths where None. Raises
     CannotRun where the simulation breaks down.
     """
-    parts = run_parts(
+    whole: Run | None = None
+    done = 0
+    for part in run_parts(
         model, setpoint, rng, simulator=simulator, controllers=controllers, progress=progress
-    )
-    return _joined(parts, len(setpoint))
+    ):
+        whole = _empty(part, len(setpoint)) if whole is None else whole
+        for column, new in zip(whole.arrays, part.arrays, strict=True):
+            column[done : done + len(part)] = new
+        done += len(part)
+    assert whole is not None
+    return whole
 
 
 def run_parts(
@@ -225,7 +238,8 @@ def run_parts(
         wanted = setpoint.part(first, min(first + CHUNK, n))
         noise = rng.standard_normal((len(wanted), n_axes)) * scale
         part = _empty(before, len(wanted))
-        simulation.run(first, shared, _stacked(wanted), noise, _arrays(part))
+        columns = (wanted.position, wanted.velocity, wanted.acceleration, wanted.force)
+        simulation.run(first, shared, np.stack(columns, axis=2), noise, part.arrays)
         require_sound(
             np.concatenate([before.signals[-1:], part.signals]),
             np.concatenate([before.forces[-1:], part.forces]),
@@ -235,15 +249,6 @@ def run_parts(
         before = part
         if progress:
             progress(first + len(wanted), n)
-
-
-def _stacked(setpoint: Setpoint) -> Array:
-    columns = (setpoint.position, setpoint.velocity, setpoint.acceleration, setpoint.force)
-    return np.stack(columns, axis=2)
-
-
-def _arrays(part: Run) -> tuple[Array, Array, Array]:
-    return part.signals, part.forces, part.states
 
 
 def _empty(like: Run, samples: int) -> Run:
@@ -256,20 +261,6 @@ def _empty(like: Run, samples: int) -> Run:
     )
 
 
-def _joined(parts: Iterable[Run], samples: int) -> Run:
-    """Parts that have so many samples together, as one run."""
-    whole: Run | None = None
-    done = 0
-    for part in parts:
-        if whole is None:
-            whole = _empty(part, samples)
-        for column, new in zip(_arrays(whole), _arrays(part), strict=True):
-            column[done : done + len(part)] = new
-        done += len(part)
-    assert whole is not None
-    return whole
-
-
 def _watched(
     model: MachineModel, table: Table
 ) -> tuple[NDArray[np.int64], tuple[tuple[str, str], ...]]:
@@ -279,6 +270,6 @@ def _watched(
     for label, entry in zip(table.labels, table.entries, strict=True):
         states = effects[label].states
         if 0 < len(states) <= WATCHED_STATES:
-            indices += [int(entry[3]) + i for i in range(len(states))]
+            indices += [int(entry[S_AT]) + i for i in range(len(states))]
             names += [(label[0], f"{label[1]}_{s}") for s in states]
     return np.array(indices, dtype=np.int64), tuple(names)

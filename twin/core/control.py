@@ -22,16 +22,19 @@ INTEGRAL, PREVIOUS, SPEED = range(3)
 class Controller:
     """PID with filtered derivative and mass feedforward, for one axis.
 
-    proportional N/m, integral N/(m s), derivative N s/m, filter_bandwidth Hz (of the speed taken
-    from the reading), mass kg (feedforward). With all zero the loop is open: only the setpoint's
-    force acts.
+    With all zero the loop is open: only the setpoint's force acts.
     """
 
     proportional: float = 0.0
+    """N/m."""
     integral: float = 0.0
+    """N/(m s)."""
     derivative: float = 0.0
+    """N s/m, on the speed taken from the reading."""
     filter_bandwidth: float = 0.0
+    """Hz, of that speed."""
     mass: float = 0.0
+    """kg, of the feedforward."""
 
     @classmethod
     def for_axis(cls, axis: AxisModel) -> Controller:

@@ -240,19 +240,20 @@ def sense(entries, first, last, parameters, states, io, position):
 
 @dataclass(frozen=True)
 class Table:
-    """A model as plain arrays.
-
-    entries (n, 4): law address, kind, first parameter, first state. parameters (n_p,).
-    axes: for each axis (first entry, last entry, first state, first sensing entry, last sensing
-    entry). labels: (axis name, effect name) of each entry. masses (n_axes,) kg.
-    """
+    """A model as plain arrays."""
 
     entries: NDArray[np.int64]
+    """(n, 4), one row an effect: address of its law, kind, first parameter, first state."""
     parameters: NDArray[np.float64]
+    """(n_p,) of all effects, one after the other."""
     axes: NDArray[np.int64]
+    """(n_axes, 5): first entry, last entry, first state, first and last sensing entry."""
     masses: NDArray[np.float64]
+    """(n_axes,) kg, moved."""
     n_states: int
+    """How many states there are."""
     labels: tuple[tuple[str, str], ...]
+    """(axis name, effect name) of each entry."""
 
 
 def build_table(

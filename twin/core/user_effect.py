@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Iterator
 from pathlib import Path
 
 from twin.core.compiled import law_address
@@ -70,56 +71,43 @@ class Guarded(list):
 
 
 def require_sound(effect: Effect, path: Path) -> None:
-    """Raise InputError, in one line, where the law of a user's file cannot work."""
+    """Raise InputError, in one line, where the law of a user's file cannot work.
+
+    At usual speeds it must give a finite number and some result; over a wide range of motion its
+    indices must stay within their arrays.
+    """
     values = [_tried(p.start, p.lower, p.upper, p.strength) for p in effect.parameters]
     p, s = Guarded("p", values), Guarded("s", [0.0] * len(effect.states))
     acted = False
-    for speed in SPEEDS:
-        io = Guarded("io", _sample(speed))
-        before = list(io)
+    for k, sample in enumerate([*map(_at_speed, SPEEDS), *_anywhere()]):
+        usual, io = k < len(SPEEDS), Guarded("io", sample)
         try:
             effect.law(p, s, io)
+            if usual and not all(map(math.isfinite, [*io, *s])):
+                raise ValueError("the result is not a finite number")
         except Outside as touched:
-            raise InputError(f"{path}: {outside_words(effect, str(touched))}") from None
+            words = outside_words(effect, str(touched))
+            raise InputError(f"{path}: at x = {sample[X]:.3g} m {words}") from None
         except (ArithmeticError, ValueError) as error:
-            raise InputError(f"{path}: {_not_finite(speed, str(error))}") from error
+            if usual:
+                raise InputError(
+                    f"{path}: its law gives no finite number at v = {sample[V]:g} m/s ({error}); "
+                    "it must for every speed, also 0: treat that case apart"
+                ) from error
+            s = Guarded("s", [0.0] * len(effect.states))  # of numbers beyond any machine
         except Exception as error:
+            told = " ".join(f"{type(error).__name__}: {error}".split())
             raise InputError(
-                f"{path}: its law fails at v = {speed:g} m/s: {_told(error)}; use only numbers, "
+                f"{path}: its law fails at v = {sample[V]:g} m/s: {told}; use only numbers, "
                 "math functions and the arrays p, s, io"
             ) from error
-        if not all(map(math.isfinite, [*io, *s])):
-            raise InputError(f"{path}: {_not_finite(speed, 'the result is not a finite number')}")
-        acted = acted or before != list(io)
+        acted = acted or sample != list(io)
     if not acted:
         raise InputError(
             f"{path}: its law writes no result; a {effect.kind.name.lower()} effect writes "
             f"{RESULT[effect.kind]}"
         )
-    _require_indices(effect, values, path)
     law_address(effect)
-
-
-def _require_indices(effect: Effect, values: list[float], path: Path) -> None:
-    """Raise InputError where an index leaves its array anywhere in a wide range of motion."""
-    rng = random.Random(1)
-    p, s = Guarded("p", values), Guarded("s", [0.0] * len(effect.states))
-    for k in range(MOTIONS):
-        size = 10.0 ** rng.uniform(-6.0, 1.0)
-        io = Guarded("io", [rng.choice((-1.0, 1.0)) * size * rng.random() for _ in range(IO_SIZE)])
-        io[DT], io[MASS], io[MOVED], io[WHEN] = PERIOD, 1.0, 1.0, 1.0
-        io[INDEX], io[TIME] = k, k * PERIOD
-        try:
-            effect.law(p, s, io)
-        except Outside as touched:
-            words = outside_words(effect, str(touched))
-            raise InputError(f"{path}: at x = {io[X]:.3g} m {words}") from None
-        except (ArithmeticError, ValueError):  # of numbers beyond any machine
-            s = Guarded("s", [0.0] * len(effect.states))
-
-
-def _told(error: Exception) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 def _tried(start: float, lower: float, upper: float, strength: bool) -> float:
@@ -127,15 +115,26 @@ def _tried(start: float, lower: float, upper: float, strength: bool) -> float:
     return start if start or not strength else min(max(0.1, lower), upper)
 
 
-def _sample(speed: float) -> list[float]:
+def _at_speed(speed: float) -> list[float]:
+    """io as in a simulation."""
     io = [0.0] * IO_SIZE
-    io[DT], io[MASS], io[MOVED], io[WHEN] = PERIOD, 1.0, 1.0, 1.0
-    io[X], io[V], io[U] = 0.0123, speed, 1.0
-    io[READING] = io[X]
-    io[DRY] = io[STATIC] = io[VISCOUS] = 1.0
-    io[HOLD] = speed / PERIOD + 1.0
-    io[NET] = io[ACC] = 1.0
+    io[DT] = PERIOD
+    io[X] = io[READING] = 0.0123
+    io[V], io[HOLD] = speed, speed / PERIOD + 1.0
+    for one in (MASS, MOVED, WHEN, U, DRY, STATIC, VISCOUS, NET, ACC):
+        io[one] = 1.0
     return io
+
+
+def _anywhere() -> Iterator[list[float]]:
+    """io along motions of all sizes, both ways."""
+    rng = random.Random(1)
+    for k in range(MOTIONS):
+        size = 10.0 ** rng.uniform(-6.0, 1.0)
+        io = [rng.choice((-1.0, 1.0)) * size * rng.random() for _ in range(IO_SIZE)]
+        io[DT], io[MASS], io[MOVED], io[WHEN] = PERIOD, 1.0, 1.0, 1.0
+        io[INDEX], io[TIME] = k, k * PERIOD
+        yield io
 
 
 def outside_words(effect: Effect, touched: str) -> str:
@@ -146,10 +145,3 @@ def outside_words(effect: Effect, touched: str) -> str:
         "io": f"it has {IO_SIZE} slots; use the names of twin.effect, such as io[X]",
     }
     return f"its law uses {touched}, but {has[touched.split('[')[0]]}"
-
-
-def _not_finite(speed: float, reason: str) -> str:
-    return (
-        f"its law gives no finite number at v = {speed:g} m/s ({reason}); it must for every speed, "
-        "also 0: treat that case apart"
-    )

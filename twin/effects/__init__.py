@@ -13,7 +13,6 @@ import re
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
 
 from twin.effect import Effect
 from twin.entries import near
@@ -71,16 +70,22 @@ class Catalogue(Mapping[str, Effect]):
 
 
 def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:
-    """The catalogue of this package, and the effects of the user's own files.
+    """The effects of this package, and those of the user's own Python files.
 
-    Loading a user's file runs its code. Raises InputError where one is missing, has the name of
-    another effect, cannot be run, does not come to an end, or defines no EFFECT.
+    Loading a user's file runs its code, first in a process of its own. Raises InputError where a
+    file is missing, has the name of another effect, cannot be run, does not come to an end within
+    30 s, or defines no EFFECT.
     """
     names = [m.name for m in pkgutil.iter_modules(__path__)]
     effects = [importlib.import_module(f"{__name__}.{name}").EFFECT for name in names]
     for path in map(Path, user_files):
         _require_name(path, Catalogue(effects))
-        _try_apart(path)
+        from twin.apart import NoAnswer, apart
+
+        try:
+            apart(_load_and_try, path, seconds=LONGEST_TRIAL, memory=LARGEST_TRIAL)
+        except NoAnswer as error:
+            raise InputError(f"{path}: {error}") from error
         effects.append(_load(path))
     return Catalogue(effects)
 
@@ -98,15 +103,6 @@ def _require_name(path: Path, taken: Catalogue) -> None:
         )
 
 
-def _try_apart(path: Path) -> None:
-    from twin.apart import NoAnswer, apart
-
-    try:
-        apart(_load_and_try, path, seconds=LONGEST_TRIAL, memory=LARGEST_TRIAL)
-    except NoAnswer as error:
-        raise InputError(f"{path}: {error}") from error
-
-
 def _load_and_try(path: Path) -> None:
     """Raise InputError for what is wrong with a file; it may also end the process, or hang."""
     from twin.core.user_effect import (
@@ -117,16 +113,6 @@ def _load_and_try(path: Path) -> None:
 
 
 def _load(path: Path) -> Effect:
-    effect = getattr(_import_file(path), "EFFECT", None)
-    if not isinstance(effect, Effect):
-        raise InputError(
-            f"{path}: defines no EFFECT of type twin.effect.Effect; "
-            "see the worked example in examples/my_effect.py"
-        )
-    return effect
-
-
-def _import_file(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(f"user_effect_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise InputError(f"{path}: is not a Python file; an effect is one .py file")
@@ -141,4 +127,10 @@ def _import_file(path: Path) -> ModuleType:
                 "; a Parameter has a name, unit, start, lower, upper and meaning, in this order"
             )
         raise InputError(f"{path}: cannot be loaded as an effect: {reason}") from error
-    return module
+    effect = getattr(module, "EFFECT", None)
+    if not isinstance(effect, Effect):
+        raise InputError(
+            f"{path}: defines no EFFECT of type twin.effect.Effect; "
+            "see the worked example in examples/my_effect.py"
+        )
+    return effect

@@ -74,9 +74,10 @@ class LawReport:
 
 
 def check_effect(effect: Effect) -> LawReport:
-    """Put every law for effects of this kind to the effect, about a second or two.
+    """Try every law that holds for effects of this kind on the effect; takes a second or two.
 
-    Where it uses what it has not declared nothing else is tried: compiled, it would write anywhere.
+    A broken law is part of the report and raises nothing. Where the effect uses what it has not
+    declared, nothing else is tried: compiled, it would write anywhere.
     """
     outcomes: list[Outcome] = []
     for law in (law for law in LAWS if effect.kind in law.kinds):

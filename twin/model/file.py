@@ -15,7 +15,7 @@ from twin.effects import Catalogue, load_catalogue
 from twin.entries import read_entries, read_toml
 from twin.errors import InputError, at
 from twin.files import write_atomically
-from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, Interval, MachineModel
+from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, MachineModel
 from twin.model.schema import AxisEntry, EffectEntry, ModelFile
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 
@@ -72,9 +72,11 @@ def model_files(name: str | Path) -> list[Path]:
 
 
 def load_model(name: str | Path, catalogue: Catalogue | None = None) -> MachineModel:
-    """Read a machine model, with the effects of the package where None are given.
+    """Read a machine model from a TOML file, given by its path or, of the package's, by its name.
 
-    Raises InputError naming the file, the entry and what is allowed.
+    catalogue: the effects that the file may name; those of the package where None. Raises
+    InputError, in one line that names file and entry, for a file that is none and for a value that
+    is not allowed.
     """
     path = find_model(name)
     catalogue = load_catalogue() if catalogue is None else catalogue
@@ -227,7 +229,11 @@ def _axis_table(axis: AxisModel) -> tomlkit.items.Table:
 
 
 def save_model(model: MachineModel, path: str | Path) -> None:
-    """Write the model, and its MJCF beside it where that is not there yet."""
+    """Write the model as a TOML file, each value with its unit in a comment.
+
+    Its MJCF text is written beside it where there is no such file yet. A file of that path is
+    replaced as a whole or not at all. Raises InputError where it cannot be written.
+    """
     path = Path(path)
     write_atomically(path, format_model(model).encode())
     if model.mjcf and model.mjcf_name:
@@ -253,54 +259,40 @@ def read_intervals(
     for axis, entries in given.items():
         if axis not in axes:
             raise InputError(f"{ENTRY}: the model has no axis '{axis}'; it has {', '.join(axes)}")
-        values, ends = _values(axes[axis]), {}
+        values = {
+            axes[axis].mass_parameter.name: axes[axis].mass,
+            **{f"{f.effect.name}.{n}": v for f in axes[axis].effects for n, v in f.values.items()},
+        }
+        ratio, ends = entries.get(ABOVE_FLOOR, 1.0), {}
+        if not isinstance(ratio, float):
+            raise InputError(
+                f"{ENTRY}: {ABOVE_FLOOR} = {ratio}: give one number, error over noise floor"
+            )
         for label, pair in entries.items():
             if label == ABOVE_FLOOR:
                 continue
-            low, high = _ends(label, pair)
+            if isinstance(pair, float) or not pair[0] <= pair[1]:
+                raise InputError(f"{ENTRY}: {label} = {pair}: give two numbers, the low one first")
             if label not in values:
                 raise InputError(f"{ENTRY}: axis {axis} has no parameter '{label}'; remove it")
-            if low <= values[label] <= high:
-                ends[label] = low, high
-        found[axis] = AxisIntervals(ends, _ratio(entries.get(ABOVE_FLOOR, 1.0)))
+            if pair[0] <= values[label] <= pair[1]:
+                ends[label] = pair[0], pair[1]
+        found[axis] = AxisIntervals(ends, ratio)
     return found
-
-
-def _ratio(given: Sequence[float] | float) -> float:
-    if isinstance(given, float):
-        return given
-    raise InputError(f"{ENTRY}: {ABOVE_FLOOR} = {given}: give one number, error over noise floor")
-
-
-def _ends(label: str, ends: Sequence[float] | float) -> Interval:
-    if isinstance(ends, float) or not ends[0] <= ends[1]:
-        raise InputError(f"{ENTRY}: {label} = {ends}: give two numbers, the low one first")
-    return ends[0], ends[1]
-
-
-def _values(axis: AxisModel) -> dict[str, float]:
-    """Every parameter of an axis by its label."""
-    own = {f"{f.effect.name}.{name}": v for f in axis.effects for name, v in f.values.items()}
-    return {axis.mass_parameter.name: axis.mass, **own}
 
 
 def intervals_table(model: MachineModel) -> tomlkit.items.Table:
     """The intervals of a model as TOML, each with its unit in a comment."""
     table = tomlkit.table(is_super_table=True)
-    for axis, intervals in model.intervals.items():
-        units = model.axes[axis].units
-        entries = tomlkit.table()
+    for name, intervals in model.intervals.items():
+        axis, entries = model.axes[name], tomlkit.table()
         entries.comment(COMMENT)
-        meaning = units.words("1, force error over noise floor")
+        meaning = axis.units.words("1, force error over noise floor")
         entries[ABOVE_FLOOR] = tomlkit.item(intervals.above_floor).comment(meaning)
         for label, ends in intervals.ends.items():
-            unit = units(_unit(model.axes[axis], label))
-            entries.append(tomlkit.key([label]), tomlkit.item(list(ends)).comment(unit))
-        table[axis] = entries
+            effect, _, parameter = label.rpartition(".")
+            own = axis[effect].effect.parameter(parameter) if effect else axis.mass_parameter
+            value = tomlkit.item(list(ends)).comment(axis.units(own.unit))
+            entries.append(tomlkit.key([label]), value)
+        table[name] = entries
     return table
-
-
-def _unit(axis: AxisModel, label: str) -> str:
-    """Unit of a parameter on a linear axis."""
-    effect, _, name = label.rpartition(".")
-    return axis[effect].effect.parameter(name).unit if effect else axis.mass_parameter.unit

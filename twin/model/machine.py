@@ -15,23 +15,30 @@ from twin.numbers import is_number
 
 @dataclass(frozen=True)
 class HistoryStep:
-    """One step of the model's growth.
-
-    Errors are RMS force errors in ``unit``; None where not measured. The selection logs may have
-    taken part in the choice of the effect; on the test logs nothing was decided.
-    """
+    """One step of the model's growth; errors are RMS force errors, None where not measured."""
 
     action: str
+    """What was done: "add" or "replace"."""
     effect: str
+    """Name of the effect."""
     axis: str
+    """Name of the axis."""
     fit_error_before: float
+    """On the training logs, before the step."""
     fit_error_after: float
+    """On the training logs, after it."""
     holdout_error_before: float | None
+    """On the selection logs, which may have taken part in the choice of the effect."""
     holdout_error_after: float | None
+    """The same after the step."""
     unit: str = LINEAR.force
+    """Of the errors."""
     notes: tuple[str, ...] = ()
+    """What else is to be said of the step, in sentences."""
     test_error_before: float | None = None
+    """On the test logs, on which nothing was decided."""
     test_error_after: float | None = None
+    """The same after the step."""
 
 
 Interval = tuple[float, float]
@@ -39,14 +46,12 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class AxisIntervals:
-    """Low and high ends (90 %) by parameter label, in the parameters' units.
-
-    above_floor: force error of the fit over its noise floor. Where it is more than noise the model
-    is wrong, and a fit's file has no ends.
-    """
+    """The intervals (90 %) that the last fit of an axis found."""
 
     ends: Mapping[str, Interval]
+    """Low and high end by parameter label, in its unit; none where the model is wrong."""
     above_floor: float
+    """Force error of the fit over its noise floor; far above 1 the model is wrong."""
 
 
 MASS = Parameter(LINEAR.mass_name, LINEAR.mass, 1.0, LEAST, MOST, "moved mass")
@@ -59,33 +64,40 @@ MOST_AXES_OF_A_PAIR = 2  # with more, which is the other axis?
 
 @dataclass(frozen=True)
 class Hardware:
-    """What surrounds an axis' mechanics.
-
-    In the units of a linear axis; a rotary one has their counterparts (see twin.model.units).
-    travel (m, low and high; None where it is not known), force_constant (N/A), force_limit (N),
-    encoder_resolution (m), encoder_noise (m rms), current_noise (A rms), velocity (m/s),
-    acceleration (m/s^2) and jerk (m/s^3) limits of its moves, bandwidth (Hz) of its position loop.
-    """
+    """What surrounds an axis' mechanics, in the units of a linear axis (see twin.model.units)."""
 
     travel: tuple[float, float] | None = None
+    """Low and high end of the travel, m; None where it is not known."""
     force_constant: float = 1.0
+    """Force of the drive per current, N/A."""
     force_limit: float = math.inf
+    """Most force of the drive, N."""
     encoder_resolution: float = 0.0
+    """Step of the readings, m."""
     encoder_noise: float = 0.0
+    """Noise of the readings, m RMS."""
     current_noise: float = 0.0
+    """Noise of the measured current, A RMS."""
     velocity: float = 0.25
+    """Fastest move, m/s."""
     acceleration: float = 2.0
+    """Strongest acceleration of a move, m/s^2."""
     jerk: float = 200.0
+    """Highest jerk of a move, m/s^3."""
     bandwidth: float = 30.0
+    """Bandwidth of the position loop, Hz."""
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """An effect with its parameter values (name -> SI value); ``fixed`` are held by a fit."""
+    """An effect with its parameter values."""
 
     effect: Effect
+    """The physical law."""
     values: Mapping[str, float] = field(hash=False)
+    """Value by parameter name, in the parameter's unit."""
     fixed: frozenset[str]
+    """Names of the parameters that a fit holds."""
 
     @classmethod
     def at_start(
@@ -141,19 +153,22 @@ def _check_value(effect: Effect, name: str, value: float, units: AxisUnits) -> N
 
 @dataclass(frozen=True)
 class AxisModel:
-    """One axis: moved mass (kg), hardware, and its effects in the order they were added.
+    """One axis of a machine: what is moved, what surrounds it, and its effects.
 
-    rotary: whether it turns; then ``mass`` is the moment of inertia (kg m^2) and all lengths are
-    angles. mass_fixed: whether a fit holds the mass. Zero mass: the motion is imposed, and the
-    force of a log is the one that it takes; such an axis cannot be simulated. Raises InputError
-    for a mass below zero, two frictions, and an effect that the axis cannot have.
+    Raises InputError for a mass below zero, two frictions, and an effect that the axis cannot have.
     """
 
     mass: float
+    """Moved mass, kg; of a rotary axis its moment of inertia, kg m^2. Zero: the motion is imposed,
+    and the force of a log is the one that it takes; such an axis cannot be simulated."""
     hardware: Hardware = Hardware()
+    """Travel, drive, encoder and limits."""
     effects: tuple[Fitted, ...] = ()
+    """The effects with their values, in the order in which they were added."""
     mass_fixed: bool = False
+    """Whether a fit holds the mass."""
     rotary: bool = False
+    """Whether the axis turns: all lengths are then angles (rad), forces torques (N m)."""
 
     def __post_init__(self) -> None:
         name, unit = self.units.mass_name, self.units.mass
@@ -243,22 +258,25 @@ class AxisModel:
 
 @dataclass(frozen=True)
 class MachineModel:
-    """A stage: axes by name, the rate it is sampled at (Hz), its MuJoCo file and its history.
+    """A machine: its axes, how it is sampled, and how the model grew.
 
     Raises InputError where it has more than two axes and an effect that depends on the other one.
-
-    mjcf: MJCF text of the stage, or None for plain slides and hinges, one for each axis. intervals:
-    by axis, of the parameters that the last fit of the axis found; none where it was exchanged
-    since.
     """
 
     name: str
+    """What the machine is called."""
     axes: Mapping[str, AxisModel]
+    """Its axes by name."""
     sample_rate: float = 10_000.0
+    """Rate of control and simulation, Hz."""
     mjcf: str | None = None
+    """MJCF text of its bodies; None: each axis is a plain slide or hinge."""
     mjcf_name: str | None = None
+    """Name of the MJCF file beside the model file."""
     history: tuple[HistoryStep, ...] = field(default=())
+    """How the model grew, the first step first."""
     intervals: Mapping[str, AxisIntervals] = field(default_factory=dict)
+    """By axis, what its last fit found; none where the axis was exchanged since."""
 
     def __post_init__(self) -> None:
         for name, axis in self.axes.items():

@@ -14,10 +14,12 @@ from twin.model.machine import AxisModel
 
 @dataclass(frozen=True)
 class ParameterReference:
-    """One number of an axis model that a fit may change; effect "" is the axis' own mass."""
+    """One number of an axis model that a fit may change."""
 
     effect: str
+    """Name of the effect; "" for the axis' own mass."""
     parameter: Parameter
+    """Which of its parameters, or the mass as one."""
 
     @property
     def label(self) -> str:

@@ -115,30 +115,23 @@ def _find(address: int, wanted: int, limit: int = 1 << 19) -> int:
     raise RuntimeError(UNKNOWN_LAYOUT)
 
 
-def _words(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[int], list[int]]:
-    """What the fields of Offsets hold in this model and data, as 8-byte words."""
-    time = int(np.float64(data.time).view(np.uint64))
+def _fields(model: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, int]]:
+    """Of each field of Offsets the address of its struct, and the 8-byte word that it holds."""
+    in_model = (model.nnumericdata, model.numeric_data.ctypes.data)
     arrays = (data.userdata, data.qpos, data.qvel, data.ctrl, data.qfrc_passive)
-    return (
-        [model.nnumericdata, model.numeric_data.ctypes.data],
-        [time, *(a.ctypes.data for a in arrays)],
-    )
+    in_data = (int(np.float64(data.time).view(np.uint64)), *(a.ctypes.data for a in arrays))
+    return [*((model._address, w) for w in in_model), *((data._address, w) for w in in_data)]
 
 
 @cache
 def offsets() -> Offsets:
     """Struct offsets, found in one live object and verified in another."""
-    model, data = _probe(numeric=977, userdata=3, neighbours=False)
-    in_model, in_data = _words(model, data)
-    found = Offsets(
-        *(_find(model._address, w) for w in in_model), *(_find(data._address, w) for w in in_data)
-    )
-    model, data = _probe(numeric=1013, userdata=5, neighbours=True)
-    in_model, in_data = _words(model, data)
-    seen_model = [_word_at(model._address, o) for o in found[:2]]
-    seen_data = [_word_at(data._address, o) for o in found[2:]]
-    if (seen_model, seen_data) != (in_model, in_data):
-        raise RuntimeError(UNKNOWN_LAYOUT)
+    probe = _probe(numeric=977, userdata=3, neighbours=False)
+    found = Offsets(*(_find(address, word) for address, word in _fields(*probe)))
+    probe = _probe(numeric=1013, userdata=5, neighbours=True)
+    for offset, (address, word) in zip(found, _fields(*probe), strict=True):
+        if _word_at(address, offset) != word:
+            raise RuntimeError(UNKNOWN_LAYOUT)
     return found
 
 

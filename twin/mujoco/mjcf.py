@@ -248,14 +248,8 @@ def _require_bare(
             f"{model.mjcf_name}: joint '{axis}' is not a {wanted}, but the axis is {units.kind} "
             f"({units.mass_name} in {units.mass}); change one of them"
         )
-    own = {
-        "damping": np.any(joint.damping),
-        "stiffness": np.any(joint.stiffness),
-        "frictionloss": np.any(joint.frictionloss),
-        "armature": np.any(joint.armature),
-    }
-    for name, present in own.items():
-        if present:
+    for name in ("damping", "stiffness", "frictionloss", "armature"):
+        if np.any(getattr(joint, name)):
             raise InputError(
                 f"{model.mjcf_name}: joint '{axis}' has {name} of its own; remove it and give the "
                 "axis an effect instead"
