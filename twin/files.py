@@ -24,7 +24,7 @@ def require_writable(path: Path) -> None:
     """Raise InputError now, instead of after the work, where the file could not be written."""
     with _explained(path):
         if not _is_direct(path):
-            with _opened(_beside(path, ".", _passing())) as stream:
+            with _opened(_checked(path), _passing()) as stream:
                 stream.write(TRIAL)
         elif path.is_char_device():  # a pipe would end there for its reader
             with open(path, "wb", buffering=0) as stream:
@@ -40,22 +40,28 @@ def make_folder(path: Path) -> None:
         raise InputError(f"{path}: cannot be made: {reason}; give another folder") from error
 
 
-def replacing(path: Path) -> AbstractContextManager[BinaryIO]:
+def atomic_writer(path: Path) -> AbstractContextManager[BinaryIO]:
     """A stream whose bytes become ``path`` at the end, or nothing where anything fails.
 
     A symbolic link is followed, a file keeps its permissions, and a device or pipe is written to.
     Raises InputError where the folder or the disk refuses.
     """
-    return _written(path, ".", _passing())
+    return _written(path, _passing())
 
 
 def recording(path: Path) -> AbstractContextManager[BinaryIO]:
-    """``replacing`` for what grows while a long run lasts: the file ``path.unfinished``.
+    """``atomic_writer`` for what grows while a long run lasts: the file ``path.unfinished``.
 
     It is removed where the run fails or is interrupted. A killed run leaves it to be recovered,
     until the next run that records to the same path. Raises InputError where one does just now.
     """
-    return _written(path, "", UNFINISHED)
+    return _written(path, "{}" + UNFINISHED)
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all; raises InputError."""
+    with atomic_writer(path) as stream:
+        stream.write(content)
 
 
 def is_same_file(one: Path, other: Path) -> bool:
@@ -67,12 +73,6 @@ def is_same_file(one: Path, other: Path) -> bool:
     return os.path.realpath(one) == os.path.realpath(other)
 
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all; raises InputError."""
-    with replacing(path) as stream:
-        stream.write(content)
-
-
 def remove_unfinished() -> None:
     """Remove what is half written, where the program ends at once."""
     for part in tuple(_unfinished):
@@ -81,41 +81,41 @@ def remove_unfinished() -> None:
 
 
 @contextmanager
-def _written(path: Path, before: str, behind: str) -> Iterator[BinaryIO]:
-    """A stream whose bytes lie beside ``path`` and become it; before, behind: see ``_beside``."""
+def _written(path: Path, name: str) -> Iterator[BinaryIO]:
+    """A stream whose bytes lie in a file beside ``path``, of that name, and become it."""
     with _explained(path):
         if _is_direct(path):
             with open(path, "wb") as stream:
                 yield stream
             return
-        part = _beside(path, before, behind)
-        with _opened(part) as stream:
+        target = _checked(path)
+        with _opened(target, name) as stream:
             yield stream
-            _put_in_place(stream, part, _target(path))
+            stream.flush()
+            os.fsync(stream.fileno())
+            if target.exists():
+                os.chmod(stream.name, stat.S_IMODE(target.stat().st_mode))
+            os.replace(stream.name, target)
+            with suppress(OSError):  # the folder's entry as well, where the system can
+                number = os.open(target.parent, os.O_RDONLY)
+                try:
+                    os.fsync(number)
+                finally:
+                    os.close(number)
 
 
 def _passing() -> str:
-    """The end of the name of a file of this process until it is whole."""
-    return f".{os.getpid()}{PART}"
-
-
-def _beside(path: Path, before: str, behind: str) -> Path:
-    """The file beside ``path`` whose name has that before and behind it; removes left-over ones.
-
-    Raises InputError for a path that is no file in a folder that is there.
-    """
-    target = _target(path)
-    if target.is_dir():
-        raise InputError(f"{path}: is a folder; give the name of a file in it")
-    if not target.parent.is_dir():
-        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
-    _remove_left_over(target.parent)
-    return target.with_name(f"{before}{target.name}{behind}")
+    """The name beside a file, put in for {}, of what this process writes until it is whole."""
+    return f".{{}}.{os.getpid()}{PART}"
 
 
 @contextmanager
-def _opened(part: Path) -> Iterator[BinaryIO]:
-    """An empty file that nobody else writes, removed on leaving if it is still there."""
+def _opened(target: Path, name: str) -> Iterator[BinaryIO]:
+    """An empty file beside the target that nobody else writes, removed on leaving if still there.
+
+    name: with {} for that of the target.
+    """
+    part = target.with_name(name.format(target.name))
     with open(part, "ab") as stream:
         try:
             _lock(stream)
@@ -132,14 +132,23 @@ def _opened(part: Path) -> Iterator[BinaryIO]:
             _unfinished.discard(part)
 
 
-def _put_in_place(stream: BinaryIO, part: Path, target: Path) -> None:
-    """Make a part that is complete the target."""
-    stream.flush()
-    os.fsync(stream.fileno())
-    if target.exists():
-        os.chmod(part, stat.S_IMODE(target.stat().st_mode))
-    os.replace(part, target)
-    _keep_folder(target.parent)
+def _checked(path: Path) -> Path:
+    """The file itself where the path is a symbolic link to it, and its folder free of remains.
+
+    Raises InputError for a path that is no file in a folder that is there. The unfinished files of
+    runs that were killed are removed; a run that lives has its own locked.
+    """
+    target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    if target.is_dir():
+        raise InputError(f"{path}: is a folder; give the name of a file in it")
+    if not target.parent.is_dir():
+        raise InputError(f"{path}: its folder does not exist; create {path.parent} first")
+    for part in target.parent.glob(f".*{PART}"):
+        if part not in _unfinished:
+            with suppress(OSError), open(part, "r+b") as stream:
+                _lock(stream)
+                part.unlink()
+    return target
 
 
 @contextmanager
@@ -164,34 +173,9 @@ def _is_direct(path: Path) -> bool:
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
-def _target(path: Path) -> Path:
-    """The file itself where the path is a symbolic link to it."""
-    return Path(os.path.realpath(path)) if path.is_symlink() else path
-
-
-def _remove_left_over(folder: Path) -> None:
-    """Remove the unfinished files of runs that were killed; a run that lives has its own locked."""
-    for part in folder.glob(f".*{PART}"):
-        if part in _unfinished:
-            continue
-        with suppress(OSError), open(part, "r+b") as stream:
-            _lock(stream)
-            part.unlink()
-
-
 def _lock(stream: BinaryIO) -> None:
     """Hold the file until it is closed; raises OSError where another process does."""
     if sys.platform != "win32":  # there an open file cannot be removed
         import fcntl
 
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-def _keep_folder(folder: Path) -> None:
-    """Write the folder's entry to the disk as well, where the system can."""
-    with suppress(OSError):
-        number = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(number)
-        finally:
-            os.close(number)

@@ -9,13 +9,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.breakdown import require_sound
 from twin.core.compiled import S_AT
 from twin.core.control import Controller, gain_table
 from twin.core.loop import N_SIGNALS, run_mujoco, run_reduced
 from twin.core.native import Table
 from twin.errors import CannotRun, InputError
 from twin.experiments.trajectory import AnySetpoint
+from twin.instability import require_sound
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import USER_HEADER, attach, offsets, passive_callback, step_address
 

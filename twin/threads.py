@@ -7,10 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import wraps
 from threading import Lock
-from typing import TYPE_CHECKING, ParamSpec, TypeVar
-
-if TYPE_CHECKING:
-    from threadpoolctl import ThreadpoolController
+from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -67,26 +64,23 @@ def one_for_matrices(job: Callable[P, R]) -> Callable[P, R]:
 def _one_blas_thread() -> Iterator[None]:
     from threadpoolctl import ThreadpoolController
 
-    blas = ThreadpoolController().select(user_api="blas")
-    limit = _from_any_thread(blas, lambda: blas.limit(limits=1))
+    libraries = ThreadpoolController().select(user_api="blas").lib_controllers
+    before = [(library, library.num_threads) for library in libraries]
+    for library in libraries:
+        _set_threads(library, 1)
     try:
         yield
     finally:
-        _from_any_thread(blas, limit.restore_original_limits)
+        for library, count in before:
+            _set_threads(library, count)
 
 
-def _from_any_thread(blas: ThreadpoolController, change: Callable[[], R]) -> R:
-    """Change a limit; threadpoolctl 3.8 ignores, without a word, all threads but one.
+def _set_threads(library: Any, count: int) -> None:
+    """threadpoolctl 3.8 heeds, without a word, only the first thread that set a count.
 
-    That is the first that set a limit, until it lets go. The last call may end in another.
+    Until that lets go: it does so here before and after, as the last call may end in another.
     """
-
-    def let_go() -> None:
-        for library in blas.lib_controllers:
-            if hasattr(library, "clear_controlling_thread"):
-                library.clear_controlling_thread(force=True)
-
-    let_go()
-    changed = change()
-    let_go()
-    return changed
+    let_go = getattr(library, "clear_controlling_thread", lambda force: None)
+    let_go(force=True)
+    library.set_num_threads(count)
+    let_go(force=True)

@@ -14,9 +14,9 @@ import pytest
 from twin.errors import InputError
 from twin.files import (
     PART,
+    atomic_writer,
     recording,
     remove_unfinished,
-    replacing,
     require_writable,
     write_atomically,
 )
@@ -25,8 +25,8 @@ POSIX = pytest.mark.skipif(sys.platform == "win32", reason="links, pipes and rig
 KILLED = """
 import os, signal
 from pathlib import Path
-from twin.files import replacing
-with replacing(Path("a.bin")) as stream:
+from twin.files import atomic_writer
+with atomic_writer(Path("a.bin")) as stream:
     stream.write(b"half")
     stream.flush()
     os.kill(os.getpid(), signal.SIGKILL)
@@ -76,19 +76,21 @@ def test_a_pipe_and_a_device_are_written_to(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device of Linux")
-def test_a_full_disk_is_one_line_and_found_before_the_work(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_is_one_line_and_found_before_the_work(tmp_path: Path) -> None:
+    import resource
+
     with pytest.raises(InputError, match="/dev/full: cannot be written: No space left"):
         write_atomically(Path("/dev/full"), b"x" * 10**6)
     with pytest.raises(InputError, match="/dev/full: cannot be written: No space left"):
         require_writable(Path("/dev/full"))
     require_writable(Path("/dev/null"))
-    part = tmp_path / f".a.bin.{os.getpid()}{PART}"
-    part.symlink_to("/dev/full")
-    monkeypatch.setattr("twin.files._remove_left_over", lambda folder: None)
-    with pytest.raises(InputError, match=r"a\.bin: cannot be written: No space left"):
-        require_writable(tmp_path / "a.bin")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))  # as a disk with so much left
+        with pytest.raises(InputError, match=r"a\.bin: cannot be written: File too large"):
+            require_writable(tmp_path / "a.bin")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -116,7 +118,7 @@ def test_a_run_that_was_killed_leaves_nothing_behind_the_next(tmp_path: Path) ->
     assert [p.name for p in tmp_path.iterdir()] == ["b.bin"]
 
 
-@pytest.mark.parametrize("kind", [replacing, recording])
+@pytest.mark.parametrize("kind", [atomic_writer, recording])
 def test_a_program_that_ends_at_once_leaves_nothing_half_written(kind, tmp_path: Path) -> None:
     def end_at_once() -> None:
         with kind(tmp_path / "a.bin") as stream:
@@ -130,7 +132,7 @@ def test_a_program_that_ends_at_once_leaves_nothing_half_written(kind, tmp_path:
 
 
 def test_a_run_that_lives_keeps_its_part(tmp_path: Path) -> None:
-    with replacing(tmp_path / "a.bin") as stream:
+    with atomic_writer(tmp_path / "a.bin") as stream:
         stream.write(b"one")
         write_atomically(tmp_path / "b.bin", b"two")
     assert (tmp_path / "a.bin").read_bytes() == b"one"

@@ -7,14 +7,13 @@ import pytest
 from constructed import effect
 
 from twin import simulator
-from twin.apart import NoAnswer, apart
-from twin.breakdown import HUGE, require_sound
 from twin.core.control import Controller, gain_table
 from twin.core.loop import N_SIGNALS, READING_COLUMN
 from twin.effect import INDEX, OUT, READING, TIME, Effect, Kind
 from twin.entries import read_toml, shown, toml_document
 from twin.errors import CannotRun, InputError, at
 from twin.experiments.trajectory import Setpoint
+from twin.instability import HUGE, require_sound
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.numbers import is_number
 from twin.simulator import MujocoSimulator, ReducedSimulator, run, run_parts
@@ -43,22 +42,23 @@ def setpoint(n: int) -> Setpoint:
 
 
 @pytest.mark.parametrize("stage", [ReducedSimulator, MujocoSimulator])
-def test_a_run_in_parts_is_the_same_run_and_tells_how_far_it_is(stage, monkeypatch):
-    """The same seed draws the same noise, part by part."""
-    wanted, told = setpoint(250), []
-    whole = run(MODEL, wanted, np.random.default_rng(3), simulator=stage)
-    monkeypatch.setattr(simulator, "CHUNK", 100)
-    again = run(
+def test_a_run_in_parts_is_the_same_run_and_tells_how_far_it_is(stage):
+    """The same seed draws the same noise, part by part; what comes later changes nothing."""
+    chunk, more, told = simulator.CHUNK, 500, []
+    n = 2 * chunk + more
+    wanted = setpoint(n)
+    whole = run(
         MODEL, wanted, np.random.default_rng(3), simulator=stage,
         progress=lambda done, of: told.append((done, of)),
     )  # fmt: skip
     parts = list(run_parts(MODEL, wanted, np.random.default_rng(3), simulator=stage))
-    assert [len(p) for p in parts] == [100, 100, 50]
-    assert told == [(100, 250), (200, 250), (250, 250)]
+    assert [len(p) for p in parts] == [chunk, chunk, more]
+    assert told == [(chunk, n), (2 * chunk, n), (n, n)]
+    begin = run(MODEL, setpoint(chunk), np.random.default_rng(3), simulator=stage)
     for name in ("signals", "forces", "states"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(whole, name))
         joined = np.concatenate([getattr(p, name) for p in parts])
         np.testing.assert_array_equal(joined, getattr(whole, name))
+        np.testing.assert_array_equal(getattr(begin, name), getattr(parts[0], name))
 
 
 def test_each_axis_has_its_own_encoder_noise():
@@ -178,65 +178,7 @@ def test_a_long_value_is_cut_in_a_message():
         deep = deep[0]
 
 
-# --- work apart ----------------------------------------------------------------------------
-
-
-def doubled(value):
-    return 2 * value
-
-
-def refused(value):
-    raise InputError(f"{value} is refused")
-
-
-def endless():
-    while True:
-        pass
-
-
-def exits(code):
-    import os
-
-    os._exit(code)
-
-
-def leaves():
-    raise SystemExit(3)
-
-
-def fails():
-    raise KeyError("damaged\n  table")
-
-
-def not_sent():
-    return lambda: None
-
-
-def hungry(size):
-    return len(bytearray(size))
-
-
-def test_work_apart_gives_its_answer_its_refusal_or_none():
-    assert apart(doubled, 21, seconds=20.0) == 42
-    with pytest.raises(InputError, match="7 is refused") as told:
-        apart(refused, 7, seconds=20.0)
-    assert not isinstance(told.value, NoAnswer)
-    with pytest.raises(NoAnswer, match=r"does not come to an end within 0.2 s"):
-        apart(endless, seconds=0.2)
-    with pytest.raises(NoAnswer, match="ended the program"):
-        apart(exits, 0, seconds=20.0)
-    assert apart(hungry, 10**6, seconds=20.0, memory=10**8) == 10**6
-    with pytest.raises(InputError, match="takes more memory"):
-        apart(hungry, 3 * 10**8, seconds=20.0, memory=10**8)
-
-
-def test_an_error_in_work_apart_is_told_and_an_exit_as_an_exit():
-    with pytest.raises(NoAnswer, match=r"^failed while it was loaded \(KeyError: .damaged.* table"):
-        apart(fails, seconds=20.0)
-    with pytest.raises(NoAnswer, match=r"failed while it was loaded .*pickle"):
-        apart(not_sent, seconds=20.0)
-    with pytest.raises(NoAnswer, match="ended the program while it was loaded; remove the exit"):
-        apart(leaves, seconds=20.0)
+# --- the origin of time ---------------------------------------------------------------------
 
 
 def _index_and_time(p, s, io):

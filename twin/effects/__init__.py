@@ -80,10 +80,10 @@ def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:
     effects = [importlib.import_module(f"{__name__}.{name}").EFFECT for name in names]
     for path in map(Path, user_files):
         _require_name(path, Catalogue(effects))
-        from twin.apart import NoAnswer, apart
+        from twin.isolated import NoAnswer, isolated
 
         try:
-            apart(_load_and_try, path, seconds=LONGEST_TRIAL, memory=LARGEST_TRIAL)
+            isolated(_load_and_try, path, seconds=LONGEST_TRIAL, memory=LARGEST_TRIAL)
         except NoAnswer as error:
             raise InputError(f"{path}: {error}") from error
         effects.append(_load(path))

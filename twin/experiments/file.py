@@ -19,7 +19,7 @@ from twin.errors import InputError
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, kind_of
 from twin.experiments.trajectory import AnySetpoint, Setpoint
-from twin.files import replacing, write_atomically
+from twin.files import atomic_writer, write_atomically
 from twin.model.machine import MachineModel
 from twin.model.units import LINEAR, AxisUnits
 from twin.numbers import is_number
@@ -153,7 +153,7 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
         names += [f"{name} position [{u.position}]", f"{name} velocity [{u.velocity}]"]
         names += [f"{name} acceleration [{u('m/s^2')}]"]
         names += [f"{name} force [{u.force}]"] if i in driven else []
-    with replacing(path) as stream:
+    with atomic_writer(path) as stream:
         stream.write((",".join(names) + "\n").encode())
         for first in range(0, len(setpoint), ROWS):
             part = setpoint.part(first, min(first + ROWS, len(setpoint)))

@@ -15,10 +15,10 @@ import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
-from twin.apart import apart
 from twin.importers.formats import is_hdf5, read_hdf5
 from twin.importers.mapping import ImportMap
 from twin.importers.table import SMALLEST_TABLE, Table, chosen, parsing, require_fits, split_columns
+from twin.isolated import isolated
 
 SHORTEST = 5.0  # s that a file may take, whatever its size
 SLOWEST = 2e7  # bytes of content a second
@@ -35,7 +35,7 @@ def read(path: Path, mapping: ImportMap) -> Table:
         content = content_bytes(path)
     # In a process of its own: SciPy's reader of damaged files may crash, hang or fill the memory.
     return Table(
-        apart(
+        isolated(
             _read, path, mapping.column_names(),
             seconds=SHORTEST + content / SLOWEST, memory=SMALLEST_TABLE + COPIES * content,
         )

@@ -35,7 +35,7 @@ from mcap.records import (
 )
 from numpy.typing import NDArray
 
-from twin.files import recording, replacing
+from twin.files import atomic_writer, recording
 from twin.logs.assemble import CHECKSUM, METADATA_NAME, checksum
 from twin.logs.container import MAGIC
 from twin.logs.layout import sample_times
@@ -215,7 +215,7 @@ def write_log(log: Log, path: str | Path, progress: Progress | None = None) -> N
     back (a NaN, columns of different length, no position, ...) and where writing fails.
     """
     plan, samples = outline(log), samples_of(log)
-    with replacing(Path(path)) as stream:
+    with atomic_writer(Path(path)) as stream:
         for written in _written(stream, plan, [samples], log.sample_rate, log.attachments):
             if progress is not None:
                 progress(written, len(log))
@@ -235,7 +235,7 @@ def record_log(parts: Iterable[Log], path: str | Path) -> int:
 
 def write_parts(parts: Iterable[Log], path: str | Path) -> int:
     """``record_log`` for what is there already: nothing is left of it where it is not finished."""
-    with replacing(Path(path)) as stream:
+    with atomic_writer(Path(path)) as stream:
         return _recorded(stream, parts)
 
 
@@ -258,7 +258,7 @@ def write_topics(
     units: "/model/x/force" -> unit. Raises InputError as write_log does.
     """
     plan, samples = outline_of_topics(topics, units, sample_rate)
-    with replacing(Path(path)) as stream:
+    with atomic_writer(Path(path)) as stream:
         for _ in _written(stream, plan, [samples], sample_rate, {}):
             pass
 

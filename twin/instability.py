@@ -1,4 +1,4 @@
-"""When a simulation has broken down: at which sample, on which axis, by which effect."""
+"""When a simulation has become unstable: at which sample, on which axis, by which effect."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Work in a process of its own, where it can neither hang nor end this one.
+"""Work in an isolated process, where it can neither hang nor end this one.
 
 For what is not ours: a user's effect file, whose code is run, and libraries that a damaged file may
 crash.
@@ -24,7 +24,9 @@ class NoAnswer(InputError):
     """The work hung, failed, crashed or ended its process."""
 
 
-def apart(work: Callable[..., T], *arguments: Any, seconds: float, memory: int | None = None) -> T:
+def isolated(
+    work: Callable[..., T], *arguments: Any, seconds: float, memory: int | None = None
+) -> T:
     """What ``work`` returns, from another process.
 
     work: a function of a module, as the other process looks it up by name. memory: bytes that it
@@ -33,70 +35,59 @@ def apart(work: Callable[..., T], *arguments: Any, seconds: float, memory: int |
     """
     # A fork starts at once, with all that is imported; elsewhere it is not safe.
     context: Any = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
-    answers, questions = context.Pipe(duplex=False)
-    process = context.Process(
-        target=_attempt, args=(work, arguments, questions, memory), daemon=True
-    )
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_attempt, args=(work, arguments, theirs, memory), daemon=True)
     process.start()
-    questions.close()
+    theirs.close()
     try:
-        if not answers.poll(seconds):
+        if not ours.poll(seconds):
             raise NoAnswer(
                 f"does not come to an end within {seconds:g} s; look for a loop without an end"
             )
-        error, result = answers.recv()
+        error, result = ours.recv()
     except EOFError:  # it ended without a word
         process.join()
-        raise NoAnswer(_ended(process.exitcode)) from None
+        raise NoAnswer(_ending(process.exitcode)) from None
     finally:
         process.kill()
         process.join()
-        answers.close()
+        ours.close()
     if error is not None:
         raise error
     return result
 
 
 def _attempt(
-    work: Callable[..., Any], arguments: tuple, questions: Connection, memory: int | None
+    work: Callable[..., Any], arguments: tuple, answer: Connection, memory: int | None
 ) -> None:
+    """Send (None, result), or (error, None); an exit sends nothing."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_DFL)
     faulthandler.disable()
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in (1, 2):  # what is printed here is printed again, or nobody's concern
         os.dup2(nowhere, stream)
-    if memory is not None:
-        _limit(memory)
     try:
-        questions.send((None, work(*arguments)))
-        return
-    except Exception as error:  # an exit is none
-        told = _told(error)
-    questions.send((told, None))
+        if memory is not None and sys.platform == "linux":
+            import resource
+
+            with open("/proc/self/statm") as pages:
+                held = int(pages.read().split()[0]) * resource.getpagesize()
+            resource.setrlimit(resource.RLIMIT_AS, (held + memory, resource.RLIM_INFINITY))
+        answer.send((None, work(*arguments)))
+    except InputError as error:
+        answer.send((InputError(str(error)), None))
+    except MemoryError:
+        words = "takes more memory than a file of its size may; export it again"
+        answer.send((InputError(words), None))
+    except Exception as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        words = f"failed while it was loaded ({reason}); if the file is sound, report this"
+        answer.send((NoAnswer(words), None))
 
 
-def _told(error: Exception) -> InputError:
-    """What is raised in this process for an error in the other."""
-    if isinstance(error, InputError):
-        return InputError(str(error))
-    if isinstance(error, MemoryError):
-        return InputError("takes more memory than a file of its size may; export it again")
-    reason = " ".join(f"{type(error).__name__}: {error}".split())
-    return NoAnswer(f"failed while it was loaded ({reason}); if the file is sound, report this")
-
-
-def _limit(memory: int) -> None:
-    """Let this process take so many bytes more than it has, on Linux."""
-    if sys.platform == "linux":
-        import resource
-
-        with open("/proc/self/statm") as stream:
-            held = int(stream.read().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (held + memory, resource.RLIM_INFINITY))
-
-
-def _ended(code: int | None) -> str:
+def _ending(code: int | None) -> str:
+    """Why a process ended without an answer."""
     if code is not None and code < 0:
         return f"crashed while it was loaded ({signal.Signals(-code).name})"
     return "ended the program while it was loaded; remove the exit"
