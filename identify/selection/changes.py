@@ -128,12 +128,17 @@ class Freed:
     def name(self) -> str:
         return self.effect.name
 
+    def free(self, axis: AxisModel) -> AxisModel:
+        """The axis with the parameter free, at the value that it had."""
+        law = axis[self.name]
+        return axis.with_effect(replace(law, fixed=law.fixed - {self.parameter}))
+
     def look(self, judged: Judged, trial: Trial) -> Look:
         """By the change of the residual at two other values: the law bends between them."""
-        axis, law = judged.fit.axis, judged.fit.axis[self.name]
-        free = replace(law, fixed=law.fixed - {self.parameter})
+        axis, free = judged.fit.axis, self.free(judged.fit.axis)
+        law = free[self.name]
         others = [{**law.values, self.parameter: r * self.held} for r in OTHER_BENDS]
-        axes = [axis.with_effect(replace(free, values=v)) for v in (law.values, *others)]
+        axes = [free, *(axis.with_effect(replace(law, values=v)) for v in others)]
 
         def columns(logs: Sequence[PreparedLog]) -> list[Array]:
             now, *then = (residual(a, logs) for a in axes)
@@ -183,7 +188,9 @@ class Reshaped:
         if curve not in axis.names:
             return None
         axis = axis.without(curve)
-        return axis if self.name in axis.names else axis.with_effect(self.law)
+        kinds = {f.effect.kind for f in axis.effects}
+        replaced = self.law.effect.kind is Kind.FRICTION and Kind.FRICTION in kinds
+        return axis if replaced or self.name in axis.names else axis.with_effect(self.law)
 
     def columns(self, without: Judged, fit: Judged) -> tuple[Columns, bool]:
         axis, logs = without.fit.axis, without.dataset.fit

@@ -142,8 +142,11 @@ def _proved(found: Found) -> tuple[Found, tuple[Finding, ...]]:
     doubted = [f for f in findings if replace(f.score, among=1).refused or f not in sure]
     if not doubted:
         return found, findings
-    weakest = min(doubted, key=lambda f: f.score.part).effect
-    return _proved(without_law(weakest, found))
+    weakest = min(doubted, key=lambda f: f.score.part)
+    rest = _proved(without_law(weakest.effect, found))
+    if weakest.score.refused or len(rest[1]) == len(findings) - 1:
+        return rest
+    return found, findings  # others need the curve, whatever its band
 
 
 def _with_own_noise(found: Found) -> Found:

@@ -178,6 +178,8 @@ def _shaped(finding: Finding, change: Change, less: Fit, found: Found) -> Findin
         return replace(finding, kind=kind, bend=bend, shape=drawn)
     assert isinstance(change, Reshaped)
     before = less if name in less.axis.names else fit_axis(without, dataset.fit)
+    if name not in before.axis.names:  # another friction has taken the place of its law
+        before = found.base.fit
     return replace(finding, kind=kind, shape=found_shape(change.shape, before, dataset))
 
 

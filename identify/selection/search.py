@@ -180,10 +180,26 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         fit = fit_thoroughly(judged.fit.axis, judged.dataset, judged.fit.begun)
         dataset, fit = synchronised(fit, judged.dataset)
         judged = _settled(Judged(fit, dataset))
+    judged, steps = _bent(judged, steps)
     first = (
         first if first.dataset is judged.dataset else _refitted_on(first.fit.axis, first, judged)
     )
     return Found(judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
+
+
+def _bent(judged: Judged, steps: tuple[Step, ...]) -> tuple[Judged, tuple[Step, ...]]:
+    """The fit and the steps with exponents set free that are others than their laws hold.
+
+    A law of another exponent is another law, however little its exponent takes of what is left.
+    """
+    added = {s.change.name for s in steps if isinstance(s.change, Added)}
+    for change in (c for c in freed_of(judged.fit.axis) if c.name in added):
+        look = Look(change, 0.0, (change.free(judged.fit.axis),))
+        freed = judged_change(judged, look, change.refit(judged, look))
+        asked = freed.candidate.delta_bic > RULE.least_bic and not freed.candidate.doubt
+        if asked and freed.candidate.gain.t > -least_t(1):  # other logs do not contradict it
+            judged, steps = freed.judged, (*steps, Step(freed))
+    return judged, steps
 
 
 def _settled(judged: Judged) -> Judged:
