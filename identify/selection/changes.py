@@ -31,7 +31,8 @@ from twin.model.parameters import ParameterReference
 Array = NDArray[np.float64]
 
 SAME_ERROR = 1.01  # relative error that simpler values of an effect may have
-HEAD_EVALUATIONS = 4  # of a friction fitted on the heads; more do not change their order
+HEAD_EVALUATIONS = 4  # of a friction fitted on the heads; more do not change which start is best
+MORE_EVALUATIONS = 12  # of the best of them, where it helps; frictions with a memory need them
 OTHER_BENDS = (0.6, 1.5)  # times what a law holds by design, at which its exponent is tried
 
 
@@ -98,6 +99,8 @@ class Added:
         old = _refitted_to_heads(fit, judged.dataset)
         fits = [fit_roughly(fit.axis.with_effect(s.fitted), heads, HEAD_EVALUATIONS) for s in found]
         best = sorted(fits, key=lambda f: f.error)
+        if best[0].error < old.error:
+            best[0] = fit_roughly(best[0].axis, heads, MORE_EVALUATIONS)
         both = moving(heads, sticks(old.axis) or sticks(best[0].axis))
         before, after = (float(np.mean(residual(f.axis, heads)[both] ** 2)) for f in (old, best[0]))
         return Look(self, part_of(before, after, old.floor**2), tuple(f.axis for f in best))
