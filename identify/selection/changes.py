@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
-from identify.estimation.fit import Fit, fit_axis, fit_roughly
+from identify.estimation.fit import Fit, at_bounds, fit_axis, fit_roughly
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import Start, starts
 from identify.selection.acceptance import Judged, part_of
@@ -237,7 +237,11 @@ def from_all_starts(judged: Judged, look: Look, first: Fit) -> Fit:
 
 
 def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
-    """The fit with the simplest values of the effect, where they explain as much."""
+    """The fit with the simplest values of the effect, where they explain as much.
+
+    Strengths that ended at a bound belong to another law; it is fitted without them.
+    """
+    fit = _less_at_bounds(fit, dataset, effect)
     if effect.simplest is None:
         return fit
     fitted = fit.axis[effect.name]
@@ -246,6 +250,17 @@ def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
         return fit
     again = fit_axis(fit.axis.with_effect(replace(fitted, values=simple)), dataset.fit)
     return again if again.error < SAME_ERROR * fit.error else fit
+
+
+def _less_at_bounds(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
+    ended = {label.split(".")[-1] for label in at_bounds(fit, effect.name)}
+    strengths = {p.name for p in effect.strengths}
+    if not ended or not ended < strengths:
+        return fit
+    fitted = fit.axis[effect.name]
+    values = {**fitted.values, **dict.fromkeys(ended, 0.0)}
+    less = replace(fitted, values=values, fixed=fitted.fixed | ended)
+    return fit_axis(fit.axis.with_effect(less), dataset.fit)
 
 
 def axis_less(effect: Effect, axis: AxisModel, base: AxisModel) -> AxisModel:

@@ -23,7 +23,8 @@ EFFECT = Effect(
             start_rule=lambda e: 0.8 * e.force_max,
             scan=lambda e: tuple(e.force_max * part for part in (0.5, 0.65, 0.8, 0.9, 0.97)),
         ),
-        Parameter("loss", "1", 0.0, 0.0, 1.0, "part lost of what is above", strength=True),
+        # 1 is a hard limit; the bound lies beyond, so that a hard one does not end at it.
+        Parameter("loss", "1", 0.0, 0.0, 1.5, "part lost of what is above", strength=True),
     ),
     law=law,
     fingerprint="residual opposes the command at its peaks and is zero below",
