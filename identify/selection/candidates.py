@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
+from identify.dataset.floor import noise_beside
 from identify.dataset.noise_floor import floor_of, unrounded_floor_of
 from identify.estimation.evidence import (
     Evidence,
@@ -178,7 +179,8 @@ def _follows_motion(alone: AxisModel, dataset: Dataset) -> bool:
 def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
     """An effect that is noise: it raises the floor that readings without it would have.
 
-    It counts where it makes a good part of the error on all logs that choose, and no more than it.
+    It counts where it makes a good part of the error on all logs that choose, no more than it, and
+    no less than the floor may be: the rounding of slow motion is known to a third.
     """
     dataset, fit = before.dataset, after.fit
     logs = (*dataset.fit, *dataset.holdout)
@@ -188,7 +190,8 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
     plain = Candidate(
         effect, dataset.axis, fit, Evidence(0.0, 1, fit.samples), Gain(error, error, 0.0)
     )
-    if not (RULE.least_part < part and SURE * floor < error < RULE.at_floor * floor):
+    highest = max(RULE.at_floor * floor, noise_beside(fit.axis, logs).high)
+    if not (RULE.least_part < part and SURE * floor < error < highest):
         return plain
     t = float(np.sqrt(max(effective_samples(left) * noise_gain(left, less, floor), 0.0)))
     taken = Taken(t, part, part)
