@@ -19,6 +19,7 @@ from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sti
 from identify.estimation.fit import Fit, at_bounds, fit_axis, fit_roughly
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import Start, starts
+from identify.rules import RULE
 from identify.selection.acceptance import Judged, part_of
 from identify.selection.bends import held_bends
 from identify.selection.controls import Columns, Trial, change_of, with_unit_penalty
@@ -106,7 +107,7 @@ class Added:
         return Look(self, part_of(before, after, old.floor**2), tuple(f.axis for f in best))
 
     def refit(self, judged: Judged, look: Look) -> Fit:
-        return simplified(fit_axis(look.axes[0], judged.dataset.fit), judged.dataset, self.effect)
+        return simplified(fit_axis(look.axes[0], judged.dataset.fit), judged, self.effect)
 
     def undone(self, axis: AxisModel, base: AxisModel) -> AxisModel | None:
         return axis_less(self.effect, axis, base) if self.name in axis.names else None
@@ -233,34 +234,36 @@ def from_all_starts(judged: Judged, look: Look, first: Fit) -> Fit:
         return min([first, *(fit_axis(axis, logs) for axis in axes)], key=lambda f: f.error)
     begun = judged.fit.begun.with_effect(first.axis[change.name])
     fits = [first, *(fit_axis(axis, logs) for axis in (begun, *axes))]
-    return simplified(min(fits, key=lambda f: f.error), judged.dataset, change.effect)
+    return simplified(min(fits, key=lambda f: f.error), judged, change.effect)
 
 
-def simplified(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
+def simplified(fit: Fit, judged: Judged, effect: Effect) -> Fit:
     """The fit with the simplest values of the effect, where they explain as much.
 
     Strengths that ended at a bound belong to another law; it is fitted without them.
     """
-    fit = _less_at_bounds(fit, dataset, effect)
+    fit = _less_at_bounds(fit, judged, effect)
     if effect.simplest is None:
         return fit
     fitted = fit.axis[effect.name]
     simple = effect.simplest(fitted.values)
     if simple == dict(fitted.values):
         return fit
-    again = fit_axis(fit.axis.with_effect(replace(fitted, values=simple)), dataset.fit)
+    again = fit_axis(fit.axis.with_effect(replace(fitted, values=simple)), fit.logs)
     return again if again.error < SAME_ERROR * fit.error else fit
 
 
-def _less_at_bounds(fit: Fit, dataset: Dataset, effect: Effect) -> Fit:
+def _less_at_bounds(fit: Fit, judged: Judged, effect: Effect) -> Fit:
+    """The fit without the strengths that ended at a bound, where it still takes most of as much."""
     ended = {label.split(".")[-1] for label in at_bounds(fit, effect.name)}
-    strengths = {p.name for p in effect.strengths}
-    if not ended or not ended < strengths:
+    if not ended or not ended < {p.name for p in effect.strengths}:
         return fit
     fitted = fit.axis[effect.name]
     values = {**fitted.values, **dict.fromkeys(ended, 0.0)}
     less = replace(fitted, values=values, fixed=fitted.fixed | ended)
-    return fit_axis(fit.axis.with_effect(less), dataset.fit)
+    again = fit_axis(fit.axis.with_effect(less), fit.logs)
+    before, first, then = (f.error**2 for f in (judged.fit, fit, again))
+    return again if before - then > RULE.promise * (before - first) else fit
 
 
 def axis_less(effect: Effect, axis: AxisModel, base: AxisModel) -> AxisModel:
