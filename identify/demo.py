@@ -12,7 +12,7 @@ from identify import workflow
 from identify.dataset.dataset import Dataset, datasets
 from identify.estimation.fit import Fit, fit_axis
 from identify.experiment_design.planting import draw_effect, hidden_part, other_machine
-from identify.output.report import write_report
+from identify.output.report import Source, write_report
 from identify.results.addition import Addition
 from identify.results.results import Diagnosis
 from twin.effect import Effect, Kind
@@ -97,6 +97,7 @@ def demo(
         comparison=diagnosis.comparison,
         history=final.history,
         additions=[addition] if addition else [],
+        source=Source(f"twin demo -o {folder} --seed {seed}", model.name, folder),
     )
     return Demo(hidden, diagnosis, addition, report)
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -33,6 +34,9 @@ from identify.cli.shared import (
     unconfirmed,
     with_roles,
 )
+
+if TYPE_CHECKING:
+    from identify.output.report import Source
 
 
 class Objective(StrEnum):
@@ -91,6 +95,13 @@ def fit(
     say(text, {**found, "left_out": silent}, as_json_, [*findings, *silent, *alarms])
 
 
+def source_of(model: str) -> Source:
+    """What a page is made of, as it stands in the command line."""
+    from identify.output.report import Source
+
+    return Source(shlex.join(["twin", *sys.argv[1:]]), model)
+
+
 @app.command()
 def compare(
     model: Model,
@@ -126,6 +137,7 @@ def compare(
         write_report(
             out, title=f"{machine.name}: model against measurement", diagnosis=None,
             comparison=result, history=machine.history, assumed=unconfirmed(findings),
+            source=source_of(model),
         )  # fmt: skip
     if mcap:
         workflow.side_by_side_of(result).write(mcap)
@@ -169,7 +181,7 @@ def diagnose(
         write_report(
             out, title=f"{machine.name}: what the model lacks", diagnosis=result,
             comparison=result.comparison, history=result.model.history,
-            assumed=unconfirmed(findings),
+            assumed=unconfirmed(findings), source=source_of(model),
         )  # fmt: skip
     told = {**as_json.diagnose_json(result, findings), "left_out": silent}
     say(as_text.diagnose_text(result), told, as_json_, [*findings, *silent])

@@ -2,34 +2,35 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
+from datetime import date
 from pathlib import Path
 
 from identify.dataset.given_logs import Role
 from identify.output.numbers import quantity
 from identify.output.report import answer, effects, residual
-from identify.output.report.drawing import drawing_style
+from identify.output.report.explorer import explored
 from identify.output.report.page import Answer, Block, Heading, Part, Section
 from identify.output.report.page import page as whole_page
-from identify.output.report.subject import Subject
+from identify.output.report.subject import Source, Subject
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis
 from twin.files import require_writable, write_atomically
+from twin.model.file import format_model
 from twin.model.machine import HistoryStep
 
 SECTIONS = (
     Part("answer", "Answer", answer.cards),
+    Part("found", "What each effect explains", effects.found),
     Part("law-shape", "The shape of a law", effects.law_shapes),
-    Part("force", "Measured and modelled force", residual.forces),
-    Part("residual", "What the model leaves unexplained", residual.residuals),
     Part("regions", "Where the error is", residual.regions),
-    Part("tests", "Is the residual noise?", residual.whiteness, residual.reasons),
-    Part("shape", "Fitted curves without physics", effects.curves),
     Part("ranking", "Candidates, ranked", effects.ranking),
     Part("growth", "The error, effect by effect", of_all=effects.growth),
     Part("equations", "The laws of the named effects", effects.equations),
     Part("parameters", "Parameters", effects.parameters),
     Part("logs", "Errors log by log", residual.logs),
+    Part("tests", "Is the residual noise?", residual.whiteness, residual.reasons),
     Part("notes", "Notes", of_all=answer.notes),
 )
 
@@ -43,20 +44,24 @@ def write_report(
     history: Sequence[HistoryStep],
     additions: Sequence[Addition] = (),
     assumed: Sequence[str] = (),
+    source: Source | None = None,
 ) -> None:
     """Write the report of a comparison, and of a diagnosis or additions where there are any.
 
-    assumed: findings of the log check on what import maps assume, said first.
+    assumed: findings of the log check on what import maps assume, said first. source: what the page
+    was made of.
 
-    One HTML file without outside references: styles and pictures are inside. It appears whole or
-    not at all. Raises InputError where the folder does not exist.
+    One HTML file without outside references: styles, scripts and signals are inside. It appears
+    whole or not at all. Raises InputError where the folder does not exist.
     """
     require_writable(path)
     subject = Subject(
-        title, diagnosis, comparison, tuple(history), tuple(additions), tuple(assumed)
+        title, diagnosis, comparison, tuple(history), tuple(additions), tuple(assumed),
+        source or Source(),
+    )  # fmt: skip
+    text = whole_page(
+        subject.title, facts(subject), sections(subject), explored(subject), origin(subject)
     )
-    with drawing_style():
-        text = whole_page(subject.title, facts(subject), sections(subject))
     write_atomically(path, text.encode("utf-8"))
 
 
@@ -73,24 +78,43 @@ def sections(subject: Subject, parts: Sequence[Part] = SECTIONS) -> list[Section
         if part.of_all:
             blocks += part.of_all(subject)
         if blocks:
-            made.append(Section(part.anchor, part.title.replace("force", subject.forces), blocks))
+            made.append(Section(part.anchor, part.title, blocks))
     return made
 
 
 def facts(subject: Subject) -> list[tuple[str, str]]:
     """The line under the title: model, logs by role, test functions."""
     axes = subject.comparison.axes.values()
-    logs = dict.fromkeys(log.motion.name for a in axes for log in a.logs)
     lengths = dict.fromkeys(quantity(a.logs[0].test_function.length, "s") for a in axes)
-    diagnosed = subject.diagnosis.axes.values() if subject.diagnosis else ()
     shown = [("Not confirmed", line) for line in subject.assumed]
     shown.append(("Model", subject.comparison.model.name))
-    shown.append(("Training logs" if diagnosed else "Logs", ", ".join(logs)))
-    for name, role in (("Selection logs", Role.SELECTION), ("Test logs", Role.TEST)):
-        others = (log.motion.name for d in diagnosed for log in d.dataset.having(role))
-        if text := ", ".join(dict.fromkeys(others)):
-            shown.append((name, text))
+    for role, logs in subject.logs.items():
+        compared = role is Role.TRAINING and subject.diagnosis is None
+        title = "Logs" if compared else f"{role.value.capitalize()} logs"
+        shown += [(title, ", ".join(logs))] if logs else []
     return [*shown, ("Test functions", ", ".join(lengths))]
 
 
-__all__ = ["write_report"]
+def origin(subject: Subject) -> list[tuple[str, str]]:
+    """The footer: by what, when and of which files the page was made."""
+    model = subject.comparison.model
+    for view in subject.views:
+        model = model.with_axis(view.name, view.final.axis) if view.final else model
+    shown = [("Date", date.today().isoformat())]
+    if subject.source.command:
+        shown.append(("Command", subject.source.command))
+    shown.append(("Model, sha256", hashlib.sha256(format_model(model).encode()).hexdigest()))
+    for name in (name for names in subject.logs.values() for name in names):
+        shown.append((f"{name}, sha256", _digest(subject.source.folder / name)))
+    return shown
+
+
+def _digest(path: Path) -> str:
+    """That of a file; a log that was given from memory has none."""
+    if not path.is_file():
+        return "given in memory, not as a file"
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+__all__ = ["Source", "write_report"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from identify.dataset.given_logs import Role
 from identify.output.numbers import arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import Answer, Block, Listing, Tile, Tone
@@ -15,6 +17,8 @@ from identify.results.told import Told
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.model.machine import HistoryStep
+
+ADD = re.compile(r"twin add (--shape )?\w+")
 
 
 def cards(view: AxisView) -> list[Block]:
@@ -32,7 +36,23 @@ def _diagnosed(view: AxisView, found: AxisDiagnosis, told: Told, said: Said) -> 
         tiles=_tiles(view, found, told),
         remarks=_remarks(view, found, said),
         tone=Tone.PLAIN if found.verdict is Verdict.NOTHING_MISSING else Tone.STRONG,
+        commands=[view.subject.command(text) for text in _following(found, said)],
     )
+
+
+def _following(found: AxisDiagnosis, said: Said) -> list[str]:
+    """The next step as commands, of model and logs that are still to be named."""
+    if found.verdict is Verdict.NOTHING_MISSING:
+        return []
+    for finding in found.missing:
+        if finding.tied:
+            between = f"{finding.effect} {finding.tied[0]}"
+            return [f"twin plan MODEL LOG... --between {between} -o next.toml"]
+        if finding.together:
+            second = f"twin add {finding.together[0]} first.toml LOG... -o both.toml"
+            return [f"twin add {finding.effect} MODEL LOG... -o first.toml", second]
+    asked = (ADD.search(text) for text in (*said.following, *said.advice))
+    return [f"{m[0]} MODEL LOG... -o better.toml" for m in asked if m][:1]
 
 
 def _remarks(view: AxisView, found: AxisDiagnosis, said: Said) -> list[str]:
@@ -47,7 +67,6 @@ def _remarks(view: AxisView, found: AxisDiagnosis, said: Said) -> list[str]:
         _runner_up(found),
         plan and next_step_in_words(plan),
         refit_in_words(refit) if quiet and refit else None,
-        *said.following,
         *said.advice,
     )
     return [capitalised(text) for text in every if text]
@@ -122,6 +141,7 @@ def _compared(view: AxisView) -> Answer:
             "The force error is larger than noise explains; twin diagnose finds which effect is "
             "missing."
         )
+    following = [] if at_floor else ["twin diagnose MODEL LOG... -o diagnosis.html"]
     return Answer(
         headline=f"Axis {view.name}: "
         + ("the model explains the measurement" if at_floor else view.words(headline)),
@@ -129,6 +149,7 @@ def _compared(view: AxisView) -> Answer:
         tiles=[*_error_tiles(view, axis.total_error, axis.floor), *_position_tile(view, "")],
         remarks=[],
         tone=Tone.PLAIN if at_floor else Tone.STRONG,
+        commands=[view.subject.command(text) for text in following],
     )
 
 

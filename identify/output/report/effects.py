@@ -1,16 +1,12 @@
-"""Effects: candidates, what was added, the laws that are named, their curves and parameters."""
+"""Effects: what each explains, candidates, what was added, laws that are named, parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-
-import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-from numpy.typing import NDArray
+from dataclasses import replace
 
 from identify.dataset.given_logs import Role
-from identify.estimation.intervals import Estimate
+from identify.estimation.intervals import Estimate, ModelWrong
 from identify.output.numbers import (
     NOTHING,
     Scale,
@@ -21,23 +17,16 @@ from identify.output.numbers import (
     spaced,
     title_case,
 )
-from identify.output.report.drawing import (
-    BLUE,
-    GREY,
-    INK,
-    ORANGE,
-    binned_mean,
-    draw_bars,
-    new_figure,
-    plain_tick,
-)
 from identify.output.report.page import (
     Block,
+    Chart,
     Column,
+    Drawn,
     Facts,
     Heading,
+    Ink,
+    Line,
     Listing,
-    Picture,
     Row,
     Table,
     Tone,
@@ -55,14 +44,59 @@ from identify.output.words.fit import (
 from identify.results.addition import Addition
 from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis
-from identify.selection.found_shape import BEHIND, FoundShape
+from identify.selection.found_shape import FoundShape
 from identify.selection.nonparametric import nonparametric_labels
 from twin.effect import Effect
 from twin.model.machine import AxisModel, HistoryStep
 from twin.model.units import units_of
 
-Array = NDArray[np.float64]
 UNBROKEN = "\u00a0"  # space at which no line ends
+
+# --- what each effect explains ---------------------------------------------------------------
+
+
+def found(view: AxisView) -> list[Block]:
+    """A row for each finding, and one for all together."""
+    if view.found is None or not view.found.findings:
+        return []
+    findings, tested, unit = view.found.findings, view.found.tested, view.units.force
+    scale = Scale.of(unit, [tested.before, *(f.tested.before for f in findings)])
+    rows = [
+        Row((
+            title_case(f.effect),
+            scale.text(f.tested.before),
+            scale.text(f.tested.after),
+            percent(f.explains),
+            percent(max(f.score.part, 0.0)),
+            percent(max(f.score.control, 0.0)),
+            NOTHING if f.confidence is None else percent(f.confidence),
+        ), bar=min(max(f.explains, 0.0), 1.0))
+        for f in findings
+    ]  # fmt: skip
+    if len(findings) > 1:
+        every = (scale.text(tested.before), scale.text(tested.after))
+        rows.append(Row(("All together", *every, percent(together(view)), *[NOTHING] * 3)))
+    titles = (
+        "Error without it", "Error with all", "Share of squared error",
+        "Of the logs that decided", "Shifted in time, at most", "Such answers right",
+    )  # fmt: skip
+    columns = (Column("Effect"), *(Column(title, numeric=True) for title in titles))
+    caption = (
+        f"RMS force error on the {tested.on.value} logs. Each effect is taken out alone and the "
+        "others refitted: they can stand in for it, so the shares need not sum to that of all "
+        "together. The same force shifted in time cannot be real. Such answers were right in the "
+        "self-test."
+    )
+    return [Table(columns, rows, view.words(caption))]
+
+
+def together(view: AxisView) -> float:
+    """Part of the squared error above the noise floor that all findings together remove."""
+    assert view.found is not None
+    tested, floor = view.found.tested, view.floors.get(view.found.tested.on, view.axis.floor)
+    above = tested.before**2 - floor**2
+    return min((tested.before**2 - tested.after**2) / above, 1.0) if above > 0.0 else 0.0
+
 
 # --- the shape of a law, and curves without physics ------------------------------------------
 
@@ -78,114 +112,41 @@ def law_shapes(view: AxisView) -> list[Block]:
                 f"{capitalised(advice([finding]))}"
             )
             blocks.append(Heading(f"{spaced(finding.effect)} on {view.name}".capitalize()))
-            blocks.append(Picture(draw_shape(finding.shape), caption))
+            blocks += [*shape_charts(finding.shape), Listing([caption])]
     return blocks
 
 
-def draw_shape(shape: FoundShape) -> Figure:
-    """The curve assumed beside the curve found, a panel for each direction."""
-    figure = new_figure(3.0)
-    every = figure.subplots(1, len(shape.curves), sharey=True, squeeze=False)[0]
-    scale = Scale.of(shape.force_unit, [np.nanmax(np.abs(c.found)) for c in shape.curves.values()])
+def shape_charts(shape: FoundShape) -> list[Chart]:
+    """The curve assumed beside the curve found, a chart for each direction."""
+    curves = shape.curves.values()
+    scale = Scale.of(shape.force_unit, [value for c in curves for value in (*c.found, *c.assumed)])
     along, words = Scale.of(shape.unit, shape.coordinate), units_of(shape.force_unit).words
-    x = along(shape.coordinate)
-    for axes, (direction, curve) in zip(every, shape.curves.items(), strict=True):
-        color = ORANGE if direction == BEHIND else BLUE
-        low, high = scale(curve.found - curve.band), scale(curve.found + curve.band)
-        axes.fill_between(x, low, high, color=color, alpha=0.2, linewidth=0, label="90 % band")
-        axes.plot(x, scale(curve.found), color=color, label="found in the logs")
-        axes.plot(x, scale(curve.assumed), color=INK, linestyle="--", label="assumed by the law")
-        axes.set_title(direction)
-        within = " within one period" if shape.period is not None else ""
-        axes.set_xlabel(along.label(words(f"{shape.over.value}{within}").capitalize()))
-    every[0].set_ylabel(scale.label(words("Force of the law")))
-    figure.legend(*every[0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
-    return figure
-
-
-def curves(view: AxisView) -> list[Block]:
-    """A picture for each nonparametric effect of the model."""
-    caption = (
-        "Mean force of the fitted curves along the logs, moving forwards and backwards. Its shape "
-        "is a hint at the missing physics."
-    )
-    blocks: list[Block] = []
-    for fitted in view.model.effects:
-        if fitted.effect.is_nonparametric:
-            name = fitted.effect.name
-            blocks += [
-                Heading(f"{spaced(name)} on {view.name}".capitalize()),
-                Picture(draw_curves(view, view.axis.curves[name]), view.words(caption)),
-                Listing([capitalised(nonparametric_in_words(fitted))]),
-            ]
-    return blocks
-
-
-def draw_curves(view: AxisView, force: Array) -> Figure:
-    """The force (n,) N of fitted curves by position and by speed."""
-    position, velocity = (
-        np.concatenate([getattr(log.motion, signal) for log in view.axis.logs])
-        for signal in ("position", "velocity")
-    )
-    figure, units = new_figure(3.0), view.units
-    left, right = figure.subplots(1, 2, sharey=True)
-    scale = Scale.of(units.force, force)
-    along, fast = Scale.of(units.position, position), Scale.of(units.velocity, velocity)
-    directions = ((velocity > 0.0, BLUE, "forwards"), (velocity < 0.0, ORANGE, "backwards"))
-    for mask, color, label in directions:
-        for axes, x in ((left, along(position)), (right, fast(velocity))):
-            axes.plot(*binned_mean(x[mask], scale(force[mask])), color=color, label=label)
-    left.set_xlabel(along.label(units.words("Position")))
-    right.set_xlabel(fast.label("Speed"))
-    left.set_ylabel(scale.label(units.words("Force of the curves")))
-    figure.legend(*left.get_legend_handles_labels(), loc="outside upper left", ncols=2)
-    return figure
+    within = " within one period" if shape.period is not None else ""
+    label = along.label(words(f"{shape.over.value}{within}").capitalize())
+    return [
+        Chart(
+            (label, along(shape.coordinate)),
+            scale.label(words(f"Force of the law, {direction}")),
+            [
+                Drawn("90 % band", scale(curve.found - curve.band), Line.BAND),
+                Drawn("90 % band", scale(curve.found + curve.band), Line.BAND),
+                Drawn("found in the logs", scale(curve.found)),
+                Drawn("assumed by the law", scale(curve.assumed), Line.DASH, Ink.INK),
+            ],
+        )
+        for direction, curve in shape.curves.items()
+    ]
 
 
 # --- candidates ------------------------------------------------------------------------------
 
 WITH_VALUES = 3  # candidates whose parameter values are printed
-CLIP = 1.6  # of the error before; a bar that is longer is cut
 
 
 def ranking(view: AxisView) -> list[Block]:
-    """A picture and a table of all absent effects, best first."""
-    if view.found is None or view.told is None or not view.found.ranking:
-        return []
-    caption = (
-        f"Force error ({tested_on(view.found)}) after each effect was added and everything "
-        "refitted: a missing effect brings it from the dashed line towards the noise floor."
-    )
-    figure = draw_ranking(view.found, view.told)
-    return [Picture(figure, view.words(caption)), ranking_table(view.found)]
-
-
-def draw_ranking(found: AxisDiagnosis, told: Told) -> Figure:
-    """The error after each candidate, beside the error before and the noise floor."""
-    ranked, units = found.ranking, found.dataset.units
-    before, after = ranked[0].gain.before, [c.gain.after for c in ranked]
-    scale = Scale.of(units.force, [before])
-    end = float(scale(min(max(before, *after), CLIP * before)))
-    figure = new_figure(0.9 + 0.27 * len(ranked))
-    axes = figure.subplots()
-    lengths = [min(float(scale(a)), end) for a in after]
-    colors = [ORANGE if c is found.best else BLUE if c.supported else GREY for c in ranked]
-    draw_bars(axes, [spaced(c.effect.name) for c in ranked], lengths, colors)
-    axes.axvline(float(scale(before)), color=INK, linestyle="--", label="before")
-    floor = told.floors[found.dataset.chosen_on]
-    axes.axvline(float(scale(floor)), color=INK, linestyle=":", label="noise floor")
-    for row, error in enumerate(after):
-        cut = "bar cut, " if scale(error) > end else ""
-        axes.text(
-            1.0, row, f"{cut}{number(float(scale(error)))}", ha="right", va="center", fontsize=8.5,
-            transform=axes.get_yaxis_transform(),
-        )  # fmt: skip
-    axes.set_xlim(0.0, 1.15 * end)
-    tested = units.words(f"{tested_on(found).capitalize()} force error, RMS")
-    axes.set_xlabel(scale.label(tested))
-    axes.set_ylabel("Effect added")
-    figure.legend(loc="outside upper right", ncols=2)
-    return figure
+    """A table of all absent effects, best first."""
+    known = view.found is not None and view.found.ranking
+    return [ranking_table(view.found)] if view.found and known else []
 
 
 def ranking_table(found: AxisDiagnosis) -> Table:
@@ -204,7 +165,8 @@ def ranking_table(found: AxisDiagnosis) -> Table:
             spaced(why_not(found, c)),
             values_of(c.effect, c.fit.axis) if rank < WITH_VALUES else "",
         )
-        rows.append(Row(cells, Tone.STRONG if c is found.best else tone))
+        removed = min(max(c.part, 0.0), 1.0) if c.score else 0.0
+        rows.append(Row(cells, Tone.STRONG if c is found.best else tone, removed))
     titles = ("Evidence (ΔBIC)", "Error before", "Error after", "Part removed")
     columns = (
         Column("Effect"), *(Column(title, numeric=True) for title in titles), Column("Why not"),
@@ -227,84 +189,28 @@ def values_of(effect: Effect, model: AxisModel) -> str:
 
 # --- the error, effect by effect -------------------------------------------------------------
 
-COLORS = {Role.TRAINING: BLUE, Role.SELECTION: ORANGE, Role.TEST: GREY}
-MARKS = {Role.TRAINING: "o-", Role.SELECTION: "s--", Role.TEST: "^-."}
-
 
 def growth(subject: Subject) -> list[Block]:
     """A picture and a table for each axis with added effects; their position errors if known."""
     by_axis: dict[str, list[HistoryStep]] = {}
     for step in subject.steps:
         by_axis.setdefault(step.axis, []).append(step)
-    caption = (
-        "Force error after each effect was added and the model refitted. A real effect lowers the "
-        "error on the selection logs as much as the error on the training logs."
-    )
     blocks: list[Block] = []
     for axis, steps in by_axis.items():
         if len(by_axis) > 1 or len(subject.views) > 1:
             blocks.append(Heading(f"Axis {axis}"))
-        picture = draw_growth(steps, subject.floors(axis))
-        blocks += [
-            Picture(picture, units_of(steps[0].unit).words(caption)), growth_table(steps),
-        ]  # fmt: skip
+        blocks.append(growth_table(steps, subject.floors(axis)))
     if subject.additions:
         blocks.append(_positions(subject.additions))
     return blocks
-
-
-def draw_growth(steps: Sequence[HistoryStep], floors: Mapping[Role, float]) -> Figure:
-    """The error from the start to the last step, on the logs of each role."""
-    unit = steps[0].unit
-    errors = {role: _course(steps, role) for role in Role}
-    scale = Scale.of(unit, errors[Role.TRAINING])
-    figure = new_figure(3.2)
-    axes = figure.subplots()
-    for role, values in errors.items():
-        if np.isfinite(values).any():
-            style = {"color": COLORS[role], "label": f"{role.value} logs", "linewidth": 1.6}
-            axes.plot(scale(values), MARKS[role], **style)  # type: ignore[arg-type]
-    fit, held = scale(errors[Role.TRAINING]), scale(errors[Role.SELECTION])
-    for i, (a, b) in enumerate(zip(fit, held, strict=True)):
-        # The larger above and the smaller below: clear of a falling line.
-        for value, color, above in ((a, BLUE, not a < b), (b, ORANGE, not b <= a)):
-            if np.isfinite(value):
-                side, align = (7.0, "left") if above else (-7.0, "right")
-                axes.annotate(
-                    number(value), (i, value), (side, side), textcoords="offset points",
-                    color=color, fontsize=8.5, ha=align, va="center",
-                )  # fmt: skip
-    for role in (Role.TRAINING, Role.SELECTION):
-        # A history from a file may be of other logs; where it ends below the floor of these, it is.
-        if role in floors and errors[role][-1] >= floors[role]:
-            label = f"noise floor, {role.value} logs"
-            axes.axhline(float(scale(floors[role])), color=COLORS[role], linestyle=":", label=label)
-    names = ["at the start", *(_step_name(s, f"+ {spaced(s.effect)}") for s in steps)]
-    axes.set_xticks(range(len(names)), names)
-    axes.set_yscale("log")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter(FuncFormatter(plain_tick))
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.set_xlim(-0.4, len(names) - 0.6)
-    axes.set_xlabel("Effect added")
-    axes.set_ylabel(scale.label(units_of(unit).words("Force error, RMS")))
-    figure.legend(loc="outside upper right", ncols=3)
-    return figure
-
-
-def _course(steps: Sequence[HistoryStep], role: Role) -> Array:
-    """Errors (n + 1,) N at the start and after each step, nan where there are none."""
-    none = (np.nan, np.nan)
-    pairs = [errors_of_step(s).get(role, none) for s in steps]
-    return np.array([pairs[0][0], *(after for _, after in pairs)])
 
 
 def _step_name(step: HistoryStep, added: str) -> str:
     return added if step.action == "add" else f"{step.action} {spaced(step.effect)}"
 
 
-def growth_table(steps: Sequence[HistoryStep]) -> Table:
-    """The errors before and after each step."""
+def growth_table(steps: Sequence[HistoryStep], floors: Mapping[Role, float]) -> Table:
+    """The errors before and after each step, and the noise floors of the logs of this page."""
     roles = (Role.TRAINING, Role.SELECTION, Role.TEST)
     shown = [r for r in roles if r is not Role.TEST or any(r in errors_of_step(s) for s in steps)]
     scale = Scale.of(steps[0].unit, [e for s in steps for e in errors_of_step(s)[Role.TRAINING]])
@@ -313,9 +219,16 @@ def growth_table(steps: Sequence[HistoryStep]) -> Table:
         pairs = [errors_of_step(s).get(role, (None, None)) for role in shown]
         cells = (scale.text(error) for pair in pairs for error in pair)
         rows.append(Row((_step_name(s, title_case(s.effect)), *cells)))
+    if floors:
+        cells = (text for role in shown for text in ("", scale.text(floors.get(role))))
+        rows.append(Row(("Noise floor of these logs", *cells), Tone.MUTED))
     titles = (f"{role.value.capitalize()}, {w}" for role in shown for w in ("before", "after"))
     columns = (Column("Effect added"), *(Column(title, numeric=True) for title in titles))
-    caption = "RMS force error on the logs of each role; everything is refitted at each step."
+    caption = (
+        "RMS force error on the logs of each role when the effect was added and everything "
+        "refitted. A real effect lowers the error on the selection logs as much as that on the "
+        "training logs."
+    )
     return Table(columns, rows, units_of(steps[0].unit).words(caption))
 
 
@@ -340,8 +253,11 @@ def _positions(additions: Sequence[Addition]) -> Table:
 
 
 def equations(view: AxisView) -> list[Block]:
-    """The named effects, and those that the data cannot separate from them."""
-    return [block for effect, model in _named(view) for block in _law(effect, model, view.name)]
+    """The named effects, those that the data cannot separate from them, and fitted curves."""
+    curves = [f for f in view.model.effects if f.effect.is_nonparametric]
+    said = [Listing([capitalised(nonparametric_in_words(f)) for f in curves])] if curves else []
+    laws = [b for effect, model in _named(view) for b in _law(effect, model, view.name)]
+    return [*laws, *said]
 
 
 def _named(view: AxisView) -> Iterator[tuple[Effect, AxisModel]]:
@@ -402,6 +318,8 @@ def _fitted(found: AxisDiagnosis, told: Told, label: str) -> Table:
         columns.append(Column(heading, numeric=True))
         # Where all values have the same reason, it is in the caption instead of a column.
         if common := common_reason(known):
+            if isinstance(common, ModelWrong):  # over the one noise floor of this page
+                common = replace(common, floor=told.floor)
             remarks.append(f"{heading}: {no_interval_in_words(common)}.")
         else:
             columns.append(Column("90 % interval"))

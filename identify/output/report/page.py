@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from identify.output.numbers import typeset
-from identify.output.report.drawing import data_uri
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from identify.output.report.subject import AxisView, Subject
+
+Array = NDArray[np.float64]
+CHART_DIGITS = 5  # significant, of a number that is drawn
 
 
 class Tone(Enum):
@@ -39,11 +44,79 @@ class Heading:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure, with a sentence that says what to look for."""
+    """A figure of matplotlib, with a sentence that says what to look for."""
 
     macro: ClassVar[str] = "picture"
     figure: Figure
     caption: str
+
+    @property
+    def uri(self) -> str:
+        """The figure as a link that holds it."""
+        from identify.output.report.drawing import data_uri  # which a report without one spares
+
+        return data_uri(self.figure)
+
+
+class Line(Enum):
+    """How a line of a chart is drawn, by report.js."""
+
+    LINE = "line"
+    DASH = "dash"
+    STEPS = "steps"
+    STEMS = "stems"
+    BAND = "band"  # the edge of a band, which the next line is the other edge of
+
+
+class Ink(Enum):
+    """Whose line it is: the model's, the final model's, the measurement's, or a bound."""
+
+    BEFORE = "before"
+    AFTER = "after"
+    INK = "ink"
+    SOFT = "soft"
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A line of a chart over its horizontal values; not a number where there is nothing."""
+
+    label: str
+    values: Array
+    line: Line = Line.LINE
+    ink: Ink = Ink.BEFORE
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Lines over common horizontal values in printed units, drawn in the reader's browser."""
+
+    macro: ClassVar[str] = "chart"
+    x: tuple[str, Array]
+    y: str
+    lines: Sequence[Drawn]
+    caption: str = ""
+    logarithmic: bool = False
+
+    @property
+    def spec(self) -> dict[str, Any]:
+        """What report.js draws."""
+        edges = [i + 1 for i, drawn in enumerate(self.lines) if drawn.line is Line.BAND]
+        return {
+            "x": {"label": self.x[0], "values": printed(self.x[1]), "log": self.logarithmic},
+            "y": {"label": self.y, "log": self.logarithmic},
+            "series": [
+                {"label": typeset(d.label), "values": printed(d.values), "kind": d.line.value,
+                 "color": d.ink.value}
+                for d in self.lines
+            ],
+            "bands": list(zip(edges[::2], edges[1::2], strict=True)),
+        }  # fmt: skip
+
+
+def printed(values: Array) -> list[float | None]:
+    """Numbers as short as a picture needs them; None for what is none."""
+    return [float(f"{v:.{CHART_DIGITS}g}") if np.isfinite(v) else None for v in values]
 
 
 @dataclass(frozen=True)
@@ -56,10 +129,11 @@ class Column:
 
 @dataclass(frozen=True)
 class Row:
-    """Cells of a table row."""
+    """Cells of a table row. bar: 0..1, drawn behind the first."""
 
     cells: Sequence[str]
     tone: Tone = Tone.PLAIN
+    bar: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -100,7 +174,7 @@ class Tile:
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer for one axis, in big words."""
+    """The answer for one axis, in big words. commands: what to run next."""
 
     macro: ClassVar[str] = "answer"
     headline: str
@@ -108,9 +182,10 @@ class Answer:
     tiles: Sequence[Tile]
     remarks: Sequence[str]
     tone: Tone
+    commands: Sequence[str] = ()
 
 
-Block = Heading | Picture | Table | Listing | Facts | Answer
+Block = Heading | Picture | Chart | Table | Listing | Facts | Answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +207,18 @@ class Part:
     of_all: Callable[[Subject], list[Block]] | None = None
 
 
-def page(title: str, facts: Sequence[tuple[str, str]], shown: Sequence[Section]) -> str:
-    """The page as HTML text; every text is escaped by the template. facts: under the title."""
+def page(
+    title: str,
+    facts: Sequence[tuple[str, str]],
+    shown: Sequence[Section],
+    signals: Sequence[Mapping[str, Any]] = (),
+    origin: Sequence[tuple[str, str]] = (),
+) -> str:
+    """The page as HTML text; every text is escaped by the template.
+
+    facts: under the title. signals: of each axis, to be explored beside the first section. origin:
+    in the footer, what the page was made of.
+    """
     environment = Environment(
         loader=PackageLoader("identify.output.report", "."),
         autoescape=True,
@@ -141,10 +226,12 @@ def page(title: str, facts: Sequence[tuple[str, str]], shown: Sequence[Section])
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(data_uri=data_uri, typeset=typeset)
+    environment.filters.update(typeset=typeset)
     return environment.get_template("report.html.j2").render(
         title=title,
         facts=facts,
         sections=shown,
-        version=importlib.metadata.version("proton-twin"),
+        signals=signals,
+        drawn=bool(signals) or any(isinstance(b, Chart) for s in shown for b in s.blocks),
+        origin=[("proton-twin", importlib.metadata.version("proton-twin")), *origin],
     )

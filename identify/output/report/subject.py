@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-
-import numpy as np
-from numpy.typing import NDArray
+from pathlib import Path
 
 from identify.dataset.given_logs import Role
 from identify.estimation.fit import Fit
 from identify.output.words.diagnosis import Said, all_found, said_of
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis
+from identify.results.signals import Signals, signals_of
 from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.misfit_maps import AxisComparison
 from twin.model.machine import AxisModel, HistoryStep
 from twin.model.units import AxisUnits
 
-Array = NDArray[np.float64]
+
+@dataclass(frozen=True)
+class Source:
+    """What a report was made of: the command as typed, the model's name in it, the logs' folder."""
+
+    command: str = ""
+    model: str = "MODEL"
+    folder: Path = Path()
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +40,29 @@ class Subject:
     history: Sequence[HistoryStep]
     additions: Sequence[Addition]
     assumed: Sequence[str] = ()
+    source: Source = Source()
+
+    @cached_property
+    def logs(self) -> dict[Role, list[str]]:
+        """Names of the logs by role; those of a comparison alone are given as training logs."""
+        compared = (log.motion.name for a in self.comparison.axes.values() for log in a.logs)
+        named = {Role.TRAINING: list(dict.fromkeys(compared))}
+        for role in (Role.SELECTION, Role.TEST):
+            diagnosed = self.diagnosis.axes.values() if self.diagnosis else ()
+            others = (log.motion.name for d in diagnosed for log in d.dataset.having(role))
+            named[role] = list(dict.fromkeys(others))
+        return named
+
+    def command(self, text: str) -> str:
+        """A command with the model and the logs of this page in the place of MODEL and LOG..."""
+        first, *others = (
+            [shlex.join(pair) for name in names for pair in [[*option, name]]]
+            for names, option in zip(
+                self.logs.values(), ([], ["--holdout"], ["--test"]), strict=True
+            )
+        )
+        every = " ".join([*first, *(text for some in others for text in some)])
+        return text.replace("LOG...", every).replace("MODEL", shlex.quote(self.source.model))
 
     @cached_property
     def views(self) -> list[AxisView]:
@@ -117,8 +147,11 @@ class AxisView:
         """The noise floors by role of logs, N RMS."""
         return self.told.floors if self.told else {Role.TRAINING: self.axis.floor}
 
-    def by_log(self, residual: Array, kept: NDArray[np.bool_]) -> list[Array]:
-        """A residual (n,) N of each log of the comparison, nan where it carries no information."""
-        every = np.full(len(kept), np.nan)
-        every[kept] = residual
-        return np.split(every, np.cumsum([len(log) for log in self.axis.logs])[:-1])
+    @cached_property
+    def signals(self) -> Signals:
+        """What is drawn: of all logs of a diagnosis, else of those that were compared."""
+        if self.found is None:
+            return signals_of(dict.fromkeys(self.axis.logs), self.model, None)
+        dataset, final = self.found.dataset, self.final
+        logs = {log: role for role in Role for log in dataset.having(role)}
+        return signals_of(logs, self.found.base.axis, final.axis if final else None)

@@ -1,0 +1,339 @@
+/* The plots of a report. Data are in the page: "signals" (of each axis, explored here) and the
+   charts' own specifications. Time plots share one range, of which the other plots show the part. */
+"use strict";
+(() => {
+const INK = "#1b2a38", SOFT = "#5b6875", GRID = "#e3e8ed", FLOOR = "rgba(120,135,150,.22)";
+const BEFORE = "#2f6db3", AFTER = "#b4530f", MEASURED = "#7b8794";
+const COLORS = ["#2e7d32", "#8e24aa", "#00838f", "#c2185b", "#8a5a00", "#3949ab", "#5d4037", "#00695c"];
+const RAMP = ["#e6edf4", "#b5d0e8", "#7fb0d8", "#4a8ac2", "#2660a0", "#123a70", "#071a3a"];
+const $ = id => document.getElementById(id);
+const data = JSON.parse($("signals")?.textContent || "[]");
+const digits = v => v == null ? "–" : String(+v.toPrecision(4)).replace("-", "−");
+const withUnit = unit => (u, v) => v == null ? "–" : `${digits(v)} ${unit}`;
+const label = s => `${s.label} (${s.unit || "1"})`;
+const extent = values => {
+  let low = Infinity, high = -Infinity;
+  for (const v of values) if (v != null) { if (v < low) low = v; if (v > high) high = v; }
+  return low > high ? [0, 1] : [low, high];
+};
+const padded = (low, high) => {
+  const more = 0.05 * (high - low) || Math.abs(low) || 1;
+  return [low - more, high + more];
+};
+
+// --- plots of any kind ---------------------------------------------------------------------
+
+function plot(place, options, values) {
+  place.replaceChildren();
+  const axis = (name, more) => ({label: name, stroke: INK, grid: {stroke: GRID, width: 1},
+    ticks: {stroke: GRID}, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif",
+    labelSize: 20, ...more});
+  const u = new uPlot({
+    width: Math.max(place.clientWidth, 200), pxAlign: false, ...options, series: [options.x, ...options.series],
+    scales: {x: {time: false}, ...options.scales},
+    axes: [axis(options.labels[0], {size: 32, ...(options.labels[0] ? {} : {label: null})}), axis(options.labels[1], {size: 62})],
+  }, values, place);
+  if (!place.watch) {
+    place.watch = new ResizeObserver(() => place.shown.setSize({width: Math.max(place.clientWidth, 200), height: place.shown.height}));
+    place.watch.observe(place);
+  }
+  place.shown = u;
+  return u;
+}
+const line = (name, color, unit, more) => ({label: name, stroke: color, width: 1.25,
+  points: {show: false}, value: withUnit(unit), ...more});
+
+function rectangle(u, left, right, low, high, color) {
+  const [x0, x1] = [left, right].map(v => v == null ? null : u.valToPos(v, "x", true));
+  const [y0, y1] = [low, high].map(v => u.valToPos(v, "y", true));
+  const {left: l, top: t, width: w, height: h} = u.bbox;
+  const a = Math.max(x0 ?? l, l), b = Math.min(x1 ?? l + w, l + w);
+  const c = Math.max(y1, t), d = Math.min(y0, t + h);
+  u.ctx.fillStyle = color;
+  if (b > a && d > c) u.ctx.fillRect(a, c, b - a, d - c);
+}
+
+// --- signals of an axis --------------------------------------------------------------------
+
+class Axis {
+  constructor(given) {
+    Object.assign(this, given);
+    this.decoded = new Map();
+    const gaps = this.integers(given.index), x = this.x = [], regular = this.regular = [];
+    let at = 0, index = 0, start = 0;
+    for (const log of this.logs) {
+      log.begin = start;
+      for (let i = 0; i < log.count; i++) {
+        index += gaps[at++];
+        x.push(start + log.start + (index - log.first) * log.step);
+        regular.push(index % this.every === 0);
+      }
+      start = log.end = x[x.length - 1] + log.step;
+      x.push(start), regular.push(false);
+    }
+  }
+  integers(text) { return new Int16Array(Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer); }
+  of(name) { return this.signals.find(s => s.name === name); }
+  values(name) {  // in the printed unit; null where unknown, and between logs
+    if (!this.decoded.has(name)) {
+      const s = this.of(name), q = this.integers(s.data), out = [];
+      let at = 0;
+      for (const log of this.logs) {
+        for (let i = 0; i < log.count; i++, at++)
+          out.push(q[at] === -32768 ? null : (s.middle + s.scale * Math.sinh(q[at] * s.step)) / s.size);
+        out.push(null);
+      }
+      this.decoded.set(name, out);
+    }
+    return this.decoded.get(name);
+  }
+  logAt(x) { return this.logs.find(log => x < log.end) || this.logs[this.logs.length - 1]; }
+}
+
+if (data.length) {
+  let axis, plots = [], range = null, waiting = false, busy = false;
+  const axes = data.map(given => new Axis(given));
+  const choices = (id, pairs, chosen) => {
+    const select = $(id);
+    select.replaceChildren(...pairs.map(([value, text]) => new Option(text, value, false, value === chosen)));
+    select.closest("label").hidden = pairs.length < 2;
+  };
+  const names = list => list.map(name => [name, axis.of(name).label]);
+  const series = () => [  // force plot: name, label, color
+    ["to_explain", MEASURED, 3], ["model_before", BEFORE, 1.5],
+    ...(axis.of("after") ? [["model_after", AFTER, 1.5]] : []),
+    ...axis.effects.map((name, i) => [name, COLORS[i % COLORS.length], 1.5]),
+  ];
+  const difference = (a, b) => a.map((v, i) => v == null || b[i] == null ? null : v - b[i]);
+  function shown(name) {  // what the model makes is what is to be explained less what is left
+    if (!name.startsWith("model_")) return axis.values(name);
+    const left = axis.of(name.slice(6)), to = axis.of("to_explain"), factor = left.size / to.size;
+    return difference(axis.values("to_explain"), axis.values(left.name).map(v => v == null ? null : v * factor));
+  }
+  const title = name => name.startsWith("model_") ? axis.texts[name] : axis.of(name).label;
+
+  function choose(name) {
+    axis = axes.find(a => a.name === name);
+    range = null;
+    choices("axis", axes.map(a => [a.name, a.name]), name);
+    choices("show", [["residual", axis.texts.residual], ["force", axis.texts.force], ...names(axis.effects)], "residual");
+    choices("against", [["time", "time"], ...names(axis.coordinates)], axis.against);
+    choices("log", [["", "all logs"], ...axis.logs.map((log, i) => [String(i), log.title])], "");
+    const second = axis.coordinates.find(c => c !== axis.against && c === (axis.against === "velocity" ? "position" : "velocity"));
+    choices("map-x", names(axis.coordinates), axis.against === "time" ? "position" : axis.against);
+    choices("map-y", names(axis.coordinates), second || axis.coordinates[0]);
+    choices("map-of", names(axis.residuals), axis.residuals[0]);
+    toggles();
+    times();
+    follow();
+  }
+
+  function toggles() {
+    $("toggles").replaceChildren(...series().map(([name, color], i) => {
+      const box = document.createElement("input"), mark = document.createElement("i"), text = document.createElement("label");
+      box.type = "checkbox", box.checked = i < series().length - axis.effects.length || axis.named.includes(name);
+      mark.style.background = color;
+      box.addEventListener("change", () => plots[0].setSeries(i + 1, {show: box.checked}));
+      text.append(box, mark, title(name));
+      return text;
+    }));
+  }
+
+  function times() {
+    plots = [];
+    const to = axis.of("to_explain"), left = axis.of("before"), x = axis.x;
+    const boxes = [...$("toggles").querySelectorAll("input")];
+    const common = {
+      x: {label: "Time", value: (u, v) => v == null ? "–" : `${digits(v - axis.logAt(v).begin)} s of ${axis.logAt(v).title}`},
+      cursor: {sync: {key: "time", setSeries: false}, drag: {x: true, y: false}, points: {size: 6}},
+    };
+    const hooks = {
+      setScale: [(u, key) => key === "x" && !busy && zoomed(u.scales.x.min, u.scales.x.max)],
+      draw: [u => axis.logs.slice(1).forEach(log => {
+        const at = u.valToPos(log.begin, "x", true);
+        if (at < u.bbox.left || at > u.bbox.left + u.bbox.width) return;
+        u.ctx.fillStyle = SOFT, u.ctx.fillRect(at, u.bbox.top, 1, u.bbox.height);
+      })],
+    };
+    plots.push(plot($("forces"), {...common, hooks, height: 260, labels: ["", `${axis.texts.force} (${to.unit})`],
+      series: series().map(([name, color, width], i) => line(title(name), color, to.unit, {width, show: boxes[i].checked}))},
+      [x, ...series().map(([name]) => shown(name))]));
+    const band = {drawClear: [u => rectangle(u, null, null, -axis.floor, axis.floor, FLOOR)]};
+    plots.push(plot($("left"), {...common, hooks: {...hooks, ...band}, height: 200, labels: ["", `${axis.texts.residual} (${left.unit})`],
+      scales: {y: {range: (u, low, high) => padded(Math.min(low ?? 0, -axis.floor), Math.max(high ?? 0, axis.floor))}},
+      series: axis.residuals.map((name, i) => line(title(name), [BEFORE, AFTER][i], left.unit))},
+      [x, ...axis.residuals.map(name => axis.values(name))]));
+    motion(common, hooks);
+  }
+  function motion(common, hooks) {
+    const name = $("against").value === "time" ? "position" : $("against").value, s = axis.of(name);
+    plots[2] = plot($("motion"), {...common, hooks, height: 150, labels: ["Time (s), logs in a row", label(s)],
+      series: [line(s.label, INK, s.unit)]}, [axis.x, axis.values(name)]);
+    plots[2].again = () => motion(common, hooks);
+  }
+
+  function zoomed(low, high) {
+    const all = [axis.x[0], axis.x[axis.x.length - 1]];
+    if (low == null || low === range?.[0] && high === range?.[1]) return;
+    range = [Math.max(low, all[0]), Math.min(high, all[1])];
+    if (range[0] === all[0] && range[1] === all[1]) $("log").value = "";
+    busy = true;
+    for (const u of plots) u.batch(() => u.setScale("x", {min: range[0], max: range[1]}));
+    busy = false;
+    follow();
+  }
+  function zoom(what) {
+    const [first, last] = [axis.x[0], axis.x[axis.x.length - 1]], [a, b] = range || [first, last];
+    const width = (b - a) * ({in: 0.5, out: 2}[what] || 1), shift = {left: -0.5, right: 0.5}[what] || 0;
+    const centre = Math.min(Math.max((a + b) / 2 + shift * width, first + width / 2), last - width / 2);
+    if (what === "all" || width >= last - first) zoomed(first, last);
+    else zoomed(centre - width / 2, centre + width / 2);
+  }
+  function follow() {  // the plots that show the part in time that is in view, once a frame
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => { waiting = false; coordinate(); map(); });
+  }
+  function part() {  // indices in view, and a sentence about them
+    const x = axis.x, [low, high] = range || [x[0], x[x.length - 1]];
+    let a = x.findIndex(v => v >= low), b = x.length;
+    while (b > a && x[b - 1] > high) b--;
+    const whole = a === 0 && b === x.length;
+    return [Math.max(a, 0), b, whole ? "all logs" : `the ${digits(high - low)} s in view, of ${axis.logAt(low).title}`];
+  }
+
+  // --- any signal against any coordinate ---------------------------------------------------
+
+  function means(x, y, a, b, low, high, accepts) {
+    const bins = Math.min(Math.max(Math.floor((b - a) / (25 * axis.every)), 20), 140);
+    const sum = new Float64Array(bins), count = new Uint32Array(bins), width = (high - low) / bins || 1;
+    for (let i = a; i < b; i++)
+      if (axis.regular[i] && x[i] != null && y[i] != null && accepts(i)) {
+        const k = Math.min(Math.floor((x[i] - low) / width), bins - 1);
+        sum[k] += y[i], count[k]++;
+      }
+    const at = Array.from(sum, (_, k) => low + (k + 0.5) * width);
+    return [at, Array.from(sum, (v, k) => count[k] >= 4 ? v / count[k] : null)];
+  }
+
+  function coordinate() {
+    const what = $("show").value, against = $("against").value, [a, b, where] = part();
+    const x = against === "time" ? axis.x : axis.values(against), along = against === "time" ? {label: "Time, logs in a row", unit: "s"} : axis.of(against);
+    const group = what === "residual" ? axis.residuals.map((n, i) => [n, [BEFORE, AFTER][i]])
+      : what === "force" ? series().slice(0, series().length - axis.effects.length) : series().filter(s => s[0] === what);
+    const unit = axis.of(what === "residual" ? "before" : "to_explain").unit;
+    const dots = group.map(([name]) => shown(name)), speed = axis.values("velocity");
+    const xs = x.slice(a, b), [low, high] = extent(xs), reach = extent(dots.flatMap(d => extent(d.slice(a, b))));
+    const floor = what === "residual" ? axis.floor : 0;
+    const sides = $("apart").checked ? [["forwards", i => speed[i] > 0, []], ["backwards", i => speed[i] < 0, [6, 4]]] : [["", () => true, []]];
+    const lines = [], values = [];
+    let at;
+    group.forEach(([name, color], g) => sides.forEach(([side, accepts, dash]) => {
+      let mean;
+      [at, mean] = means(x, dots[g], a, b, low, high, accepts);
+      values.push([null, ...mean, null]);
+      lines.push(line(`${title(name)}${side && ", " + side}, mean`, color, unit, {width: 2.25, dash, spanGaps: false}));
+    }));
+    const bounds = padded(Math.min(reach[0], -floor), Math.max(reach[1], floor));
+    const u = plot($("coordinate"), {
+      height: 390, labels: [label(along), `${what === "residual" ? axis.texts.residual : axis.texts.force} (${unit})`],
+      x: {label: along.label, value: withUnit(along.unit)}, series: lines, cursor: {drag: {x: true, y: true, uni: 12}},
+      scales: {y: {range: () => bounds}},
+      hooks: {drawClear: [u => {
+        if (floor) rectangle(u, null, null, -floor, floor, FLOOR);
+        const {left: l, top: t, width: w, height: h} = u.bbox, size = b - a > 8000 ? 2 : 3, ctx = u.ctx;
+        group.forEach(([, color], g) => {
+          ctx.fillStyle = color, ctx.globalAlpha = b - a > 8000 ? 0.25 : 0.4;
+          for (let i = a; i < b; i++) {
+            if (x[i] == null || dots[g][i] == null) continue;
+            const px = u.valToPos(x[i], "x", true), py = u.valToPos(dots[g][i], "y", true);
+            if (px >= l && px <= l + w && py >= t && py <= t + h) ctx.fillRect(px - size / 2, py - size / 2, size, size);
+          }
+        });
+        ctx.globalAlpha = 1;
+      }]},
+    }, [[low, ...at, high === low ? low + 1 : high], ...values]);
+    $("coordinate-note").textContent = `Dots: ${axis.texts.dots} of ${where}; lines: their means. `
+      + (floor ? `Grey: the noise floor of the training logs, ±${digits(axis.floor)} ${unit}.` : "")
+      + (axis.every > 1 ? ` Of every ${axis.every} test functions one and the extremes are shown.` : "");
+    return u;
+  }
+
+  // --- map of the error over two coordinates -----------------------------------------------
+
+  function map() {
+    const [nx, ny, of] = ["map-x", "map-y", "map-of"].map(id => $(id).value), [a, b, where] = part();
+    const x = axis.values(nx), y = axis.values(ny), left = axis.values(of), unit = axis.of(of).unit;
+    const [x0, x1] = extent(x.slice(a, b)), [y0, y1] = extent(y.slice(a, b)), columns = 48, rows = 28;
+    const dx = (x1 - x0) / columns || 1, dy = (y1 - y0) / rows || 1;
+    const square = new Float64Array(columns * rows), count = new Uint32Array(columns * rows);
+    const cell = (u, v) => Math.min(Math.floor((v - y0) / dy), rows - 1) * columns + Math.min(Math.floor((u - x0) / dx), columns - 1);
+    for (let i = a; i < b; i++)
+      if (axis.regular[i] && x[i] != null && y[i] != null && left[i] != null) {
+        const k = cell(x[i], y[i]);
+        square[k] += left[i] * left[i], count[k]++;
+      }
+    const error = Array.from(square, (s, k) => count[k] ? Math.sqrt(s / count[k]) : null);
+    const top = Math.max(extent(error)[1], axis.floor * 1.01), steps = RAMP.length - 1;
+    const color = v => RAMP[v <= axis.floor ? 0 : Math.min(1 + Math.floor(steps * Math.log(v / axis.floor) / Math.log(top / axis.floor)), steps)];
+    plot($("map-plot"), {
+      height: 320, labels: [label(axis.of(nx)), label(axis.of(ny))], legend: {show: false},
+      x: {}, series: [{stroke: "transparent"}], cursor: {drag: {x: true, y: true, uni: 12}},
+      scales: {y: {range: () => [y0, y0 + rows * dy]}},
+      hooks: {
+        draw: [u => error.forEach((v, k) => {
+          const i = k % columns, j = Math.floor(k / columns);
+          if (v != null) rectangle(u, x0 + i * dx, x0 + (i + 1) * dx, y0 + j * dy, y0 + (j + 1) * dy, color(v));
+        })],
+        setCursor: [u => {
+          const at = [u.posToVal(u.cursor.left, "x"), u.posToVal(u.cursor.top, "y")], k = cell(...at);
+          $("map-value").textContent = u.cursor.left >= 0 && count[k]
+            ? `${axis.of(nx).label} ${digits(at[0])} ${axis.of(nx).unit}, ${axis.of(ny).label.toLowerCase()} ${digits(at[1])} ${axis.of(ny).unit}: ${digits(error[k])} ${unit} RMS, ${count[k]} test functions` : "Point at a cell to read it.";
+        }],
+      },
+    }, [[x0, x0 + columns * dx], [null, null]]);
+    $("map-scale").replaceChildren(...RAMP.map(c => Object.assign(document.createElement("i"), {style: `background:${c}`})));
+    $("map-note").textContent = `RMS of ${where}: from the noise floor ${digits(axis.floor)} ${unit} and less (lightest) to ${digits(top)} ${unit} (darkest), in equal ratios.`;
+  }
+
+  const on = (id, job) => $(id).addEventListener("change", job);
+  on("axis", () => choose($("axis").value));
+  on("show", coordinate), on("apart", coordinate);
+  on("against", () => { plots[2].again(); if (range) plots[2].setScale("x", {min: range[0], max: range[1]}); coordinate(); });
+  ["map-x", "map-y", "map-of"].forEach(id => on(id, map));
+  on("log", () => { const log = axis.logs[$("log").value], kept = $("log").value; log ? zoomed(log.begin, log.end) : zoom("all"); $("log").value = kept; });
+  document.querySelectorAll("[data-zoom]").forEach(button => button.addEventListener("click", () => zoom(button.dataset.zoom)));
+  $("time").addEventListener("keydown", event => {
+    const what = {ArrowLeft: "left", ArrowRight: "right", "+": "in", "=": "in", "-": "out", 0: "all", Escape: "all"}[event.key];
+    if (what && !["SELECT", "INPUT"].includes(event.target.tagName)) { event.preventDefault(); zoom(what); }
+  });
+  choose(data[0].name);
+}
+
+// --- small charts --------------------------------------------------------------------------
+
+for (const place of document.querySelectorAll("[data-chart]")) {
+  const spec = JSON.parse(place.dataset.chart), kinds = {
+    line: {}, dash: {dash: [7, 5]}, steps: {paths: uPlot.paths.stepped({align: 1})},
+    stems: {paths: uPlot.paths.bars({size: [0.15, 8, 2], align: 0}), fill: BEFORE},
+  };
+  const log = on => on ? {distr: 3} : {};
+  plot(place, {
+    height: 240, labels: [spec.x.label, spec.y.label], x: {label: spec.x.label, value: (u, v) => digits(v)},
+    scales: {x: {time: false, ...log(spec.x.log)}, y: log(spec.y.log)}, bands: spec.bands.map(b => ({series: b, fill: "rgba(47,109,179,.18)"})),
+    series: spec.series.map(s => line(s.label, {before: BEFORE, after: AFTER, ink: INK, soft: MEASURED}[s.color], "", {...kinds[s.kind], width: s.kind === "band" ? 0.5 : 1.5})),
+    cursor: {drag: {x: true, y: false}},
+  }, [spec.x.values, ...spec.series.map(s => s.values)]);
+}
+
+// --- commands to copy ----------------------------------------------------------------------
+
+for (const button of document.querySelectorAll("[data-copy]"))
+  button.addEventListener("click", async () => {
+    const code = button.parentElement.querySelector("code");
+    try { await navigator.clipboard.writeText(code.textContent); }
+    catch { getSelection().selectAllChildren(code); document.execCommand("copy"); }
+    button.textContent = "Copied";
+  });
+addEventListener("beforeprint", () => document.querySelectorAll("details").forEach(d => { d.open = true; }));
+})();

@@ -1,0 +1,73 @@
+"""What a page draws of an axis: its forces and coordinates by test functions, log after log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.coordinates import gathered
+from identify.dataset.given_logs import Role
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.estimation.force_balance import averaged_force, residual
+from identify.estimation.residual_dependence import UNITS, unit_of
+from identify.validation.misfit_maps import periods, phase_name
+from twin.model.machine import AxisModel
+from twin.model.units import LINEAR
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Signals (n,) of one axis by test functions, all logs in a row.
+
+    roles: of the logs; None where they have none. time: s, in its own log. coordinates, units: by
+    name, of the motion and within each period of the model. command: N. to_explain: command minus
+    mass x acceleration, N. before, after: force residual N without and with what was found (None:
+    nothing was), not a number at rest, where static friction is undetermined. effects: by name the
+    force of each effect of the final model, N, as the motor has to balance it.
+    """
+
+    logs: tuple[PreparedLog, ...]
+    roles: tuple[Role | None, ...]
+    time: Array
+    coordinates: Mapping[str, Array]
+    units: Mapping[str, str]
+    command: Array
+    to_explain: Array
+    before: Array
+    after: Array | None
+    effects: Mapping[str, Array]
+
+
+def signals_of(
+    logs: Mapping[PreparedLog, Role | None], before: AxisModel, after: AxisModel | None
+) -> Signals:
+    """The signals of some logs, with the model before anything was found, and the final one."""
+    every = tuple(logs)
+    final = after or before
+    command = np.concatenate([log.command for log in every])
+    where = gathered(every)
+    for name, period in periods(final).items():
+        where[phase_name(name)] = np.mod(where["position"], period)
+    known = {**UNITS, "command": LINEAR.force}
+    whole = averaged_force(final, every)
+    return Signals(
+        logs=every,
+        roles=tuple(logs.values()),
+        time=where.pop("time"),
+        coordinates=where,
+        units={name: unit_of(name, every[0].motion, known) for name in where},
+        command=command,
+        to_explain=command - final.mass * np.concatenate([log.acceleration for log in every]),
+        before=_left(before, every),
+        after=None if after is None else _left(after, every),
+        effects={n: averaged_force(final.without(n), every) - whole for n in final.names},
+    )
+
+
+def _left(axis: AxisModel, logs: tuple[PreparedLog, ...]) -> Array:
+    return np.where(moving(logs, sticks(axis)), residual(axis, logs), np.nan)
