@@ -12,8 +12,8 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike
 
 from identify.output.numbers import NOTHING, number, pretty, spaced
-from identify.output.report.drawing import INK, new_figure, plain_tick
-from identify.output.report.page import Column, Picture, Row, Table
+from identify.output.report.page import Column, Row, Table
+from studies.drawing import INK, Picture, new_figure, plain_tick
 
 HEIGHT = 2.2  # inches of a row of panels
 

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-import base64
-import re
-from collections.abc import Iterator
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
-from unittest.mock import patch
-
-from matplotlib.figure import Figure
 
 from identify import workflow
-from identify.output.report import sections, write_report
+from identify.output.report import write_report
 from identify.output.report.answer import cards
-from identify.output.report.drawing import drawing_style
-from identify.output.report.page import Answer, Picture, Section
+from identify.output.report.page import Answer
 from identify.output.report.subject import Subject
 from identify.results.addition import Addition
 from identify.results.results import Diagnosis
@@ -103,64 +95,28 @@ def cogging_case() -> Case:
     )  # fmt: skip
 
 
-BLANK = "data:image/svg+xml;base64," + base64.b64encode(b"<svg/>").decode()
-
-
-def without_drawing() -> AbstractContextManager[object]:
-    """Inside, pictures are blank: drawing them takes most of a report's time."""
-    return patch("identify.output.report.page.data_uri", lambda figure: BLANK)
-
-
-def pictures_in(page: str) -> list[str]:
-    """SVG texts of the pictures of a page."""
-    found = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', page)
-    return [base64.b64decode(text).decode() for text in found]
-
-
 class Outline(HTMLParser):
-    """Tags, attributes and visible text of a page."""
+    """Tags, attributes and visible text of a page; its scripts and styles apart."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
         self.tags: list[str] = []
         self.attributes: list[tuple[str, str | None]] = []
         self.text = ""
+        self._apart = False
         self.feed(page)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
         self.attributes += attrs
+        self._apart = tag in ("script", "style")
+
+    def handle_endtag(self, tag: str) -> None:
+        self._apart = False
 
     def handle_data(self, data: str) -> None:
-        self.text += data
-
-
-def made(subject: Subject) -> dict[str, Section]:
-    with drawing_style():
-        return {section.anchor: section for section in sections(subject)}
-
-
-def figures(subject: Subject) -> Iterator[Figure]:
-    for section in made(subject).values():
-        for block in section.blocks:
-            if isinstance(block, Picture):
-                yield block.figure
+        self.text += "" if self._apart else data
 
 
 def answers(subject: Subject) -> list[Answer]:
     return [b for view in subject.views for b in cards(view) if isinstance(b, Answer)]
-
-
-def readable(figure: Figure) -> None:
-    """Every line and mark can be seen, and a row of axes is neither flat nor tall."""
-    rows = max((axes.get_subplotspec().get_gridspec().nrows for axes in figure.axes), default=1)
-    assert 0.9 <= figure.get_figheight() / rows <= 4.3, "inches a row"
-    for axes in figure.axes:
-        for line in axes.get_lines():
-            drawn = line.get_linestyle() != "None"
-            marked = line.get_marker() not in ("None", None, "")
-            assert drawn or marked
-            assert not drawn or 0.4 <= line.get_linewidth() <= 5.0
-            assert not marked or 2.0 <= line.get_markersize() <= 7.0
-        for artist in (*axes.get_lines(), *axes.collections, *axes.patches):
-            assert artist.get_alpha() is None or 0.1 <= artist.get_alpha() <= 1.0

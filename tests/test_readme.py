@@ -20,7 +20,6 @@ from unittest.mock import patch
 
 import pytest
 from cli_runs import in_small, twin
-from report_cases import without_drawing
 
 from twin import effects
 
@@ -74,7 +73,7 @@ def test_the_loop_runs_as_printed_and_the_error_falls(tmp_path):
 def test_the_loop_runs_in_small_and_the_error_falls(tmp_path):
     """The printed commands on short logs, with two effects to choose from and blank pictures."""
     rivals = ("cogging", "force_constant_ripple")
-    with in_small(*rivals, duration=5.0), without_drawing():
+    with in_small(*rivals, duration=5.0):
         assert_the_error_falls(lambda command: twin(*command[1:], folder=tmp_path), tmp_path)
 
 
@@ -113,7 +112,7 @@ def test_the_recordings_are_diagnosed_in_small(tmp_path):
     """The five commands and the example in Python, with two effects to choose from."""
     own = next(block for block in blocks("sh") if "import" in block)
     own_effects = ("coulomb_viscous", "constant_force")  # of the drive, and of a first model
-    with in_small("cogging", "spring", *own_effects), without_drawing(), chdir(tmp_path):
+    with in_small("cogging", "spring", *own_effects), chdir(tmp_path):
         script, *commands = commands_of(own)
         recordings = runpy.run_path(str(ROOT / script[1]), run_name="recordings")
         recordings["main"](tmp_path)

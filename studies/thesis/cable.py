@@ -12,8 +12,7 @@ import numpy as np
 from identify import cable_force
 from identify.analysis.cable_force import CableForce
 from identify.estimation.evidence import rms
-from identify.output.report.drawing import BLUE, GREY, ORANGE
-from identify.output.report.page import Picture
+from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import Array, Found, Numbers

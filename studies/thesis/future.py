@@ -24,9 +24,8 @@ from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.force_balance import steady_friction
 from identify.estimation.intervals import half_widths
 from identify.output.numbers import spaced
-from identify.output.report.drawing import BLUE, GREY, ORANGE
-from identify.output.report.page import Picture
 from identify.selection.nonparametric import fit_nonparametric
+from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.mixed_friction import EQUAL, mixed, mixture, mixture_in_words

@@ -22,8 +22,8 @@ from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.force_balance import force_along
 from identify.output.numbers import spaced
-from identify.output.report.drawing import BLUE
 from identify.output.report.page import Block
+from studies.drawing import BLUE
 from studies.telling import Line, Panel, picture, table
 from studies.thesis import study
 from studies.thesis.behaviours import LEG, LOOP, RATE, behaviours, traits, turning

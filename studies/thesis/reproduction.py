@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from identify.output.numbers import capitalised
-from identify.output.report.drawing import drawing_style
 from identify.output.report.page import Answer, Section, Tone, page
+from studies.drawing import drawing_style
 from studies.telling import numbers, tables
 from studies.thesis import cable, dynamic, future, models, residuals, simulation, track, twin
 from studies.thesis.study import Chapter, Found

@@ -24,8 +24,8 @@ from identify.dataset.motion import motion_of
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import steady_friction
 from identify.estimation.intervals import with_band
-from identify.output.report.drawing import BLUE, GREY, ORANGE
-from identify.output.report.page import Picture
+from studies.drawing import BLUE, GREY, ORANGE
+from studies.drawing import Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import SIDES, Array, Found, Numbers

@@ -14,9 +14,9 @@ import numpy as np
 
 from identify.analysis.following import closed_loop_errors, identified, twin_of
 from identify.output.as_json import agree_json
-from identify.output.report.drawing import BLUE, GREY
 from identify.output.words.fit import agreement_in_words, causes_in_words, difference_in_words
 from identify.validation.agreement import Agreement, agreement
+from studies.drawing import BLUE, GREY
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import CATALOGUE, Found

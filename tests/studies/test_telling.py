@@ -6,10 +6,25 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from report_cases import readable
+from matplotlib.figure import Figure
 
-from identify.output.report.drawing import BLUE, drawing_style
+from studies.drawing import BLUE, drawing_style
 from studies.telling import Line, Panel, numbers, picture, tables
+
+
+def readable(figure: Figure) -> None:
+    """Every line and mark can be seen, and a row of axes is neither flat nor tall."""
+    rows = max((axes.get_subplotspec().get_gridspec().nrows for axes in figure.axes), default=1)
+    assert 0.9 <= figure.get_figheight() / rows <= 4.3, "inches a row"
+    for axes in figure.axes:
+        for line in axes.get_lines():
+            drawn = line.get_linestyle() != "None"
+            marked = line.get_marker() not in ("None", None, "")
+            assert drawn or marked
+            assert not drawn or 0.4 <= line.get_linewidth() <= 5.0
+            assert not marked or 2.0 <= line.get_markersize() <= 7.0
+        for artist in (*axes.get_lines(), *axes.collections, *axes.patches):
+            assert artist.get_alpha() is None or 0.1 <= artist.get_alpha() <= 1.0
 
 
 @dataclass(frozen=True)

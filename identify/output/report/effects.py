@@ -144,9 +144,13 @@ WITH_VALUES = 3  # candidates whose parameter values are printed
 
 
 def ranking(view: AxisView) -> list[Block]:
-    """A table of all absent effects, best first."""
-    known = view.found is not None and view.found.ranking
-    return [ranking_table(view.found)] if view.found and known else []
+    """A table of all absent effects that were refitted, best first, and the others' names."""
+    if view.found is None or not view.found.ranking:
+        return []
+    others = [spaced(c.effect.name) for c in view.found.ranking if not c.score]
+    said = f"Not refitted, as one linear step of them takes too little: {', '.join(others)}."
+    table = ranking_table(view.found)
+    return [*([table] if table.rows else []), *([Listing([said])] if others else [])]
 
 
 def ranking_table(found: AxisDiagnosis) -> Table:
@@ -154,19 +158,19 @@ def ranking_table(found: AxisDiagnosis) -> Table:
     units = found.dataset.units
     scale = Scale.of(units.force, [e for c in found.ranking for e in (c.gain.before, c.gain.after)])
     rows = []
-    for rank, c in enumerate(found.ranking):
+    for rank, c in enumerate(c for c in found.ranking if c.score):
         tone = Tone.PLAIN if c.supported else Tone.MUTED
         cells = (
             title_case(c.effect.name),
-            number(c.delta_bic) if c.score else "",
+            number(c.delta_bic),
             scale.text(c.gain.before),
             scale.text(c.gain.after),
-            percent(max(c.part, 0.0)) if c.score else "",
+            percent(max(c.part, 0.0)),
             spaced(why_not(found, c)),
             values_of(c.effect, c.fit.axis) if rank < WITH_VALUES else "",
         )
-        removed = min(max(c.part, 0.0), 1.0) if c.score else 0.0
-        rows.append(Row(cells, Tone.STRONG if c is found.best else tone, removed))
+        shown = Tone.STRONG if c is found.best else tone
+        rows.append(Row(cells, shown, min(max(c.part, 0.0), 1.0)))
     titles = ("Evidence (ΔBIC)", "Error before", "Error after", "Part removed")
     columns = (
         Column("Effect"), *(Column(title, numeric=True) for title in titles), Column("Why not"),

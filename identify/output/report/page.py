@@ -6,7 +6,7 @@ import importlib.metadata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from identify.output.numbers import typeset
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from identify.output.report.subject import AxisView, Subject
 
 Array = NDArray[np.float64]
@@ -31,7 +29,10 @@ class Tone(Enum):
     MUTED = "muted"
 
 
-# Each block is drawn by the macro of its name in blocks.html.j2.
+class Block(Protocol):
+    """A piece of a section, drawn by the macro of its name in blocks.html.j2."""
+
+    macro: ClassVar[str]
 
 
 @dataclass(frozen=True)
@@ -40,22 +41,6 @@ class Heading:
 
     macro: ClassVar[str] = "heading"
     text: str
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """A figure of matplotlib, with a sentence that says what to look for."""
-
-    macro: ClassVar[str] = "picture"
-    figure: Figure
-    caption: str
-
-    @property
-    def uri(self) -> str:
-        """The figure as a link that holds it."""
-        from identify.output.report.drawing import data_uri  # which a report without one spares
-
-        return data_uri(self.figure)
 
 
 class Line(Enum):
@@ -183,9 +168,6 @@ class Answer:
     remarks: Sequence[str]
     tone: Tone
     commands: Sequence[str] = ()
-
-
-Block = Heading | Picture | Chart | Table | Listing | Facts | Answer
 
 
 @dataclass(frozen=True, eq=False)

@@ -230,10 +230,11 @@ def not_named_in_words(found: AxisDiagnosis, index: int) -> str | None:
 
 
 def why_not(found: AxisDiagnosis, candidate: Candidate) -> str:
-    """Why a candidate is not proved by itself; nothing where it is."""
-    if candidate.supported:
-        return ""
+    """Why a candidate is not named, or not proved by itself; nothing where it is."""
     name = candidate.effect.name
+    if candidate.supported:
+        beside = found.named and not any(name in answer for answer in found.answers)
+        return f"not needed beside {listed(found.named)}" if beside else ""
     pairs = (f.together[0] for f in found.findings if f.effect == name and f.together)
     other = next(pairs, None)
     return f"proved only together with {other}" if other else candidate.refused or ""

@@ -17,7 +17,6 @@ from identify.experiment_design.discrimination import (
 )
 from identify.output.as_json import diagnose_json
 from identify.output.report import sections
-from identify.output.report.drawing import drawing_style
 from identify.output.report.subject import Subject
 from identify.output.text import diagnose_text, plan_text
 from identify.rules import RULE
@@ -196,8 +195,7 @@ def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
 def sections_of(found):
     """The sections of the report of a diagnosis."""
     subject = Subject("test", found, found.comparison, (), ())
-    with drawing_style():
-        return sections(subject)
+    return sections(subject)
 
 
 @pytest.mark.slow

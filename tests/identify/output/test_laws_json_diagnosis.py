@@ -14,7 +14,6 @@ from strict_json import expected_refit, strict
 
 from identify.output.as_json import _finding, add_json, diagnose_json, estimate_json, plan_json
 from identify.output.report import sections
-from identify.output.report.drawing import drawing_style
 from identify.output.words.diagnosis import SEVERAL, remarks_on
 from identify.output.words.findings import advice
 from identify.selection.bends import Bend
@@ -182,8 +181,7 @@ def test_writing_what_was_diagnosed_runs_no_law_and_no_fit():
     try:
         diagnose_json(case.diagnosis), str(case.diagnosis), add_json(case.addition)
         subject = case.subject(case.diagnosis)
-        with drawing_style():
-            sections(subject)
+        sections(subject)
     finally:
         sys.setprofile(None)
     assert ran == set()

@@ -14,15 +14,14 @@ from identify.output.numbers import arrow, capitalised, number, quantity, spaced
 from identify.output.report import SECTIONS, facts, sections
 from identify.output.report.answer import cards as cards_of
 from identify.output.report.answer import notes
-from identify.output.report.drawing import drawing_style
-from identify.output.report.page import Answer, Picture, Section, Tile, Tone, page
+from identify.output.report.page import Tone, page
 from identify.output.report.residual import regions
 from identify.output.report.subject import Subject
 from identify.output.words.diagnosis import SEVERAL, VERDICTS, remarks_on
 from identify.output.words.findings import SHARES, advice, finding_in_words
 from identify.output.words.fit import refit_in_words
 from identify.output.words.plan import next_step_in_words
-from identify.output.words.residual import region_in_words
+from identify.output.words.residual import place_in_words, region_in_words
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 
@@ -34,11 +33,8 @@ def subject_of(diagnosis=None, *, history=made.STEPS, additions=(), **changes) -
 
 
 def page_of(subject: Subject) -> Page:
-    """The page, its pictures left out."""
-    with drawing_style():
-        shown = sections(subject, [part for part in SECTIONS if part.anchor in TABLES])
-    bare = [replace(s, blocks=[b for b in s.blocks if not isinstance(b, Picture)]) for s in shown]
-    return Page(page(subject.title, facts(subject), bare))
+    shown = sections(subject, [part for part in SECTIONS if part.anchor in TABLES])
+    return Page(page(subject.title, facts(subject), shown))
 
 
 # --- the answer -----------------------------------------------------------------------------
@@ -131,7 +127,8 @@ def test_the_answer_for_one_effect_without_held_out_logs():
     assert card.headline == "Axis x: cogging is missing"
     assert "cross-validated error" in card.remarks[1]
     assert "comes nearest to deciding, but is too short" in card.remarks[2]
-    assert card.remarks[3] == "Next: twin add cogging MODEL LOG... -o better.toml."
+    logs = "'run 1' 'run 2' --holdout 'held 1'"
+    assert card.commands == [f"twin add cogging MODEL {logs} -o better.toml"]
 
 
 def test_what_the_test_logs_contradict_stands_in_the_headline():
@@ -139,7 +136,7 @@ def test_what_the_test_logs_contradict_stands_in_the_headline():
     card, _ = cards(made.diagnosed(made.diagnosis_of(findings=(against,))))
     assert card.headline == ("Axis x: cogging is missing (not confirmed by the test logs: cogging)")
     assert not any("% of such answers" in r for r in card.remarks)
-    assert not any(r.startswith("Next: twin add") for r in card.remarks)
+    assert card.commands == []
 
 
 def test_cross_validated_errors_have_a_tile_of_their_own():
@@ -183,24 +180,29 @@ def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
 # --- regions, notes, facts ------------------------------------------------------------------
 
 
-def scaled(region) -> str:
-    return capitalised(region_in_words(region))
+def test_the_worst_regions_are_in_the_order_of_what_is_printed():
+    shown = page_of(subject_of()).table("regions", 0)
+    titles = ["RMS error", "Times noise floor", "Share of squared error", "Share of time"]
+    assert {where: [row[t] for t in titles] for where, row in shown.items()} == {
+        "Position between 12.3 and 25.7 mm": ["121 mN", "14.3", "37 %", "0 %"],
+        "Moving backwards": ["87.0 mN", "7.70", "53 %", "0 %"],
+    }
+    assert [row["Difference"] for row in shown.values()] == ["37 %", "53 %"]
 
 
-def test_the_worst_regions_in_words():
-    near, back = made.comparison_of().worst
-    assert scaled(near) == (
-        "Position between 12.3 and 25.7 mm: 121 mN RMS, 14.3 times the noise floor, 37 % of the "
-        "squared error."
-    )
-    assert scaled(back).startswith("Moving backwards: 87.0 mN RMS, 7.70 times")
-    assert scaled(replace(back, low=0.0, high=1.5)).startswith("Moving forwards")
+@pytest.mark.parametrize(
+    ("low", "high", "said"),
+    [(0.0, 1.5, "moving forwards"), (-1.5, 0.0, "moving backwards")],
+)
+def test_a_direction_is_named(low, high, said):
+    _, back = made.comparison_of().worst
+    assert place_in_words(replace(back, low=low, high=high)) == said
 
 
 def test_a_narrow_region_has_the_digits_of_its_width():
     near, _ = made.comparison_of().worst
-    narrow = scaled(replace(near, low=0.01131, high=0.01157))
-    assert narrow.startswith("Position between 11.31 and 11.57 mm:")
+    narrow = place_in_words(replace(near, low=0.01131, high=0.01157))
+    assert narrow == "position between 11.31 and 11.57 mm"
 
 
 def test_regions_have_headings_only_among_several_axes():
@@ -258,12 +260,3 @@ def test_the_line_under_the_title_and_the_order_of_axes():
     assert [a.name for a in subject_of(found).views] == ["x", "y"]
     quiet = replace(found, axes={"y": found.axes["y"]})
     assert [a.name for a in subject_of(quiet).views] == ["x", "y"]
-
-
-@pytest.mark.parametrize(("count", "columns"), [(1, 1), (3, 3), (4, 4), (5, 3), (6, 3), (7, 4)])
-def test_tiles_stand_in_even_rows_and_none_is_cut_off(count, columns):
-    tiles = [Tile("Torque error", "0.671 to 0.239 mN m", "RMS")] * count
-    text = page("t", (), [Section("answer", "Answer", [Answer("h", "s", tiles, (), Tone.STRONG)])])
-    assert f'<div class="tiles" style="--columns: {columns}">' in text
-    (rule,) = [line for line in text.splitlines() if line.startswith(".tiles strong")]
-    assert "nowrap" not in rule

@@ -12,9 +12,8 @@ from built_results import Page
 from identify.estimation.intervals import NotExcited, refusal
 from identify.output.numbers import number, title_case
 from identify.output.report import SECTIONS, facts, sections
-from identify.output.report.drawing import drawing_style
 from identify.output.report.effects import given_table, growth_table, values_of
-from identify.output.report.page import Picture, page
+from identify.output.report.page import page
 from identify.output.report.residual import logs
 from identify.output.report.subject import Subject
 from identify.output.words.fit import no_interval_in_words
@@ -29,11 +28,8 @@ def subject_of(diagnosis=None, *, history=made.STEPS, additions=(), **changes) -
 
 
 def page_of(subject: Subject, anchors=TABLES) -> Page:
-    """The page, its pictures left out."""
-    with drawing_style():
-        shown = sections(subject, [part for part in SECTIONS if part.anchor in anchors])
-    bare = [replace(s, blocks=[b for b in s.blocks if not isinstance(b, Picture)]) for s in shown]
-    return Page(page(subject.title, facts(subject), bare))
+    shown = sections(subject, [part for part in SECTIONS if part.anchor in anchors])
+    return Page(page(subject.title, facts(subject), shown))
 
 
 # --- the error ledger -----------------------------------------------------------------------
@@ -53,12 +49,21 @@ def test_the_ledger_shows_each_step_in_its_row_and_column():
             "Selection, before": "4.97 N", "Selection, after": "2.71 N",
             "Test, before": "5.03 N", "Test, after": "2.83 N",
         },
+        "Noise floor of these logs": {
+            "Training, before": "", "Training, after": "0.0113 N",
+            "Selection, before": "", "Selection, after": "–",
+            "Test, before": "", "Test, after": "–",
+        },
     }  # fmt: skip
     assert y == {
         "replace wear": {
             "Training, before": "3.41 N", "Training, after": "3.13 N",
             "Selection, before": "–", "Selection, after": "–",
-        }
+        },
+        "Noise floor of these logs": {
+            "Training, before": "", "Training, after": "0.0132 N",
+            "Selection, before": "", "Selection, after": "–",
+        },
     }  # fmt: skip
     text = shown.texts["growth"]
     assert text.index("Axis x") < text.index("4.57 N") < text.index("Axis y") < text.index("3.13")
@@ -66,13 +71,13 @@ def test_the_ledger_shows_each_step_in_its_row_and_column():
 
 def test_the_ledger_has_the_unit_of_its_largest_error():
     steps = (replace(made.STEPS[0], fit_error_before=0.713, fit_error_after=0.0341),)
-    (row,) = growth_table(steps).rows
+    (row,) = growth_table(steps, {}).rows
     assert row.cells[1:3] == ("0.713 N", "0.0341 N")
     rising = (replace(made.STEPS[0], fit_error_before=0.0341, fit_error_after=0.713),)
-    assert growth_table(rising).rows[0].cells[1:3] == ("0.0341 N", "0.713 N")
-    table = growth_table(made.STEPS)
+    assert growth_table(rising, {}).rows[0].cells[1:3] == ("0.0341 N", "0.713 N")
+    table = growth_table(made.STEPS, {})
     assert [c.numeric for c in table.columns] == [False] + 6 * [True]
-    assert [c.numeric for c in growth_table(rising).columns] == [False] + 4 * [True]
+    assert [c.numeric for c in growth_table(rising, {}).columns] == [False] + 4 * [True]
     assert [c.numeric for c in logs(subject_of().views[0])[0].columns] == [False] + 5 * [True]
 
 
@@ -119,17 +124,17 @@ def test_errors_log_by_log():
     shown = page_of(subject_of())
     assert shown.table("logs", 0) == {
         "run 1": {
-            "Duration": "2.00 s", "Force error, RMS": "51.7 mN", "Over noise floor": "4.58",
+            "Duration": "2.00 s", "Force error, RMS": "51.7 mN", "Times noise floor": "4.58",
             "Position error, free run, RMS": "3.17 µm", "Expected from noise": "0.213 µm",
         },
         "run 2": {
-            "Duration": "2.50 s", "Force error, RMS": "73.1 mN", "Over noise floor": "6.47",
+            "Duration": "2.50 s", "Force error, RMS": "73.1 mN", "Times noise floor": "6.47",
             "Position error, free run, RMS": "4.29 µm", "Expected from noise": "0.257 µm",
         },
     }  # fmt: skip
     second = shown.table("logs", 1)
     assert second["run 1"]["Force error, RMS"] == "53.6 mN"
-    assert second["run 1"]["Over noise floor"] == number(0.0536 / 0.0132)
+    assert second["run 1"]["Times noise floor"] == number(0.0536 / 0.0132)
     text = shown.texts["logs"]
     assert "Noise floor of the force: 11.3 mN RMS with test functions of 40.0 ms" in text
 
@@ -212,9 +217,9 @@ def test_a_model_that_is_wrong_has_no_intervals_and_one_reason():
     titles = shown.sections["parameters"][0][0]
     assert titles.count("90 % interval") == 1
     assert (
-        "Without all that was found: no interval: the force error 8.37 N is 4.0 times"
-        in shown.texts["parameters"]
-    )
+        "Without all that was found: no interval: the force error 8.37 N is 4.1 times the noise "
+        "floor 2.03 N" in shown.texts["parameters"]
+    )  # the one floor of the page, as in the tiles
 
 
 def test_values_as_given():

@@ -167,7 +167,7 @@ if (data.length) {
   }
   function motion(common, hooks) {
     const name = $("against").value === "time" ? "position" : $("against").value, s = axis.of(name);
-    plots[2] = plot($("motion"), {...common, hooks, height: 150, labels: ["Time (s), logs in a row", label(s)],
+    plots[2] = plot($("motion"), {...common, hooks, height: 180, labels: ["Time (s), logs in a row", label(s)],
       series: [line(s.label, INK, s.unit)]}, [axis.x, axis.values(name)]);
     plots[2].again = () => motion(common, hooks);
   }

@@ -1,4 +1,4 @@
-"""The look of all pictures, and their way into the page.
+"""The look of the pictures of a study, and their way into the page.
 
 Figures are made without pyplot, so that no global state and no display is involved.
 """
@@ -7,18 +7,15 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.container import BarContainer
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -66,9 +63,23 @@ STYLE: dict[RcKeyType, Any] = {
 }
 
 
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A figure on a page, with a sentence that says what to look for."""
+
+    macro: ClassVar[str] = "picture"
+    figure: Figure
+    caption: str
+
+    @property
+    def uri(self) -> str:
+        """The figure as a link that holds it."""
+        return data_uri(self.figure)
+
+
 @contextmanager
 def drawing_style() -> Iterator[None]:
-    """Inside, figures are made and rendered in the style of the report."""
+    """Inside, figures are made and rendered in the style of a page."""
     with matplotlib.rc_context(STYLE):
         yield
 
@@ -103,59 +114,3 @@ def settle(figure: Figure) -> None:
 def plain_tick(value: float, _: int) -> str:
     """Label of a logarithmic scale without mathematical notation, which is not parsed."""
     return f"{value:g}"
-
-
-def plain_decades(axis: Axis) -> None:
-    """A logarithmic axis with a plain number at each decade."""
-    axis.set_major_locator(LogLocator(subs=(1.0,)))
-    axis.set_major_formatter(FuncFormatter(plain_tick))
-    axis.set_minor_locator(NullLocator())
-
-
-def draw_bars(
-    axes: Axes, names: Sequence[str], lengths: Sequence[float], colors: Sequence[str]
-) -> BarContainer:
-    """Horizontal bars beside their names, the first at the top."""
-    bars = axes.barh(names, lengths, color=colors, height=0.62)
-    axes.invert_yaxis()
-    axes.grid(False, axis="y")
-    axes.tick_params(axis="y", length=0)
-    return bars
-
-
-def noise_band(axes: Axes, floor: float) -> None:
-    """The noise floor (RMS) as a band about zero."""
-    axes.axhspan(-floor, floor, color=FLOOR, alpha=0.7, linewidth=0, label="noise floor (± RMS)")
-
-
-def binned_mean(x: Array, y: Array) -> tuple[Array, Array]:
-    """Bin centres (k,) and means (k,) of y over bins of equal width of x; nan where few are.
-
-    x, y (n,); a y that is not a number is left out.
-    """
-    known = np.isfinite(y)
-    x, y = x[known], y[known]
-    if not len(x):
-        return x, y
-    bins = int(np.clip(len(x) // SAMPLES_A_BIN, *BINS))
-    edges = np.linspace(x.min(), x.max(), bins + 1)
-    index = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, bins - 1)
-    count = np.bincount(index, minlength=bins)
-    mean = np.bincount(index, y, bins) / np.maximum(count, 1)
-    return 0.5 * (edges[1:] + edges[:-1]), np.where(count >= LEAST_IN_BIN, mean, np.nan)
-
-
-SAMPLES_A_BIN = 25  # on average
-BINS = (20, 140)  # fewest and most
-LEAST_IN_BIN = 4  # samples below which a mean says little
-
-
-def symmetric_limit(floor: float, *values: Array) -> float:
-    """Limit (N) that shows the noise and all but the two in a thousand furthest from zero."""
-    joined = np.abs(np.concatenate(values))
-    known = joined[np.isfinite(joined)]
-    reach = 1.15 * np.quantile(known, 0.998) if len(known) else 0.0
-    return float(max(reach, 1.3 * floor, SMALLEST_LIMIT))
-
-
-SMALLEST_LIMIT = 1e-12  # N

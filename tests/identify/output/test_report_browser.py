@@ -1,0 +1,224 @@
+"""The report in a real browser: nothing goes wrong or out, and its controls do what they say."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from browser import Browser, browser
+from report_cases import Case, cogging_case
+
+from identify.output.as_json import compare_json, diagnose_json
+from identify.output.numbers import PREFIXES
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return cogging_case()
+
+
+@pytest.fixture(scope="module")
+def shown(case: Case, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Browser, Path]]:
+    folder = tmp_path_factory.mktemp("browser")
+    case.write(folder / "report.html")
+    with browser(folder) as running:
+        yield running, folder / "report.html"
+
+
+@pytest.fixture
+def page(shown: tuple[Browser, Path]) -> Iterator[Browser]:
+    """The page as it is when it has been loaded; at the end nothing has gone wrong or out."""
+    running, path = shown
+    running.open(path)
+    yield running
+    assert running.errors == []
+    assert running.requests == [path.resolve().as_uri()]
+
+
+def test_the_answer_comes_first_and_fits_the_window(page: Browser) -> None:
+    box = page.run("""const b = document.querySelector(".answer").getBoundingClientRect();
+      const p = document.getElementById("coordinate").getBoundingClientRect();
+      return [b.bottom, p.bottom, document.documentElement.scrollWidth];""")
+    assert box[0] < 800
+    assert box[1] < 800
+    assert box[2] <= 1280
+    assert page.run("return document.querySelectorAll('.plot canvas').length") >= 9
+
+
+def test_all_plots_follow_a_zoom_in_time(page: Browser) -> None:
+    zoomed = page.run("""
+      const all = span("forces"), note = text("coordinate-note");
+      document.querySelector("[data-zoom=in]").click(); await frame();
+      const near = [span("forces"), span("left"), span("motion")], inside = text("coordinate-note");
+      document.getElementById("time").dispatchEvent(
+        new KeyboardEvent("keydown", {key: "ArrowRight", bubbles: true})); await frame();
+      const later = span("left");
+      document.querySelector("[data-zoom=all]").click(); await frame();
+      return {all, near, later, again: span("forces"), note, inside, end: text("coordinate-note")};
+    """)
+    low, high = zoomed["all"]
+    width = high - low
+    for span in zoomed["near"]:
+        assert span == pytest.approx([low + width / 4, high - width / 4])
+    assert zoomed["later"] == pytest.approx([low + width / 2, high])
+    assert zoomed["again"] == pytest.approx(zoomed["all"])
+    assert zoomed["note"] == zoomed["end"] != zoomed["inside"]
+    assert "s in view" in zoomed["inside"]
+
+
+def test_a_drag_zooms_and_a_log_can_be_chosen(page: Browser) -> None:
+    before, box = page.run("""const b = document.querySelector("#left .u-over")
+      .getBoundingClientRect(); scrollTo(0, b.top - 100);
+      const c = document.querySelector("#left .u-over").getBoundingClientRect();
+      return [span("left"), [c.left, c.top, c.width, c.height]];""")
+    left, top, width, height = box
+    at = [("mouseMoved", 0.25), ("mousePressed", 0.25), ("mouseMoved", 0.5), ("mouseReleased", 0.5)]
+    for kind, part in at:
+        page.call(
+            "Input.dispatchMouseEvent", type=kind, x=left + part * width, y=top + height / 2,
+            button="left", clickCount=1,
+        )  # fmt: skip
+    dragged = page.run('await frame(); return [span("forces"), span("left")]')
+    length = before[1] - before[0]
+    for span in dragged:
+        expected = [before[0] + length / 4, before[0] + length / 2]
+        assert span == pytest.approx(expected, abs=0.02 * length)
+    chosen = page.run('await choose("log", "1"); return [span("left"), text("coordinate-note")]')
+    assert chosen[0] == pytest.approx([6.0, before[1]], abs=0.1)
+    assert "run 2 (selection)" in chosen[1]
+
+
+def test_any_signal_is_shown_over_any_coordinate(page: Browser) -> None:
+    seen = page.run("""
+      const u = () => document.getElementById("coordinate").shown, out = [];
+      const state = () => [u().axes[0].label, u().axes[1].label, u().series.length,
+        Math.max(...u().data[1].map(Math.abs)), u().scales.y.max];
+      out.push(state());
+      await choose("against", "velocity"); out.push(state());
+      await choose("against", "time"); out.push(state());
+      await choose("show", "effect cogging"); await choose("against", "cogging_phase");
+      out.push(state());
+      document.getElementById("apart").click(); await frame(); out.push(state());
+      return out;
+    """)
+    labels = [s[:2] for s in seen]
+    assert labels[0][0].startswith("Cogging phase (")
+    assert labels[0][1].startswith("Unexplained force (")
+    assert labels[1][0].startswith("Speed (mm/s")
+    assert labels[2][0] == "Time, logs in a row (s)"
+    assert [s[2] for s in seen] == [3, 3, 3, 2, 3]  # the coordinate, and a mean for each
+    assert seen[3][3] == pytest.approx(100.0, rel=0.05)  # mN of cogging, over one period
+    # The largest residual is inside the picture.
+    worst = page.run("""await choose("show", "residual"); await choose("against", "position");
+      const u = document.getElementById("left").shown, y = document.getElementById("coordinate");
+      return [Math.max(...u.data[1].filter(v => v !== null)), y.shown.scales.y.max];""")
+    assert worst[0] < worst[1]
+
+
+def test_effects_can_be_shown_and_hidden(page: Browser) -> None:
+    seen = page.run("""
+      const boxes = [...document.querySelectorAll("#toggles input")];
+      const u = document.getElementById("forces").shown;
+      const names = boxes.map(b => b.parentElement.textContent);
+      const before = boxes.map((b, i) => [b.checked, u.series[i + 1].show]);
+      boxes.forEach(b => b.click()); await frame();
+      return {names, before, after: boxes.map((b, i) => [b.checked, u.series[i + 1].show])};
+    """)
+    assert seen["names"][3:] == ["coulomb viscous", "constant force", "cogging"]
+    assert [checked for checked, _ in seen["before"]] == [True, True, True, False, False, True]
+    assert all(checked == drawn for checked, drawn in (*seen["before"], *seen["after"]))
+    assert [a for a, _ in seen["after"]] == [not b for b, _ in seen["before"]]
+
+
+def test_the_map_tells_the_error_of_a_cell(page: Browser) -> None:
+    said = page.run("""const o = document.querySelector("#map-plot .u-over");
+      const b = o.getBoundingClientRect(), u = document.getElementById("map-plot").shown, out = [];
+      for (let i = 1; i < 40; i++) for (let j = 1; j < 20; j++) {
+        u.setCursor({left: b.width * i / 40, top: b.height * j / 20});
+        const t = text("map-value"); if (t.includes("RMS")) out.push(t); }
+      await choose("map-of", "after");
+      return [out, text("map-note")];""")
+    assert len(said[0]) > 50
+    pattern = r"Cogging phase [−\d.]+ mm, speed [−\d.]+ mm/s: [\d.]+ mN RMS, \d+ test functions"
+    assert all(re.fullmatch(pattern, one) for one in said[0])
+    assert said[1].startswith("RMS of all logs: from the noise floor")
+
+
+def test_the_command_is_copied(page: Browser) -> None:
+    assert (
+        page.run("""document.querySelector("[data-copy]").click(); await frame(); await frame();
+      return document.querySelector("[data-copy]").textContent;""")
+        == "Copied"
+    )
+
+
+def test_the_page_fits_a_narrow_window(page: Browser, shown: tuple[Browser, Path]) -> None:
+    running, path = shown
+    running.open(path, 400, 800)
+    wide = running.run("""const plots = [...document.querySelectorAll(".plot .uplot")];
+      return [document.documentElement.scrollWidth,
+        ...plots.map(e => e.getBoundingClientRect().right)]""")
+    assert all(one <= 400 for one in wide)
+
+
+def test_texts_have_contrast_and_controls_have_names(page: Browser) -> None:
+    """WCAG AA: 4.5 to 1 for text, on the background that is behind it."""
+    found = page.run("""
+      const light = c => { const [r, g, b] = c.match(/[\\d.]+/g).slice(0, 3).map(v => v / 255)
+        .map(v => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
+      const own = e => getComputedStyle(e).backgroundColor;
+      const behind = e => !e ? "rgb(255, 255, 255)"
+        : own(e).endsWith(", 0)") ? behind(e.parentElement) : own(e);
+      const read = e => [...e.childNodes].some(n => n.nodeType === 3 && n.data.trim());
+      const low = [];
+      for (const e of document.querySelectorAll("body *")) {
+        if (!read(e) || !e.offsetParent) continue;
+        const [a, b] = [light(getComputedStyle(e).color), light(behind(e))].sort((p, q) => q - p);
+        if ((a + 0.05) / (b + 0.05) < 4.5) low.push(`${e.tagName}: ${e.textContent}`); }
+      const unnamed = [...document.querySelectorAll("select, input, button")]
+        .filter(e => !(e.closest("label")?.textContent || e.ariaLabel || e.textContent).trim());
+      return [low, unnamed.map(e => e.outerHTML)];
+    """)
+    assert found == [[], []]
+
+
+# --- one source: the page's numbers are those of the JSON -----------------------------------
+
+
+def number(cell: str) -> float:
+    """A printed number with a prefixed unit, SI."""
+    value, _, unit = cell.replace("−", "-").partition(" ")
+    size = {f"{prefix}{unit}": size for size, prefix in PREFIXES for unit in ("N", "m")}
+    return float(value) * size.get(unit, 1.0)
+
+
+def test_the_pages_numbers_are_those_of_the_json(page: Browser, case: Case) -> None:
+    rows = page.run("""const cells = row => [...row.cells].map(c => c.textContent);
+      const of = id => Object.fromEntries([...document.querySelectorAll(`#${id} tbody tr`)]
+        .map(cells).map(([name, ...rest]) => [name, rest]));
+      const tiles = Object.fromEntries([...document.querySelectorAll(".tiles div")].map(
+        d => [d.children[0].textContent, d.children[1].textContent]));
+      return {logs: of("logs"), ranking: of("ranking"), found: of("found"), tiles};""")
+    told = diagnose_json(case.diagnosis)
+    compared = compare_json(case.diagnosis.comparison)["axes"]["x"]
+    for name, one in compared["logs"].items():
+        cells = rows["logs"][name]
+        expected = [one["force_error"], one["force_ratio"], one["position_error"]]
+        assert [number(c) for c in cells[1:4]] == pytest.approx(expected, rel=0.006)
+    for one in told["ranking"]:
+        if one["delta_bic"] is not None:
+            cells = rows["ranking"][one["effect"].replace("_", " ").capitalize()]
+            expected = [one["delta_bic"], one["holdout_error_before"], one["holdout_error_after"]]
+            assert [number(c) for c in cells[:3]] == pytest.approx(expected, rel=0.006)
+            assert cells[4] == (one["why_not"] or "")
+    (finding,) = told["findings"]
+    errors = [number(c) for c in rows["found"]["Cogging"][:2]]
+    tested = [finding["test_error_before"], finding["test_error_after"]]
+    assert errors == pytest.approx(tested, rel=0.006)
+    before, after = rows["tiles"]["Error over noise floor"].split(" → ")
+    floor = told["noise_floor"]
+    ratios = [told["force_error"] / floor, told["force_error_with_found"] / floor]
+    assert [number(before), number(after)] == pytest.approx(ratios, rel=0.006)
