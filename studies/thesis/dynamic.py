@@ -26,8 +26,7 @@ from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import force_along
 from identify.estimation.intervals import half_widths
 from identify.estimation.open_loop import Beginning, Replay, measured_beginning
-from studies.drawing import BLUE, GREY, ORANGE
-from studies.drawing import Picture
+from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import Array, Found, Numbers, friction_of

@@ -22,8 +22,7 @@ from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
-from studies.drawing import BLUE, ORANGE
-from studies.drawing import Picture
+from studies.drawing import BLUE, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import SIDES, Array, Found, Numbers, friction_of

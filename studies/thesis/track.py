@@ -24,8 +24,7 @@ from identify.dataset.motion import motion_of
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import steady_friction
 from identify.estimation.intervals import with_band
-from studies.drawing import BLUE, GREY, ORANGE
-from studies.drawing import Picture
+from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import SIDES, Array, Found, Numbers

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.rules import RULE
 from identify.estimation.residual_dependence import Dependence
 from identify.output.numbers import (
     Scale,
@@ -30,6 +29,7 @@ from identify.output.report.page import (
 )
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.residual import correlation_in_words, loop_in_words, place_in_words
+from identify.rules import RULE
 from identify.validation.free_run import HORIZON
 from identify.validation.misfit_maps import AxisComparison, MisfitMap, Region
 from identify.validation.whiteness import Correlation, ResidualTests
