@@ -12,7 +12,7 @@ def info(logs: Logs, as_json_: Json = False) -> None:
     Example: twin info fit.mcap
     """
     from identify.output.log_info import info_json, info_text
-    from twin.checks.info import log_info
+    from twin.checks.long import log_info
 
     found = {str(path): log_info(path) for path in logs}
     say(info_text(found), info_json(found), as_json_)

@@ -100,7 +100,7 @@ def import_(
 
     Example: twin import recording.csv --map map.toml -o run.mcap
     """
-    from twin.checks import assumed
+    from twin.checks import check_assumed
     from twin.importers import import_log, load_mapping
     from twin.logs import write_log
 
@@ -115,7 +115,7 @@ def import_(
     write_log(log, out)
     result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
     resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
-    unsure = [str(f) for axis in log.axes for f in assumed.check_assumed(axis, log.metadata)]
+    unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
     said = [*resampled, *(f"{out}: warning: {finding}" for finding in unsure)]
     say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, said)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from twin.checks.info import AxisInfo, LogInfo
+from twin.checks.long import AxisInfo, LogInfo
 
 
 def info_text(found: Mapping[str, LogInfo]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import twin
-from twin.checks.info import log_info
+from twin.checks.long import log_info
 from twin.errors import InputError
 from twin.logs import ROTARY_UNITS, AxisLog, Log, write_log
 
@@ -40,7 +40,7 @@ def test_ranges_are_those_of_the_whole_log_however_long(tmp_path, monkeypatch) -
     path = tmp_path / "long.mcap"
     write_log(twin.simulate(twin.load_model("proton_xy"), "tracking", seed=1, duration=3.0), path)
     whole = log_info(path)
-    monkeypatch.setattr("twin.checks.info.PART", 7000)
+    monkeypatch.setattr("twin.checks.long.LARGEST_PART", 14_000)
     assert log_info(path).axes == whole.axes
     assert log_info(path).samples == whole.samples == 30_000
 

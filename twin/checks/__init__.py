@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from twin.checks.assumed import check_assumed
 from twin.checks.axis import Axis
 from twin.checks.breaks import check_breaks, check_outliers
 from twin.checks.channels import check_crossed, check_timing, check_units
 from twin.checks.command import check_command, check_saturation
-from twin.checks.content import check_content, check_excitation
+from twin.checks.content import check_assumed, check_content, check_excitation
 from twin.checks.report import CheckReport, Fault, Finding, Severity
 from twin.logs.log import Log
 
-__all__ = ["CheckReport", "Fault", "Finding", "Severity", "check_log", "moves"]
+__all__ = ["CheckReport", "Fault", "Finding", "Severity", "check_assumed", "check_log", "moves"]
 
 PARTS = (
     check_units, check_timing, check_breaks, check_command, check_outliers, check_saturation,

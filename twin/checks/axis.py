@@ -9,8 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.checks import limits
-from twin.checks.explain import Dynamics, Lag, Trend, find_lag, find_trend, fit_dynamics
-from twin.checks.smooth import Smoother
+from twin.checks.explain import (
+    Dynamics,
+    Lag,
+    Smoother,
+    Trend,
+    find_lag,
+    find_trend,
+    fit_dynamics,
+)
+from twin.checks.report import WHOLE, Fault, Finding, Severity
 from twin.logs.log import AxisLog
 from twin.signals import Array, median, white_noise
 
@@ -24,6 +32,14 @@ class Axis:
     name: str
     sample_rate: float
     log: AxisLog
+
+    def error(self, fault: Fault, what: str, remedy: str, where: str = WHOLE) -> Finding:
+        """A fault for which the log should not be fitted."""
+        return Finding(Severity.ERROR, fault, self.name, what, where, remedy)
+
+    def warning(self, fault: Fault, what: str, remedy: str, where: str = WHOLE) -> Finding:
+        """A fault that limits what a fit can identify."""
+        return Finding(Severity.WARNING, fault, self.name, what, where, remedy)
 
     @property
     def duration(self) -> float:
@@ -43,14 +59,14 @@ class Axis:
         return least if self.position_held else max(count_of(self.log.position), least)
 
     @cached_property
-    def position_noise(self) -> float:
-        """Noise of the position in m rms: its white part, or the rounding to its step."""
-        return max(self.position_white, self.position_step / 12**0.5)
-
-    @cached_property
     def position_white(self) -> float:
         """White part of the position, m rms."""
         return white_noise(self.log.position)
+
+    @cached_property
+    def position_noise(self) -> float:
+        """Noise of the position in m rms: its white part, or the rounding to its step."""
+        return max(self.position_white, self.position_step / 12**0.5)
 
     @cached_property
     def position_held(self) -> int:

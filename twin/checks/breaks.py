@@ -11,27 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.checks import limits
 from twin.checks.axis import Axis
-from twin.checks.report import Fault, Finding, Severity
+from twin.checks.report import Fault, Finding
 from twin.signals import Array
-
-
-class Kind(Enum):
-    """What breaks a position."""
-
-    MISSING = "missing"
-    STUCK = "stuck"
-    WRAPPED = "wrapped"
-    SAMPLE = "sample"
-    JOINED = "joined"
-    STEP = "step"
-    CLOCK = "clock"
 
 
 @dataclass(frozen=True)
@@ -41,7 +28,7 @@ class Break:
     step: m, by which the course is another behind it.
     """
 
-    kind: Kind
+    fault: Fault
     first: int
     last: int
     size: float
@@ -57,10 +44,8 @@ def check_breaks(axis: Axis) -> Iterator[Finding]:
         yield _uneven(axis)
         return
     breaks = find_breaks(axis)
-    for kind in Kind:
-        found = [b for b in breaks if b.kind is kind]
-        if found:
-            yield _finding(axis, kind, found)
+    for fault in dict.fromkeys(b.fault for b in breaks):
+        yield _finding(axis, fault, [b for b in breaks if b.fault is fault])
 
 
 def find_breaks(axis: Axis) -> list[Break]:
@@ -85,9 +70,9 @@ def _undone(breaks: list[Break], axis: Axis) -> list[Break]:
         last = out[-1] if out else None
         if last is not None and b.first - last.last < limits.SHORT_GAP * axis.sample_rate:
             opposed = abs(last.step + b.step) < limits.ALIKE_SPEEDS * abs(b.step)
-            if opposed or {last.kind, b.kind} <= {Kind.SAMPLE, Kind.CLOCK}:
+            if opposed or {last.fault, b.fault} <= {Fault.OUTLIERS, Fault.UNEVEN}:
                 size = max(abs(last.size), abs(b.step or b.size))
-                out[-1] = Break(Kind.SAMPLE, last.first, b.last, size)
+                out[-1] = Break(Fault.OUTLIERS, last.first, b.last, size)
                 continue
         out.append(b)
     return out
@@ -105,7 +90,7 @@ def _stuck(axis: Axis) -> Iterator[Break]:
         ends = (bends[max(first - 3, 0) : first + 1], bends[max(last - 3, 0) : last + 1])
         caught_up = abs(x[min(last + 1, len(x) - 1)] - x[last])
         if all(part.any() for part in ends):
-            yield Break(Kind.STUCK, int(first), int(last), float(caught_up))
+            yield Break(Fault.STUCK, int(first), int(last), float(caught_up))
 
 
 def _classified(axis: Axis, first: int, last: int) -> Break | None:
@@ -125,20 +110,20 @@ def _classified(axis: Axis, first: int, last: int) -> Break | None:
         off = float(axis.jumps[first - 1 : last].max())
         if last - first > limits.CLUSTER:
             return None
-        kind = Kind.CLOCK if off < limits.A_SAMPLE * abs(speed) * dt else Kind.SAMPLE
-        return Break(kind, first, last, off)
+        fault = Fault.UNEVEN if off < limits.A_SAMPLE * abs(speed) * dt else Fault.OUTLIERS
+        return Break(fault, first, last, off)
     setpoint = axis.log.columns.get("setpoint_position")
     follows = _around(setpoint, first, last) if setpoint is not None else None
     with_setpoint = follows is not None and abs(follows[0]) > 0.5 * abs(step)
     if abs(step) >= limits.WHOLE_TRAVEL * np.ptp(x) and alike and not with_setpoint:
-        return Break(Kind.WRAPPED, first, last, abs(step))
+        return Break(Fault.WRAPPED, first, last, abs(step))
     if setpoint is not None and not with_setpoint:
-        return Break(Kind.STEP, first, last, step, step)
+        return Break(Fault.STEP, first, last, step, step)
     samples = step / (speed * dt) if speed else np.inf
     gap = limits.LONGEST_GAP if alike else limits.SHORT_GAP
     if 0.5 < samples <= gap * axis.sample_rate:
-        return Break(Kind.MISSING, first, last, float(round(samples)), step)
-    return Break(Kind.STEP if alike else Kind.JOINED, first, last, step, step)
+        return Break(Fault.MISSING, first, last, float(round(samples)), step)
+    return Break(Fault.STEP if alike else Fault.JOINED, first, last, step, step)
 
 
 def _around(x: Array, first: int, last: int) -> tuple[float, float, float] | None:
@@ -152,47 +137,48 @@ def _around(x: Array, first: int, last: int) -> tuple[float, float, float] | Non
     return float(x[end] - x[begin]) - expected, before, after
 
 
-def _finding(axis: Axis, kind: Kind, found: list[Break]) -> Finding:
-    first, unit = found[0], axis.log.units["position"]
-    largest = max(found, key=lambda b: abs(b.size))
-    size = f"{abs(largest.size):.3g} {unit}"
-    fault, what, remedy = {
-        Kind.MISSING: (
-            Fault.MISSING, f"{largest.size:.0f} samples are missing, the motion goes on behind",
+def _finding(axis: Axis, fault: Fault, found: list[Break]) -> Finding:
+    first, largest = found[0], max(found, key=lambda b: abs(b.size))
+    size = f"{abs(largest.size):.3g} {axis.log.units['position']}"
+    what, remedy = {
+        Fault.MISSING: (
+            f"{largest.size:.0f} samples are missing, the motion goes on behind",
             "import the file with its time stamps, or cut the log there",
         ),
-        Kind.STUCK: (
-            Fault.STUCK,
+        Fault.STUCK: (
             f"the position stands still for {(first.last - first.first) / axis.sample_rate:.3g} s "
             f"and is {size} farther in the next sample: the encoder was stuck",
             "cut the log there, and check the encoder's connection",
         ),
-        Kind.WRAPPED: (
-            Fault.WRAPPED, f"the position goes back by {size} in one sample: its counter wraps",
+        Fault.WRAPPED: (
+            f"the position goes back by {size} in one sample: its counter wraps",
             f"add {size} behind each wrap before the import",
         ),
-        Kind.SAMPLE: (
-            Fault.OUTLIERS, f"samples of the position are off by up to {size}",
+        Fault.OUTLIERS: (
+            f"samples of the position are off by up to {size}",
             "repair these samples, or cut the log there",
         ),
-        Kind.JOINED: (
-            Fault.JOINED, f"position and motion differ on both sides by {size}: logs were joined",
+        Fault.JOINED: (
+            f"position and motion differ on both sides by {size}: logs were joined",
             "import each part as a log of its own",
         ),
-        Kind.STEP: (
-            Fault.STEP, f"the position steps by {size} and goes on as before: counts were lost",
+        Fault.STEP: (
+            f"the position steps by {size} and goes on as before: counts were lost",
             "cut the log there, and check the encoder's connection",
         ),
-        Kind.CLOCK: (
-            Fault.UNEVEN,
+        Fault.UNEVEN: (
             f"the position is off by {size}, less than two samples' motion: a clock skipped",
             "record with the drive's own clock",
         ),
-    }[kind]  # fmt: skip
-    more = f" and {len(found) - 1} more times" if len(found) > 1 else ""
-    where = f"{first.first / axis.sample_rate:.6g} to {first.last / axis.sample_rate:.6g} s{more}"
-    severity = Severity.WARNING if fault is Fault.UNEVEN else Severity.ERROR
-    return Finding(severity, fault, axis.name, what, where, remedy)
+    }[fault]  # fmt: skip
+    told = axis.warning if fault is Fault.UNEVEN else axis.error
+    where = f"{first.first / axis.sample_rate:.6g} to {first.last / axis.sample_rate:.6g} s"
+    return told(fault, what, remedy, where + and_more(len(found)))
+
+
+def and_more(count: int) -> str:
+    """Behind the place of the first of so many."""
+    return f" and {count - 1} more times" if count > 1 else ""
 
 
 def is_uneven(axis: Axis) -> bool:
@@ -214,25 +200,24 @@ def _bends_of_a_clock(axis: Axis) -> NDArray[np.intp]:
 
 def _uneven(axis: Axis) -> Finding:
     bends = _bends_of_a_clock(axis)
-    unit = axis.log.units["position"]
-    return Finding(
-        Severity.WARNING, Fault.UNEVEN, axis.name,
-        f"the position bends by up to {axis.jumps[bends].max():.3g} {unit} at {len(bends)} "
-        "samples all over the log: the clock jitters, or samples are missing",
-        f"from {bends[0] / axis.sample_rate:.6g} s",
+    size = f"{axis.jumps[bends].max():.3g} {axis.log.units['position']}"
+    return axis.warning(
+        Fault.UNEVEN,
+        f"the position bends by up to {size} at {len(bends)} samples all over the log: the clock "
+        "jitters, or samples are missing",
         "record with the drive's own clock, or import with the time stamps",
-    )  # fmt: skip
+        f"from {bends[0] / axis.sample_rate:.6g} s",
+    )
 
 
 def held(axis: Axis, name: str, count: int) -> Finding:
     """A signal that is held for ``count`` samples."""
-    return Finding(
-        Severity.WARNING, Fault.HELD, axis.name,
-        f"{name} changes at every {count}th sample only: it was sampled at "
-        f"{axis.sample_rate / count:g} Hz and held",
-        "whole log",
-        f"record it at {axis.sample_rate:g} Hz, or the log at {axis.sample_rate / count:g} Hz",
-    )  # fmt: skip
+    rate = axis.sample_rate / count
+    return axis.warning(
+        Fault.HELD,
+        f"{name} changes at every {count}th sample only: it was sampled at {rate:g} Hz and held",
+        f"record it at {axis.sample_rate:g} Hz, or the log at {rate:g} Hz",
+    )
 
 
 def check_outliers(axis: Axis) -> Iterator[Finding]:
@@ -312,12 +297,5 @@ def _outliers(
     remedy: str = "cut the log there (was an end stop hit, the carriage touched?)",
 ) -> Finding:
     bursts = np.split(times, np.flatnonzero(np.diff(times) > limits.BURSTS_APART) + 1)
-    more = f" and {len(bursts) - 1} more times" if len(bursts) > 1 else ""
-    return Finding(
-        Severity.ERROR,
-        Fault.OUTLIERS,
-        axis.name,
-        what,
-        f"{bursts[0][0]:.6g} to {bursts[0][-1]:.6g} s{more}",
-        remedy,
-    )
+    where = f"{bursts[0][0]:.6g} to {bursts[0][-1]:.6g} s{and_more(len(bursts))}"
+    return axis.error(Fault.OUTLIERS, what, remedy, where)

@@ -11,9 +11,10 @@ import numpy as np
 from twin.checks import limits
 from twin.checks.axis import Axis
 from twin.checks.explain import Trend, find_lag, fit_dynamics
-from twin.checks.report import Fault, Finding, Severity
+from twin.checks.report import Fault, Finding
 from twin.signals import Array
 
+DEAD_TIME = ", unless the drive has that dead time"
 READINGS = ("position", "velocity", "current", "force")
 
 
@@ -27,13 +28,10 @@ def check_timing(axis: Axis) -> Iterator[Finding]:
     if abs(lag) > allowed:
         dead_time = -limits.PHYSICAL <= lag < 0.0
         late = "force" if lag > 0.0 else "position"
-        yield Finding(
-            Severity.WARNING if dead_time else Severity.ERROR,
+        yield (axis.warning if dead_time else axis.error)(
             Fault.LAG,
-            axis.name,
             f"the force is {_text(axis, lag)} the motion that it causes",
-            "whole log",
-            f"{_remedy(axis, late, lag)}{', unless the drive has that dead time' * dead_time}",
+            f"{_remedy(axis, late, lag)}{DEAD_TIME * dead_time}",
         )
     else:
         yield from _steady(axis)
@@ -68,23 +66,22 @@ def _steady(axis: Axis) -> Iterator[Finding]:
     if trend is None or not axis.dynamics.explains:
         return
     if abs(trend.drift) > max(limits.DRIFT, limits.SURE_LAG * trend.drift_error):
-        yield Finding(
-            Severity.WARNING, Fault.DRIFT, axis.name,
+        yield axis.warning(
+            Fault.DRIFT,
             f"the force gets {abs(trend.drift) * 1e3:.2g} ms a second "
             f"{'later' if trend.drift > 0.0 else 'earlier'} against the position "
             f"({abs(trend.drift) * 1e6:.3g} ppm, +- {trend.drift_error * 1e6:.2g}): two clocks",
-            "whole log", "record both with one clock, or import each with time stamps",
-        )  # fmt: skip
+            "record both with one clock, or import each with time stamps",
+        )
         return
     if _is_steady(axis, trend) and _is_steady(axis, axis.trend_beside_memory):
         late = "force" if trend.seconds > 0.0 else "position"
-        yield Finding(
-            Severity.WARNING, Fault.LAG, axis.name,
+        yield axis.warning(
+            Fault.LAG,
             f"the force is {_text(axis, trend.seconds)} the motion that it causes, "
             f"+- {trend.error * 1e3:.2g} ms",
-            "whole log",
-            f"{_remedy(axis, late, trend.seconds)}, unless the drive has that dead time",
-        )  # fmt: skip
+            f"{_remedy(axis, late, trend.seconds)}{DEAD_TIME}",
+        )
 
 
 def _is_steady(axis: Axis, trend: Trend | None) -> bool:
@@ -105,14 +102,8 @@ def _lag(axis: Axis, signal: Array, other: Array) -> float:
 
 
 def _disagree(axis: Axis, name: str, other: str, late: str, lag: float) -> Finding:
-    return Finding(
-        Severity.WARNING,
-        Fault.LAG,
-        axis.name,
-        f"{name} is {_text(axis, lag)} {other}",
-        "whole log",
-        _remedy(axis, late, lag),
-    )
+    what = f"{name} is {_text(axis, lag)} {other}"
+    return axis.warning(Fault.LAG, what, _remedy(axis, late, lag))
 
 
 def _text(axis: Axis, lag: float) -> str:
@@ -135,19 +126,19 @@ UNKNOWN_SLIP = "a scale or the sample rate is wrong"
 
 @dataclass(frozen=True)
 class _Pair:
-    """A signal and the one that states the same; low, high: their allowed ratio.
+    """A signal and the one that states the same; allowed: their ratio, from and to.
 
-    follows: whether the one states where the other should be, and not where it is.
+    follows: whether the one states where the other should be, and not where it is. zero: whether 0
+    is the same on both sides, as of speeds and not of positions.
     """
 
     name: str
     signal: Array
     other_name: str
     other: Array
-    low: float
-    high: float
+    allowed: tuple[float, float]
     follows: bool = False
-    zero: bool = False  # whether 0 is the same on both sides, as of speeds and not of positions
+    zero: bool = False
 
 
 def check_units(axis: Axis) -> Iterator[Finding]:
@@ -162,39 +153,35 @@ def _travel(axis: Axis) -> Iterator[Finding]:
     for name in ("position", "setpoint_position"):
         travel = np.ptp(axis.log.columns[name]) if name in axis.log.columns else 0.0
         if travel > limits.LONGEST_TRAVEL and not axis.log.kind.rotary:
-            yield Finding(
-                Severity.ERROR,
+            yield axis.error(
                 Fault.UNIT,
-                axis.name,
                 f"{name} travels {travel:.4g} m, more than {limits.LONGEST_TRAVEL:g} m; "
                 f"in mm it would be {travel / 1e3:.4g} m",
-                "whole log",
                 "correct its unit in the import map",
             )
 
 
 def _pairs(axis: Axis) -> Iterator[_Pair]:
     columns, smoother = axis.log.columns, axis.smoother
-    setpoint, velocity = columns.get("setpoint_position"), columns.get("setpoint_velocity")
-    acceleration = columns.get("setpoint_acceleration")
+    setpoint = columns.get("setpoint_position")
     if setpoint is not None:
-        # a controller may follow badly; one that is off by more than 2 does not follow at all
-        yield _Pair("position", smoother.position(columns["position"]), "setpoint_position",
-                    smoother.position(setpoint), 0.5, 2.0, follows=True)  # fmt: skip
-    if "velocity" in columns:
-        yield _Pair("velocity", smoother.rate(columns["velocity"]),
-                    "the rate of position", axis.velocity, 0.95, 1.05, zero=True)  # fmt: skip
-    if setpoint is not None and velocity is not None:
-        yield _Pair("setpoint_velocity", smoother.rate(velocity),
-                    "the rate of setpoint_position", smoother.velocity(setpoint),
-                    0.95, 1.05, zero=True)  # fmt: skip
-    if setpoint is not None and acceleration is not None:
-        yield _Pair("setpoint_acceleration", smoother.rate(acceleration),
-                    "the second rate of setpoint_position", smoother.acceleration(setpoint),
-                    0.9, 1.1)  # fmt: skip
+        goal = smoother.position(setpoint)
+        yield _Pair("position", smoother.position(columns["position"]), "setpoint_position", goal,
+                    limits.FOLLOWS, follows=True)  # fmt: skip
+    rates = {"velocity": ("position", axis.velocity)}
+    if setpoint is not None:
+        rates["setpoint_velocity"] = ("setpoint_position", smoother.velocity(setpoint))
+    for name, (of, rate) in rates.items():
+        if name in columns:
+            yield _Pair(name, smoother.rate(columns[name]), f"the rate of {of}", rate,
+                        limits.SAME_RATE, zero=True)  # fmt: skip
+    if setpoint is not None and "setpoint_acceleration" in columns:
+        name = "setpoint_acceleration"
+        yield _Pair(name, smoother.rate(columns[name]), "the second rate of setpoint_position",
+                    smoother.acceleration(setpoint), limits.SAME_SECOND_RATE)  # fmt: skip
     if {"force", "current"} <= set(columns) and axis.log.force_constant is not None:
         yield _Pair("force", columns["force"], "force constant x current",
-                    axis.log.force_constant * columns["current"], 0.98, 1.02)  # fmt: skip
+                    axis.log.force_constant * columns["current"], limits.SAME_FORCE)  # fmt: skip
 
 
 def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
@@ -208,7 +195,7 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
     if abs(product) < limits.RELATED * np.sqrt(power * float(one @ one)):
         return
     ratio = product / power
-    if pair.low <= ratio <= pair.high:
+    if pair.allowed[0] <= ratio <= pair.allowed[1]:
         return
     if ratio < 0.0:
         fault, looks = Fault.SIGN, "one of them is reversed"
@@ -216,19 +203,16 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
         fault, looks = Fault.UNIT, _looks_like(ratio)
         if looks == UNKNOWN_SLIP and pair.follows and axis.soft_loop:
             return
-    yield Finding(
-        Severity.ERROR,
+    yield axis.error(
         fault,
-        axis.name,
         f"{pair.name} is {ratio:.4g} times {pair.other_name}: {looks}",
-        "whole log",
         "correct unit, scale, sign or sample rate in the import map",
     )
 
 
 def _looks_like(ratio: float) -> str:
     for size, text in _SLIPS.items():
-        if abs(np.log(ratio * size)) < 0.3 or abs(np.log(ratio / size)) < 0.3:
+        if min(abs(np.log(ratio * size)), abs(np.log(ratio / size))) < limits.LOOKS_LIKE:
             return f"it looks like {text}"
     return UNKNOWN_SLIP
 
@@ -239,13 +223,10 @@ def _reversed_force(axis: Axis) -> Iterator[Finding]:
     fit = axis.dynamics
     if fit.explains and fit.mass_matters and fit.mass < 0.0:
         units = axis.log.kind
-        yield Finding(
-            Severity.ERROR,
+        yield axis.error(
             Fault.SIGN,
-            axis.name,
             f"the force acts against the acceleration, as if the "
             f"{units.mass_name} were {fit.mass:.3g} {units.mass}",
-            "whole log",
             "give the force or the position the sign -1 in the import map",
         )
 
@@ -260,12 +241,12 @@ def check_crossed(axes: Sequence[Axis]) -> Iterator[Finding]:
         if own < limits.WORSE * crossed or crossed > limits.EXPLAINED_CROSSED:
             continue
         what = "positions" if _follows(one, other) and _follows(other, one) else "forces"
-        yield Finding(
-            Severity.ERROR, Fault.SWAPPED, one.name,
+        yield one.error(
+            Fault.SWAPPED,
             f"the motion of axis {other.name} leaves {100 * crossed:.2g} % of this force, "
             f"its own {100 * own:.2g} %: {what} of axes {one.name} and {other.name} are swapped",
-            "whole log", f"exchange the columns of the {what} of both axes in the import map",
-        )  # fmt: skip
+            f"exchange the columns of the {what} of both axes in the import map",
+        )
 
 
 def _left(force: Axis, motion: Axis) -> float:

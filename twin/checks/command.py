@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from twin.checks import limits
 from twin.checks.axis import Axis
-from twin.checks.breaks import held
-from twin.checks.report import Fault, Finding, Severity
+from twin.checks.breaks import and_more, held
+from twin.checks.report import Fault, Finding
 from twin.signals import Array
 
 
@@ -26,12 +26,12 @@ def check_command(axis: Axis) -> Iterator[Finding]:
     steps = np.abs(np.diff(force)).max()  # a sample off its neighbours is off one beside it
     if steps > least and len(single := _single(off := off_course(force), least)):
         first = single[0] / axis.sample_rate
-        more = f" and {len(single) - 1} more times" if len(single) > 1 else ""
-        yield Finding(
-            Severity.ERROR, Fault.OUTLIERS, axis.name,
+        yield axis.error(
+            Fault.OUTLIERS,
             f"single samples of the force are off by up to {off.max():.3g} {unit}",
-            f"{first:.6g} s{more}", "repair these samples, or cut the log there",
-        )  # fmt: skip
+            "repair these samples, or cut the log there",
+            f"{first:.6g} s{and_more(len(single))}",
+        )
     yield from _noise(axis)
 
 
@@ -40,9 +40,8 @@ def _single(off: Array, least: float) -> NDArray[np.intp]:
     bad = off > least
     if not bad.any():
         return np.flatnonzero(bad)
-    bad &= off > limits.SINGLE_SAMPLE * float(
-        np.quantile(off, 0.99)
-    )  # one at a steep edge is off by as much
+    # A sample at a steep edge is off by as much as its neighbours.
+    bad &= off > limits.SINGLE_SAMPLE * float(np.quantile(off, 0.99))
     together = np.convolve(bad, np.ones(limits.NOISE_BURST), "same")
     return np.flatnonzero(bad & (together <= limits.MOST_TOGETHER))  # noise is no single sample
 
@@ -55,13 +54,13 @@ def _noise(axis: Axis) -> Iterator[Finding]:
     if not axis.dynamics.explains or averaged < limits.HIDES * left:
         return
     if noise > limits.NOISY * float(np.std(axis.log.force)):
-        yield Finding(
-            Severity.WARNING, Fault.NOISE, axis.name,
+        yield axis.warning(
+            Fault.NOISE,
             f"the force has noise of {noise:.3g} {unit} rms from sample to sample, {averaged:.2g} "
             f"{unit} over {axis.smoother.length * 1e3:.2g} ms: about all that is left of it beside "
             "the motion",
-            "whole log", "record the command that the controller computed, or shield the cable",
-        )  # fmt: skip
+            "record the command that the controller computed, or shield the cable",
+        )
 
 
 def off_course(signal: Array) -> Array:
@@ -86,14 +85,12 @@ def check_saturation(axis: Axis) -> Iterator[Finding]:
         stuck = _exactly(axis, force, extreme) or _but_for_noise(axis, sign * axis.force)
         if stuck:
             first, seconds = stuck
-            yield Finding(
-                Severity.WARNING,
+            yield axis.warning(
                 Fault.SATURATION,
-                axis.name,
                 f"the force stays at its extreme of {extreme:.4g} {axis.log.units['force']} for "
                 f"{seconds:.3g} s in all",
-                f"from {first:.6g} s",
                 "move more gently if the drive was at its limit, and record its actual force",
+                f"from {first:.6g} s",
             )
 
 

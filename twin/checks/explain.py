@@ -1,14 +1,104 @@
-"""A command explained by the motion: a rough model of the axis, and lags."""
+"""Signals made comparable by a low-pass, and a command explained by the motion, with its lag."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import cached_property
+from itertools import combinations, pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.checks import limits
-from twin.signals import Array, sliding_products
+from twin.signals import Array, between, rate, sliding_products
+
+
+@dataclass(frozen=True)
+class Smoother:
+    """Low-pass of signals sampled every ``period`` (s), by which all are put on one slow clock.
+
+    Blocks of whole samples keep position and held command aligned: over a block the command acts,
+    the mean velocity is the difference of the positions at its two ends.
+    """
+
+    period: float
+
+    @cached_property
+    def samples(self) -> int:
+        """Samples in a block."""
+        return max(round(limits.BLOCK / self.period), 1)
+
+    @property
+    def block(self) -> float:
+        """Length of a block in s."""
+        return self.samples * self.period
+
+    @cached_property
+    def weights(self) -> Array:
+        """(w,) weights (1 - r^2)^2 of the low-pass, of unit sum."""
+        count = max(round(limits.WINDOW / self.block), limits.FEWEST_BLOCKS) | 1
+        r = (2.0 * np.arange(count) - (count - 1)) / (count + 1)
+        phi = (1.0 - r**2) ** 2
+        return np.asarray(phi / phi.sum())
+
+    @property
+    def length(self) -> float:
+        """Length of the low-pass in s."""
+        return len(self.weights) * self.block
+
+    def position(self, x: Array) -> Array:
+        """Position (n,) -> low-passed, in the middle of each block (m,)."""
+        edges = self._edges(x)
+        return self._low_pass(0.5 * (edges[1:] + edges[:-1]))
+
+    def velocity(self, x: Array) -> Array:
+        """Position (n,) -> low-passed velocity (m,)."""
+        return self._low_pass(self._block_velocity(x))
+
+    def acceleration(self, x: Array) -> Array:
+        """Position (n,) -> low-passed acceleration (m,); the ends repeat their neighbours."""
+        return self._low_pass(rate(self._block_velocity(x), self.block))
+
+    def direction(self, x: Array, slow: float) -> Array:
+        """Position (n,) -> low-passed sign of the velocity (m,), rounded off below ``slow``."""
+        return self._low_pass(np.tanh(self._block_velocity(x) / slow))
+
+    def held(self, u: Array) -> Array:
+        """Signal held over each sample (n,) -> low-passed (m,)."""
+        count = (len(u) - 1) // self.samples
+        means = u[: count * self.samples].reshape(count, self.samples).mean(axis=1)
+        return self._low_pass(means)
+
+    def rate(self, v: Array) -> Array:
+        """Signal read at each sample (n,) -> low-passed mean over each block (m,)."""
+        return self.held(0.5 * (v + np.append(v[1:], v[-1])))
+
+    def time(self, index: NDArray[np.intp]) -> Array:
+        """Times (k,) in s of the middle of low-passed samples ``index`` (k,)."""
+        return np.asarray((index + 0.5 * len(self.weights)) * self.block)
+
+    def held_noise(self, noise: float) -> float:
+        """Noise of ``held`` where that of the signal is white, of rms ``noise``."""
+        return float(noise / self.samples**0.5 * np.linalg.norm(self.weights))
+
+    def velocity_noise(self, noise: float) -> float:
+        """Noise of ``velocity`` where that of the position is white, of rms ``noise``."""
+        return float(noise / self.block * np.linalg.norm(np.convolve(self.weights, [1.0, -1.0])))
+
+    def acceleration_noise(self, noise: float) -> float:
+        """Noise of ``acceleration``, likewise."""
+        kernel = np.convolve(np.convolve(self.weights, [1.0, -1.0]), [0.5, 0.0, -0.5])
+        return float(noise / self.block**2 * np.linalg.norm(kernel))
+
+    def _block_velocity(self, x: Array) -> Array:
+        return between(self._edges(x), self.block)
+
+    def _edges(self, x: Array) -> Array:
+        count = (len(x) - 1) // self.samples
+        return x[: count * self.samples + 1 : self.samples]
+
+    def _low_pass(self, signal: Array) -> Array:
+        return np.convolve(signal, self.weights, "valid")
 
 
 @dataclass(frozen=True)
@@ -69,38 +159,42 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
     """
     reach = min(round(limits.LONGEST_LAG / block), len(signal) // limits.MOTION_OVER_LAG)
     inner = slice(reach, len(signal) - reach)
-    weights = kept[inner]
-    columns = _unit_columns(explained_by[inner] * weights[:, None])
+    columns = explained_by[inner] * kept[inner, None]
+    length = np.linalg.norm(columns, axis=0)
+    columns = columns / np.where(length > 0.0, length, 1.0)
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-12, hermitian=True)
     centred = signal - signal.mean()
-    total = sliding_products(centred**2, weights)
+    total = sliding_products(centred**2, kept[inner])
     products = sliding_products(centred, columns.T)
-    found = np.einsum("ij,ij->j", products, inverse @ products)
-    residual = np.maximum(total - found, 0.0)
-    dips = 1 + np.flatnonzero((residual[1:-1] <= residual[:-2]) & (residual[1:-1] < residual[2:]))
-    if not len(dips):
-        return Lag(0.0, False)
-    # a dip lies between two samples: the parabola through three of them has its bottom there
-    below, at, above = residual[dips - 1], residual[dips], residual[dips + 1]
-    bend = below - 2.0 * at + above  # above 0, as a dip is lower than the one behind it
-    fraction = 0.5 * (below - above) / bend
-    bottom = np.maximum(at - 0.25 * (below - above) * fraction, 0.0)
-    least = min(bottom.min(), residual.min())  # the latter where it falls to an end
+    residual = np.maximum(total - np.einsum("ij,ij->j", products, inverse @ products), 0.0)
+    dips, fraction, bottom = _dips(residual)
+    least = min(bottom.min(initial=np.inf), residual.min())  # the latter where it falls to an end
     good = (bottom <= limits.AS_GOOD_LAG**2 * least) | (bottom <= limits.WRONG_LAG**2 * total[dips])
     if not good.any():
         return Lag(0.0, False)
-    dips, fraction = dips[good], fraction[good]
-    nearest = int(np.argmin(np.abs(dips - reach)))  # a periodic motion has several
-    best, at = int(dips[nearest]), residual[dips[nearest]]
+    nearest = int(np.argmin(np.abs(dips[good] - reach)))  # a periodic motion has several
+    best = int(dips[good][nearest])
     clear = (
-        at < limits.CLEAR_LAG**2 * total[best]
+        residual[best] < limits.CLEAR_LAG**2 * total[best]
         and residual[reach] > limits.WRONG_LAG**2 * total[reach]
-        and at < limits.BETTER_LAG**2 * residual[reach]
+        and residual[best] < limits.BETTER_LAG**2 * residual[reach]
     )
-    samples = float(best - reach + fraction[nearest])
+    samples = float(best - reach + fraction[good][nearest])
     return Lag(
         samples * block, bool(clear) and abs(samples) <= limits.OF_A_PERIOD * _period(centred)
     )
+
+
+def _dips(residual: Array) -> tuple[NDArray[np.intp], Array, Array]:
+    """Samples (k,) of the dips, by what part of one the bottom lies behind each, and its height.
+
+    A dip lies between two samples: the parabola through three of them has its bottom there.
+    """
+    dips = 1 + np.flatnonzero((residual[1:-1] <= residual[:-2]) & (residual[1:-1] < residual[2:]))
+    below, at, above = residual[dips - 1], residual[dips], residual[dips + 1]
+    bend = below - 2.0 * at + above  # above 0, as a dip is lower than the one behind it
+    fraction = 0.5 * (below - above) / bend
+    return dips, fraction, np.maximum(at - 0.25 * (below - above) * fraction, 0.0)
 
 
 @dataclass(frozen=True)
@@ -128,11 +222,8 @@ def find_trend(signal: Array, explained_by: Array, kept: Array, block: float) ->
     times = times - times.mean()
     middle = float(np.median(lags))
     spread = 1.4826 * float(np.median(np.abs(lags - middle)))
-    slopes = [
-        (lags[j] - lags[i]) / (times[j] - times[i])
-        for i in range(len(lags)) for j in range(i + 1, len(lags))
-    ]  # fmt: skip
-    drift = float(np.median(slopes))
+    pairs = combinations(range(len(lags)), 2)
+    drift = float(np.median([(lags[j] - lags[i]) / (times[j] - times[i]) for i, j in pairs]))
     left = 1.4826 * float(np.median(np.abs(lags - middle - drift * times)))
     length = float(np.linalg.norm(times))
     return Trend(middle, 1.25 * spread / len(lags) ** 0.5, drift, 1.25 * left / length)
@@ -152,8 +243,3 @@ def _period(signal: Array) -> float:
         return float("inf")
     again = np.flatnonzero(alike[below[0] :] > limits.REPEATS)
     return float(below[0] + again[0]) if len(again) else float("inf")
-
-
-def _unit_columns(matrix: Array) -> Array:
-    length = np.linalg.norm(matrix, axis=0)
-    return matrix / np.where(length > 0.0, length, 1.0)

@@ -4,6 +4,12 @@ They are told by drives whose faults are known (tests/twin/checks): sound ones p
 named from the size on that a fit would notice.
 """
 
+# The low-pass at which signals are compared
+
+BLOCK = 1e-3  # s: what is faster is noise to an identification of friction
+WINDOW = 20e-3  # s, full length; shorter, the noise of usual encoders hides the acceleration
+FEWEST_BLOCKS = 8  # in a window, so that its shape is smooth at any rate
+
 # An axis in motion, and what its command is explained by
 
 IMPOSSIBLE = 4.0  # times the acceleration that 99 % of the samples stay below
@@ -95,6 +101,12 @@ SURE_LAG = 5.0  # times its error, that a lag or a drift must be
 DRIFT = 60e-6  # s/s; two quartz clocks differ by less
 FOLLOWING = 30e-3  # s, what a slow position loop may account for
 LONGEST_TRAVEL = 10.0  # m; farther, the unit is wrong
+# Allowed ratios, from and to, of two signals that state the same
+FOLLOWS = (0.5, 2.0)  # a position and its setpoint; off by more, no controller follows at all
+SAME_RATE = (0.95, 1.05)  # a velocity and the rate of a position, which the low-pass rounds alike
+SAME_SECOND_RATE = (0.9, 1.1)  # an acceleration and the second rate, whose noise is larger
+SAME_FORCE = (0.98, 1.02)  # a force and its current: one scale, with no filter between
+LOOKS_LIKE = 0.3  # of the logarithm: how near to a known slip of units a ratio is named so
 RELATED = 0.9  # correlation of two signals that state the same
 WORSE = 1.2  # times what the motion of the other axis leaves of a force, its own leaves
 EXPLAINED_CROSSED = 0.6  # largest part that the motion of the other axis leaves

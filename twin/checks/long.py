@@ -1,18 +1,25 @@
-"""The check of a log that is too long for memory: part by part, and what the parts agree on."""
+"""A log that is too long for memory: checked, measured and described part by part."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from twin.checks import check_log
-from twin.checks.report import CheckReport, Fault, Finding
-from twin.logs.decode import read_parts, samples_by_axis, verified_parts
-from twin.logs.log import Log, joined, thinned
+import numpy as np
 
-_OF_THE_WHOLE = (Fault.FLAT, Fault.WEAK_EXCITATION, Fault.COARSE_POSITION)  # not of each part
-_WHOLE = "whole log"
+from twin.checks import check_log
+from twin.checks.report import WHOLE, CheckReport, Fault, Finding, Severity
+from twin.logs.decode import read_parts, samples_by_axis, verified_parts
+from twin.logs.log import Array, Log, joined, thinned
+
+OF_THE_WHOLE = (Fault.FLAT, Fault.WEAK_EXCITATION, Fault.COARSE_POSITION)  # not of each part
+# Samples, all axes together. A check takes 130 bytes a sample beside 0.1 GB for the program.
+LARGEST_PART = 2_500_000
+# A fit takes some 75 bytes a sample and more for each millisecond of motion, which no rate changes.
+MOST_SAMPLES = 7_500_000
+LONGEST_STEP = 5e-4  # s: two in a block of motion; with one the residual is half as large again
+OWN = ("sample_rate_hz", "axes", "schema_version")  # metadata that are told as something else
 
 
 @dataclass(frozen=True)
@@ -31,39 +38,28 @@ def together(parts: Sequence[Part]) -> CheckReport:
     """
     if len(parts) == 1:
         return parts[0].report
-    found: dict[tuple[str, Fault], list[tuple[Part, Finding]]] = {}
+    found: dict[tuple[str, Fault], dict[float, tuple[Part, Finding]]] = {}
     for part in parts:
-        for finding in _once(part.report.findings):
-            found.setdefault((finding.axis, finding.fault), []).append((part, finding))
+        for f in part.report.findings:
+            found.setdefault((f.axis, f.fault), {}).setdefault(part.start, (part, f))
     return CheckReport(
         tuple(
-            _said(seen, len(parts))
+            _said(list(seen.values()), len(parts))
             for (_, fault), seen in found.items()
-            if fault not in _OF_THE_WHOLE or len(seen) == len(parts)
+            if fault not in OF_THE_WHOLE or len(seen) == len(parts)
         )
     )
 
 
-def _once(findings: Iterable[Finding]) -> list[Finding]:
-    return list({(f.axis, f.fault): f for f in reversed(list(findings))}.values())[::-1]
-
-
 def _said(seen: Sequence[tuple[Part, Finding]], parts: int) -> Finding:
     """A fault that was seen in some parts, of its worst severity."""
-    part, first = next(((p, f) for p, f in seen if f.severity.value == "error"), seen[0])
-    if first.where == _WHOLE and len(seen) == parts:
+    part, first = next(((p, f) for p, f in seen if f.severity is Severity.ERROR), seen[0])
+    if first.where == WHOLE and len(seen) == parts:
         return first
     place = f"{part.start:g} to {part.stop:g} s"
-    where = place if first.where == _WHOLE else f"{first.where} into the part from {place}"
+    where = place if first.where == WHOLE else f"{first.where} into the part from {place}"
     more = len(seen) - 1
     return replace(first, where=where + (f", and in {more} other parts" if more else ""))
-
-
-# Samples, all axes together. A check takes 130 bytes a sample beside 0.1 GB for the program.
-LARGEST_PART = 2_500_000
-# A fit takes some 75 bytes a sample and more for each millisecond of motion, which no rate changes.
-MOST_SAMPLES = 7_500_000
-LONGEST_STEP = 5e-4  # s: two in a block of motion; with one the residual is half as large again
 
 
 def check_file(path: Path) -> CheckReport:
@@ -127,3 +123,67 @@ def _thinned(parts: Iterable[Log], every: int) -> Iterator[Log]:
         count = len(whole) // step * step
         held = whole.part(count, len(whole)).copied() if count < len(whole) else None
         yield thinned(whole.part(0, count), step)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A signal of an axis with its unit, its least and its largest value."""
+
+    name: str
+    unit: str
+    least: float
+    most: float
+
+
+@dataclass(frozen=True)
+class AxisInfo:
+    """The signals of an axis. kind: linear or rotary; constant: force constant and unit, if any."""
+
+    kind: str
+    channels: tuple[Channel, ...]
+    constant: tuple[float, str] | None
+
+
+@dataclass(frozen=True)
+class LogInfo:
+    """What is in a log. sample_rate: Hz; metadata: what its writer said; check: its findings."""
+
+    samples: int
+    sample_rate: float
+    axes: Mapping[str, AxisInfo]
+    metadata: Mapping[str, str]
+    check: CheckReport
+
+    @property
+    def duration(self) -> float:
+        """Number of samples / sample rate, s."""
+        return self.samples / self.sample_rate
+
+
+def log_info(path: str | Path) -> LogInfo:
+    """What is in a log, which is read part by part. Raises InputError where it cannot be read."""
+    samples = 0
+    reports: list[Part] = []
+    ranges: dict[tuple[str, str], tuple[float, float]] = {}
+    for part in _checked(_parts(Path(path)), reports):
+        samples += len(part)
+        for axis, own in part.axes.items():
+            for name, column in own.columns.items():
+                ranges[axis, name] = _wider(column, ranges.get((axis, name)))
+    metadata = {name: value for name, value in part.metadata.items() if name not in OWN}
+    axes = {name: _axis(part, name, ranges) for name in part.axes}
+    return LogInfo(samples, part.sample_rate, axes, metadata, together(reports))
+
+
+def _wider(column: Array, known: tuple[float, float] | None) -> tuple[float, float]:
+    low, high = float(np.min(column)), float(np.max(column))
+    return (low, high) if known is None else (min(low, known[0]), max(high, known[1]))
+
+
+def _axis(log: Log, name: str, ranges: Mapping[tuple[str, str], tuple[float, float]]) -> AxisInfo:
+    own = log.axes[name]
+    channels = tuple(Channel(n, own.units[n], *ranges[name, n]) for n in own.columns)
+    constant = own.force_constant
+    return AxisInfo(
+        own.kind.kind, channels, None if constant is None else (constant, own.kind("N/A"))
+    )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+WHOLE = "whole log"
+
 
 class Severity(Enum):
     """ERROR: do not fit this log. WARNING: it limits what a fit can identify."""

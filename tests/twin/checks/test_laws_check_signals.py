@@ -7,8 +7,8 @@ of its rows, measured with unit impulses; a lag that is put in is the lag that i
 import numpy as np
 import pytest
 
-from twin.checks.explain import find_lag, fit_dynamics
-from twin.checks.smooth import BLOCK, WINDOW, Smoother
+from twin.checks.explain import Smoother, find_lag, fit_dynamics
+from twin.checks.limits import BLOCK, WINDOW
 from twin.signals import white_noise
 
 RATES = (200.0, 1000.0, 1500.0, 4000.0)

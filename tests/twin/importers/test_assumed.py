@@ -11,7 +11,7 @@ from import_cases import mapping, write_csv
 from scipy.io import savemat
 
 from twin.checks import Fault, check_log
-from twin.checks.assumed import assumptions
+from twin.checks.content import assumptions
 from twin.importers import import_log
 from twin.importers.guess import guess_map
 from twin.logs import read_log, write_log
