@@ -51,7 +51,7 @@ def everything() -> None:
     _write(GENERATED / "gallery.md", gallery(catalogue))
     _write(GENERATED / "commands.md", commands())
     _write(GENERATED / "faults.md", "".join(f"- {fault.value}\n" for fault in Fault))
-    for name in ("model", "map"):
+    for name in ("model", "map", "answers"):
         schema = json.loads((SCHEMAS / f"{name}.schema.json").read_text(encoding="utf-8"))
         _write(GENERATED / f"{name}.md", schema_tables(schema))
 

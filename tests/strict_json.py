@@ -1,28 +1,41 @@
-"""JSON of results as a strict reader gets it, and what fits and diagnoses have in common of it."""
+"""JSON of results as a strict reader gets it: valid against the schema that ships."""
+
+from __future__ import annotations
 
 import json
+from functools import cache
+from typing import Any
 
-from identify.output.machine import plain
+from jsonschema import Draft202012Validator
+
+from identify.output.as_json import FILE, json_of
 
 
-def strict(found):
+def strict(found: Any) -> Any:
     """The object after its way through text, which knows no NaN and no infinity."""
 
-    def refuse(constant):
+    def refuse(constant: str) -> None:
         raise AssertionError(f"{constant} is no JSON")
 
-    return json.loads(json.dumps(plain(found)), parse_constant=refuse)
+    return json.loads(json.dumps(found), parse_constant=refuse)
 
 
-def expected_refit(changed):
-    """What is said of the parameters that a fit moves."""
-    return {
-        "force_error_as_given": changed.given, "force_error": changed.refitted, "force_unit": "N",
-        "changed": [
-            {
-                "parameter": c.label, "before": c.before, "after": c.after, "unit": c.unit,
-                "force": c.force, "force_unit": "N", "same_force_as": list(c.alike),
-            }
-            for c in changed.changes
-        ],
-    }  # fmt: skip
+def told(result: Any, **more: Any) -> Any:
+    """What the command of a result prints with --json, without its place in the schema."""
+    return valid(strict(json_of(result, **more)))
+
+
+def valid(found: dict[str, Any]) -> dict[str, Any]:
+    """The object of a command, without its place in the schema, against which it is held."""
+    place = found.pop("schema")
+    identifier, _, at = place.partition("#")
+    assert identifier == shipped()["$id"]
+    within = {**shipped(), "anyOf": [{"$ref": f"#{at}"}]}
+    Draft202012Validator(within).validate({"schema": place, **found})
+    return found
+
+
+@cache
+def shipped() -> dict[str, Any]:
+    """The JSON schema of answers, as it ships."""
+    return json.loads(FILE.read_text(encoding="utf-8"))

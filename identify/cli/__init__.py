@@ -9,12 +9,12 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from identify.cli import agree, doctor, example, logs, loop, machine, plan
+from identify.cli import doctor, loop, machine
 from identify.cli.shared import app
 from twin.errors import InputError
 from twin.threads import VARIABLES
 
-__all__ = ["agree", "doctor", "example", "logs", "loop", "machine", "main", "plan"]
+__all__ = ["doctor", "loop", "machine", "main"]
 
 OBJECTS = 100_000  # that may be made before cycles among them are sought
 INTERRUPTED = 130  # exit code that typer makes of Ctrl-C, without a word
@@ -92,5 +92,7 @@ def fail(message: str) -> int:
     line = " ".join(message.split())
     print(f"twin: {line}", file=sys.stderr)
     if "--json" in sys.argv[1:]:
-        print(json.dumps({"error": line}))
+        from identify.output.answers.machine import ErrorAnswer
+
+        print(json.dumps(ErrorAnswer(error=line).entries()))
     return 2

@@ -45,12 +45,11 @@ def doctor(as_json_: Json = False) -> None:
 
     Example: twin doctor
     """
+    from identify.output.answers.machine import DoctorAnswer
+
     lines = [look() for look in LOOKS]
-    told = [
-        {"about": n.about, "found": n.found, "remedy": n.remedy, "needed": n.needed} for n in lines
-    ]
     ok = not any(line.needed and line.remedy for line in lines)
-    say("\n".join(map(str, lines)), {"ok": ok, "lines": told}, as_json_)
+    say("\n".join(map(str, lines)), DoctorAnswer.of(ok=ok, lines=lines), as_json_)
     if not ok:
         raise typer.Exit(1)
 

@@ -1,9 +1,11 @@
-"""Commands of the loop: fit, compare, diagnose, add, demo."""
+"""Commands of the loop: fit, compare, diagnose, add, agree, plan, demo."""
 
 from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -15,28 +17,34 @@ from identify.cli.apart import require_apart
 from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
     MEANINGLESS,
+    CheckedRecordings,
     Effects,
     FitLogs,
     Holdout,
     Json,
     Logs,
     Model,
+    ModelOption,
+    Recordings,
+    Report,
     Test,
     TestFunction,
     app,
     catalogue_with,
     left_out,
     machine_model,
-    read_checked,
-    require_folder,
     require_report,
     say,
-    unconfirmed,
+    tell,
     with_roles,
 )
+from twin.errors import InputError
+from twin.files import require_writable
 
 if TYPE_CHECKING:
-    from identify.output.report import Source
+    from identify.experiment_design.rival_hypotheses import Rival
+    from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
+    from twin.effects import Catalogue
 
 
 class Objective(StrEnum):
@@ -69,44 +77,32 @@ def fit(
     Example: twin fit proton_xy fit.mcap --holdout held.mcap -o fitted.toml
     """
     from identify import workflow
-    from identify.output import as_json
-    from identify.output import text as as_text
-    from identify.output.as_json import simulation_fit_json
     from identify.output.words.fit import objectives_in_words
     from twin.model.file import save_model
 
     if out:
-        require_folder(out)
+        require_writable(out)
     catalogue = catalogue_with(effects)
-    result, findings, silent = with_roles(
+    fitted, findings, silent = with_roles(
         partial(workflow.fit, catalogue=catalogue, test_function=test_function),
         machine_model(model, catalogue), logs, holdout, test, MEANINGLESS,
     )  # fmt: skip
-    fitted, text, found = result.model, as_text.fit_text(result), as_json.fit_json(result)
-    alarms: list[str] = []
+    warnings = [*findings, *silent]
+    result: FitResult | SimulationFit = fitted
     if objective is Objective.SIMULATION:
         with progress_on_stderr() as progress:
-            refined = workflow.fit_simulation(result, progress=progress)
-        fitted, text, found = refined.model, str(refined), simulation_fit_json(refined)
-        alarms = objectives_in_words(refined)
-        found |= {"objectives_disagree": alarms}
+            result = moved = workflow.fit_simulation(fitted, progress=progress)
+        warnings += objectives_in_words(moved)
     if out:
-        save_model(fitted, out)
-    say(text, {**found, "left_out": silent}, as_json_, [*findings, *silent, *alarms])
-
-
-def source_of(model: str) -> Source:
-    """What a page is made of, as it stands in the command line."""
-    from identify.output.report import Source
-
-    return Source(shlex.join(["twin", *sys.argv[1:]]), model)
+        save_model(result.model, out)
+    tell(result, as_json_, warnings, left_out=silent)
 
 
 @app.command()
 def compare(
     model: Model,
     logs: Logs,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")] = None,
+    out: Report = None,
     mcap: Annotated[
         Path | None,
         typer.Option(help="The first log measured, modelled and their difference, as MCAP."),
@@ -120,29 +116,18 @@ def compare(
     Example: twin compare fitted.toml test.mcap -o report.html
     """
     from identify import workflow
-    from identify.output import as_json
-    from identify.output import text as as_text
 
-    if out:
-        require_report(out)
+    require_report(out)
     if mcap:
-        require_folder(mcap)
-    machine = machine_model(model, catalogue_with(effects))
-    recorded, findings = read_checked(logs)
+        require_writable(mcap)
+    machine, recorded = machine_model(model, catalogue_with(effects)), CheckedRecordings(logs)
     with progress_on_stderr() as progress, left_out() as silent:
         result = workflow.compare(machine, recorded, test_function=test_function, progress=progress)
-    if out:
-        from identify.output.report import write_report
-
-        write_report(
-            out, title=f"{machine.name}: model against measurement", diagnosis=None,
-            comparison=result, history=machine.history, assumed=unconfirmed(findings),
-            source=source_of(model),
-        )  # fmt: skip
+    title = f"{machine.name}: model against measurement"
+    _report(out, title, model, None, result, recorded.findings)
     if mcap:
         workflow.side_by_side_of(result).write(mcap)
-    told = {**as_json.compare_json(result), "left_out": silent}
-    say(as_text.compare_text(result), told, as_json_, [*findings, *silent])
+    tell(result, as_json_, [*recorded.findings, *silent], left_out=silent)
 
 
 @app.command()
@@ -151,7 +136,7 @@ def diagnose(
     logs: FitLogs,
     holdout: Holdout = None,
     test: Test = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")] = None,
+    out: Report = None,
     test_function: TestFunction = None,
     effects: Effects = None,
     as_json_: Json = False,
@@ -161,30 +146,37 @@ def diagnose(
     Example: twin diagnose fitted.toml fit.mcap --holdout held.mcap -o diagnosis.html
     """
     from identify import workflow
-    from identify.output import as_json
-    from identify.output import text as as_text
 
-    if out:
-        require_report(out)
+    require_report(out)
     catalogue = catalogue_with(effects)
     machine = machine_model(model, catalogue)
-    result, findings, silent = with_roles(
-        partial(workflow.diagnose, catalogue=catalogue, test_function=test_function),
-        machine,
-        logs,
-        holdout,
-        test,
-    )
-    if out:
-        from identify.output.report import write_report
+    job = partial(workflow.diagnose, catalogue=catalogue, test_function=test_function)
+    result, findings, silent = with_roles(job, machine, logs, holdout, test)
+    title = f"{machine.name}: what the model lacks"
+    _report(out, title, model, result, result.comparison, findings)
+    told = {"data_faults": findings, "left_out": silent}
+    tell(result, as_json_, [*findings, *silent], **told)
 
-        write_report(
-            out, title=f"{machine.name}: what the model lacks", diagnosis=result,
-            comparison=result.comparison, history=result.model.history,
-            assumed=unconfirmed(findings), source=source_of(model),
-        )  # fmt: skip
-    told = {**as_json.diagnose_json(result, findings), "left_out": silent}
-    say(as_text.diagnose_text(result), told, as_json_, [*findings, *silent])
+
+def _report(
+    out: Path | None,
+    title: str,
+    name: str,
+    diagnosis: Diagnosis | None,
+    comparison: Comparison,
+    findings: Sequence[str],
+) -> None:
+    """Write the report that was asked for; name: of the given model; findings: on the logs."""
+    if out is None:
+        return
+    from identify.output.report import Source, write_report
+
+    model = comparison.model if diagnosis is None else diagnosis.model
+    write_report(
+        out, title=title, diagnosis=diagnosis, comparison=comparison, history=model.history,
+        assumed=[line for line in findings if "the import map assumes" in line],
+        source=Source(shlex.join(["twin", *sys.argv[1:]]), name),
+    )  # fmt: skip
 
 
 @app.command()
@@ -211,11 +203,9 @@ def add(
     Example: twin add cogging fitted.toml fit.mcap --holdout held.mcap -o better.toml
     """
     from identify import workflow
-    from identify.output import as_json
-    from identify.output import text as as_text
     from twin.model.file import save_model
 
-    require_folder(out)
+    require_writable(out)
     catalogue = catalogue_with(effects)
     chosen, made = catalogue[effect], workflow.add_shape if shape else workflow.add
     result, findings, silent = with_roles(
@@ -223,17 +213,104 @@ def add(
         machine_model(model, catalogue), logs, holdout, test, MEANINGLESS,
     )  # fmt: skip
     save_model(result.model, out)
-    told = {**as_json.add_json(result), "left_out": silent}
-    say(as_text.add_text(result), told, as_json_, [*findings, *silent])
+    tell(result, as_json_, [*findings, *silent], left_out=silent)
     if not result.kept:
         raise typer.Exit(1)
+
+
+@app.command()
+def agree(
+    a: Annotated[str, typer.Argument(metavar="A", help="Fitted model (.toml).")],
+    b: Annotated[str, typer.Argument(metavar="B", help="Fitted model (.toml).")],
+    effects: Effects = None,
+    as_json_: Json = False,
+) -> None:
+    """Say whether two fits agree within their uncertainties; exit code 1 where they do not.
+
+    Example: twin agree monday.toml friday.toml
+    """
+    from identify import workflow
+
+    catalogue = catalogue_with(effects)
+    fits = [machine_model(name, catalogue) for name in (a, b)]
+    with progress_on_stderr() as progress:
+        progress("comparing the fits", 0, 1)
+        result = workflow.agree(*fits, catalogue=catalogue)
+    tell(result, as_json_, a=a, b=b)
+    if not result.agrees:
+        raise typer.Exit(1)
+
+
+@app.command()
+def plan(
+    model: Model,
+    logs: Annotated[
+        list[Path] | None, typer.Argument(metavar="[LOG...]", help="Existing MCAP logs.")
+    ] = None,
+    between: Annotated[
+        tuple[str, str] | None,
+        typer.Option(help="Two effects to add to the model, or two fitted models (.toml)."),
+    ] = None,
+    axis: Annotated[str | None, typer.Option(help="Axis to be explained.")] = None,
+    duration: Annotated[float, typer.Option(help="Length of the experiment in s.")] = 20.0,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Experiment to write (.toml).")] = Path(
+        "experiment.toml"
+    ),
+    holdout: Holdout = None,
+    test_function: TestFunction = None,
+    effects: Effects = None,
+    as_json_: Json = False,
+) -> None:
+    """Choose the experiment that decides between explanations; `twin simulate` runs it.
+
+    Example: twin plan fitted.toml --between cogging wear --duration 8 -o next.toml
+    """
+    from identify import workflow
+    from identify.output.answers.diagnoses import answer_of
+    from identify.output.text import plan_text
+    from twin.experiments.file import ENDING, SUFFIX, save_experiment, write_setpoints
+
+    if out.suffix != SUFFIX:
+        raise InputError(f"{out}: an experiment is a {SUFFIX} file; give such a name")
+    require_writable(out)
+    catalogue = catalogue_with(effects)
+    machine = machine_model(model, catalogue)
+    rivals = [_rival(name, catalogue) for name in between or ()]
+    recorded = CheckedRecordings(logs, beside=holdout)
+    with progress_on_stderr() as progress:
+        result = workflow.plan(
+            machine, recorded, Recordings(holdout, beside=logs), between=rivals,
+            catalogue=catalogue, axis=axis, duration=duration, test_function=test_function,
+            progress=progress,
+        )  # fmt: skip
+    text, table = plan_text(result), out.with_suffix(ENDING)
+    made: dict[str, str] = {}
+    if result.decides:
+        chosen = result.chosen
+        save_experiment(chosen.experiment, out, *text.splitlines()[:3], units=chosen.units)
+        write_setpoints(chosen.experiment, machine, 0, table)
+        text += (
+            f"\n{table}: the setpoints, to be run on the machine"
+            f"\n{out}: the experiment; `twin simulate {out} --model MODEL -o LOG` simulates it"
+        )
+        made = {"file": str(out), "setpoints": str(table)}
+    say(text, answer_of(result, **made), as_json_, recorded.findings)
+    if not result.decides:
+        raise typer.Exit(1)
+
+
+def _rival(name: str, catalogue: Catalogue) -> Rival:
+    """The model of that file, or the effect of that name."""
+    if name.endswith(".toml"):
+        return replace(machine_model(name, catalogue), name=name)
+    return catalogue[name]
 
 
 @app.command()
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path("demo"),
     seed: Annotated[int, typer.Option(help="Draws the machine and its hidden effect.")] = 2,
-    model: Annotated[str, typer.Option("--model", help="Machine model (.toml).")] = "proton_xy",
+    model: ModelOption = "proton_xy",
     effects: Effects = None,
     as_json_: Json = False,
 ) -> None:
@@ -243,26 +320,26 @@ def demo(
     """
     from identify.demo import BETTER
     from identify.demo import demo as run
-    from identify.output import as_json
+    from identify.output.answers.diagnoses import DemoAnswer, answer_of
 
     require_apart({"-o": out / BETTER}, {"--model": model})
     catalogue = catalogue_with(effects)
     machine = machine_model(model, catalogue)
 
-    def tell(text: str) -> None:
+    def line(text: str) -> None:
         print(text, file=sys.stderr if as_json_ else sys.stdout, flush=True)
 
     with progress_on_stderr() as progress:
-        result = run(machine, catalogue, out, seed, tell, progress)
+        result = run(machine, catalogue, out, seed, line, progress)
     hidden = result.hidden.effect.name
-    summary = {
-        "hidden": hidden,
-        "named": result.named,
-        "report": str(result.report),
-        "diagnosis": as_json.diagnose_json(result.diagnosis),
-        "addition": result.addition and as_json.add_json(result.addition),
-    }
+    answer = DemoAnswer.of(
+        result,
+        hidden=hidden,
+        report=str(result.report),
+        diagnosis=answer_of(result.diagnosis),
+        addition=result.addition and answer_of(result.addition),
+    )
     verdict = "the diagnosis is right" if result.named else "the diagnosis did not name it"
-    say(f"5. the hidden effect was {hidden}: {verdict}\nreport: {result.report}", summary, as_json_)
+    say(f"5. the hidden effect was {hidden}: {verdict}\nreport: {result.report}", answer, as_json_)
     if not result.named:
         raise typer.Exit(1)

@@ -1,29 +1,27 @@
-"""Commands on the machine's side: simulate, import, check, recover, effects."""
+"""Commands on the machine's side: simulate, import, new, info, check, recover, effects, example."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
+    CheckedRecordings,
     Effects,
     Json,
     Logs,
+    ModelOption,
     app,
     catalogue_with,
     machine_model,
-    read_checked,
-    require_folder,
     say,
 )
 from twin.errors import InputError
-
-if TYPE_CHECKING:
-    from twin.effects import Catalogue
+from twin.files import require_writable
 
 
 @app.command()
@@ -31,7 +29,7 @@ def simulate(
     experiment: Annotated[
         str, typer.Argument(help="tracking, moves, cable_pass, ...; or a .toml from `twin plan`.")
     ],
-    model: Annotated[str, typer.Option("--model", help="Machine model (.toml).")] = "proton_xy",
+    model: ModelOption = "proton_xy",
     out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")] = Path("log.mcap"),
     seed: Annotated[int, typer.Option(help="Same seed, same log.")] = 0,
     duration: Annotated[
@@ -48,8 +46,7 @@ def simulate(
 
     Example: twin simulate moves --model example_machine --duration 10 -o fit.mcap
     """
-    from functools import partial
-
+    from identify.output.answers.machine import LogAnswer
     from twin.experiments.file import SUFFIX, load_experiment, write_setpoints
     from twin.experiments.lasting import missed
     from twin.experiments.named import DURATION, Reach, find_experiment, simulate_parts
@@ -57,7 +54,7 @@ def simulate(
 
     for file in (out, setpoints):
         if file is not None:
-            require_folder(file)
+            require_writable(file)
     stage = machine_model(model, catalogue_with(effects))
     chosen = load_experiment(experiment) if experiment.endswith(SUFFIX) else experiment
     reach = Reach(stage)
@@ -72,11 +69,15 @@ def simulate(
             chosen = find_experiment(chosen, stage, axis, duration or DURATION)
         write_setpoints(chosen, stage, seed, setpoints)
     rate = stage.sample_rate
-    result = {"log": str(out), "samples": samples, "sample_rate": rate, "unit": "Hz"}
-    result |= {"setpoints": str(setpoints)} if setpoints else {}
+    answer = LogAnswer(
+        log=str(out),
+        samples=samples,
+        sample_rate=rate,
+        setpoints=str(setpoints) if setpoints else None,
+    )
     asked = None if duration is None else missed(duration, samples / rate)
     warnings = [*reach.warnings(), *([asked] if asked else [])]
-    say(f"{out}: {samples} samples at {rate:g} Hz", result, as_json_, warnings)
+    say(f"{out}: {samples} samples at {rate:g} Hz", answer, as_json_, warnings)
 
 
 @app.command("import")
@@ -100,12 +101,13 @@ def import_(
 
     Example: twin import recording.csv --map map.toml -o run.mcap
     """
+    from identify.output.answers.machine import LogAnswer
     from twin.checks import check_assumed
     from twin.importers import import_log, load_mapping
     from twin.logs import write_log
 
     if out is not None:
-        require_folder(out)
+        require_writable(out)
     if guess:
         _guess(sources, out, as_json_)
         return
@@ -113,26 +115,26 @@ def import_(
         raise InputError("give --map MAP and -o LOG; --guess proposes a map")
     log = import_log(sources, load_mapping(mapping))
     write_log(log, out)
-    result = {"log": str(out), "samples": len(log), "sample_rate": log.sample_rate, "unit": "Hz"}
+    answer = LogAnswer(log=str(out), samples=len(log), sample_rate=log.sample_rate)
     resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
     unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
     said = [*resampled, *(f"{out}: warning: {finding}" for finding in unsure)]
-    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", result, as_json_, said)
+    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", answer, as_json_, said)
 
 
 def _guess(sources: list[Path], out: Path | None, as_json_: bool) -> None:
     """Print or write a proposed map; exit code 1 where something is missing in it."""
+    from identify.output.answers.machine import MapAnswer
     from twin.files import write_atomically
     from twin.importers.guess import guess_map
 
     if len(sources) != 1:
         raise InputError(f"--guess was given {len(sources)} files; give one at a time")
     found = guess_map(sources[0])
-    result = {"map": found.text, "missing": list(found.missing)}
     if out is not None:
         write_atomically(out, found.text.encode())
-    say(found.text if out is None else f"{out}: a map to be read and corrected", result, as_json_,
-        found.missing)  # fmt: skip
+    text = found.text if out is None else f"{out}: a map to be read and corrected"
+    say(text, MapAnswer.of(found, map=found.text), as_json_, found.missing)
     if found.missing:
         raise typer.Exit(1)
 
@@ -148,11 +150,12 @@ def new(
     Example: twin new run.mcap -o model.toml
     """
     from identify.analysis.first_model import first_model, not_determined
+    from identify.output.answers.machine import NewModelAnswer
     from twin.effects import load_catalogue
     from twin.model.file import save_model
 
-    require_folder(out)
-    recorded, findings = read_checked(logs)
+    require_writable(out)
+    recorded = CheckedRecordings(logs)
     model = first_model(dict(recorded), out.stem, load_catalogue())
     save_model(model, out)
     unknown = {axis: not_determined(found) for axis, found in model.axes.items()}
@@ -163,8 +166,22 @@ def new(
         for label in labels
     ]
     text = f"{out}: axes {', '.join(model.axes)}; now `twin fit {out} {logs[0]} -o fitted.toml`"
-    result = {"model": str(out), "axes": list(model.axes), "not_determined": unknown}
-    say("\n".join([text, *notes]), result, as_json_, findings)
+    answer = NewModelAnswer(model=str(out), axes=list(model.axes), not_determined=unknown)
+    say("\n".join([text, *notes]), answer, as_json_, recorded.findings)
+
+
+@app.command()
+def info(logs: Logs, as_json_: Json = False) -> None:
+    """Tell what is in logs: length, rate, axes, signals with units and ranges, and faults.
+
+    Example: twin info fit.mcap
+    """
+    from identify.output.answers.machine import info_answer
+    from identify.output.machine import info_text
+    from twin.checks.long import log_info
+
+    found = {str(path): log_info(path) for path in logs}
+    say(info_text(found), info_answer(found), as_json_)
 
 
 @app.command()
@@ -173,11 +190,12 @@ def check(logs: Logs, as_json_: Json = False) -> None:
 
     Example: twin check run.mcap
     """
-    from identify.output import machine as told
+    from identify.output.answers.machine import check_answer
+    from identify.output.machine import check_text
     from twin.checks.long import check_file
 
     reports = {str(path): check_file(path) for path in logs}
-    say(told.check_text(reports), told.check_json(reports), as_json_)
+    say(check_text(reports), check_answer(reports), as_json_)
     if not all(report.ok for report in reports.values()):
         raise typer.Exit(1)
 
@@ -195,17 +213,17 @@ def recover(
 
     Example: twin recover bad.mcap -o good.mcap
     """
+    from identify.output.answers.machine import RecoveryAnswer
     from twin.logs import recover_file
 
-    require_folder(out)
+    require_writable(out)
     recovery, files = recover_file(log, out, unproved=unproved)
     others = {str(path): text for path, text in files.items() if path != out}
-    result = {
-        "log": str(out), "kept": recovery.kept, "lost": list(recovery.lost),
-        "not_proved": list(recovery.unproved), "others": list(others),
-    }  # fmt: skip
+    answer = RecoveryAnswer.of(
+        recovery, log=str(out), not_proved=recovery.unproved, others=list(others)
+    )
     written = [f"{path}: {text}" for path, text in others.items()]
-    say("\n".join([str(recovery), *written]), result, as_json_)
+    say("\n".join([str(recovery), *written]), answer, as_json_)
 
 
 @app.command()
@@ -224,45 +242,67 @@ def effects(
 
     Example: twin effects cogging --plot cogging.png
     """
-    from identify.output import machine as told
+    from identify.output.answers.machine import EffectsAnswer, effect_answer, laws_answer
+    from identify.output.machine import draw, effect_text, effects_text, laws_text
 
     catalogue = catalogue_with(files)
     if check_:
+        from twin.laws.verdict import check_effect
+
         if plot is not None:
             raise InputError(f"--check draws nothing; give --plot {plot} in a command of its own")
         names = [f.stem for f in files or ()] if name is None else [name]
-        _put_to_the_laws(catalogue, names, as_json_)
+        if not names:
+            raise InputError(
+                "--check was given no effect; give the NAME of one, or your own file with --effects"
+            )
+        reports = [check_effect(effect) for effect in [catalogue[name] for name in names]]
+        say(laws_text(reports), laws_answer(reports), as_json_)
+        if not all(report.ok for report in reports):
+            raise typer.Exit(1)
         return
     if name is not None:
         chosen = catalogue[name]
         if plot is not None:
             from identify.experiment_design.planting import signature
-            from identify.output.machine import draw
 
-            require_folder(plot)
+            require_writable(plot)
             draw(chosen, *signature(chosen, catalogue), plot)
-        say(told.effect_text(chosen), told.effect_json(chosen), as_json_)
+        say(effect_text(chosen), effect_answer(chosen), as_json_)
         return
     if plot is not None:
         raise InputError(f"--plot {plot}: draws one effect; give its NAME")
     everything = list(catalogue.values())
-    say(
-        told.effects_text(everything),
-        {"effects": [told.effect_json(e) for e in everything]},
-        as_json_,
-    )
+    answer = EffectsAnswer(effects=[effect_answer(e) for e in everything])
+    say(effects_text(everything), answer, as_json_)
 
 
-def _put_to_the_laws(catalogue: Catalogue, names: Sequence[str], as_json_: bool) -> None:
-    """Check these effects; exit code 1 where a law does not hold."""
-    from identify.output.machine import laws_json, laws_text
-    from twin.laws.verdict import check_effect
+@app.command()
+def example(
+    name: Annotated[
+        str | None, typer.Argument(help="Which example; all are listed if left out.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="New folder; NAME if left out.")
+    ] = None,
+    as_json_: Json = False,
+) -> None:
+    """Write an example with its data and the commands to type, or list the examples.
 
-    if not names:
-        raise InputError(
-            "--check was given no effect; give the NAME of one, or your own file with --effects"
-        )
-    reports = [check_effect(effect) for effect in [catalogue[name] for name in names]]
-    say(laws_text(reports), laws_json(reports), as_json_)
-    if not all(report.ok for report in reports):
-        raise typer.Exit(1)
+    Example: twin example hidden_effect
+    """
+    from identify.output.answers.machine import ExampleAnswer, ExamplesAnswer
+    from twin.examples import EXAMPLES, write_example
+
+    if name is None:
+        width, told = max(map(len, EXAMPLES)), {key: e.summary for key, e in EXAMPLES.items()}
+        lines = [f"{key:{width}s}  {summary}" for key, summary in told.items()]
+        say("\n".join(lines), ExamplesAnswer(examples=told), as_json_)
+        return
+    into = out or Path(name)
+    chosen, files = write_example(name, into)
+    lines = [f"{into}: {', '.join(file.name for file in files)}"]
+    lines += [f"data: {chosen.data}"] if chosen.data else []
+    lines += ["now:", f"  cd {into}", *(f"  {command}" for command in chosen.commands)]
+    answer = ExampleAnswer.of(chosen, folder=str(into), files=[str(file) for file in files])
+    say("\n".join(lines), answer, as_json_)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -14,9 +15,10 @@ import typer
 from identify.cli.apart import Command
 from identify.cli.progress import progress_on_stderr
 from twin.errors import InputError
+from twin.files import require_writable
 
 if TYPE_CHECKING:
-    from twin.checks import CheckReport
+    from identify.output.answers.answer import Answer
     from twin.effects import Catalogue
     from twin.logs import Log
     from twin.model.machine import MachineModel
@@ -50,6 +52,7 @@ app = Commands(
 Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs.")]
 FitLogs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs to fit on.")]
 Model = Annotated[str, typer.Argument(metavar="MODEL", help="Machine model (.toml).")]
+ModelOption = Annotated[str, typer.Option("--model", help="Machine model (.toml).")]
 Holdout = Annotated[
     list[Path] | None,
     typer.Option(
@@ -75,6 +78,15 @@ TestFunction = Annotated[
         "left out.",
     ),
 ]
+Report = Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Effects = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--effects",
+        help="Your own effect file; loading it runs its code. May be repeated.",
+    ),
+]
 
 
 def _version(asked: bool) -> None:
@@ -94,39 +106,7 @@ def front_door(
     """Find out why the model and the machine disagree."""
 
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Effects = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--effects",
-        help="Your own effect file; loading it runs its code. May be repeated.",
-    ),
-]
-
-
-def say(text: str, result: dict[str, Any], as_json: bool, warnings: Sequence[str] = ()) -> None:
-    """Print the warnings on standard error, and the result as text or as one JSON object."""
-    from identify.output.machine import plain
-
-    for warning in warnings:
-        print(f"twin: {warning}", file=sys.stderr)
-    print(json.dumps(plain(result)) if as_json else text)
-
-
-@contextmanager
-def left_out() -> Iterator[list[str]]:
-    """The lines that are said meanwhile of logs that say nothing, instead of on standard error."""
-    import logging
-
-    lines: list[str] = []
-    handler = logging.Handler()
-    handler.emit = lambda record: lines.append(record.getMessage())  # type: ignore[method-assign]
-    logger = logging.getLogger("identify")
-    logger.addHandler(handler)
-    try:
-        yield lines
-    finally:
-        logger.removeHandler(handler)
+# --- what is read ----------------------------------------------------------------------------
 
 
 def catalogue_with(files: list[Path] | None) -> Catalogue:
@@ -139,6 +119,71 @@ def machine_model(name: str, catalogue: Catalogue) -> MachineModel:
     from twin.model.file import load_model
 
     return load_model(name, catalogue)
+
+
+class Recordings(Mapping[str, "Log"]):
+    """Logs by name, read each time that one is asked for, less what identification does not read.
+
+    So nobody holds a log for a command that is done with it: datasets() takes each once. beside:
+    other logs that are held in memory as well; where all are too long, they are read at a lower
+    rate, which is said on standard error.
+    """
+
+    def __init__(self, paths: Sequence[Path] | None, beside: Sequence[Path] | None = None) -> None:
+        from twin.checks.long import step_of
+
+        self.paths = {str(path): path for path in paths or ()}
+        self.every = step_of([*self.paths.values(), *(beside or ())]) if paths else 1
+
+    def __getitem__(self, name: str) -> Log:
+        path = self.paths[name]
+        log = self.read(path)
+        if self.every > 1:
+            print(
+                f"twin: {path}: is read at {log.sample_rate:g} Hz, because all logs together are "
+                "too long to be held in memory; cut them to be fitted at their own rate",
+                file=sys.stderr,
+            )
+        return log
+
+    def read(self, path: Path) -> Log:
+        """The log of a file."""
+        from twin.checks.long import read_measured
+
+        return read_measured(path, MEASURED, self.every)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.paths)
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+
+class CheckedRecordings(Recordings):
+    """The same, checked as they are read.
+
+    findings: of the check on the whole logs, one sentence each, there when the logs have been read.
+    refused: names of the faults with which a log is refused by an InputError.
+    """
+
+    def __init__(
+        self,
+        paths: Sequence[Path] | None,
+        beside: Sequence[Path] | None = None,
+        refused: Collection[str] = (),
+    ) -> None:
+        super().__init__(paths, beside)
+        self.refused, self.findings = refused, list[str]()
+
+    def read(self, path: Path) -> Log:
+        from twin.checks.long import read_checked
+
+        log, report = read_checked(path, MEASURED, self.every)
+        for finding in report.findings:
+            if finding.fault.name in self.refused and finding.severity.value == "error":
+                raise InputError(f"{path}: {finding}; nothing is fitted to it")
+            self.findings.append(f"{path}: {finding.severity.value}: {finding}")
+        return log
 
 
 def with_roles(
@@ -158,105 +203,48 @@ def with_roles(
 
     share()
     held, tests = holdout or [], test or []
-    recorded, findings = read_checked(logs, beside=[*held, *tests], refused=refused)
-    others = read_measured(held, beside=[*logs, *tests]), read_measured(tests, [*logs, *held])
+    recorded = CheckedRecordings(logs, [*held, *tests], refused)
+    others = Recordings(held, [*logs, *tests]), Recordings(tests, [*logs, *held])
     with progress_on_stderr() as progress, left_out() as silent:
         result = job(model, recorded, *others, progress=progress)
-    return result, findings, silent
+    return result, recorded.findings, silent
 
 
-class Recordings(Mapping[str, "Log"]):
-    """Logs by name, read from their files each time that one is asked for.
-
-    So nobody holds a log for a command that is done with it: datasets() takes each once.
-    """
-
-    def __init__(self, paths: Sequence[Path], read: Callable[[Path], Log]) -> None:
-        self._paths = {str(path): path for path in paths}
-        self._read = read
-
-    def __getitem__(self, name: str) -> Log:
-        return self._read(self._paths[name])
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._paths)
-
-    def __len__(self) -> int:
-        return len(self._paths)
+@contextmanager
+def left_out() -> Iterator[list[str]]:
+    """The lines that are said meanwhile of logs that say nothing, instead of on standard error."""
+    lines: list[str] = []
+    handler = logging.Handler()
+    handler.emit = lambda record: lines.append(record.getMessage())  # type: ignore[method-assign]
+    logger = logging.getLogger("identify")
+    logger.addHandler(handler)
+    try:
+        yield lines
+    finally:
+        logger.removeHandler(handler)
 
 
-def read_measured(
-    paths: Sequence[Path] | None, beside: Sequence[Path] | None = None
-) -> Mapping[str, Log]:
-    """The logs by name, less what identification does not read: most of their memory.
-
-    beside: other logs that are held in memory as well. Where all are too long, they are read at a
-    lower rate.
-    """
-    from twin.checks.long import read_measured as read
-    from twin.checks.long import step_of
-
-    every = step_of([*(paths or ()), *(beside or ())]) if paths else 1
-    return Recordings(paths or (), lambda path: said(path, read(path, MEASURED, every), every))
+# --- what is written -------------------------------------------------------------------------
 
 
-def read_checked(
-    paths: Sequence[Path] | None,
-    beside: Sequence[Path] | None = None,
-    refused: Collection[str] = (),
-) -> tuple[Mapping[str, Log], list[str]]:
-    """The same, and the findings of the log check on the whole logs, one sentence each.
-
-    They are there when the logs have been read. Raises InputError then for an error of a kind that
-    is refused.
-    """
-    from twin.checks.long import read_checked as read
-    from twin.checks.long import step_of
-
-    every = step_of([*(paths or ()), *(beside or ())]) if paths else 1
-    findings: list[str] = []
-
-    def checked(path: Path) -> Log:
-        log, report = read(path, MEASURED, every)
-        for finding in report.findings:
-            if finding.fault.name in refused and finding.severity.value == "error":
-                raise InputError(f"{path}: {finding}; nothing is fitted to it")
-        findings.extend(sentences(str(path), report))
-        return said(path, log, every)
-
-    return Recordings(paths or (), checked), findings
+def say(text: str, answer: Answer, as_json: bool, warnings: Sequence[str] = ()) -> None:
+    """Print the warnings on standard error, and the answer as text or as one JSON object."""
+    for warning in warnings:
+        print(f"twin: {warning}", file=sys.stderr)
+    print(json.dumps(answer.entries()) if as_json else text)
 
 
-def said(path: Path, log: Log, every: int) -> Log:
-    """The log; that it was read at a lower rate is said on standard error."""
-    if every > 1:
-        print(
-            f"twin: {path}: is read at {log.sample_rate:g} Hz, because all logs together are too "
-            "long to be held in memory; cut them to be fitted at their own rate",
-            file=sys.stderr,
-        )
-    return log
+def tell(result: Any, as_json: bool, warnings: Sequence[str] = (), **more: Any) -> None:
+    """Print a result of the workflow; more: entries of its JSON object that the command knows."""
+    from identify.output.as_json import answer_of
+    from identify.output.text import text_of
+
+    say(text_of(result), answer_of(result, **more), as_json, warnings)
 
 
-def sentences(name: str, report: CheckReport) -> list[str]:
-    """The findings of the log check, one sentence each."""
-    return [f"{name}: {finding.severity.value}: {finding}" for finding in report.findings]
-
-
-def unconfirmed(findings: Sequence[str]) -> list[str]:
-    """Of the findings those that tell what an import map assumes."""
-    return [line for line in findings if "the import map assumes" in line]
-
-
-def require_report(path: Path) -> None:
+def require_report(path: Path | None) -> None:
     """Raise InputError where a report could not be written, or its name is that of another kind."""
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{path}: a report is an .html file; give such a name")
-    require_folder(path)
-
-
-def require_folder(path: Path) -> None:
-    """Raise InputError now, instead of after the work, where the file could not be written."""
-    from twin.files import require_writable
-
-    require_writable(path)
+    if path is not None:
+        if path.suffix.lower() not in (".html", ".htm"):
+            raise InputError(f"{path}: a report is an .html file; give such a name")
+        require_writable(path)

@@ -1,18 +1,15 @@
-"""What describes a machine, as text and JSON: the catalogue, its laws, checks of logs, pictures.
+"""What describes a machine, as text: the catalogue, its laws, checks of logs, pictures.
 
-Apart from ``text`` and ``as_json`` because these commands need nothing of the identification,
+Apart from ``text`` because these commands need nothing of the identification,
 whose modules take a second to load.
 """
 
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from twin.effect import Effect
 from twin.errors import InputError
@@ -25,31 +22,8 @@ if TYPE_CHECKING:
 
     from identify.dataset.motion import Motion
     from twin.checks import CheckReport
+    from twin.checks.long import AxisInfo, LogInfo
     from twin.laws.verdict import LawReport
-
-
-def plain(value: Any) -> Any:
-    """A value as JSON knows it: the one hook for whatever a result holds.
-
-    A dataclass by its fields, arrays as lists, an Enum by its value, not a number as null.
-    """
-    if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(v) for v in value]
-    if hasattr(value, "tolist"):  # of NumPy, which a short command need not load
-        return plain(value.tolist())
-    if isinstance(value, Enum):
-        return value.value
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def pick(value: object, *names: str, **renamed: str) -> dict[str, Any]:
-    """These attributes of a result by name; renamed: key = name of the attribute."""
-    keys = {**{name: name for name in names}, **renamed}
-    return {key: getattr(value, name) for key, name in keys.items()}
 
 
 # --- the catalogue ---------------------------------------------------------------------------
@@ -80,18 +54,6 @@ def effect_text(effect: Effect) -> str:
             f"{ROTARY.mass}",
         ]
     )
-
-
-def effect_json(effect: Effect) -> dict[str, Any]:
-    """Everything the catalogue knows of one effect."""
-    told = ("name", "is_nonparametric", "summary", "equation", "source", "states", "fingerprint")
-    return {
-        **pick(effect, *told, "excited_by"),
-        "kind": effect.kind.name.lower(),
-        "parameters": [
-            pick(p, "name", "unit", "start", "lower", "upper", "meaning") for p in effect.parameters
-        ],
-    }
 
 
 FORMATS = ("png", "svg", "pdf")
@@ -142,19 +104,6 @@ def laws_text(reports: Sequence[LawReport]) -> str:
     )
 
 
-def laws_json(reports: Sequence[LawReport]) -> dict[str, Any]:
-    """Whether all laws hold for all effects, and each law; ``holds`` is null where not tried."""
-    return {
-        "ok": all(r.ok for r in reports),
-        "effects": {
-            r.effect: [
-                {"law": o.law, "holds": o.holds, "fault": o.fault or None} for o in r.outcomes
-            ]
-            for r in reports
-        },
-    }
-
-
 def check_text(reports: Mapping[str, CheckReport]) -> str:
     """One line a finding, or that there is none."""
     lines = []
@@ -165,14 +114,38 @@ def check_text(reports: Mapping[str, CheckReport]) -> str:
     return "\n".join(lines)
 
 
-def check_json(reports: Mapping[str, CheckReport]) -> dict[str, Any]:
-    """Whether all logs may be fitted, and the findings of each."""
-    told = ("axis", "what", "where", "remedy")
-    logs = {
-        name: [
-            {"severity": f.severity, "fault": f.fault.name.lower(), **pick(f, *told)}
-            for f in report.findings
+def info_text(found: Mapping[str, LogInfo]) -> str:
+    """Some lines a log: length and rate, what its writer said, each axis, and whether it is fit."""
+    return "\n".join(line for name, info in found.items() for line in _lines(name, info))
+
+
+def _lines(name: str, info: LogInfo) -> list[str]:
+    lines = [
+        f"{name}: {info.duration:.4g} s, {info.samples} samples at {info.sample_rate:g} Hz, "
+        f"{'axis' if len(info.axes) == 1 else 'axes'} {', '.join(info.axes)}"
+    ]
+    said = ", ".join(f"{key} {value}" for key, value in info.metadata.items())
+    lines += [f"  written by: {said}"] if said else []
+    for axis, own in info.axes.items():
+        lines += [f"  axis {axis} ({_about(own)})"]
+        width = max(len(c.name) for c in own.channels)
+        lines += [
+            f"    {c.name:{width}s}  {c.least:.6g} to {c.most:.6g} {c.unit}" for c in own.channels
         ]
-        for name, report in reports.items()
-    }
-    return plain({"ok": all(report.ok for report in reports.values()), "logs": logs})
+    return [*lines, f"  check: {_checked(name, info)}"]
+
+
+def _about(axis: AxisInfo) -> str:
+    if axis.constant is None:
+        return axis.kind
+    value, unit = axis.constant
+    return f"{axis.kind}, force constant {value:g} {unit}"
+
+
+def _checked(name: str, info: LogInfo) -> str:
+    findings = info.check.findings
+    if not findings:
+        return "suitable for identification"
+    worst = "warnings alone" if info.check.ok else "not suitable for identification"
+    kinds = dict.fromkeys(f"{f.fault.value} (axis {f.axis})" for f in findings)
+    return f"{worst}: {', '.join(kinds)}; `twin check {name}` tells where, and what to do"

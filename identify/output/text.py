@@ -199,6 +199,7 @@ def _candidate(c: Candidate, found: AxisDiagnosis) -> str:
     return f"  {c.effect.name:28s} {c.delta_bic:10.1f}   {errors}   {why}".rstrip()
 
 
+@text_of.register
 def plan_text(result: Plan) -> str:
     """The question, the chosen experiment and what it is expected to show, and the next best."""
     supposed, chosen = supposed_in_words(result), result.chosen
@@ -235,6 +236,7 @@ def add_text(result: Addition) -> str:
     return "\n".join(lines)
 
 
+@text_of.register
 def agree_text(result: Agreement) -> str:
     """By axis whether the fits agree, what differs, and what would make the difference."""
     lines = []

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from identify.cli.progress import progress_on_stderr
-from identify.cli.shared import say
-from identify.output.machine import plain
+from identify.output.answers.answer import plain
 from studies.thesis.reproduction import reproduce
 from twin.errors import InputError
 from twin.files import make_folder, write_atomically
@@ -40,7 +39,8 @@ def main(given: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(f"thesis: {error}", file=sys.stderr)
         return 2
-    say(f"{done}\nreport: {report}", {**found, "report": str(report)}, asked.json)
+    told = json.dumps(plain({**found, "report": str(report)}))
+    print(told if asked.json else f"{done}\nreport: {report}")
     return 0
 
 

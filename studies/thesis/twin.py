@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from identify.analysis.following import closed_loop_errors, identified, twin_of
-from identify.output.as_json import agree_json
+from identify.output.as_json import json_of
 from identify.output.words.fit import agreement_in_words, causes_in_words, difference_in_words
 from identify.validation.agreement import Agreement, agreement
 from studies.drawing import BLUE, GREY
@@ -53,8 +53,8 @@ def run(small: bool, rng: np.random.Generator) -> Found:
     )
     added = own.mass * HEAVIER
     numbers = {
-        "alike": agree_json(alike),
-        "changed": {**agree_json(changed), "added_mass": added, "unit": "kg"},
+        "alike": json_of(alike),
+        "changed": {**json_of(changed), "added_mass": added, "unit": "kg"},
         "closed_loop_error": {
             signal: {"found": error, "unit": "1",
                      "published_emps": dict(zip(("run", "pulses"), EMPS[signal], strict=True))}

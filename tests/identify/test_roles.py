@@ -15,7 +15,7 @@ from identify.dataset.given_logs import Role
 from identify.estimation.channel_delay import realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import error_on
-from identify.output.as_json import diagnose_json
+from identify.output.as_json import json_of
 from identify.results.results import Diagnosis
 from identify.workflow import add_named, diagnose
 from twin.effects import Catalogue
@@ -63,7 +63,7 @@ def without(told: object, keys: set[str]) -> object:
 
 def test_a_test_log_decides_nothing_and_gives_the_errors(found):
     other = diagnosed({"c": louder(TEST["c"])})
-    told, changed = diagnose_json(found), diagnose_json(other)
+    told, changed = json_of(found), json_of(other)
     assert without(changed, TESTED) == without(told, TESTED)
     assert told["missing"] == ["quadratic_drag"]
     (finding,), (noisy,) = told["findings"], changed["findings"]

@@ -4,7 +4,8 @@ An editor with TOML support takes a schema from a first line such as
 
     #:schema .venv/lib/python3/site-packages/twin/schemas/model.schema.json
 
-`python -m twin.schemas` writes them anew, after a change of an effect or of an entry.
+`python -m twin.schemas` writes them anew, after a change of an effect or of an entry. Beside them
+lies the schema of what commands print (`identify.output.as_json`).
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from identify.analysis.first_model import first_model
 from identify.dataset.dataset import by_log, datasets
 from identify.dataset.shared_samples import share_samples
 from identify.estimation.channel_delay import aligned
-from identify.output.as_json import fit_json
+from identify.output.as_json import json_of
 from identify.output.text import fit_text
 from identify.validation.free_run import HORIZON, free_run, rms_error
 from identify.validation.misfit_maps import AxisComparison
@@ -265,7 +265,7 @@ def test_standstill_is_the_same_to_check_and_fit_and_told(kind):
     assert result.datasets["x"].still == ("rest", "held")
     assert "not fitted on rest, held, where axis x stands still" in fit_text(result)
     assert "axis y: not fitted, as it moves in no log" in fit_text(result)
-    told = fit_json(result)
+    told = json_of(result)
     assert told["axes"]["x"]["left_out"] == ["rest", "held"]
     assert told["not_fitted"] == ["y"]
     with pytest.raises(InputError, match="no axis of the model \\(x, y\\) moves in the logs; give"):

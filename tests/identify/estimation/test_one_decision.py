@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from check_drive import drive
 
-from identify.output.as_json import fit_json
+from identify.output.as_json import json_of
 from identify.validation.agreement import agreement
 from identify.workflow import fit
 from twin.effects import Catalogue, load_catalogue
@@ -35,7 +35,7 @@ def test_what_is_refused_is_not_written(tmp_path, effects, refused):
     save_model(found.model, tmp_path / "m.toml")
     written = load_model(tmp_path / "m.toml", CATALOGUE)
     kept = written.intervals["x"].ends
-    told = fit_json(found)["axes"]["x"]["parameters"]
+    told = json_of(found)["axes"]["x"]["parameters"]
     ends = {label: tuple(p["interval_90"]) for label, p in told.items() if p["interval_90"]}
     assert kept == ends
     assert bool(kept) is not refused

@@ -15,7 +15,7 @@ from identify.experiment_design.discrimination import (
     Explanation,
     contest,
 )
-from identify.output.as_json import diagnose_json
+from identify.output.as_json import json_of
 from identify.output.report import sections
 from identify.output.report.subject import Subject
 from identify.output.text import diagnose_text, plan_text
@@ -182,7 +182,7 @@ def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     catalogue = Catalogue([CATALOGUE[e] for e in case.pair])
     found = diagnose(case.stage, *logs, catalogue=catalogue, test_function=WINDOW)
     assert found.axes["x"].verdict is Verdict.MISSING_EFFECTS
-    following = diagnose_json(found)["next_experiment"]
+    following = json_of(found)["next_experiment"]
     assert following["decides"]
     assert following["experiment"]["kind"] in KINDS
     assert "rate of change of the motor force" in following["missing_motion"]

@@ -16,7 +16,7 @@ from identify.experiment_design.discrimination import (
     contest,
     require_within_limits,
 )
-from identify.output.as_json import plan_json
+from identify.output.as_json import json_of
 from identify.output.text import plan_text
 from identify.output.words.plan import not_run_in_words
 from twin.effects import load_catalogue
@@ -111,7 +111,7 @@ def test_what_cannot_run_is_told_with_its_reason_and_a_mistake_is_not_passed_ove
     kinds = {line.split(":")[0] for line in told}
     assert kinds <= set(KINDS)
     assert any("too slowly for a test function of 0.02 s" in line for line in told)
-    assert plan_json(found)["not_run"] == told
+    assert json_of(found)["not_run"] == told
     assert f"not run: {told[0]}" in plan_text(found)
     arena = Arena(stage, "x", (Explanation("as it is", stage.axes["x"]),), test_function=0.02)
     asked = [Passes("x", span=9.0, speed=0.2, repeats=1)]

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted
+from strict_json import told
 
 from identify.estimation.fit import Outcome
 from identify.estimation.open_loop import Beginning
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.planting import FORCE, MASS, exemplary_motion, signature
-from identify.output.as_json import agree_json, simulation_fit_json
-from identify.output.machine import laws_json, laws_text, plain
+from identify.output.machine import laws_text
 from identify.output.numbers import Scale
 from identify.output.text import agree_text, simulation_fit_text
 from identify.output.words.addition import notes_in_words, step_in_words
@@ -48,9 +47,9 @@ def test_a_motion_fit_in_json() -> None:
     result = SimulationFit(
         None, SimpleNamespace(not_fitted=["z"]), {"x": fit}, {"x": (6.1e-3, 4.3e-3)}
     )  # type: ignore[arg-type]
-    told = json.loads(json.dumps(plain(simulation_fit_json(result))))
-    assert (told["objective"], told["not_fitted"]) == ("simulation", ["z"])
-    x = told["axes"]["x"]
+    found = told(result)
+    assert (found["objective"], found["not_fitted"]) == ("simulation", ["z"])
+    x = found["axes"]["x"]
     rms = 12.5**0.5 * 1e-3
     assert x["position_error"] == pytest.approx(rms)
     assert x["position_error_of_force_fit"] == 8.5e-3
@@ -70,7 +69,7 @@ def test_a_motion_fit_in_json() -> None:
                 "position_unit": "m", "velocity": 0.23, "velocity_unit": "m/s"},
     }  # fmt: skip
     none = replace(result, axes={"x": motion_fit(Outcome.NOT_CONVERGED)}, holdout_error={"x": None})
-    x = simulation_fit_json(none)["axes"]["x"]
+    x = told(none)["axes"]["x"]
     assert not x["converged"]
     assert x["holdout_position_error"] is None is x["holdout_position_error_of_force_fit"]
 
@@ -164,13 +163,14 @@ OTHER = replace(
 
 
 def test_two_fits_in_json() -> None:
-    told = agree_json(Agreement({"x": SAME, "y": OTHER}, ("z",)))
-    assert (told["agree"], told["not_compared"]) == (False, ["z"])
-    x, y = told["axes"]["x"], told["axes"]["y"]
+    found = told(Agreement({"x": SAME, "y": OTHER}, ("z",)), a="m.toml", b="n.toml")
+    assert (found["a"], found["b"]) == ("m.toml", "n.toml")
+    assert (found["agree"], found["not_compared"]) == (False, ["z"])
+    x, y = found["axes"]["x"], found["axes"]["y"]
     assert (x["agree"], y["agree"]) == (True, False)
     assert y["differing"] == ["p0", "p2"]  # the surest first
-    for axis, found in ((x, SAME), (y, OTHER)):
-        for d in found.differences:
+    for axis, own in ((x, SAME), (y, OTHER)):
+        for d in own.differences:
             assert axis["parameters"][d.label] == {
                 "a": d.a, "b": d.b, "difference": pytest.approx(d.ratio * d.standard_error),
                 "standard_error": d.standard_error, "unit": d.unit, "limit": d.limit,
@@ -208,7 +208,7 @@ def test_two_fits_in_words() -> None:
 # --- the laws of effects -------------------------------------------------------------------
 
 
-def test_laws_in_text_and_json() -> None:
+def test_laws_in_text() -> None:
     held, failed, untried = (
         verdict.Outcome(f"law {i}", holds, fault)
         for i, (holds, fault) in enumerate(((True, ""), (False, "off by 3"), (None, "after that")))
@@ -218,14 +218,6 @@ def test_laws_in_text_and_json() -> None:
         "a: ok: law 0", "b: ok: law 0", "b: FAILED: law 1: off by 3",
         "b: not tried: law 2: after that",
     ]  # fmt: skip
-    told = laws_json(reports)
-    assert not told["ok"]
-    assert laws_json(reports[:1])["ok"]
-    assert told["effects"]["b"] == [
-        {"law": "law 0", "holds": True, "fault": None},
-        {"law": "law 1", "holds": False, "fault": "off by 3"},
-        {"law": "law 2", "holds": None, "fault": "after that"},
-    ]
 
 
 # --- the fingerprint of an effect ----------------------------------------------------------

@@ -13,7 +13,7 @@ from identify.estimation.fit import Outcome
 from identify.estimation.intervals import NotExcited, refusal
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.experiment_design.missing_excitation import Gap
-from identify.output.as_json import plan_json
+from identify.output.as_json import json_of
 from identify.output.machine import check_text, effect_text, effects_text
 from identify.output.numbers import quantity, span
 from identify.output.text import (
@@ -144,7 +144,7 @@ def test_the_experiments_of_a_plan_are_in_order_of_evidence():
     told = [re.search(r"evidence (?:\(.*\) )?([\d.]+)", row)[1] for row in rows]
     assert told == ["57.3", "91.0", "9.00"]
     assert ["by one linear step" in row for row in rows] == [False, True, False]
-    assert [t["delta_bic"] for t in plan_json(plan)["ranking"]] == [57.3, 91.0, 9.0]
+    assert [t["delta_bic"] for t in json_of(plan)["ranking"]] == [57.3, 91.0, 9.0]
 
 
 def test_a_plan_for_one_model():

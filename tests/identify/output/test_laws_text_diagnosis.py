@@ -10,7 +10,7 @@ from built_fits import NOISE, built, built_fit, step
 
 from identify.dataset.given_logs import Role
 from identify.estimation.fit import Outcome
-from identify.output.as_json import diagnose_json
+from identify.output.as_json import json_of
 from identify.output.text import diagnose_text, plan_text
 from identify.output.words.diagnosis import (
     SEVERAL,
@@ -106,7 +106,7 @@ def test_a_finding_that_the_test_logs_contradict_is_not_confirmed():
     )
     assert "% of such answers" not in " ".join(others)
     assert "Not confirmed by the test logs: cogging." in told_of_x(x)[0]
-    told = diagnose_json(made.diagnosed(x))["axes"]["x"]["findings"]
+    told = json_of(made.diagnosed(x))["axes"]["x"]["findings"]
     assert [f["contradicted_by_test_logs"] for f in told] == [True, False]
     assert [f["confidence"] is None for f in told] == [True, False]
     assert next_command(x) == []
@@ -117,7 +117,7 @@ def test_what_is_too_small_to_matter_has_one_line_and_no_headline():
     lines = told_of_x(x)
     assert lines.count("  also seen, too small to matter: wear, quadratic_drag") == 1
     assert "wear" not in lines[0]
-    told = diagnose_json(made.diagnosed(x))["axes"]["x"]
+    told = json_of(made.diagnosed(x))["axes"]["x"]
     assert told["also_seen"] == ["wear", "quadratic_drag"]
     assert "wear" not in told["missing"]
     assert not any("also seen" in line for line in told_of_x(made.diagnosis_of()))
@@ -136,7 +136,7 @@ def test_what_decided_nothing_is_told_apart_from_what_also_chose():
         told = remarks_on(made.diagnosed(d), "x")
         flatters = [r for r in told if "helped to choose" in r]
         assert [f"are of the {on} logs" in r for r in flatters] == [True] * (on != "test")
-    assert diagnose_json(made.diagnosed(tested))["axes"]["x"]["test_error_on"] == "test"
+    assert json_of(made.diagnosed(tested))["axes"]["x"]["test_error_on"] == "test"
 
 
 def test_nothing_is_said_of_held_out_logs_where_there_are_none():
@@ -192,7 +192,7 @@ def test_two_effects_that_need_each_other_are_told_as_such():
     )
     assert "twin add lugre first.toml LOG... -o both.toml; judge after the second" in said
     assert f"  {said}" in told_of_x(x)
-    told = diagnose_json(made.diagnosed(x))["axes"]["x"]
+    told = json_of(made.diagnosed(x))["axes"]["x"]
     assert told["needed_together"] == [said]
     assert told["ranking"][1]["why_not"] == "proved only together with cogging"
     assert told["findings"][0]["together"] == ["lugre"]
@@ -214,7 +214,7 @@ def test_a_step_whose_effect_is_not_named_says_why():
     assert why(drag, lugre) == [later, None]
     left = made.diagnosis_of(steps=(drag, lugre), findings=(LUGRE,))
     assert step_lines(left)[0].endswith(f" N; not named: {later}")
-    assert diagnose_json(made.diagnosed(left))["axes"]["x"]["steps"][0]["not_named"] == later
+    assert json_of(made.diagnosed(left))["axes"]["x"]["steps"][0]["not_named"] == later
 
 
 def test_remarks_are_about_what_a_reader_must_know():

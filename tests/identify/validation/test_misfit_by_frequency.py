@@ -1,13 +1,10 @@
 """Force error by frequency: noise alone is the noise band, a planted line stands out of its own."""
 
-import json
-
 import numpy as np
 import pytest
 from machines import one_axis
 
 from identify.output import as_json
-from identify.output.machine import plain
 from identify.output.words.residual import region_in_words
 from identify.validation.misfit_maps import bands
 from identify.workflow import compare, fit
@@ -65,7 +62,7 @@ def test_the_worst_region_names_the_band(pumped):
 
 
 def test_the_bands_are_in_the_json(pumped):
-    found = json.loads(json.dumps(plain(as_json.compare_json(pumped))))
+    found = as_json.json_of(pumped)
     region = found["axes"]["x"]["regions"]["frequency"]
     assert region["unit"] == "Hz"
     assert max(region["force_error"]) == pytest.approx(HEIGHT / np.sqrt(2.0), rel=0.03)

@@ -1,6 +1,5 @@
 """Residual tests: white stays within the bounds, what is coloured or knows the input does not."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,6 @@ from identify.dataset.dataset import datasets
 from identify.estimation.force_balance import residual
 from identify.output import as_json
 from identify.output import text as as_text
-from identify.output.machine import plain
 from identify.output.words.residual import loop_in_words
 from identify.results.results import Comparison
 from identify.validation.whiteness import Loop, correlation, loop_of, residual_tests
@@ -140,7 +138,7 @@ def compared(logs) -> Comparison:
 
 
 def test_the_reason_and_the_bounds_are_said(compared):
-    found = json.loads(json.dumps(plain(as_json.compare_json(compared))))
+    found = as_json.json_of(compared)
     tests = found["axes"]["x"]["residual_tests"]
     assert tests["loop"] == "closed"
     assert tests["tested"] == "force residual"

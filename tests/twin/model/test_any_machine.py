@@ -28,7 +28,7 @@ from identify.dataset.coordinates import coordinates_of
 from identify.dataset.dataset import datasets
 from identify.estimation.residual_dependence import unit_of
 from identify.output import as_json, text
-from identify.output.machine import plain
+from identify.output.answers.answer import plain
 from identify.output.report import write_report
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis, FitResult
@@ -217,8 +217,8 @@ def test_texts_model_file_and_report_are_in_units_of_the_axis(gone_round: Round)
 
 def test_json_is_in_units_of_the_axis(gone_round: Round) -> None:
     objects = [
-        as_json.fit_json(gone_round.fitted), as_json.compare_json(gone_round.compared),
-        as_json.diagnose_json(gone_round.found), as_json.add_json(gone_round.added),
+        as_json.json_of(gone_round.fitted), as_json.json_of(gone_round.compared),
+        as_json.json_of(gone_round.found), as_json.json_of(gone_round.added),
     ]  # fmt: skip
     units = set().union(*(stated_units(json.loads(json.dumps(plain(o)))) for o in objects))
     kind = gone_round.units
@@ -233,7 +233,7 @@ def test_an_effect_of_the_other_axis_is_no_candidate_where_there_are_several(
 ) -> None:
     left_out = ("axis_coupling",) if gone_round.kind == "three" else ()
     assert gone_round.found.not_tried == left_out
-    told = as_json.diagnose_json(gone_round.found)
+    told = as_json.json_of(gone_round.found)
     assert told["not_tried"] == list(left_out)
     notes = [n for n in told["notes"] if "not tried" in n]
     assert bool(notes) == bool(left_out)

@@ -42,7 +42,7 @@ def test_a_plan_is_in_units_of_the_axis() -> None:
     shown = text.plan_text(chosen)
     assert not (wrong := OF_A_SLIDE.search(shown)), wrong
     assert "N·m RMS unexplained" in shown
-    assert stated_units(as_json.plan_json(chosen)) == {"N m", "s"}
+    assert stated_units(as_json.json_of(chosen)) == {"N m", "s"}
     planned = Passes("c", span=0.3, speed=0.2, repeats=1)
     file = format_experiment(planned, units=driven_units(planned, model))
     assert "# rad, length of a pass" in file

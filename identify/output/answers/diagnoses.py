@@ -1,0 +1,398 @@
+"""The JSON of diagnoses, planned experiments and added effects."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from identify.dataset.given_logs import Role
+from identify.experiment_design.discrimination import SimulatedExperiment
+from identify.experiment_design.plan import Plan
+from identify.output.answers.answer import Answer, Entry, Number, answer_of, read
+from identify.output.answers.fits import EstimateEntry, RefitEntry, estimate_entries
+from identify.output.words.diagnosis import (
+    model_change_in_words,
+    not_named_in_words,
+    said_of,
+    why_not,
+)
+from identify.output.words.findings import advice, together_in_words
+from identify.output.words.plan import gap_in_words, in_order, not_run_in_words
+from identify.results.addition import Addition
+from identify.results.results import Diagnosis
+from identify.selection.candidates import Candidate
+from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.findings import FindingKind
+from identify.validation.misfit_maps import Region
+from twin.curve import Coordinate
+from twin.experiments.file import parameters
+from twin.experiments.kinds import kind_of
+
+# --- planned experiments ---------------------------------------------------------------------
+
+
+class ExperimentEntry(Entry):
+    """An experiment as it was simulated, and what it is expected to show."""
+
+    experiment: dict[str, Any]
+    """Its kind and its parameters, as in the TOML file."""
+    duration: Number
+    duration_unit: str = "s"
+    expected_difference: Number = read("difference")
+    noise_floor: Number = read("floor")
+    unit: str = read("units.force")
+    delta_bic: Number
+    """Expected evidence between two explanations; null of one."""
+    information: Number
+    """On the parameters of one model, nats; null of two explanations."""
+
+
+class PlanAnswer(Answer, ExperimentEntry):
+    """What `twin plan` prints: the chosen experiment, and those it was chosen from."""
+
+    axis: str
+    between: list[str]
+    decides: bool
+    excited_by: dict[str, str]
+    favoured_by_the_logs: str | None = read("favoured")
+    refitted_on_logs: bool
+    missing_motion: str
+    ranking: list[ExperimentEntry]
+    not_run: list[str]
+    file: str | None = None
+    setpoints: str | None = None
+
+
+@answer_of.register
+def _(result: Plan, **more: Any) -> PlanAnswer:
+    several = len(result.between) > 1
+    return PlanAnswer.of(
+        result,
+        result.chosen,
+        **_experiment(result.chosen, several),
+        refitted_on_logs=not result.supposed,
+        missing_motion=gap_in_words(result.gap),
+        ranking=[ExperimentEntry.of(t, **_experiment(t, several)) for t in in_order(result)],
+        not_run=[not_run_in_words(n) for n in result.not_run],
+        **more,
+    )
+
+
+def _experiment(t: SimulatedExperiment, several: bool) -> dict[str, Any]:
+    return {
+        "experiment": {"kind": kind_of(t.experiment), **parameters(t.experiment)},
+        "delta_bic": t.gain if several else None,
+        "information": None if several else t.gain,
+    }
+
+
+# --- candidates and additions ----------------------------------------------------------------
+
+
+class ValuesEntry(Entry):
+    """An effect with the values of its parameters."""
+
+    effect: str
+    parameters: dict[str, Number]
+    parameter_units: dict[str, str]
+
+
+class AdditionAnswer(Answer, ValuesEntry):
+    """What `twin add` prints: the RMS errors before and after."""
+
+    action: str
+    axis: str
+    unit: str
+    fit_error_before: Number
+    fit_error_after: Number
+    holdout_error_before: Number
+    holdout_error_after: Number
+    test_error_before: Number
+    test_error_after: Number
+    is_nonparametric: bool = read("candidate.effect.is_nonparametric")
+    kept: bool
+    """Whether the logs prove the effect."""
+    part: Number = read("candidate.part")
+    """What it takes of the squared error above the noise floor."""
+    why_not: str | None = read("candidate.refused")
+    notes: list[str]
+    noise_floor: Number = read("candidate.fit.floor")
+    position_error_on: str | None = read("position_log")
+    position_error_before: Number
+    position_error_after: Number
+    position_error_in_mujoco: Number = read("replayed")
+    position_unit: str = read("units.position")
+    left_out: list[str] = Field([])
+
+
+@answer_of.register
+def _(result: Addition, **more: Any) -> AdditionAnswer:
+    before, after = result.position_error or (None, None)
+    return AdditionAnswer.of(
+        result,
+        result.step,
+        **_values(result.candidate),
+        position_error_before=before,
+        position_error_after=after,
+        **more,
+    )
+
+
+def _values(c: Candidate) -> dict[str, Any]:
+    """The values of the effect of a candidate, and their units."""
+    axis, name = c.fit.axis, c.effect.name
+    return {"parameters": axis[name].values, "parameter_units": axis.parameter_units(name)}
+
+
+class CandidateEntry(ValuesEntry):
+    """An effect that was tried beside the model."""
+
+    delta_bic: Number
+    holdout_error_before: Number = read("gain.before")
+    holdout_error_after: Number = read("gain.after")
+    unit: str
+    supported: bool
+    part: Number
+    why_not: str | None
+
+
+class StepEntry(CandidateEntry):
+    """A change of the model that was accepted on the way to the answer."""
+
+    change: str
+    dropped: list[str]
+    with_others: bool
+    not_named: str | None
+
+
+def _candidate(c: Candidate, d: AxisDiagnosis) -> dict[str, Any]:
+    return {
+        "effect": c.effect.name,
+        "delta_bic": c.delta_bic if c.score else None,
+        "unit": c.fit.axis.units.force,
+        "why_not": why_not(d, c) or None,
+        **_values(c),
+    }
+
+
+def _step(d: AxisDiagnosis, index: int) -> StepEntry:
+    step = d.steps[index]
+    given = _candidate(step.tried.candidate, d) | {"effect": step.change.name}
+    return StepEntry.of(
+        step,
+        step.tried.candidate,
+        **given,
+        change=model_change_in_words(step.change),
+        not_named=not_named_in_words(d, index),
+    )
+
+
+# --- findings --------------------------------------------------------------------------------
+
+
+class BendEntry(Entry):
+    """A parameter that a law holds, and the value that the logs ask for in its place."""
+
+    parameter: str
+    held: Number
+    found: Number
+    unit: str
+
+
+class CurveEntry(Entry):
+    """The curve that a law assumes, the one found, and the half width of its 90 % band."""
+
+    assumed: list[Number]
+    found: list[Number]
+    band_90: list[Number] = read("band")
+
+
+class ShapeEntry(Entry):
+    """The curve of a law as it is assumed and as it is found, by direction."""
+
+    over: Coordinate
+    coordinate: list[Number]
+    coordinate_unit: str = read("unit")
+    period: Number
+    unit: str = read("force_unit")
+    lets_go_at_standstill: bool = read("lets_go")
+    curves: dict[str, CurveEntry]
+
+
+class FindingEntry(Entry):
+    """An effect that is missing, or of another shape, and what shows it."""
+
+    effect: str
+    kind: FindingKind
+    explains: Number
+    """Part of the squared error above the noise floor."""
+    confidence: Number
+    """How often such answers were right in the self-test; null where test logs contradict."""
+    unit: str
+    parameters: dict[str, Number]
+    parameter_units: dict[str, str]
+    together: list[str]
+    """Effects without which the logs do not prove it."""
+    bend: BendEntry | None
+    indistinguishable_from: list[str] = read("tied")
+    contradicted_by_test_logs: bool = read("contradicted")
+    test_error_before: Number = read("tested.before")
+    test_error_after: Number = read("tested.after")
+    test_error_on: Role = read("tested.on")
+    part: Number = read("score.part")
+    """What it removes, above the noise floor, of the logs that decided it."""
+    t: Number = read("score.t")
+    control: Number = read("score.control")
+    """The part that the same force shifted in time stays below, 19 of 20 times."""
+    shape: ShapeEntry | None
+
+
+class DependenceEntry(Entry):
+    """On what an unexplained error depends."""
+
+    share_of_error: Number
+    depends_on: str
+    period: Number
+    unit: str
+
+
+class RegionEntry(Entry):
+    """Where an error is largest."""
+
+    coordinate: str
+    low: Number
+    high: Number
+    coordinate_unit: str = read("unit")
+    error: Number = read("rms")
+    over_noise_floor: Number = read("ratio")
+    share_of_error: Number = read("share")
+    unit: str = read("force_unit")
+
+
+class RemainderEntry(Entry):
+    """What stands above the noise floor beside the findings."""
+
+    depends_on: str
+    share_of_error: Number
+    period: Number
+    period_unit: str
+    error: Number
+    over_noise_floor: Number = read("ratio")
+    unit: str
+    where: RegionEntry | None
+    advice: str
+
+
+class RepeatEntry(Entry):
+    """A force that repeats along the track in each log, with another phase in each."""
+
+    period: Number
+    period_unit: str = read("units.position")
+    amplitude: dict[str, Number]
+    unit: str = read("units.force")
+    phase: dict[str, Number]
+    phase_unit: str = "rad"
+
+
+def _remainder(d: AxisDiagnosis, region: Region | None) -> RemainderEntry | None:
+    left, fit = d.unexplained, d.with_named
+    if left is None:
+        return None
+    return RemainderEntry.of(
+        left,
+        fit,
+        period_unit=left.unit,
+        unit=fit.axis.units.force,
+        where=region,
+        advice=advice(d.findings),
+    )
+
+
+# --- diagnoses -------------------------------------------------------------------------------
+
+
+class DiagnosisEntry(Entry):
+    """The diagnosis of an axis."""
+
+    axis: str
+    verdict: str
+    explanation: str
+    effect: str | None
+    """The effect that is named first."""
+    missing: list[str] = read("named")
+    ambiguous_with: list[str]
+    findings: list[FindingEntry]
+    needed_together: list[str]
+    also_seen: list[str] = read("small")
+    unexplained: DependenceEntry | None
+    remainder: RemainderEntry | None
+    repeats_not_general: RepeatEntry | None = read("repeat")
+    ranking: list[CandidateEntry]
+    steps: list[StepEntry]
+    force_error: Number = read("base.error")
+    force_error_with_found: Number = read("final.error")
+    noise_floor: Number = read("floor")
+    noise_floors: dict[Role, Number] = read("floors")
+    test_error_before: Number = read("tested.before")
+    test_error_after: Number = read("tested.after")
+    test_error_on: Role = read("tested.on")
+    unit: str
+    parameters: dict[str, EstimateEntry]
+    force_shift: Number = read("dataset.channel_delay")
+    force_shift_unit: str = "s"
+    refit: RefitEntry | None
+    not_tried: list[str]
+    notes: list[str]
+    next_experiment: PlanAnswer | None
+    next_experiment_refused: str | None
+
+
+class DiagnosisAnswer(Answer, DiagnosisEntry):
+    """What `twin diagnose` prints: the axis that the answer is about, and the same by axis."""
+
+    axes: dict[str, DiagnosisEntry]
+    data_faults: list[str] = Field([])
+    """What the check of the logs found."""
+    left_out: list[str] = Field([])
+
+
+@answer_of.register
+def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
+    axes = {axis: _diagnosis(result, axis) for axis in result.axes}
+    leading = axes[result.leading.dataset.axis]
+    return DiagnosisAnswer.of(leading, axes=axes, **more)
+
+
+def _diagnosis(result: Diagnosis, axis: str) -> DiagnosisEntry:
+    d, told, said = result.axes[axis], result.told[axis], said_of(result, axis)
+    planned = result.next_experiments.get(axis)
+    return DiagnosisEntry.of(
+        d,
+        told,
+        axis=axis,
+        verdict=d.verdict.name.lower(),
+        explanation=said.verdict,
+        effect=d.best.effect.name if d.best else None,
+        needed_together=together_in_words(d),
+        remainder=_remainder(d, result.left_over.get(axis)),
+        ranking=[CandidateEntry.of(c, **_candidate(c, d)) for c in d.ranking],
+        steps=[_step(d, i) for i in range(len(d.steps))],
+        unit=d.base.axis.units.force,
+        parameters=estimate_entries(told.after),
+        refit=result.refits.get(axis),
+        not_tried=result.not_tried,
+        notes=said.notes,
+        next_experiment=planned and answer_of(planned),
+        next_experiment_refused=result.not_planned.get(axis),
+    )
+
+
+class DemoAnswer(Answer):
+    """What `twin demo` prints; named: whether the diagnosis named the hidden effect."""
+
+    hidden: str
+    named: bool
+    report: str
+    diagnosis: DiagnosisAnswer
+    addition: AdditionAnswer | None

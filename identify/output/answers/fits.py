@@ -1,0 +1,388 @@
+"""The JSON of fits, of comparisons of a model with logs, and of two fits."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from identify.estimation.intervals import Estimate
+from identify.estimation.simulated_motion import MotionFit
+from identify.output.answers.answer import Answer, Entry, Number, answer_of, read
+from identify.output.words.fit import (
+    MOTION_OUTCOMES,
+    OUTCOMES,
+    no_interval_in_words,
+    objectives_in_words,
+)
+from identify.output.words.residual import loop_in_words, region_in_words
+from identify.results.results import Comparison, FitResult, SimulationFit
+from identify.validation.agreement import Agreement, AxisAgreement
+from identify.validation.misfit_maps import AxisComparison
+from twin.model.parameters import free_parameters
+from twin.model.parameters import read as values_of
+
+# --- fits ------------------------------------------------------------------------------------
+
+
+class EstimateEntry(Entry):
+    """A value with its 90 % interval, or the reason why it has none."""
+
+    value: Number
+    unit: str
+    free: bool
+    interval_90: tuple[Number, Number] | None
+    interval_refused: str | None
+
+
+class ChangeEntry(Entry):
+    """A parameter that a fit changed, and the force that the change makes."""
+
+    parameter: str = read("label")
+    before: Number
+    after: Number
+    unit: str
+    force: Number
+    force_unit: str
+    same_force_as: list[str] = read("alike")
+
+
+class RefitEntry(Entry):
+    """What fitting changed of the given model."""
+
+    force_error_as_given: Number = read("given")
+    force_error: Number = read("refitted")
+    force_unit: str = read("unit")
+    changed: list[ChangeEntry] = read("changes")
+
+
+class FitEntry(Entry):
+    """The fit of an axis: RMS force errors on the logs of each role, and the parameters."""
+
+    outcome: str
+    converged: bool
+    at_bound: list[str]
+    force_error: Number = read("error")
+    noise_floor: Number = read("floor")
+    holdout_force_error: Number
+    test_force_error: Number
+    unit: str
+    left_out: list[str]
+    """Logs in which the axis stands still."""
+    force_noise: Number
+    """Force that no sensor makes and nothing measured foretells, RMS."""
+    force_shift: Number = read("channel_delay")
+    force_shift_unit: str = "s"
+    beginnings_left_out: dict[str, Number]
+    beginnings_left_out_unit: str = "s"
+    parameters: dict[str, EstimateEntry]
+    refit: RefitEntry | None
+
+
+class FitAnswer(Answer):
+    """What `twin fit` prints."""
+
+    objective: Literal["force"] = "force"
+    axes: dict[str, FitEntry]
+    not_fitted: list[str]
+    """Axes that move in no log."""
+    left_out: list[str] = Field([])
+    """Logs that say nothing of an axis, and why."""
+
+
+@answer_of.register
+def _(result: FitResult, **more: Any) -> FitAnswer:
+    axes = {
+        axis: FitEntry.of(
+            fit,
+            result.datasets[axis],
+            outcome=fit.axis.units.words(OUTCOMES[fit.ended]),
+            converged=fit.ended.name != "NOT_CONVERGED",
+            holdout_force_error=result.holdout_error[axis],
+            test_force_error=result.test_error[axis],
+            unit=fit.axis.units.force,
+            left_out=result.left_out[axis],
+            beginnings_left_out=result.datasets[axis].begun,
+            parameters=estimate_entries(result.estimates[axis]),
+            refit=result.refits[axis],
+        )
+        for axis, fit in result.fits.items()
+    }
+    return FitAnswer(axes=axes, not_fitted=list(result.not_fitted), **more)
+
+
+def estimate_entries(estimates: tuple[Estimate, ...]) -> dict[str, EstimateEntry]:
+    """Estimates by their labels."""
+    return {
+        e.label: EstimateEntry.of(
+            e,
+            interval_90=None if e.low is None else (e.low, e.high),
+            interval_refused=e.reason and no_interval_in_words(e.reason),
+        )
+        for e in estimates
+    }
+
+
+# --- fits of simulated motion ----------------------------------------------------------------
+
+
+class SimulatedValueEntry(Entry):
+    """A parameter, and what the fit of the force had found."""
+
+    value: Number
+    force_fit: Number
+    unit: str
+
+
+class BeginningEntry(Entry):
+    """Where the simulated motion of a log begins."""
+
+    time: Number
+    time_unit: str = "s"
+    position: Number
+    position_unit: str
+    velocity: Number
+    velocity_unit: str
+
+
+class SimulationFitEntry(Entry):
+    """The fit of an axis to simulated motion: RMS position errors, before and after."""
+
+    outcome: str
+    converged: bool
+    position_error: Number = read("error")
+    position_error_of_force_fit: Number = read("error_begun")
+    holdout_position_error: Number
+    holdout_position_error_of_force_fit: Number
+    unit: str
+    errors_of_starts: list[Number] = read("starts")
+    parameters: dict[str, SimulatedValueEntry]
+    beginnings: dict[str, BeginningEntry]
+
+
+class SimulationFitAnswer(Answer):
+    """What `twin fit --objective simulation` prints."""
+
+    objective: Literal["simulation"] = "simulation"
+    axes: dict[str, SimulationFitEntry]
+    not_fitted: list[str] = read("force.not_fitted")
+    objectives_disagree: list[str]
+    """A sentence for each parameter that the two objectives give far apart."""
+    left_out: list[str] = Field([])
+
+
+@answer_of.register
+def _(result: SimulationFit, **more: Any) -> SimulationFitAnswer:
+    axes = {axis: _motion_fit(fit, result.holdout_error[axis]) for axis, fit in result.axes.items()}
+    return SimulationFitAnswer.of(
+        result, axes=axes, objectives_disagree=objectives_in_words(result), **more
+    )
+
+
+def _motion_fit(fit: MotionFit, held: tuple[float, float] | None) -> SimulationFitEntry:
+    units, where = fit.axis.units, free_parameters(fit.axis)
+    values = zip(where, values_of(fit.axis, where), values_of(fit.begun, where), strict=True)
+    before, after = held or (None, None)
+    return SimulationFitEntry.of(
+        fit,
+        outcome=MOTION_OUTCOMES[fit.outcome],
+        converged=fit.outcome.name != "NOT_CONVERGED",
+        holdout_position_error=after,
+        holdout_position_error_of_force_fit=before,
+        unit=units.position,
+        parameters={
+            c.label: {"value": now, "force_fit": begun, "unit": units(c.parameter.unit)}
+            for c, now, begun in values
+        },
+        beginnings={
+            log.motion.name: BeginningEntry.of(
+                begun,
+                time=begun.first * log.motion.sample_period,
+                position_unit=units.position,
+                velocity_unit=units("m/s"),
+            )
+            for log, begun in zip(fit.logs, fit.beginnings, strict=True)
+        },
+    )
+
+
+# --- whether two fits agree ------------------------------------------------------------------
+
+
+class DifferenceEntry(Entry):
+    """A parameter of two fits."""
+
+    a: Number
+    b: Number
+    difference: Number
+    standard_error: Number
+    in_standard_errors: Number = read("ratio")
+    limit: Number
+    differs: bool
+    unit: str
+
+
+class CauseEntry(Entry):
+    """An absent effect that would make a share of the difference."""
+
+    effect: str
+    share: Number
+    or_: list[str] = Field(validation_alias="alike", serialization_alias="or")
+
+
+class AgreementEntry(Entry):
+    """Whether the fits of an axis agree."""
+
+    agree: bool
+    parameters: dict[str, DifferenceEntry]
+    differing: list[str]
+    not_compared: list[str]
+    only_in_a: list[str] = read("only_a")
+    only_in_b: list[str] = read("only_b")
+    error_over_noise_floor: list[Number] = read("above_floor")
+    force: Number
+    """What the parameters that differ amount to, RMS."""
+    force_unit: str = read("unit")
+    causes: list[CauseEntry]
+
+
+class AgreementAnswer(Answer):
+    """What `twin agree` prints."""
+
+    a: str | None = None
+    b: str | None = None
+    agree: bool = read("agrees")
+    axes: dict[str, AgreementEntry]
+    not_compared: list[str]
+
+
+@answer_of.register
+def _(result: Agreement, **more: Any) -> AgreementAnswer:
+    axes = {axis: _agreement(found) for axis, found in result.axes.items()}
+    return AgreementAnswer.of(result, axes=axes, **more)
+
+
+def _agreement(found: AxisAgreement) -> AgreementEntry:
+    return AgreementEntry.of(
+        found,
+        agree=not found.differing,
+        parameters={
+            d.label: DifferenceEntry.of(d, difference=d.b - d.a) for d in found.differences
+        },
+        differing=[d.label for d in found.differing],
+    )
+
+
+# --- comparisons -----------------------------------------------------------------------------
+
+
+class LogErrorsEntry(Entry):
+    """The RMS errors of a log; those of the position are null of imposed motion."""
+
+    force_error: Number
+    force_unit: str
+    force_ratio: Number
+    position_error: Number
+    position_unit: str
+    position_ratio: Number
+
+
+class MapEntry(Entry):
+    """The force residual by regions of a coordinate."""
+
+    unit: str
+    centre: list[Number]
+    mean: list[Number]
+    share: list[Number]
+    """Of the squared error."""
+    force_error: list[Number] = read("rms")
+    noise_floor: list[Number] = read("floor")
+
+
+class HistogramEntry(Entry):
+    """How the force residual is distributed."""
+
+    edges: list[Number]
+    unit: str
+    density: list[Number]
+    density_unit: str
+    normal_rms: Number = read("floor")
+    share_within_90: Number = read("within")
+
+
+class CorrelationEntry(Entry):
+    """The correlation of the force residual with a signal, by lag."""
+
+    lag: list[Number]
+    lag_unit: str = "s"
+    value: list[Number]
+    tested: list[bool]
+    bound_90: Number = read("bound")
+    limit_all_99: Number = read("limit")
+    share_outside: Number = read("outside")
+    passed: bool = read("passes")
+
+
+class ResidualTestsEntry(Entry):
+    """Whether the force residual is noise."""
+
+    tested: str
+    loop: Literal["open", "closed", "unknown"]
+    reason: str
+    samples: int
+    passed: bool = read("passes")
+    histogram: HistogramEntry
+    correlations: dict[str, CorrelationEntry]
+
+
+class ComparisonEntry(Entry):
+    """The errors of an axis, by log and by region."""
+
+    logs: dict[str, LogErrorsEntry]
+    noise_floor: Number = read("floor")
+    position_drift_of_noise: dict[str, Number] = read("position_floor")
+    regions: dict[str, MapEntry]
+    worst: list[str]
+    residual_tests: ResidualTestsEntry
+
+
+class ComparisonAnswer(Answer):
+    """What `twin compare` prints."""
+
+    axes: dict[str, ComparisonEntry]
+    left_out: list[str] = Field([])
+
+
+@answer_of.register
+def _(result: Comparison, **more: Any) -> ComparisonAnswer:
+    return ComparisonAnswer.of(axes={a: _comparison(c) for a, c in result.axes.items()}, **more)
+
+
+def _comparison(c: AxisComparison) -> ComparisonEntry:
+    t, units = c.tests, c.units
+    return ComparisonEntry.of(
+        c,
+        logs={name: _log_errors(c, name) for name in c.force_error},
+        regions={m.coordinate: m for m in c.maps},
+        worst=[region_in_words(r) for r in c.worst],
+        residual_tests=ResidualTestsEntry.of(
+            t,
+            tested=units.words("force residual"),
+            loop=t.loop.name.lower(),
+            reason=units.words(loop_in_words(t.loop)),
+            histogram=HistogramEntry.of(t, unit=units.force, density_unit=units("1/N")),
+            correlations={one.signal: one for one in t.correlations},
+        ),
+    )
+
+
+def _log_errors(c: AxisComparison, log: str) -> LogErrorsEntry:
+    force, position = c.force_error[log], c.position_error.get(log)
+    return LogErrorsEntry(
+        force_error=force,
+        force_unit=c.units.force,
+        force_ratio=force / c.floor,
+        position_error=position,
+        position_unit=c.units.position,
+        position_ratio=position and position / max(c.position_floor[log], 1e-300),
+    )

@@ -1,0 +1,255 @@
+"""The JSON of commands that need no identification: machines, effects, logs, files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from identify.output.answers.answer import Answer, Entry, Number, read
+
+if TYPE_CHECKING:  # a command that only shows the catalogue loads no NumPy
+    from twin.checks.long import AxisInfo, LogInfo
+    from twin.checks.report import CheckReport
+    from twin.effect import Effect
+    from twin.laws.verdict import LawReport
+
+
+class ErrorAnswer(Answer):
+    """What any command prints that was given bad input, or that failed."""
+
+    error: str
+
+
+# --- effects ---------------------------------------------------------------------------------
+
+
+class ParameterEntry(Entry):
+    """A parameter of an effect, in the units of a linear axis."""
+
+    name: str
+    unit: str
+    start: Number
+    lower: Number
+    upper: Number
+    meaning: str
+
+
+class EffectEntry(Entry):
+    """What the catalogue knows of an effect."""
+
+    name: str
+    kind: str
+    is_nonparametric: bool
+    summary: str
+    equation: str
+    source: str
+    states: list[str]
+    fingerprint: str
+    excited_by: str
+    parameters: list[ParameterEntry]
+
+
+class EffectAnswer(Answer, EffectEntry):
+    """What `twin effects NAME` prints."""
+
+
+class EffectsAnswer(Answer):
+    """What `twin effects` prints: the catalogue."""
+
+    effects: list[EffectEntry]
+
+
+def effect_answer(effect: Effect) -> EffectAnswer:
+    """Everything the catalogue knows of one effect."""
+    return EffectAnswer.of(effect, kind=effect.kind.name.lower())
+
+
+class LawEntry(Entry):
+    """A law of every effect; holds: null where it was not tried."""
+
+    law: str
+    holds: bool | None
+    fault: str | None
+
+
+class LawsAnswer(Answer):
+    """What `twin effects --check` prints."""
+
+    ok: bool
+    effects: dict[str, list[LawEntry]]
+
+
+def laws_answer(reports: Sequence[LawReport]) -> LawsAnswer:
+    """Whether all laws hold for all effects, and each law."""
+    return LawsAnswer(
+        ok=all(r.ok for r in reports),
+        effects={
+            r.effect: [LawEntry.of(o, fault=o.fault or None) for o in r.outcomes] for r in reports
+        },
+    )
+
+
+# --- logs ------------------------------------------------------------------------------------
+
+
+class CheckFindingEntry(Entry):
+    """A fault of a log."""
+
+    severity: Literal["error", "warning"]
+    fault: str
+    axis: str
+    what: str
+    where: str
+    remedy: str
+
+
+class CheckAnswer(Answer):
+    """What `twin check` prints; ok: whether all logs may be fitted."""
+
+    ok: bool
+    logs: dict[str, list[CheckFindingEntry]]
+
+
+def check_answer(reports: Mapping[str, CheckReport]) -> CheckAnswer:
+    """The findings of each log."""
+    logs = {
+        name: [CheckFindingEntry.of(f, fault=f.fault.name.lower()) for f in report.findings]
+        for name, report in reports.items()
+    }
+    return CheckAnswer(ok=all(report.ok for report in reports.values()), logs=logs)
+
+
+class ChannelEntry(Entry):
+    """The range of a signal."""
+
+    unit: str
+    least: Number
+    most: Number
+
+
+class AxisInfoEntry(Entry):
+    """The signals of an axis."""
+
+    kind: str
+    force_constant: Number
+    force_constant_unit: str | None
+    channels: dict[str, ChannelEntry]
+
+
+class FaultEntry(Entry):
+    """A fault of a log in a sentence."""
+
+    severity: Literal["error", "warning"]
+    fault: str
+    axis: str
+    text: str
+
+
+class LogInfoEntry(Entry):
+    """What is in a log."""
+
+    duration: Number
+    duration_unit: str = "s"
+    samples: int
+    sample_rate: Number
+    sample_rate_unit: str = "Hz"
+    metadata: dict[str, str]
+    axes: dict[str, AxisInfoEntry]
+    ok: bool = read("check.ok")
+    findings: list[FaultEntry]
+
+
+class InfoAnswer(Answer):
+    """What `twin info` prints."""
+
+    logs: dict[str, LogInfoEntry]
+
+
+def info_answer(found: Mapping[str, LogInfo]) -> InfoAnswer:
+    """By the name of the log."""
+    return InfoAnswer(
+        logs={
+            name: LogInfoEntry.of(
+                info,
+                axes={axis: _axis_info(own) for axis, own in info.axes.items()},
+                findings=[FaultEntry.of(f, text=str(f)) for f in info.check.findings],
+            )
+            for name, info in found.items()
+        }
+    )
+
+
+def _axis_info(axis: AxisInfo) -> AxisInfoEntry:
+    value, unit = axis.constant or (None, None)
+    channels: dict[str, Any] = {c.name: c for c in axis.channels}
+    return AxisInfoEntry.of(axis, force_constant=value, force_constant_unit=unit, channels=channels)
+
+
+class LogAnswer(Answer):
+    """What `twin simulate` and `twin import` print of the log that they wrote."""
+
+    log: str
+    samples: int
+    sample_rate: Number
+    unit: str = "Hz"
+    setpoints: str | None = None
+
+
+class RecoveryAnswer(Answer):
+    """What `twin recover` prints."""
+
+    log: str
+    kept: str
+    lost: list[str]
+    not_proved: list[str]
+    others: list[str]
+    """The other intact parts, as files beside the log."""
+
+
+# --- files -----------------------------------------------------------------------------------
+
+
+class MapAnswer(Answer):
+    """What `twin import --guess` prints: a map as TOML, and what is missing in it."""
+
+    map: str
+    missing: list[str]
+
+
+class NewModelAnswer(Answer):
+    """What `twin new` prints; not_determined: by axis, the values that the logs do not tell."""
+
+    model: str
+    axes: list[str]
+    not_determined: dict[str, list[str]]
+
+
+class ExamplesAnswer(Answer):
+    """What `twin example` prints: what each example is."""
+
+    examples: dict[str, str]
+
+
+class ExampleAnswer(Answer):
+    """What `twin example NAME` prints; data: where the data are to be had, if not in the folder."""
+
+    folder: str
+    files: list[str]
+    commands: list[str]
+    data: str | None
+
+
+class LineEntry(Entry):
+    """A thing that `twin doctor` looked at; remedy: how to get what is missing, if anything."""
+
+    about: str
+    found: str
+    remedy: str | None
+    needed: bool
+
+
+class DoctorAnswer(Answer):
+    """What `twin doctor` prints; ok: whether nothing is missing that `twin` needs."""
+
+    ok: bool
+    lines: list[LineEntry]
