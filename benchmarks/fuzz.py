@@ -26,7 +26,6 @@ from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.importers import import_log, load_mapping
 from twin.logs import AxisLog, Log, read_log, recover_log, write_log
-from twin.logs import writer as encode
 from twin.model.file import find_model, load_model
 
 INPUTS = 10_000
@@ -196,11 +195,7 @@ def _subjects(folder: Path) -> Iterator[Subject]:
 
 def _log_bytes(log: Log, folder: Path) -> bytes:
     """The log in several chunks."""
-    whole, encode.CHUNK_BYTES = encode.CHUNK_BYTES, 4000
-    try:
-        write_log(log, folder / "a.mcap")
-    finally:
-        encode.CHUNK_BYTES = whole
+    write_log(log, folder / "a.mcap", chunk_bytes=4000)
     return (folder / "a.mcap").read_bytes()
 
 

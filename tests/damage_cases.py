@@ -1,14 +1,16 @@
 """A small log of one topic in five chunks, ways to damage it, and what recovery says of it."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap_bytes import CHUNK, MESSAGE_INDEX, Piece
+from mcap_bytes import CHUNK, MESSAGE_INDEX, Piece, records
 
 from twin.errors import InputError
-from twin.logs import AxisLog, Log, Recovery, read_log, recover_log
+from twin.logs import AxisLog, Log, Recovery, read_log, recover_log, write_log
 
 RATE, COUNT, PER_CHUNK = 500.0, 33, 7
 CHUNKS = -(-COUNT // PER_CHUNK)
@@ -20,6 +22,7 @@ LOG = Log(
     {"source": "a test"},
     attachments={"model.toml": b"mass = 1.0\n"},
 )
+CRC_AT = 9 + 24  # of a chunk record
 
 
 @dataclass(frozen=True)
@@ -34,15 +37,22 @@ class Case:
         """Its chunk records."""
         return [r for r in self.records if r.opcode == CHUNK]
 
-    def behind(self, chunk: Piece) -> int:
+    def behind(self, number: int) -> int:
         """End of the message indexes behind a chunk."""
-        following = self.records[self.records.index(chunk) + 1 :]
+        following = [r for r in self.records if r.start >= self.chunks[number].end]
         return next(r.start for r in following if r.opcode != MESSAGE_INDEX)
 
 
-def samples_of(chunk: int) -> set[int]:
-    """Numbers of the samples in a chunk."""
-    return set(range(chunk * PER_CHUNK, min((chunk + 1) * PER_CHUNK, COUNT)))
+def written(path: Path) -> Case:
+    """The log as it is."""
+    write_log(LOG, path, chunk_bytes=PER_CHUNK * ROW)
+    data = path.read_bytes()
+    return Case(data, records(data))
+
+
+def samples_of(*chunks: int) -> set[int]:
+    """Numbers of the samples in chunks."""
+    return {k for k in range(COUNT) if k // PER_CHUNK in chunks}
 
 
 def span(count: str, seconds: str) -> set[int]:
@@ -82,14 +92,17 @@ def account(case: Case, recovery: Recovery) -> Account:
                     damaged |= samples_of(number)
         if found := re.match(r"/axis/x: (\d+) samples are missing, from (\S+) s to", sentence):
             damaged |= span(*found.groups())
-    whole = recovery.kept == f"all {COUNT} samples"
-    match = re.fullmatch(r"(\d+) samples from (\S+) s", recovery.kept)
-    assert whole or match, recovery.kept
-    kept = set(range(COUNT)) if whole else span(*match.groups())
-    return Account(kept, left_out, damaged)
+    return Account(kept(recovery.kept), left_out, damaged)
 
 
-def recovered(path, data: bytes) -> tuple[Log, Recovery]:
+def kept(text: str) -> set[int]:
+    """The samples of a sentence."""
+    match = re.fullmatch(r"(\d+) samples from (\S+) s", text)
+    assert match or text == f"all {COUNT} samples", text
+    return span(*match.groups()) if match else set(range(COUNT))
+
+
+def recovered(path: Path, data: bytes) -> tuple[Log, Recovery]:
     """The file is refused by strict reading; what is recovered is what was written."""
     path.write_bytes(data)
     with pytest.raises(InputError) as caught:
@@ -97,16 +110,13 @@ def recovered(path, data: bytes) -> tuple[Log, Recovery]:
     log, recovery = recover_log(path)
     assert recovery.lost
     assert all("\n" not in loss for loss in recovery.lost)
-    reason = str(caught.value).removeprefix(f"{path}: ")
-    assert reason.startswith(recovery.lost[0])
-    match = re.fullmatch(r"(\d+) samples from (\S+) s", recovery.kept)
-    assert match
+    assert str(caught.value).removeprefix(f"{path}: ").startswith(recovery.lost[0])
     assert log.metadata["recovered"] == recovery.kept
-    where = sorted(span(*match.groups()))
-    assert len(log) == len(where)
-    for name, axis in LOG.axes.items():
-        for field, column in axis.columns.items():
-            np.testing.assert_array_equal(log.axes[name].columns[field], column[where])
+    for part in (log, *recovery.others):
+        where = sorted(kept(part.metadata["recovered"]))
+        assert len(part) == len(where)
+        for field, column in LOG.axes["x"].columns.items():
+            np.testing.assert_array_equal(part.axes["x"].columns[field], column[where])
     return log, recovery
 
 
@@ -118,6 +128,14 @@ def spoilt(case: Case, *chunks: int) -> bytes:
     return bytes(data)
 
 
+def flipped(data: bytes, *places: int, mask: int = 1) -> bytes:
+    """The bytes with these bits flipped at some places."""
+    out = bytearray(data)
+    for place in places:
+        out[place] ^= mask
+    return bytes(out)
+
+
 def runs_without(*missing: int) -> list[set[int]]:
     """Samples of the stretches of chunks between those missing."""
     runs: list[set[int]] = [set()]
@@ -127,3 +145,85 @@ def runs_without(*missing: int) -> list[set[int]]:
         else:
             runs[-1] |= samples_of(number)
     return [r for r in runs if r]
+
+
+# Damage drawn at random: the bytes, and the chunks that it touched
+
+Damage = tuple[bytes, set[int]]
+
+
+def _overwritten(case: Case, start: int, new: bytes) -> Damage:
+    end = start + len(new)
+    touched = {i for i, c in enumerate(case.chunks) if c.start < end and start < c.end}
+    return case.data[:start] + new + case.data[end:], touched
+
+
+def _anywhere(case: Case, rng: np.random.Generator) -> int:
+    return int(rng.integers(case.chunks[0].start, case.chunks[-1].end))
+
+
+def _a_chunk(rng: np.random.Generator) -> int:
+    return int(rng.integers(CHUNKS))
+
+
+def a_bit(case: Case, rng: np.random.Generator) -> Damage:
+    place = _anywhere(case, rng)
+    return _overwritten(case, place, bytes([case.data[place] ^ 1 << int(rng.integers(8))]))
+
+
+def zeros(case: Case, rng: np.random.Generator) -> Damage:
+    return _overwritten(case, _anywhere(case, rng), bytes(int(rng.integers(1, 600))))
+
+
+def noise(case: Case, rng: np.random.Generator) -> Damage:
+    return _overwritten(case, _anywhere(case, rng), rng.bytes(int(rng.integers(1, 600))))
+
+
+def a_length(case: Case, rng: np.random.Generator) -> Damage:
+    place = case.chunks[_a_chunk(rng)].start + 1 + int(rng.integers(8))
+    return _overwritten(case, place, rng.bytes(1))
+
+
+def a_cut(case: Case, rng: np.random.Generator) -> Damage:
+    place = _anywhere(case, rng)
+    return case.data[:place], {i for i, c in enumerate(case.chunks) if c.end > place}
+
+
+def bytes_gone(case: Case, rng: np.random.Generator) -> Damage:
+    start, size = _anywhere(case, rng), int(rng.integers(1, 300))
+    _, touched = _overwritten(case, start, bytes(size))
+    return case.data[:start] + case.data[start + size :], touched
+
+
+def bytes_more(case: Case, rng: np.random.Generator) -> Damage:
+    start = _anywhere(case, rng)
+    touched = {i for i, c in enumerate(case.chunks) if c.start < start < c.end}
+    return case.data[:start] + rng.bytes(int(rng.integers(1, 300))) + case.data[start:], touched
+
+
+def swapped(case: Case, rng: np.random.Generator) -> Damage:
+    i, j = sorted(rng.choice(CHUNKS, 2, replace=False))
+    a, b = case.chunks[i].start, case.behind(i)
+    c, d = case.chunks[j].start, case.behind(j)
+    data = case.data
+    return data[:a] + data[c:d] + data[b:c] + data[a:b] + data[d:], set()
+
+
+def doubled(case: Case, rng: np.random.Generator) -> Damage:
+    i = _a_chunk(rng)
+    start, end = case.chunks[i].start, case.behind(i)
+    return case.data[:end] + case.data[start:end] + case.data[end:], set()
+
+
+def no_checksum(case: Case, rng: np.random.Generator) -> Damage:
+    i = _a_chunk(rng)
+    start, end = case.chunks[i].start, case.chunks[i].end
+    data = bytearray(case.data)
+    data[start + CRC_AT : start + CRC_AT + 4] = bytes(4)
+    data[int(rng.integers(start + 60, end))] ^= 1 << int(rng.integers(8))
+    return bytes(data), {i}
+
+
+DRAWN: tuple[Callable[[Case, np.random.Generator], Damage], ...] = (
+    a_bit, zeros, noise, a_length, a_cut, bytes_gone, bytes_more, swapped, doubled, no_checksum,
+)  # fmt: skip

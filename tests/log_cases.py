@@ -10,7 +10,7 @@ from mcap.writer import Writer
 
 from twin.logs import FIELDS, AxisLog, Log
 from twin.logs.log import Array
-from twin.logs.schema import file_descriptor_set, protobuf_segments
+from twin.logs.messages import file_descriptor_set, tag
 
 RATE = 10_000.0
 
@@ -79,15 +79,15 @@ def write_together(path: Path, log: Log, *, rows: int = 30, **options: object) -
             number = writer.register_schema("twin.AxisSample", "protobuf", schema)
             stated = {"sample_rate_hz": repr(log.sample_rate)}
             channel = writer.register_channel(f"/axis/{name}", "protobuf", number, stated)
-            channels[name] = channel, protobuf_segments(numbers)
+            channels[name] = channel, numbers
         for k in range(len(log)):
             if k % rows == 0 and k:
                 writer.flush()
             time = round(k * 1e9 / log.sample_rate)
-            for name, (channel, segments) in channels.items():
-                parts = (
-                    struct.pack("<d", log.axes[name].columns[s][k]) if isinstance(s, str) else s
-                    for s in segments
+            for name, (channel, numbers) in channels.items():
+                columns = log.axes[name].columns
+                data = b"".join(
+                    tag(n) + struct.pack("<d", columns[f][k]) for f, n in numbers.items()
                 )
-                writer.add_message(channel, time, b"".join(parts), time, k)
+                writer.add_message(channel, time, data, time, k)
         writer.finish()

@@ -9,7 +9,7 @@ from mcap_bytes import log_file
 
 from twin.errors import InputError
 from twin.logs import Log, read_log
-from twin.logs.schema import file_descriptor_set, protobuf_segments
+from twin.logs.messages import file_descriptor_set, tag
 
 MS = 1_000_000
 RATED = {"sample_rate_hz": "1000"}
@@ -31,8 +31,7 @@ def channel(
 
 def message(channel: int, k: int, values: Mapping[str, float], time: int | None = None) -> Message:
     """Message k of a channel, one a ms or at a time in ns."""
-    segments = protobuf_segments({name: n for n, name in enumerate(values, 1)})
-    data = b"".join(struct.pack("<d", values[s]) if isinstance(s, str) else s for s in segments)
+    data = b"".join(tag(n) + struct.pack("<d", value) for n, value in enumerate(values.values(), 1))
     at = MS * k if time is None else time
     return Message(channel, at, data, at, k)
 

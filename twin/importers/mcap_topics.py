@@ -9,6 +9,7 @@ times since 1970.
 from __future__ import annotations
 
 import json
+import struct
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,35 +18,43 @@ from typing import Any
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema
+from mcap.records import Schema
 from numpy.typing import NDArray
 
 from twin.errors import InputError
 from twin.importers.mapping import ImportMap
 from twin.importers.table import Table, chosen, extra, parsing, require_columns
-from twin.logs.container import IN_CHUNKS, Damaged, Inflation, McapFile, open_chunk, parse
-from twin.logs.decode import message_parts, record_at
+from twin.logs.container import (
+    IN_CHUNKS,
+    Damaged,
+    FileBytes,
+    Inflation,
+    McapFile,
+    open_chunk,
+    record_at,
+)
+from twin.logs.topics import Topics
 
 LOG_TIME = "log_time"
 _STAMPS = (("sec", "nanosec"), ("seconds", "nanos"))  # ROS 2, protobuf
 
 Decode = Callable[[bytes], Any]
+_MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
 def read(path: Path, mapping: ImportMap) -> Table:
     """Columns of an MCAP file; raises InputError."""
     wanted = mapping.column_names()
     with parsing("MCAP"):
-        columns = _read(path, wanted)
+        columns = _columns(path, wanted)
     return Table({name: columns[name] for name in chosen(wanted, columns)})
 
 
-def _read(path: Path, wanted: Sequence[str]) -> dict[str, NDArray]:
-    topics = _Topics()
+def _columns(path: Path, wanted: Sequence[str]) -> dict[str, NDArray]:
     held: dict[str, array] = {}
     stamps: set[str] = set()
     seen: dict[str, None] = {}
-    for topic, time, decoded in topics.messages(path, wanted):
+    for topic, time, decoded in _messages(path, wanted):
         values = _flat(f"{topic}.", decoded) if decoded is not None else {}
         values[f"{topic}.{LOG_TIME}"] = np.datetime64(time, "ns")
         seen.update(dict.fromkeys(values))
@@ -65,53 +74,37 @@ def _read(path: Path, wanted: Sequence[str]) -> dict[str, NDArray]:
     }
 
 
-class _Topics:
-    """Schemas, channels and decoders of a file."""
+def _messages(path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
+    """Topic, log time in ns and message; of topics that are not wanted the first alone.
 
-    def __init__(self) -> None:
-        self._schemas: dict[int, Schema] = {}
-        self._channels: dict[int, Channel] = {}
-        self._decoders: dict[int, Decode | None] = {}
-
-    def messages(self, path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
-        """Topic, log time in ns and message; of topics that are not wanted the first alone.
-
-        Raises Damaged where there are not as many as the file announces.
-        """
-        shown = Counter[int]()
-        with open(path, "rb") as stream:
-            file = McapFile(stream, path.stat().st_size)
-            for opcode, content in _records(file):
-                if opcode != Opcode.MESSAGE:
-                    self._register(opcode, content)
-                    continue
-                number, _, time, _, data = message_parts(content)
-                topic = self._channels[number].topic
-                shown[number] += 1
-                if shown[number] > 1 and not any(
-                    w.startswith(f"{topic}.") for w in wanted or (f"{topic}.",)
-                ):
-                    continue
-                decode = self._decoder(number)
-                yield topic, time, decode(data) if decode else None
-        if file.statistics is not None:
-            _require_all(shown, file.statistics.channel_message_counts)
-
-    def _register(self, opcode: int, content: bytes) -> None:
-        if opcode == Opcode.SCHEMA:
-            schema = parse(Schema, content, "schema record")
-            self._schemas[schema.id] = schema
-        else:
-            channel = parse(Channel, content, "channel record")
-            self._channels[channel.id] = channel
-
-    def _decoder(self, number: int) -> Decode | None:
-        """How the messages of a channel are read; None where nothing here can."""
-        if number not in self._decoders:
-            channel = self._channels[number]
-            schema = self._schemas.get(channel.schema_id)
-            self._decoders[number] = _decoder_for(channel.message_encoding, schema)
-        return self._decoders[number]
+    Raises Damaged where there are not as many as the file announces.
+    """
+    topics, shown = Topics(), Counter[int]()
+    decoders: dict[int, Decode | None] = {}
+    with open(path, "rb") as stream:
+        file = McapFile(FileBytes(stream))
+        for opcode, content in _records(file):
+            if opcode != Opcode.MESSAGE:
+                topics.register(opcode, content)
+                continue
+            number, _, time, _ = _MESSAGE_HEAD.unpack_from(content)
+            channel = topics.channels[number]
+            shown[number] += 1
+            if shown[number] > 1 and not any(
+                w.startswith(f"{channel.topic}.") for w in wanted or (f"{channel.topic}.",)
+            ):
+                continue
+            if number not in decoders:
+                schema = topics.schemas.get(channel.schema_id)
+                decoders[number] = _decoder_for(channel.message_encoding, schema)
+            decode = decoders[number]
+            yield channel.topic, time, decode(content[_MESSAGE_HEAD.size :]) if decode else None
+    # a chunk whose kind is damaged is passed over
+    if file.counts is not None and shown.total() != sum(file.counts.values()):
+        raise Damaged(
+            f"{shown.total()} messages where its statistics announce {sum(file.counts.values())}; "
+            "copy the file again"
+        )
 
 
 def _records(file: McapFile) -> Iterator[tuple[int, bytes]]:
@@ -119,21 +112,13 @@ def _records(file: McapFile) -> Iterator[tuple[int, bytes]]:
     budget = Inflation(file.size)
     for record in file.records():
         if record.opcode == Opcode.CHUNK:
-            data, offset = open_chunk(record, budget).data, 0
+            data, _ = open_chunk(record, budget)
+            offset = 0
             while offset < len(data):
                 opcode, content, offset = record_at(data, offset)
                 yield opcode, content
         elif record.opcode in IN_CHUNKS:
             yield record.opcode, record.content
-
-
-def _require_all(found: Mapping[int, int], announced: Mapping[int, int]) -> None:
-    """Raise Damaged where messages are missing: a chunk whose kind is damaged is passed over."""
-    if sum(found.values()) != sum(announced.values()):
-        raise Damaged(
-            f"{sum(found.values())} messages where its statistics announce "
-            f"{sum(announced.values())}; copy the file again"
-        )
 
 
 def _decoder_for(encoding: str, schema: Schema | None) -> Decode | None:

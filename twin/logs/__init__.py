@@ -1,7 +1,6 @@
 """Logs: columns with units, the MCAP codec, recovery of damaged ones."""
 
-from twin.logs.by_name import GivenLogs, logs_by_name
-from twin.logs.decode import read_log
+from twin.logs.decode import GivenLogs, logs_by_name, read_log
 from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, AxisLog, Log
 from twin.logs.recover import Recovery, recover_file, recover_log
 from twin.logs.writer import record_log, write_log, write_topics

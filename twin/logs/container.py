@@ -14,54 +14,14 @@ from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
-import lz4.frame
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Footer, Statistics
+from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
 
 from twin.errors import InputError, at
-
-SMALLEST_WINDOW, LARGEST_WINDOW = 1 << 16, 1 << 22
-
-
-class FileBytes:
-    """The bytes of an open file by their place; raises InputError where the disk refuses them."""
-
-    def __init__(self, stream: BinaryIO, size: int) -> None:
-        self._stream = stream
-        self._size = size
-
-    def __len__(self) -> int:
-        return self._size
-
-    def part(self, start: int, stop: int) -> bytes:
-        """The bytes from ``start`` to before ``stop``, or as many as there are."""
-        try:
-            self._stream.seek(start)
-            return self._stream.read(max(0, min(stop, self._size) - start))
-        except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror or error}") from error
-
-    def windows(self, start: int, stop: int, beyond: int) -> Iterator[tuple[int, int, bytes]]:
-        """Place, length and bytes of windows side by side, each with ``beyond`` bytes of the next.
-
-        They grow, as what is searched for is mostly near.
-        """
-        length = SMALLEST_WINDOW
-        while start < stop:
-            own = min(length, stop - start)
-            yield start, own, self.part(start, start + own + beyond)
-            start, length = start + own, min(2 * length, LARGEST_WINDOW)
-
-    def checksum(self, start: int, stop: int) -> int:
-        """CRC-32 of the bytes from ``start`` to before ``stop``."""
-        crc = 0
-        for _, _, data in self.windows(start, stop, 0):
-            crc = zlib.crc32(data, crc)
-        return crc
-
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
@@ -73,6 +33,25 @@ T = TypeVar("T")
 
 class Damaged(InputError):
     """The bytes are not what the writer wrote: cut off, flipped, or not framed as MCAP."""
+
+
+class FileBytes:
+    """The bytes of an open file by their place; raises InputError where the disk refuses them."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self._size = os.fstat(stream.fileno()).st_size
+
+    def __len__(self) -> int:
+        return self._size
+
+    def part(self, start: int, stop: int) -> bytes:
+        """The bytes from ``start`` to before ``stop``, or as many as there are."""
+        try:
+            self._stream.seek(start)
+            return self._stream.read(max(0, min(stop, self._size) - start))
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror or error}") from error
 
 
 @dataclass(frozen=True)
@@ -87,6 +66,11 @@ class Record:
     def end(self) -> int:
         """Byte after the record."""
         return self.offset + RECORD_HEAD.size + len(self.content)
+
+    @property
+    def place(self) -> str:
+        """Where a chunk is."""
+        return f"chunk at byte {self.offset}"
 
     def parsed(self, kind: type[T]) -> T:
         """The content as a record class of ``mcap.records``; raises Damaged."""
@@ -104,55 +88,49 @@ def parse(kind: type[T], content: bytes, place: str) -> T:
 class McapFile:
     """An open MCAP file whose closing magic and summary are verified.
 
-    statistics: message counts by channel, or None where the writer left them out.
+    definitions: the schemas and channels that the summary lists. counts: messages by channel, None
+    where the writer left the statistics out.
     """
 
-    def __init__(self, stream: BinaryIO, size: int) -> None:
-        self.size = size
-        self.checked = False  # whether a checksum of all records was found right
-        self._stream = stream
+    def __init__(self, data: FileBytes) -> None:
+        self._bytes = data
+        self.size = len(data)
         self._check_magic()
         self._summary: list[Record] = []
         self._data_end = self._read_summary()
-        self.statistics = next(iter(self._summarised(Opcode.STATISTICS, Statistics)), None)
-
-    def _read_at(self, offset: int, length: int) -> bytes:
-        self._stream.seek(offset)
-        return self._stream.read(length)
+        self.definitions = [r for r in self._summary if r.opcode in IN_CHUNKS]
+        statistics = self._summarised(Opcode.STATISTICS, Statistics)
+        self.counts = statistics[0].channel_message_counts if statistics else None
 
     def _check_magic(self) -> None:
         if self.size == 0:
             raise Damaged("the file is empty")
-        if self._read_at(0, len(MAGIC)) != MAGIC:
+        if self._bytes.part(0, len(MAGIC)) != MAGIC:
             raise InputError(
                 "not an MCAP file (wrong magic in bytes 0 to 7); convert it with: twin import"
             )
-        if (
-            self.size < 2 * len(MAGIC) + _FOOTER_SIZE
-            or self._read_at(self.size - len(MAGIC), len(MAGIC)) != MAGIC
-        ):
+        least, end = 2 * len(MAGIC) + _FOOTER_SIZE, self.size - len(MAGIC)
+        if self.size < least or self._bytes.part(end, self.size) != MAGIC:
             raise Damaged(f"truncated: ends at byte {self.size} without the closing MCAP magic")
 
     def _read_summary(self) -> int:
         """Keep the records of the summary; returns where the data end."""
-        start = self.size - len(MAGIC) - _FOOTER_SIZE
-        record = self._record(start, self.size - len(MAGIC))
-        if record.opcode != Opcode.FOOTER or len(record.content) != 20:
+        end = self.size - len(MAGIC)
+        start = end - _FOOTER_SIZE
+        record = self._record(start, end)
+        if record.opcode != Opcode.FOOTER or record.end != end:
             raise Damaged(f"no footer record at byte {start}")
         footer = record.parsed(Footer)
-        if footer.summary_start == 0:
-            return start
-        if not len(MAGIC) <= footer.summary_start <= start:
-            raise Damaged(f"footer at byte {start} points outside the file")
-        summary = self._read_at(footer.summary_start, self.size - footer.summary_start)
-        covered = summary[: -len(MAGIC) - 4]
-        if footer.summary_crc not in (0, zlib.crc32(covered)):
-            raise Damaged(f"summary section at byte {footer.summary_start}: wrong checksum")
         offset = footer.summary_start
+        if offset == 0:
+            return start
+        if not len(MAGIC) <= offset <= start:
+            raise Damaged(f"footer at byte {start} points outside the file")
+        if footer.summary_crc not in (0, zlib.crc32(self._bytes.part(offset, end - 4))):
+            raise Damaged(f"summary section at byte {offset}: wrong checksum")
         while offset < start:
-            record = self._record(offset, start)
-            self._summary.append(record)
-            offset = record.end
+            self._summary.append(self._record(offset, start))
+            offset = self._summary[-1].end
         return footer.summary_start
 
     def _summarised(self, opcode: int, kind: type[T]) -> list[T]:
@@ -161,10 +139,6 @@ class McapFile:
     def channels(self) -> list[Channel]:
         """The channels, as the summary lists them."""
         return self._summarised(Opcode.CHANNEL, Channel)
-
-    def definitions(self) -> list[Record]:
-        """The schemas and channels, as the summary lists them."""
-        return [r for r in self._summary if r.opcode in (Opcode.SCHEMA, Opcode.CHANNEL)]
 
     @cached_property
     def _chunks(self) -> list[ChunkIndex]:
@@ -177,10 +151,7 @@ class McapFile:
 
         start, stop: ns. All records where the summary has no index of the chunks.
         """
-        if not self._chunks:
-            yield from self.records()
-            return
-        first = min(c.chunk_start_offset for c in self._chunks)
+        first = min((c.chunk_start_offset for c in self._chunks), default=self.size)
         for record in self.records():
             if record.offset >= first:
                 break
@@ -199,13 +170,13 @@ class McapFile:
         return (record for record in self.records() if held.get(record.offset, True))
 
     def _record(self, offset: int, end: int) -> Record:
-        head = self._read_at(offset, RECORD_HEAD.size)
-        if len(head) < RECORD_HEAD.size or offset + len(head) > end:
+        start = offset + RECORD_HEAD.size
+        if offset < 0 or start > end:
             raise Damaged(f"a record is cut off at byte {offset}")
-        opcode, length = RECORD_HEAD.unpack(head)
-        if length > end - offset - len(head):
+        opcode, length = RECORD_HEAD.unpack(self._bytes.part(offset, start))
+        if length > end - start:
             raise Damaged(f"the record at byte {offset} claims {length} bytes, more than follow")
-        return Record(opcode, offset, self._stream.read(length))
+        return Record(opcode, offset, self._bytes.part(start, start + length))
 
     def records(self) -> Iterator[Record]:
         """Records of the data section, its checksum verified at the end."""
@@ -220,9 +191,7 @@ class McapFile:
             offset = record.end
         if record.end != self._data_end or len(record.content) != 4:
             raise Damaged(f"the data section ends at byte {record.offset}, before the summary")
-        stated = record.parsed(DataEnd).data_section_crc
-        self.checked = stated == crc
-        if stated not in (0, crc):
+        if record.parsed(DataEnd).data_section_crc not in (0, crc):
             raise Damaged(
                 f"data section (bytes 0 to {offset}): wrong checksum though every chunk is intact; "
                 "metadata, an attachment or an index is damaged"
@@ -233,6 +202,19 @@ def _holds(chunk: ChunkIndex, channels: Container[int]) -> bool:
     """Whether a chunk may have messages of these channels; an index may leave out its channels."""
     held = chunk.message_index_offsets
     return not held or any(channel in channels for channel in held)
+
+
+def record_at(data: bytes, offset: int) -> tuple[int, bytes, int]:
+    """Opcode, content and end of the record at ``offset`` of a chunk; raises Damaged."""
+    start = offset + RECORD_HEAD.size
+    if start > len(data):
+        raise Damaged(f"a record is cut off, {offset} bytes into it")
+    opcode, length = RECORD_HEAD.unpack_from(data, offset)
+    if length > len(data) - start:
+        raise Damaged(f"a record claims more bytes than follow, {offset} bytes into it")
+    if opcode not in IN_CHUNKS:
+        raise Damaged(f"a record of kind {opcode}, which no chunk holds, {offset} bytes into it")
+    return opcode, data[start : start + length], start + length
 
 
 @contextmanager
@@ -253,25 +235,13 @@ def reading(path: Path) -> Iterator[None]:
 def open_mcap(path: Path) -> Iterator[McapFile]:
     """Open ``path``; every failure is an InputError that names the file."""
     with reading(path), open(path, "rb") as stream:
-        yield McapFile(stream, os.fstat(stream.fileno()).st_size)
+        yield McapFile(FileBytes(stream))
 
 
 SMALLEST_INFLATION = 1 << 24  # bytes, whatever the size of the file
-LARGEST_RATIO = 256
+LARGEST_RATIO = 256  # of what any format of this house shrinks to
 LARGEST_BOMB = 1 << 27  # bytes of a chunk that shrank by more than is usual
-USUAL_RATIO = 16
-
-
-@dataclass(frozen=True)
-class Payload:
-    """Schema, channel and message records as they stand in a chunk, decompressed.
-
-    proved: whether a checksum says that they are what was written.
-    """
-
-    place: str
-    data: bytes
-    proved: bool
+USUAL_RATIO = 16  # samples of a drive shrink by 2 to 10
 
 
 class Inflation:
@@ -295,53 +265,47 @@ class Inflation:
         self._left -= size
 
 
-def open_chunk(record: Record, budget: Inflation) -> Payload:
-    """Decompress a chunk and verify its size and checksum; raises Damaged."""
-    place = f"chunk at byte {record.offset}"
-    chunk = record.parsed(Chunk)
-    with at(place):
-        budget.take(chunk.uncompressed_size, len(chunk.data))
-        data = decompressed(chunk)
-    return Payload(place, data, chunk.uncompressed_crc != 0)
-
-
 def decompressed(chunk: Chunk) -> bytes:
     """The records in a chunk, of the size it states and with the checksum; raises Damaged."""
-    data = _decompress(chunk)
-    if len(data) != chunk.uncompressed_size:
-        raise Damaged(f"{len(data)} bytes where {chunk.uncompressed_size} are announced")
-    if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-        raise Damaged("wrong checksum")
-    return data
-
-
-def _decompress(chunk: Chunk) -> bytes:
-    size = chunk.uncompressed_size
+    kind, size = chunk.compression, chunk.uncompressed_size
+    if kind not in ("zstd", "lz4", ""):
+        raise Damaged(f"compression {kind!r} is not one of zstd, lz4 or none")
     try:
-        match chunk.compression:
-            case "":
-                return chunk.data
-            case "zstd":
-                if zstandard.frame_content_size(chunk.data) not in (-1, size):
-                    raise Damaged("its size and that of its zstd frame differ")
-                return zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
-            case "lz4":
-                return lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size)
+        # the library takes the size of the frame, whatever the chunk states
+        if kind == "zstd" and zstandard.frame_content_size(chunk.data) not in (-1, size):
+            raise Damaged("its size and that of its zstd frame differ")
+        stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     except (zstandard.ZstdError, RuntimeError, EOFError) as error:
-        raise Damaged(f"the {chunk.compression} data cannot be decompressed") from error
-    raise Damaged(f"compression {chunk.compression!r} is not one of zstd, lz4 or none")
+        raise Damaged(f"the {kind} data cannot be decompressed") from error
+    except CRCValidationError as error:
+        raise Damaged("wrong checksum") from error
+    if length != size:
+        raise Damaged(f"{length} bytes where {size} are announced")
+    return stream.read(length)
+
+
+def open_chunk(record: Record, budget: Inflation) -> tuple[bytes, bool]:
+    """The records in a chunk, and whether a checksum proves them; raises Damaged."""
+    chunk = record.parsed(Chunk)
+    with at(record.place):
+        budget.take(chunk.uncompressed_size, len(chunk.data))
+        return decompressed(chunk), chunk.uncompressed_crc != 0
 
 
 def payloads(
-    records: Iterator[Record], other: Callable[[Record], None], budget: Inflation
-) -> Iterator[Payload]:
-    """The chunks; the rest goes to ``other``. Raises Damaged, InputError."""
+    records: Iterator[Record], size: int, other: Callable[[Record], None]
+) -> Iterator[tuple[str, bytes]]:
+    """The chunks of a file of ``size`` bytes: where each is and the records in it, proved.
+
+    The other records go to ``other``. Raises Damaged, InputError.
+    """
+    budget = Inflation(size)
     for record in records:
         if record.opcode == Opcode.CHUNK:
-            payload = open_chunk(record, budget)
-            if payload.data and not payload.proved:
-                raise Damaged(f"{payload.place}: states no checksum of its samples")
-            yield payload
+            data, proved = open_chunk(record, budget)
+            if data and not proved:
+                raise Damaged(f"{record.place}: states no checksum of its samples")
+            yield record.place, data
         elif record.opcode == Opcode.MESSAGE:
             raise InputError(
                 f"a message at byte {record.offset} is outside the chunks; convert the log with: "

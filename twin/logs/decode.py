@@ -3,33 +3,49 @@
 from __future__ import annotations
 
 import math
-import struct
-from collections import Counter
-from collections.abc import Container, Iterator, Mapping, Sequence
+import zlib
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mcap.opcode import Opcode
+from mcap.records import Attachment, Metadata
 
 from twin.errors import InputError, at
-from twin.logs.assemble import EVERYTHING, Extras, Run, Wanted
-from twin.logs.container import (
-    IN_CHUNKS,
-    RECORD_HEAD,
-    Damaged,
-    Inflation,
-    McapFile,
-    Record,
-    open_mcap,
-    payloads,
-)
-from twin.logs.layout import Block, MessageLayout, RowLayout
-from twin.logs.log import Log
-from twin.logs.schema import segments_of
-from twin.logs.topics import AXIS_PREFIX, Topics
+from twin.logs.container import Damaged, McapFile, Record, open_mcap, payloads
+from twin.logs.log import Array, AxisLog, Log
+from twin.logs.messages import Block
+from twin.logs.series import Series, seconds
+from twin.logs.topics import AXIS_PREFIX, TRUTH_PREFIX, Topic, Topics, axis_of, positive_number
 
-MOST_DEFINITIONS = 100_000  # of schemas and channels in a chunk; there are 65535 of each
-_MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+METADATA_NAME = "twin"
+CHECKSUM = "checksum"  # entry of the metadata, as their record has none
+SCHEMA_VERSION = "1"
+EARLY = 0.1  # of a period: how much before a sample a range may begin to hold it
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is read of a log: axes and fields by name, None for all, and the simulator's truth."""
+
+    axes: Sequence[str] | None = None
+    fields: Sequence[str] | None = None
+    truth: bool = True
+
+    def takes(self, topic: str) -> bool:
+        """Whether samples of a topic are wanted."""
+        if self.axes is not None and axis_of(topic) not in self.axes:
+            return False
+        return topic.startswith(AXIS_PREFIX) or (self.truth and topic.startswith(TRUTH_PREFIX))
+
+    def channels(self, file: McapFile) -> Container[int]:
+        """The channels that are wanted; all where the summary lists none."""
+        listed = file.channels()
+        return {c.id for c in listed if self.takes(c.topic)} if listed else range(1 << 16)
+
+
+EVERYTHING = Wanted()
 
 
 def read_log(
@@ -51,10 +67,12 @@ def read_log(
     Raises InputError otherwise, and where no axis has position and one of current and force.
     """
     wanted = Wanted(axes, fields, truth)
-    with _remedied(path):
-        if start is None and stop is None:
-            return read_strictly(Path(path), wanted)
-        return read_between(Path(path), wanted, start or 0.0, math.inf if stop is None else stop)
+    with _opened(path) as file:
+        if start is not None or stop is not None:
+            return _between(file, wanted, start or 0.0, math.inf if stop is None else stop)
+        everything = wanted == EVERYTHING
+        records = file.records() if everything else file.selected(wanted.channels(file))
+        return next(log_parts(file, records, wanted, None))
 
 
 def read_parts(
@@ -67,40 +85,30 @@ def read_parts(
     is one part.
     """
     wanted = Wanted(None, fields, truth=False)
-    with _remedied(path), open_mcap(Path(path)) as file:
-        yield from log_parts(file, file.selected(_channels(file, wanted)), wanted, samples)
+    with _opened(path) as file:
+        yield from log_parts(file, file.selected(wanted.channels(file)), wanted, samples)
 
 
 def verified_parts(path: str | Path, samples: int) -> Iterator[Log]:
     """The same, with all of the file verified when the last part was taken."""
     wanted = Wanted(truth=False)
-    with _remedied(path), open_mcap(Path(path)) as file:
-        yield from log_parts(file, file.records_with(_channels(file, wanted)), wanted, samples)
-
-
-def read_strictly(path: Path, wanted: Wanted = EVERYTHING) -> Log:
-    """``read_log`` without the remedy in its messages."""
-    with open_mcap(path) as file:
-        everything = wanted == EVERYTHING
-        records = file.records() if everything else file.selected(_channels(file, wanted))
-        return next(log_parts(file, records, wanted, None))
+    with _opened(path) as file:
+        yield from log_parts(file, file.records_with(wanted.channels(file)), wanted, samples)
 
 
 def samples_by_axis(path: str | Path) -> dict[str, int]:
     """Samples of each axis as the file's statistics announce them; nothing where there are none."""
-    with _remedied(path), open_mcap(Path(path)) as file:
-        counts = file.statistics.channel_message_counts if file.statistics else {}
-        return {
-            c.topic.removeprefix(AXIS_PREFIX): counts.get(c.id, 0)
-            for c in file.channels()
-            if c.topic.startswith(AXIS_PREFIX)
-        }
+    with _opened(path) as file:
+        axes = [c for c in file.channels() if c.topic.startswith(AXIS_PREFIX)]
+        return {axis_of(c.topic): (file.counts or {}).get(c.id, 0) for c in axes}
 
 
 @contextmanager
-def _remedied(path: str | Path) -> Iterator[None]:
+def _opened(path: str | Path) -> Iterator[McapFile]:
+    """The file, with a remedy in the errors that tell of damage."""
     try:
-        yield
+        with open_mcap(Path(path)) as file:
+            yield file
     except Damaged as error:
         raise Damaged(
             f"{error}; copy the file again, or keep what is intact: twin recover {path} -o GOOD"
@@ -111,155 +119,293 @@ def log_parts(
     file: McapFile, records: Iterator[Record], wanted: Wanted, samples: int | None
 ) -> Iterator[Log]:
     """The log in parts of ``samples`` or a few more; whole where None."""
-    topics, extras, counts = _topics(file), Extras(), Counter[int]()
-    decoder, room, every = Decoder(topics), _capacities(file, samples), _with_samples(file, wanted)
-    run = before = Run(topics, wanted, room)
-    for payload in payloads(records, extras.add, Inflation(file.size)):
-        if samples is not None and run.holds(samples, every):
-            run.require_behind(before)
-            counts.update(run.counts)
-            yield run.log(extras)
-            run, before = Run(topics, wanted, room), run
-        with at(payload.place):
-            run.extend(decoder.blocks(payload.data))
-    counts.update(run.counts)
-    _check_counts(file, topics, counts)
-    run.require_behind(before)
-    yield run.log(extras)
+    run = Run(file, wanted, samples)
+    for place, data in payloads(records, file.size, run.extras.add):
+        if samples is not None and run.holds(samples):
+            yield run.log()
+        with at(place):
+            run.append(data)
+    run.require_counts()
+    if not run.is_told:
+        yield run.log()
 
 
-def read_between(path: Path, wanted: Wanted, start: float, stop: float) -> Log:
+def _between(file: McapFile, wanted: Wanted, start: float, stop: float) -> Log:
     """The samples from ``start`` to before ``stop``, s."""
     if not start < stop:
-        raise InputError(f"{path}: start = {start:g} s is not before stop = {stop:g} s")
-    with open_mcap(path) as file:
-        topics, extras = _topics(file), Extras()
-        decoder, run = Decoder(topics), Run(topics, wanted)
-        span = round(start * 1e9), min(stop * 1e9, 2.0**63)
-        records = file.selected(_channels(file, wanted), *span)
-        for payload in payloads(records, extras.add, Inflation(file.size)):
-            with at(payload.place):
-                run.extend(decoder.blocks(payload.data))
-        return run.between(extras, start, stop)
+        raise InputError(f"start = {start:g} s is not before stop = {stop:g} s")
+    run = Run(file, wanted)
+    span = round(start * 1e9), min(stop * 1e9, 2.0**63)
+    records = file.selected(wanted.channels(file), *span)
+    for place, data in payloads(records, file.size, run.extras.add):
+        with at(place):
+            run.append(data)
+    return run.between(start, stop)
 
 
-def _topics(file: McapFile) -> Topics:
-    """The topics as the summary lists them, whose chunks may never be read."""
-    topics = Topics()
-    for record in file.definitions():
-        topics.register(record.opcode, record.content)
-    return topics
+@dataclass
+class Extras:
+    """Metadata and attachments. proved: whether a checksum of its own proves the metadata."""
 
+    metadata: dict[str, str] = field(default_factory=dict)
+    attachments: dict[str, bytes] = field(default_factory=dict)
+    proved: bool = False
 
-def _channels(file: McapFile, wanted: Wanted) -> Container[int]:
-    """The channels that are wanted; all where the summary lists none."""
-    listed = file.channels()
-    return {c.id for c in listed if wanted.takes(c.topic)} if listed else range(1 << 16)
+    def add(self, record: Record) -> None:
+        """Take metadata or an attachment from a record; raises Damaged, InputError."""
+        if record.opcode == Opcode.METADATA:
+            metadata = record.parsed(Metadata)
+            if metadata.name == METADATA_NAME:
+                self._take(dict(metadata.metadata), f"metadata at byte {record.offset}")
+        elif record.opcode == Opcode.ATTACHMENT:
+            attachment = record.parsed(Attachment)
+            crc = int.from_bytes(record.content[-4:], "little")
+            if crc not in (0, zlib.crc32(record.content[:-4])):
+                raise Damaged(f"attachment at byte {record.offset}: wrong checksum")
+            self.attachments[attachment.name] = attachment.data
 
-
-def _with_samples(file: McapFile, wanted: Wanted) -> int:
-    """How many wanted topics have samples, as the statistics announce them; 0 where unknown."""
-    counts = file.statistics.channel_message_counts if file.statistics else {}
-    return sum(counts.get(c.id, 0) > 0 for c in file.channels() if wanted.takes(c.topic))
-
-
-def _check_counts(file: McapFile, topics: Topics, counts: Mapping[int, int]) -> None:
-    """Compare the samples with the number of messages the file announces; raises Damaged."""
-    if file.statistics is None:
-        return
-    announced = file.statistics.channel_message_counts
-    for channel, count in counts.items():
-        if count != announced.get(channel, 0):
-            raise Damaged(
-                f"{topics.channels[channel].topic}: {count} samples where the statistics "
-                f"announce {announced.get(channel, 0)}"
+    def _take(self, entries: dict[str, str], place: str) -> None:
+        stated = entries.pop(CHECKSUM, None)
+        if stated not in (None, checksum(entries)):
+            raise Damaged(f"{place}: wrong checksum")
+        version = entries.get("schema_version", SCHEMA_VERSION)
+        if version != SCHEMA_VERSION:
+            raise InputError(
+                f"log schema version is {version!r}, this program reads {SCHEMA_VERSION!r}; "
+                "install a newer proton-twin"
             )
+        self.metadata, self.proved = entries, stated is not None
 
 
-def _capacities(file: McapFile, samples: int | None) -> dict[int, int]:
-    """Samples to make room for; no more than bytes in the file, whatever its statistics say."""
-    counts = file.statistics.channel_message_counts if file.statistics else {}
-    most = file.size if samples is None else min(file.size, samples + (samples >> 4))
-    return {channel: min(count, most) for channel, count in counts.items()}
+def checksum(metadata: Mapping[str, str]) -> str:
+    """CRC-32, eight digits, of all keys and values of metadata, sorted, each behind its length."""
+    crc = 0
+    for text in (t for entry in sorted(metadata.items()) for t in entry):
+        data = text.encode()
+        crc = zlib.crc32(data, zlib.crc32(len(data).to_bytes(8, "little"), crc))
+    return f"{crc:08x}"
 
 
-class Decoder:
-    """Turns the records of a chunk into blocks of samples."""
+class Run:
+    """The samples of a file as they arrive, topic by topic, and its metadata and attachments.
 
-    def __init__(self, topics: Topics) -> None:
-        self._topics = topics
-        self._layouts: dict[int, RowLayout] = {}  # by the channel of their first message
+    samples: how many of a topic are held at once; None: all.
+    """
 
-    def blocks(self, data: bytes) -> list[Block]:
-        """Samples by channel; raises InputError, Damaged for broken framing.
+    def __init__(self, file: McapFile, wanted: Wanted, samples: int | None = None) -> None:
+        self.extras = Extras()
+        self._topics = Topics()
+        for record in file.definitions:  # chunks that hold them as well may never be read
+            self._topics.register(record.opcode, record.content)
+        self._wanted = wanted
+        self._counts = file.counts
+        self._expected = {
+            c.id for c in file.channels()
+            if (file.counts or {}).get(c.id, 0) and wanted.takes(c.topic)
+        }  # fmt: skip
+        # room for no more samples than bytes in the file, whatever its statistics say
+        self._room = file.size if samples is None else min(file.size, samples + (samples >> 4))
+        self._series: dict[int, Series] = {}
 
-        The messages of a chunk must all be laid out as the first ones, as this program writes them.
-        """
-        offset = self._register_leading(data)
-        if offset == len(data):
-            return []
-        if len(data) - offset < RECORD_HEAD.size + _MESSAGE_HEAD.size:
-            raise Damaged(f"a record is cut off, {offset} bytes into it")
-        first = _MESSAGE_HEAD.unpack_from(data, offset + RECORD_HEAD.size)[0]
-        if self._topics.topic(first) is None:
-            return []
-        for likely in (lambda: self._layouts.get(first), lambda: self._inferred(data, offset)):
-            layout = likely()
-            rows = layout.rows(data, offset) if layout else None
-            if layout and rows is not None and offset + rows.nbytes == len(data):
-                self._layouts[first] = layout
-                return list(layout.blocks(rows))
-        raise InputError(
-            "its messages are not laid out as this program writes them; convert the log with: "
-            "twin import"
+    def append(self, data: bytes) -> None:
+        """Take the samples in a chunk; raises InputError."""
+        for block in self._topics.blocks(data):
+            series = self._series.get(block.channel) or self._open(block)
+            if series is not None:
+                series.append(block)
+
+    def _open(self, block: Block) -> Series | None:
+        topic = self._topics.topic(block.channel)
+        if topic is None or not self._wanted.takes(topic.name):
+            return None
+        if any(s.topic.name == topic.name for s in self._series.values()):
+            raise InputError(f"two channels have the topic {topic.name}; write one a topic")
+        with at(topic.name):
+            room = min((self._counts or {}).get(block.channel, 0), self._room)
+            fields = None if topic.is_truth else self._wanted.fields
+            self._series[block.channel] = Series(topic, room, fields)
+        return self._series[block.channel]
+
+    def _opened(self) -> list[Series]:
+        return [series for _, series in sorted(self._series.items())]
+
+    @property
+    def is_told(self) -> bool:
+        """Whether all samples are in the logs that were made of them."""
+        return bool(self._series) and not any(s.held for s in self._series.values())
+
+    def holds(self, samples: int) -> bool:
+        """Whether all topics that the file announces hold so many or more, to the same time."""
+        series = self._series.values()
+        return (
+            self._series.keys() == self._expected
+            and len({s.span for s in series}) == 1
+            and all(s.held >= samples for s in series)
         )
 
-    def _register_leading(self, data: bytes) -> int:
-        offset = registered = 0
-        while offset < len(data):
-            opcode, content, end = record_at(data, offset)
-            if opcode == Opcode.MESSAGE:
-                break
-            registered += 1
-            if registered > MOST_DEFINITIONS:
-                raise Damaged(f"more than {MOST_DEFINITIONS} schemas and channels in one chunk")
-            self._topics.register(opcode, content)
-            offset = end
-        return offset
+    def require_counts(self) -> None:
+        """Raise Damaged where there are not as many samples as the file announces."""
+        for channel, series in self._series.items() if self._counts is not None else ():
+            announced = (self._counts or {}).get(channel, 0)
+            if series.count != announced:
+                raise Damaged(
+                    f"{series.topic.name}: {series.count} samples where the statistics announce "
+                    f"{announced}"
+                )
 
-    def _inferred(self, data: bytes, offset: int) -> RowLayout | None:
-        """Layout of the messages up to the one whose channel comes a second time."""
-        messages: dict[int, MessageLayout] = {}
-        while offset < len(data):
-            opcode, content, offset = record_at(data, offset)
-            if opcode != Opcode.MESSAGE:
-                return None
-            channel, _, _, _, payload = message_parts(content)
-            if channel in messages:
-                break
-            topic = self._topics.topic(channel)
-            segments = segments_of(payload, topic.numbers) if topic else None
-            if segments is None:
-                return None
-            messages[channel] = MessageLayout(channel, segments)
-        return RowLayout(tuple(messages.values()))
+    def log(self) -> Log:
+        """The log of what is held; raises InputError where topics differ in time, ..."""
+        rate, common = self._rate(), self._common
+        for one in self._opened():
+            if one.span != common:
+                end = one.start + (one.count - 1) * 1e9 / one.rate
+                raise InputError(
+                    f"{one.topic.name} has {one.count} samples from {seconds(one.start)} to "
+                    f"{seconds(end)}, other topics differ; "
+                    "keep what they have in common with: twin recover"
+                )
+        return assembled(((s.topic, s.taken()) for s in self._opened()), rate, self.extras)
+
+    def between(self, start: float, stop: float) -> Log:
+        """The log of the samples from ``start`` to before ``stop`` (s); raises InputError."""
+        if not self._series:
+            raise InputError(f"has no samples from {start:g} to {stop:g} s")
+        rate, common = self._rate(), self._common
+        zero = max(s.start for s in self._series.values()) * 1e-9
+        first, last = (
+            common.start + math.ceil(min(max((t - zero) * rate - EARLY, 0), len(common)))
+            for t in (start, stop)
+        )
+        if first == last:
+            raise InputError(
+                f"has no samples from {start:g} to {stop:g} s; it goes on from {zero:g} s to "
+                f"{zero + len(common) / rate:g} s"
+            )
+        columns = []
+        for series in self._opened():
+            span = slice(first - series.span.start, last - series.span.start)
+            columns.append((series.topic, {f: c[span] for f, c in series.taken().items()}))
+        return assembled(columns, rate, self.extras)
+
+    @property
+    def _common(self) -> range:
+        """The numbers of the samples that all topics have."""
+        spans = [s.span for s in self._series.values()]
+        return range(max(s.start for s in spans), min(s.stop for s in spans))
+
+    def _rate(self) -> float:
+        """The rate of all topics, Hz; raises InputError where an axis lacks anything."""
+        series = self._opened()
+        names = [s.topic.axis for s in series if not s.topic.is_truth]
+        for wanted in self._wanted.axes or ():
+            if wanted not in names:
+                raise self._has_no(wanted)
+        if not names:
+            raise self._has_no(None)
+        for one in series:
+            one.topic.require_fields()
+        return common_rate([s.topic for s in series], self.extras)
+
+    def _has_no(self, axis: str | None) -> InputError:
+        """The error for an axis without samples, None: for all of them."""
+        topics = self._topics.names()
+        if axis is not None:
+            axes = [axis_of(t) for t in topics if t.startswith(AXIS_PREFIX)]
+            return InputError(
+                f"no samples on topic {AXIS_PREFIX}{axis}; topics in the file: "
+                f"{', '.join(topics) or 'none'}; name an axis of these: {', '.join(axes) or 'none'}"
+            )
+        if any(topic.startswith("/measured/") for topic in topics):
+            return InputError(
+                "is a comparison for viewers (`twin compare --mcap`), not a log: its force is "
+                "averaged; give the log that was compared"
+            )
+        return InputError(
+            f"no samples on a topic {AXIS_PREFIX}<name>; topics in the file: "
+            f"{', '.join(topics) or 'none'}; rename them, or convert the log with: twin import"
+        )
 
 
-def record_at(data: bytes, offset: int) -> tuple[int, bytes, int]:
-    """Opcode, content and end of the record at ``offset``."""
-    start = offset + RECORD_HEAD.size
-    if start > len(data):
-        raise Damaged(f"a record is cut off, {offset} bytes into it")
-    opcode, length = RECORD_HEAD.unpack_from(data, offset)
-    if length > len(data) - start:
-        raise Damaged(f"a record claims more bytes than follow, {offset} bytes into it")
-    if opcode not in IN_CHUNKS:
-        raise Damaged(f"a record of kind {opcode}, which no chunk holds, {offset} bytes into it")
-    return opcode, data[start : start + length], start + length
+def common_rate(topics: Iterable[Topic], extras: Extras) -> float:
+    """The sample rate of all topics, Hz; raises InputError where they or the metadata differ."""
+    rates = {topic.name: topic.sample_rate for topic in topics}
+    stated = positive_number(extras.metadata, "sample_rate_hz")
+    if stated is not None:
+        rates["the metadata"] = stated
+    first, rate = next(iter(rates.items()))
+    for name, other in rates.items():
+        if abs(other - rate) > 1e-9 * rate:
+            raise InputError(
+                f"{first} is sampled at {rate:.9g} Hz, {name} says {other:.9g} Hz; "
+                "write all axes at one rate, or convert with: twin import"
+            )
+    return rate
 
 
-def message_parts(content: bytes) -> tuple[int, int, int, int, bytes]:
-    """Channel, sequence, log time, publish time (ns) and payload of a message record."""
-    if len(content) < _MESSAGE_HEAD.size:
-        raise Damaged("a message record is too short")
-    return *_MESSAGE_HEAD.unpack_from(content), content[_MESSAGE_HEAD.size :]
+def assembled(
+    columns: Iterable[tuple[Topic, dict[str, Array]]], rate: float, extras: Extras
+) -> Log:
+    """The log of topics with their columns, sampled at ``rate`` (Hz); raises InputError."""
+    axes, truth = {}, {}
+    for topic, own in columns:
+        if topic.is_truth:
+            truth[topic.axis] = own
+            continue
+        with at(topic.name):
+            axes[topic.axis] = AxisLog(own, topic.units, topic.force_constant)
+    return Log(rate, axes, extras.metadata, truth, extras.attachments)
+
+
+OneLog = Log | str | Path
+GivenLogs = OneLog | Sequence[OneLog] | Mapping[str, OneLog]
+
+
+class LogsByName(Mapping[str, Log]):
+    """Logs by name; a file is read each time that it is asked for, so that nobody holds it."""
+
+    def __init__(self, given: Mapping[str, OneLog]) -> None:
+        self._given = given
+
+    def __getitem__(self, name: str) -> Log:
+        found = self._given[name]
+        return found if isinstance(found, Log) else read_log(found)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._given)
+
+    def __len__(self) -> int:
+        return len(self._given)
+
+
+def logs_by_name(given: GivenLogs | None, role: str = "log") -> Mapping[str, Log]:
+    """The logs by name: of a file its path, of a log without one its role and number.
+
+    given: a log, the path of one, a list of them or a dict with a name for each. Raises InputError
+    for what is no log, and for a file that is given twice.
+    """
+    if given is None:
+        return {}
+    if isinstance(given, Mapping):
+        if type(given) is dict:  # another mapping may read a file for each of its values
+            for name, log in given.items():
+                _require_log(log, f"{role} {name!r}")
+        return LogsByName(given)
+    logs = [given] if isinstance(given, OneLog) else given
+    if not isinstance(logs, Sequence):
+        _require_log(logs, role)
+    named: dict[str, OneLog] = {}
+    for number, log in enumerate(logs, start=1):
+        _require_log(log, role)
+        name = f"{role} {number}" if isinstance(log, Log) else str(log)
+        if name in named:
+            raise InputError(f"{role}: {name} is given twice; give each log once")
+        named[name] = log
+    return LogsByName(named)
+
+
+def _require_log(log: object, what: str) -> None:
+    if not isinstance(log, OneLog):
+        raise InputError(
+            f"{what}: a {type(log).__name__} is no log; give a Log, the path of one, a list of "
+            "them or a dict with a name for each"
+        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -97,12 +97,15 @@ class Log:
 
     def part(self, first: int, stop: int) -> Log:
         """Its samples from number ``first`` to before ``stop``."""
-        span = slice(first, stop)
+        return self.changed(lambda name, column: column[first:stop])
+
+    def changed(self, change: Callable[[str, Array], Array]) -> Log:
+        """The same with other columns: ``change`` makes them of a signal's name and its column."""
         axes = {
-            name: replace(axis, columns={f: column[span] for f, column in axis.columns.items()})
+            name: replace(axis, columns={f: change(f, c) for f, c in axis.columns.items()})
             for name, axis in self.axes.items()
         }
-        truth = {a: {f: column[span] for f, column in c.items()} for a, c in self.truth.items()}
+        truth = {a: {f: change(f, c) for f, c in own.items()} for a, own in self.truth.items()}
         return replace(self, axes=axes, truth=truth)
 
     def copied(self) -> Log:
@@ -155,16 +158,13 @@ def thinned(log: Log, every: int) -> Log:
     It is the log that a slower recorder would have written: position, velocity and setpoint at the
     first of each ``every`` samples, current and force as means over them. Truth is left out.
     """
+    measured = replace(log, sample_rate=log.sample_rate / every, truth={})
     if every == 1:
-        return replace(log, truth={})
+        return measured
     count = len(log) // every * every
 
     def fewer(field: str, column: Array) -> Array:
         kept = column[:count].reshape(-1, every)
         return kept.mean(axis=1) if field in HELD else kept[:, 0].copy()
 
-    axes = {
-        name: replace(axis, columns={f: fewer(f, c) for f, c in axis.columns.items()})
-        for name, axis in log.axes.items()
-    }
-    return replace(log, sample_rate=log.sample_rate / every, axes=axes, truth={})
+    return measured.changed(fewer)

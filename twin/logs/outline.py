@@ -1,9 +1,9 @@
-"""The layout of a log in the file: schemas, channels and rows; verifies the log as well."""
+"""What a file holds of a log: schemas, channels, layouts and columns; verifies the log as well."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,22 +11,20 @@ from mcap.records import Channel, Schema
 from mcap.well_known import MessageEncoding, SchemaEncoding
 
 from twin.errors import InputError, at
-from twin.logs.assemble import CHECKSUM, SCHEMA_VERSION
-from twin.logs.layout import MessageLayout
+from twin.logs.decode import CHECKSUM, SCHEMA_VERSION
 from twin.logs.log import Array, AxisLog, Log
-from twin.logs.schema import (
+from twin.logs.messages import (
     AXIS_SAMPLE,
     AXIS_TRUTH,
     FIELD_NUMBERS,
+    MessageLayout,
     file_descriptor_set,
     numbered,
-    protobuf_segments,
 )
 from twin.logs.series import seconds
 from twin.logs.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_units
 from twin.numbers import first_not_finite
 
-SERIES = "twin.Series"  # the message of a topic that no log of a machine has
 _TRUTH_UNITS = ("position", "velocity")  # truth columns of these names have the axis' units
 
 
@@ -56,15 +54,30 @@ class Planned:
 
 @dataclass(frozen=True)
 class Outline:
-    """Everything but the samples."""
+    """Everything of a file but the samples. sample_rate: Hz."""
 
-    metadata: dict[str, str]
     topics: tuple[Planned, ...]
+    sample_rate: float
+    metadata: Mapping[str, str]
+    attachments: Mapping[str, bytes]
 
-    @property
-    def schemas(self) -> tuple[Schema, ...]:
-        """Each once."""
-        return tuple({topic.schema.id: topic.schema for topic in self.topics}.values())
+    @classmethod
+    def of(
+        cls, topics: Iterable[Signals], sample_rate: float, metadata: Mapping[str, str],
+        attachments: Mapping[str, bytes],
+    ) -> Outline:  # fmt: skip
+        """The file of these topics; equal schemas are written once."""
+        schemas: dict[bytes, Schema] = {}
+        planned = []
+        for number, signals in enumerate(topics, 1):
+            data = file_descriptor_set(signals.message, signals.numbers)
+            new = Schema(len(schemas) + 1, data, SchemaEncoding.Protobuf, signals.message)
+            schema = schemas.setdefault(data, new)
+            channel = Channel(
+                number, signals.topic, MessageEncoding.Protobuf, dict(signals.metadata), schema.id
+            )
+            planned.append(Planned(schema, channel, MessageLayout(number, signals.numbers)))
+        return cls(tuple(planned), sample_rate, metadata, attachments)
 
     @property
     def row_bytes(self) -> int:
@@ -72,64 +85,21 @@ class Outline:
         return sum(topic.layout.dtype.itemsize for topic in self.topics)
 
 
-def outline(log: Log) -> Outline:
-    """Plan the file; raises InputError for a log that could not be read back."""
+def outline_of(log: Log) -> Outline:
+    """The file of a log; raises InputError for one that could not be read back."""
     _check_log(log)
-    return _planned(_signals(log), _metadata(log))
+    return Outline.of(_signals(log), log.sample_rate, _metadata(log), log.attachments)
 
 
-def samples_of(log: Log, first: int = 0) -> Samples:
+def samples_of(log: Log, first: int) -> Samples:
     """The columns of a log, or of a part of one that begins with sample ``first``.
 
     Raises InputError where a column is not one finite number a sample.
     """
-    return _checked(_signals(log), len(log), log.sample_rate, first)
+    return checked(_signals(log), len(log), log.sample_rate, first)
 
 
-def _signals(log: Log) -> list[Signals]:
-    return [*_axis_signals(log), *_truth_signals(log)]
-
-
-def outline_of_topics(
-    topics: Mapping[str, Mapping[str, Array]], units: Mapping[str, str], sample_rate: float
-) -> tuple[Outline, Samples]:
-    """Plan a file of any topics, "/model/x" -> column -> (n,); units: "/model/x/force" -> unit."""
-    signals = [
-        Signals(
-            topic, SERIES, columns, numbered(columns),
-            {"sample_rate_hz": repr(float(sample_rate)),
-             **{f"unit.{c}": u for c in columns if (u := units.get(f"{topic}/{c}"))}},
-        )
-        for topic, columns in topics.items()
-    ]  # fmt: skip
-    count = len(next(iter(signals[0].columns.values())))
-    samples = _checked(signals, count, sample_rate)
-    return _planned(signals, {"source": "comparison"}), samples
-
-
-def _checked(topics: Sequence[Signals], count: int, sample_rate: float, first: int = 0) -> Samples:
-    for signals in topics:
-        with at(signals.topic):
-            _check_columns(signals, count, sample_rate, first)
-    return tuple(signals.columns for signals in topics)
-
-
-def _planned(topics: Sequence[Signals], metadata: dict[str, str]) -> Outline:
-    schemas: dict[bytes, Schema] = {}
-    planned = []
-    for number, signals in enumerate(topics, 1):
-        data = file_descriptor_set(signals.message, signals.numbers)
-        new = Schema(len(schemas) + 1, data, SchemaEncoding.Protobuf, signals.message)
-        schema = schemas.setdefault(data, new)
-        channel = Channel(
-            number, signals.topic, MessageEncoding.Protobuf, dict(signals.metadata), schema.id
-        )
-        layout = MessageLayout(number, protobuf_segments(signals.numbers))
-        planned.append(Planned(schema, channel, layout))
-    return Outline(metadata, tuple(planned))
-
-
-def _axis_signals(log: Log) -> Iterator[Signals]:
+def _signals(log: Log) -> Iterator[Signals]:
     for name, axis in log.axes.items():
         topic = AXIS_PREFIX + name
         with at(topic):
@@ -140,15 +110,11 @@ def _axis_signals(log: Log) -> Iterator[Signals]:
         if axis.force_constant is not None:
             metadata["force_constant"] = repr(float(axis.force_constant))
         yield Signals(topic, AXIS_SAMPLE, axis.columns, numbers, metadata)
-
-
-def _truth_signals(log: Log) -> Iterator[Signals]:
     for name, columns in log.truth.items():
-        numbers = numbered(columns)
         units = complete_units(log.axes[name].units) if name in log.axes else {}
         known = {f"unit.{c}": units[c] for c in _TRUTH_UNITS if c in columns and c in units}
         metadata = {**_common(name, log), **known}
-        yield Signals(TRUTH_PREFIX + name, AXIS_TRUTH, columns, numbers, metadata)
+        yield Signals(TRUTH_PREFIX + name, AXIS_TRUTH, columns, numbered(columns), metadata)
 
 
 def _common(axis: str, log: Log) -> dict[str, str]:
@@ -163,6 +129,16 @@ def _metadata(log: Log) -> dict[str, str]:
         "sample_rate_hz": repr(float(log.sample_rate)),
         "axes": ",".join(log.axes),
     }
+
+
+def checked(topics: Iterable[Signals], count: int, sample_rate: float, first: int = 0) -> Samples:
+    """The columns of topics; raises InputError where one is not one finite number a sample."""
+    samples = []
+    for signals in topics:
+        with at(signals.topic):
+            _check_columns(signals, count, sample_rate, first)
+        samples.append(signals.columns)
+    return tuple(samples)
 
 
 def _check_log(log: Log) -> None:

@@ -12,8 +12,9 @@ recovered.
 
 from __future__ import annotations
 
-import os
+import re
 import struct
+import zlib
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -28,7 +29,6 @@ from mcap.records import Chunk, ChunkIndex
 
 from twin.errors import InputError, at
 from twin.files import is_same_file
-from twin.logs.assemble import EVERYTHING, Extras, assembled, common_rate, require_fields
 from twin.logs.container import (
     MAGIC,
     RECORD_HEAD,
@@ -41,23 +41,17 @@ from twin.logs.container import (
     open_mcap,
     reading,
 )
-from twin.logs.decode import Decoder, log_parts
-from twin.logs.layout import Block, sample_times
+from twin.logs.decode import EVERYTHING, Extras, assembled, common_rate, log_parts
 from twin.logs.log import Array, Log, joined
+from twin.logs.messages import Block, sample_times
 from twin.logs.series import require_even, require_finite, seconds
 from twin.logs.topics import Topic, Topics
 from twin.logs.writer import write_parts
 
 METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
-INTACT_STEP = 1 << 17  # samples of an intact log that are held in memory at a time
-STEP = 1 << 15  # the same of a damaged one
+INTACT_STEP = 1 << 17  # samples of an intact log that are held in memory at a time: some 20 MB
+STEP = 1 << 15  # the same of a damaged one, whose chunks are held beside them
 _KEPT_CHUNKS = 2  # decompressed at a time
-_HEAD = struct.Struct("<BQQQQII")  # of a chunk, up to the length of the compression's name
-_SIZE = struct.Struct("<Q")
-_ZSTD = b"\x04\0\0\0zstd"
-_BEFORE = _HEAD.size + 4 + _SIZE.size  # bytes of a chunk before its data
-_LEAST_ROOM = 1 << 12  # bytes: what does not shrink may grow, a little
-_OPCODES = frozenset(Opcode)
 
 
 @dataclass(frozen=True)
@@ -78,12 +72,8 @@ class Recovery:
         return "\n".join((f"kept {self.kept}", *(f"not proved: {u}" for u in self.unproved), *lost))
 
 
-@dataclass(frozen=True)
-class _Kept:
-    """A stretch of samples: what it is, and its logs, which follow each other."""
-
-    text: str
-    logs: Callable[[], Iterator[Log]]
+_Kept = tuple[str, Callable[[], Iterator[Log]]]
+"""A stretch of samples: what it is, and its logs, which follow each other."""
 
 
 def recover_log(path: str | Path, *, unproved: bool = False) -> tuple[Log, Recovery]:
@@ -93,7 +83,7 @@ def recover_log(path: str | Path, *, unproved: bool = False) -> tuple[Log, Recov
     nothing speaks against them. Raises InputError where nothing is left.
     """
     with _recovered(Path(path), unproved) as (kept, recovery):
-        log, *others = [joined(stretch.logs()) for stretch in kept]
+        log, *others = [joined(logs()) for _, logs in kept]
     return log, replace(recovery, others=tuple(others))
 
 
@@ -111,9 +101,9 @@ def recover_file(
         for name in files:
             if is_same_file(name, path):
                 raise InputError(f"{path}: would be overwritten; give another name than {out}")
-        for name, stretch in files.items():
-            write_parts(stretch.logs(), name)
-    return recovery, {name: stretch.text for name, stretch in files.items()}
+        for name, (_, logs) in files.items():
+            write_parts(logs(), name)
+    return recovery, {name: text for name, (text, _) in files.items()}
 
 
 @contextmanager
@@ -125,14 +115,13 @@ def _recovered(path: Path, unproved: bool) -> Iterator[tuple[list[_Kept], Recove
         reason = str(error).removeprefix(f"{path}: ")
     else:
         text = f"all {count} samples"
-        yield [_Kept(text, lambda: _intact(path))], Recovery(text, ())
+        yield [(text, lambda: _intact(path))], Recovery(text, ())
         return
     with reading(path):
         stream = open(path, "rb")  # noqa: SIM115
     with stream:
         with reading(path):
-            file = FileBytes(stream, os.fstat(stream.fileno()).st_size)
-            kept, recovery = _Salvage(file, reason, unproved).result(str(path))
+            kept, recovery = _Salvage(FileBytes(stream), reason, unproved).result(str(path))
         yield kept, recovery
 
 
@@ -142,11 +131,22 @@ def _intact(path: Path) -> Iterator[Log]:
         yield from log_parts(file, file.records(), EVERYTHING, INTACT_STEP)
 
 
+# Chunks in the bytes of a file
+
+_HEAD = struct.Struct("<BQQQQI8sQ")  # of a chunk, up to its data
+_ZSTD = b"\x04\0\0\0zstd"
+_NAME_AT = _HEAD.size - len(_ZSTD) - 8  # of the compression, in the head
+_WINDOW = 1 << 18  # bytes that are searched at a time
+_LEAST_ROOM = 1 << 12  # bytes: what does not shrink may grow, a little
+_OPCODES = frozenset(Opcode)
+
+
 @dataclass(frozen=True)
 class _FoundChunk:
     """A chunk that lies in the file from ``offset`` to ``end``; size, crc: of what it holds.
 
-    length_holds: whether the length of its record says so too.
+    length_holds: whether the length of its record says so too. proved: whether a checksum says that
+    its records are what was written.
     """
 
     offset: int
@@ -157,7 +157,6 @@ class _FoundChunk:
 
     @property
     def proved(self) -> bool:
-        """Whether a checksum says that its records are what was written."""
         return self.crc != 0
 
     @property
@@ -167,7 +166,7 @@ class _FoundChunk:
 
     def content(self, file: FileBytes) -> bytes:
         """Its schema, channel and message records, decompressed; raises Damaged."""
-        data = file.part(self.offset + _BEFORE, self.end)
+        data = file.part(self.offset + _HEAD.size, self.end)
         return decompressed(Chunk("zstd", data, 0, 0, self.crc, self.size))
 
 
@@ -183,25 +182,22 @@ def _found_chunks(file: FileBytes) -> Iterator[_FoundChunk]:
 
 
 def _first(file: FileBytes, start: int, budget: Inflation) -> _FoundChunk | None:
-    before = _HEAD.size - 4
-    for place, length, data in file.windows(start, len(file), _BEFORE):
-        name = data.find(_ZSTD, before)
-        while before <= name < before + length:
-            offset = name - before
-            found = _opened(file, place + offset, data[offset : offset + _BEFORE], budget)
+    for place in range(start, len(file), _WINDOW):
+        data = file.part(place, place + _WINDOW + _HEAD.size)  # with all of a head that begins here
+        for name in re.finditer(re.escape(_ZSTD), data[_NAME_AT:]):
+            begin = name.start()
+            found = _opened(file, place + begin, data[begin : begin + _HEAD.size], budget)
             if found is not None:
                 return found
-            name = data.find(_ZSTD, name + 1)
     return None
 
 
 def _opened(file: FileBytes, offset: int, head: bytes, budget: Inflation) -> _FoundChunk | None:
     """The chunk at a place, by either of the two sizes that it states of its data."""
-    if len(head) < _BEFORE:
+    if len(head) < _HEAD.size:
         return None
-    _, length, _, _, size, crc, _ = _HEAD.unpack_from(head)
-    (inner,) = _SIZE.unpack_from(head, _BEFORE - _SIZE.size)
-    start, outer = offset + _BEFORE, length - (_BEFORE - RECORD_HEAD.size)
+    _, length, _, _, size, crc, _, inner = _HEAD.unpack(head)
+    start, outer = offset + _HEAD.size, length - (_HEAD.size - RECORD_HEAD.size)
     for stored in dict.fromkeys((inner, outer)):
         if not 0 < stored <= min(len(file) - start, 2 * size + _LEAST_ROOM):
             continue
@@ -215,12 +211,14 @@ def _opened(file: FileBytes, offset: int, head: bytes, budget: Inflation) -> _Fo
     return None
 
 
+# Samples, topic by topic
+
+
 @dataclass(frozen=True)
 class _Piece:
     """Samples number ``first`` to before ``stop`` of a topic, which lie in a chunk."""
 
     topic: Topic
-    channel: int
     first: int
     stop: int
     chunk: _FoundChunk
@@ -239,21 +237,17 @@ class _Stretch:
         """How many samples."""
         return self.stop - self.first
 
-    @property
-    def start(self) -> str:
-        """Time of its first sample."""
+    def __str__(self) -> str:
         topic = next(iter(self.pieces.values()))[0].topic
-        return seconds(int(sample_times(self.first, 1, topic.sample_rate)[0]))
+        return f"{self.count} samples from {_instant(self.first, topic)}"
 
     def empty(self, extras: Extras) -> Log:
         """The log without samples; raises InputError where an axis has too few signals, ..."""
         topics = [pieces[0].topic for pieces in self.pieces.values()]
         for topic in topics:
-            if not topic.is_truth:
-                require_fields(topic)
-        rate = common_rate({topic.name: topic.sample_rate for topic in topics}, extras)
+            topic.require_fields()
         nothing = ((topic, {name: np.empty(0) for name in topic.fields}) for topic in topics)
-        return assembled(nothing, rate, extras)
+        return assembled(nothing, common_rate(topics, extras), extras)
 
     def logs(self, extras: Extras, read: Callable[[_Piece], Block]) -> Iterator[Log]:
         """Its samples as logs that follow each other; raises InputError as ``empty`` does."""
@@ -265,6 +259,10 @@ class _Stretch:
                 for pieces in self.pieces.values()
             )
             yield assembled(columns, rate, extras)
+
+
+def _instant(sample: int, topic: Topic) -> str:
+    return seconds(int(sample_times(sample, 1, topic.sample_rate)[0]))
 
 
 def _columns(
@@ -294,7 +292,6 @@ class _Salvage:
         self._unproved: list[str] = []
         self._extras = Extras()
         self._topics = Topics()
-        self._decoder = Decoder(self._topics)
         self._announced: dict[int, int] = {}  # ns, of the last sample by channel, by the summary
         self._content = lru_cache(_KEPT_CHUNKS)(lambda chunk: chunk.content(file))
 
@@ -313,11 +310,11 @@ class _Salvage:
         unproved = [METADATA] if self._extras.metadata and not self._extras.proved else []
         (unproved if self._keep_unproved else self._lost).extend(self._unproved)
         lost = tuple(dict.fromkeys(self._lost))
-        recovery = Recovery(_text(longest), lost, tuple(dict.fromkeys(unproved)))
+        recovery = Recovery(str(longest), lost, tuple(dict.fromkeys(unproved)))
         return [self._kept(stretch, name) for stretch in kept], recovery
 
     def _kept(self, stretch: _Stretch, name: str) -> _Kept:
-        metadata = {**self._extras.metadata, "recovered": _text(stretch)}
+        metadata = {**self._extras.metadata, "recovered": str(stretch)}
         if self._keep_unproved and self._unproved:
             metadata["not_proved"] = "; ".join(self._unproved)
         extras = Extras(metadata, self._extras.attachments)
@@ -326,42 +323,42 @@ class _Salvage:
             with at(name):
                 yield from stretch.logs(extras, self._block)
 
-        return _Kept(_text(stretch), logs)
+        return str(stretch), logs
 
     def _block(self, piece: _Piece) -> Block:
         """The samples of a piece, read from the file again."""
-        blocks = self._decoder.blocks(self._content(piece.chunk))
-        return next(block for block in blocks if block.channel == piece.channel)
+        blocks = self._topics.blocks(self._content(piece.chunk))
+        return next(block for block in blocks if block.channel == piece.topic.layout.channel)
 
     def _others(self, stretches: list[_Stretch], longest: _Stretch) -> Iterator[_Stretch]:
         topics = {topic for s in stretches for topic in s.pieces}
         for stretch in stretches:
             if stretch is longest:
                 continue
-            try:
-                stretch.empty(self._extras)
-            except InputError as error:
-                self._lost.append(f"{_text(stretch)}: {error}")
-                continue
-            yield stretch
             absent = ", ".join(sorted(topics - stretch.pieces.keys()))
-            why = (
-                f"{absent} has no samples there"
-                if absent
-                else "a gap separates them from the longer run"
-            )
-            self._lost.append(
-                f"{stretch.count} intact samples from {stretch.start} are in a log of their own: "
-                f"{why}"
-            )
+            gap = "a gap separates them from the longer run"
+            with self._losing(), at(str(stretch)):
+                stretch.empty(self._extras)
+                yield stretch
+                self._lost.append(
+                    f"{str(stretch).replace('samples', 'intact samples')} are in a log of their "
+                    f"own: {f'{absent} has no samples there' if absent else gap}"
+                )
 
     def _by_topic(self) -> dict[str, list[_Piece]]:
         """The pieces of each topic by their numbers, each once; topics in the order of the file."""
         found: dict[int, list[_Piece]] = {}
         for chunk in self._walk():
-            if self._is_taken(chunk):
+            if not chunk.length_holds:
+                self._lost.append(
+                    f"bytes {chunk.offset} to {chunk.offset + RECORD_HEAD.size - 1}: the length of "
+                    "a chunk is unreadable; its samples are intact"
+                )
+            if not chunk.proved:
+                self._unproved.append(f"{chunk.place}: has no checksum that proves its samples")
+            if chunk.proved or self._keep_unproved:
                 for piece in self._pieces(chunk):
-                    found.setdefault(piece.channel, []).append(piece)
+                    found.setdefault(piece.topic.layout.channel, []).append(piece)
         out: dict[str, list[_Piece]] = {}
         for _, pieces in sorted(found.items()):
             name = pieces[0].topic.name
@@ -371,39 +368,28 @@ class _Salvage:
                 out[name] = self._sorted(pieces)
         return out
 
-    def _is_taken(self, chunk: _FoundChunk) -> bool:
-        if not chunk.length_holds:
-            self._lost.append(
-                f"bytes {chunk.offset} to {chunk.offset + RECORD_HEAD.size - 1}: the length of "
-                "a chunk is unreadable; its samples are intact"
-            )
-        if not chunk.proved:
-            self._unproved.append(f"{chunk.place}: has no checksum that proves its samples")
-        return chunk.proved or self._keep_unproved
-
-    def _pieces(self, chunk: _FoundChunk) -> Iterator[_Piece]:
+    def _pieces(self, chunk: _FoundChunk) -> list[_Piece]:
         """The samples of a chunk, each topic's that are numbered, timed and finite as they must."""
+        blocks, pieces = [], []
+        with self._losing(), at(chunk.place):
+            blocks = self._topics.blocks(self._content(chunk))
+        for block in blocks:
+            topic, first = self._topics.topic(block.channel), int(block.sequence[0])
+            assert topic is not None
+            with self._losing(), at(chunk.place):
+                require_even(topic, block, first, 0, first)
+                for name in topic.fields:
+                    require_finite(topic, block, name, first)
+                pieces.append(_Piece(topic, first, first + len(block.sequence), chunk))
+        return pieces
+
+    @contextmanager
+    def _losing(self) -> Iterator[None]:
+        """What is wrong is a loss, and no more."""
         try:
-            with at(chunk.place):
-                blocks = self._decoder.blocks(self._content(chunk))
+            yield
         except InputError as error:
             self._lost.append(str(error))
-            return
-        for block in blocks:
-            try:
-                with at(chunk.place):
-                    yield self._piece(chunk, block)
-            except InputError as error:
-                self._lost.append(str(error))
-
-    def _piece(self, chunk: _FoundChunk, block: Block) -> _Piece:
-        topic = self._topics.topic(block.channel)
-        assert topic is not None
-        first = int(block.sequence[0])
-        require_even(topic.name, block, first, 0, first, topic.sample_rate)
-        for name in topic.fields:
-            require_finite(topic.name, block, name, first)
-        return _Piece(topic, block.channel, first, first + len(block.sequence), chunk)
 
     def _sorted(self, pieces: list[_Piece]) -> list[_Piece]:
         """In the order of their numbers, each once, what is proved before what is not."""
@@ -435,46 +421,43 @@ class _Salvage:
 
     def _runs(self, name: str, pieces: Sequence[_Piece]) -> list[range]:
         """The numbers of samples that follow each other without a gap."""
-        rate, runs, stop = pieces[0].topic.sample_rate, [range(0)], 0
-        end = round(self._announced.get(pieces[0].channel, -1e9) * 1e-9 * rate) + 1
+        topic, runs, stop = pieces[0].topic, [range(0)], 0
+        announced = self._announced.get(topic.layout.channel, -1e9)
+        end = round(announced * 1e-9 * topic.sample_rate) + 1
         for first, last in [*((p.first, p.stop) for p in pieces), (max(end, 0), 0)]:
             if first > stop:
-                gone = (seconds(int(sample_times(k, 1, rate)[0])) for k in (stop, first))
-                self._lost.append(
-                    f"{name}: {first - stop} samples are missing, from {' to '.join(gone)}"
-                )
+                gone = " to ".join(_instant(k, topic) for k in (stop, first))
+                self._lost.append(f"{name}: {first - stop} samples are missing, from {gone}")
                 runs.append(range(first, first))
             stop = max(stop, last)
             runs[-1] = range(runs[-1].start, max(stop, runs[-1].stop))
         return [run for run in runs if run]
 
     def _walk(self) -> Iterator[_FoundChunk]:
-        """Chunks in the order of the file; behind unreadable bytes, from the next one on."""
-        file, previous, offset = self._file, len(MAGIC), len(MAGIC)
-        budget, found = Inflation(len(file)), _found_chunks(file)
-        following = next(found, None)
-        while offset < len(file) and not self._ends(offset):
-            while following is not None and following.offset < offset:
-                following = next(found, None)
-            if following is not None and following.offset == offset:
-                yield following
-                previous = offset = following.end
-                continue
-            end = self._end(offset, following)
-            if end is not None:
-                self._take(offset, end, budget)
-                previous, offset = offset, end
-            elif following is None:
-                self._lost.append(f"bytes {offset} to {len(file) - 1}: cut off or unreadable")
-                return
-            else:
-                self._lost.append(f"bytes {previous} to {following.offset - 1}: unreadable")
-                previous = offset = following.offset
+        """Chunks in the order of the file; what lies between them is taken record by record."""
+        offset, budget = len(MAGIC), Inflation(len(self._file))
+        for chunk in _found_chunks(self._file):
+            if chunk.offset >= offset:
+                offset = self._between(offset, chunk, budget)
+            if chunk.offset == offset:
+                yield chunk
+                offset = chunk.end
+        self._between(offset, None, budget)
 
-    def _ends(self, offset: int) -> bool:
-        return (
-            offset == len(self._file) - len(MAGIC) and self._file.part(offset, offset + 8) == MAGIC
-        )
+    def _between(self, offset: int, following: _FoundChunk | None, budget: Inflation) -> int:
+        """Take the records up to the next chunk, or to the end; returns where the last one ends."""
+        last, stop = offset, len(self._file) if following is None else following.offset
+        while offset < stop:
+            if offset == len(self._file) - len(MAGIC) and self._file.part(offset, stop) == MAGIC:
+                return stop
+            end = self._end(offset, following)
+            if end is None:
+                place, why = (last, "") if following else (offset, "cut off or ")
+                self._lost.append(f"bytes {place} to {stop - 1}: {why}unreadable")
+                return stop
+            self._take(offset, end, budget)
+            last, offset = offset, end
+        return offset
 
     def _end(self, offset: int, following: _FoundChunk | None) -> int | None:
         """Where the record at a place ends, if there is one.
@@ -492,9 +475,15 @@ class _Salvage:
             return None
         if following is not None and following.offset < end:
             crc = int.from_bytes(self._file.part(end - 4, end), "little")
-            if opcode != Opcode.ATTACHMENT or self._file.checksum(start, end - 4) != crc:
+            if opcode != Opcode.ATTACHMENT or self._checksum(start, end - 4) != crc:
                 return None
         return end
+
+    def _checksum(self, start: int, stop: int) -> int:
+        crc = 0
+        for place in range(start, stop, _WINDOW):
+            crc = zlib.crc32(self._file.part(place, min(place + _WINDOW, stop)), crc)
+        return crc
 
     def _take(self, offset: int, end: int, budget: Inflation) -> None:
         """Take metadata or an attachment; say what is wrong with a chunk that was not found."""
@@ -502,7 +491,7 @@ class _Salvage:
         if opcode not in (Opcode.CHUNK, Opcode.CHUNK_INDEX, Opcode.METADATA, Opcode.ATTACHMENT):
             return
         record = Record(opcode, offset, self._file.part(offset + RECORD_HEAD.size, end))
-        try:
+        with self._losing():
             if opcode == Opcode.CHUNK:
                 open_chunk(record, budget)
             elif opcode == Opcode.CHUNK_INDEX:
@@ -512,9 +501,3 @@ class _Salvage:
                     self._announced[channel] = max(ends)
             else:
                 self._extras.add(record)
-        except InputError as error:
-            self._lost.append(str(error))
-
-
-def _text(stretch: _Stretch) -> str:
-    return f"{stretch.count} samples from {stretch.start}"

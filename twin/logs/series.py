@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 import numpy as np
 
 from twin.errors import InputError
-from twin.logs.layout import Block, sample_times
 from twin.logs.log import Array
+from twin.logs.messages import Block, sample_times
 from twin.logs.topics import Topic
 from twin.numbers import first_not_finite
 
@@ -37,24 +37,31 @@ def instant(time: float) -> str:
 
 
 ROUNDING = 2.0  # ns: how far a time may be off that of its number, of which both are rounded
-LATEST_TIME = 1 << 62  # ns
+LATEST_TIME = 1 << 62  # ns, 146 years: no clock of a machine, and no sum of two overflows
 
 
 class Series:
     """Columns of one topic; ``append`` refuses what is not evenly spaced and finite.
 
-    capacity: samples expected; more are taken too. wanted: the fields that are kept, None for all.
-    start: time of the first sample in ns; ``count`` samples were taken; rate in Hz.
+    capacity: samples expected at once; more are taken too. wanted: the fields that are kept, None
+    for all. start: time of the first sample in ns; ``count`` samples were taken, of which the last
+    ``held`` are in the columns; rate in Hz.
     """
 
     def __init__(self, topic: Topic, capacity: int, wanted: Collection[str] | None = None) -> None:
         self.topic = topic
         self.rate = topic.sample_rate
-        self.start = 0
-        self.count = 0
+        self.start = self.count = self.held = 0
         self._first_sequence = 0
-        fields = [f for f in topic.fields if wanted is None or f in wanted]
-        self._columns = {name: np.empty(capacity) for name in fields}
+        self._capacity = capacity
+        self._fields = [f for f in topic.fields if wanted is None or f in wanted]
+        self._columns: dict[str, Array] = {}
+
+    @property
+    def span(self) -> range:
+        """The numbers of all its samples: where the periods since time 0 have them."""
+        first = round(self.start * 1e-9 * self.rate)
+        return range(first, first + self.count)
 
     def append(self, block: Block) -> None:
         """Take the next samples; raises InputError for a gap, a NaN or a time out of place."""
@@ -62,47 +69,39 @@ class Series:
             self.start = int(block.log_time[0])
             self._first_sequence = int(block.sequence[0])
         first = self._first_sequence + self.count
-        require_even(self.topic.name, block, first, self.start, self.count, self.rate)
-        self._reserve(len(block.log_time))
-        span = slice(self.count, self.count + len(block.log_time))
+        require_even(self.topic, block, first, self.start, self.count)
+        size = len(block.log_time)
+        self._reserve(self.held + size)
         for name, column in self._columns.items():
-            column[span] = block.columns[name]
-            require_finite(self.topic.name, block, name, self.count)
-        self.count += len(block.log_time)
+            column[self.held : self.held + size] = block.columns[name]
+            require_finite(self.topic, block, name, self.count)
+        self.count += size
+        self.held += size
 
-    def require_behind(self, before: Series) -> None:
-        """Raise InputError where there is a gap behind the samples of the part before."""
-        end = before.start + int(sample_times(before.count, 1, before.rate)[0])
-        if abs(self.start - end) > ROUNDING:
-            last = before.start + int(sample_times(before.count - 1, 1, before.rate)[0])
-            raise _misplaced(self.topic.name, 0, last, self.start, self.rate)
+    def taken(self) -> dict[str, Array]:
+        """The samples that are held, of every field; from here on only new ones are."""
+        columns = self._columns
+        for name, column in columns.items():
+            columns[name] = column if len(column) == self.held else column[: self.held].copy()
+        self._columns, self.held = {}, 0
+        return columns
 
-    def columns(self, span: slice) -> dict[str, Array]:
-        """The samples in ``span`` of every field; releases the buffers."""
-        out = {}
-        for name in list(self._columns):
-            column = self._columns.pop(name)
-            part = column[span]
-            out[name] = part if len(part) == len(column) else part.copy()
-        return out
-
-    def _reserve(self, more: int) -> None:
-        need = self.count + more
+    def _reserve(self, need: int) -> None:
+        if not self._columns:
+            self._columns = {name: np.empty(max(need, self._capacity)) for name in self._fields}
         for name, column in self._columns.items():
             if need > len(column):
                 grown = np.empty(max(need, 2 * len(column)))
-                grown[: self.count] = column[: self.count]
+                grown[: self.held] = column[: self.held]
                 self._columns[name] = grown
 
 
-def require_even(
-    name: str, block: Block, sequence: int, start: int, count: int, rate: float
-) -> None:
+def require_even(topic: Topic, block: Block, sequence: int, start: int, count: int) -> None:
     """Raise InputError where samples of a topic are not those behind ``count`` others.
 
-    sequence: number that their first must have; start: time of the topic's first sample in ns;
-    rate: Hz.
+    sequence: number that their first must have; start: time of the topic's first sample in ns.
     """
+    name, rate = topic.name, topic.sample_rate
     expected = np.arange(sequence, sequence + len(block.sequence)).astype(np.uint32)
     wrong = block.sequence != expected
     if wrong.any():
@@ -124,32 +123,29 @@ def require_even(
     if off.any():
         i = int(np.argmax(off))
         before = int(elapsed[i - 1]) if i else times[0] - 1e9 / rate
-        raise _misplaced(name, count + i, start + before, start + int(elapsed[i]), rate)
+        raise _misplaced(topic, count + i, start + before, start + int(elapsed[i]))
 
 
-def _misplaced(name: str, sample: int, before: float, time: float, rate: float) -> InputError:
+def _misplaced(topic: Topic, sample: int, before: float, time: float) -> InputError:
     """The error for a sample whose time (ns) is not a period behind that of the one before."""
-    period = 1e9 / rate
-    times = f"{seconds(before)} is followed by {seconds(time)}"
+    rate = topic.sample_rate
     if time <= before:
-        fault = f"time does not increase: {times}"
-    elif time - before > 1.5 * period:
-        fault = f"gap: {times}"
+        fault = "time does not increase"
     else:
-        fault = f"uneven time: {times}"
+        fault = "gap" if time - before > 1.5e9 / rate else "uneven time"
     return InputError(
-        f"{name}: {fault} at sample {sample}, expected a sample every "
-        f"{period / 1e9:.9g} s ({rate:.9g} Hz); keep the longest even part with: twin recover, or "
-        "convert the log with: twin import"
+        f"{topic.name}: {fault}: {seconds(before)} is followed by {seconds(time)} at sample "
+        f"{sample}, expected a sample every {1.0 / rate:.9g} s ({rate:.9g} Hz); keep the longest "
+        "even part with: twin recover, or convert the log with: twin import"
     )
 
 
-def require_finite(topic: str, block: Block, name: str, count: int) -> None:
+def require_finite(topic: Topic, block: Block, name: str, count: int) -> None:
     """Raise InputError where a column of the samples behind ``count`` others is not a number."""
     column = block.columns[name]
     if (i := first_not_finite(column)) is not None:
         raise InputError(
-            f"{topic}: {name} is {column[i]} at {seconds(float(block.log_time[i]))} "
+            f"{topic.name}: {name} is {column[i]} at {seconds(float(block.log_time[i]))} "
             f"(sample {count + i}); leave out a signal that was not recorded, "
             "or keep the longest part without it with: twin recover"
         )

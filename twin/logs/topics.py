@@ -1,33 +1,36 @@
-"""The topics of a log: names, channel metadata, and the codec of each channel."""
+"""The topics of a log: names, units and rates as its channels state them, and their samples."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+import struct
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from twin.errors import InputError, at
-from twin.logs.container import Damaged, parse
+from twin.logs.container import RECORD_HEAD, Damaged, parse, record_at
 from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS
-from twin.logs.schema import fields_of
+from twin.logs.messages import Block, MessageLayout, RowLayout, field_numbers
 
 AXIS_PREFIX = "/axis/"
 TRUTH_PREFIX = "/truth/"
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+MOST_DEFINITIONS = 100_000  # of schemas and channels in a chunk; there are 65535 of each
+_MESSAGE = struct.Struct("<BQH")  # opcode, length of what follows, channel
 
 
 @dataclass(frozen=True)
 class Topic:
-    """One topic of samples: "/axis/x" or "/truth/x"; numbers: field number -> name."""
+    """One topic of samples: "/axis/x" or "/truth/x", and how its messages lie in the file."""
 
     name: str
-    fields: tuple[str, ...]
     metadata: Mapping[str, str]
-    numbers: Mapping[int, str]
+    layout: MessageLayout
 
     @property
     def axis(self) -> str:
@@ -38,6 +41,12 @@ class Topic:
     def is_truth(self) -> bool:
         """Whether the samples are the simulator's truth."""
         return self.name.startswith(TRUTH_PREFIX)
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """The signals that a log has of it."""
+        there = self.layout.numbers
+        return tuple(there) if self.is_truth else tuple(f for f in FIELDS if f in there)
 
     @property
     def sample_rate(self) -> float:
@@ -57,6 +66,17 @@ class Topic:
         """Unit of every field; raises InputError for a unit that is not SI."""
         stated = {f: u for f in FIELDS if (u := self.metadata.get(f"unit.{f}")) is not None}
         return complete_units(stated)
+
+    def require_fields(self) -> None:
+        """Raise InputError where an axis has no position, or neither current nor force."""
+        there = self.layout.numbers
+        if self.is_truth or ("position" in there and ("current" in there or "force" in there)):
+            return
+        missing = "position" if "position" not in there else "current or force"
+        raise InputError(
+            f"{self.name} has no {missing}; fields in its messages: {', '.join(there) or 'none'}; "
+            "rename or add the field, or convert the log with: twin import"
+        )
 
 
 def axis_of(topic: str) -> str:
@@ -91,26 +111,28 @@ def positive_number(metadata: Mapping[str, str], key: str) -> float | None:
 
 @dataclass
 class Topics:
-    """Schemas and channels seen so far."""
+    """Schemas and channels seen so far, and the samples in the chunks that they describe."""
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     _topics: dict[int, Topic | None] = field(default_factory=dict)
     _seen: set[bytes] = field(default_factory=set)
+    _layouts: dict[tuple[int, ...], RowLayout] = field(default_factory=dict)
 
     def register(self, opcode: int, content: bytes) -> None:
         """Take a schema or channel record; every chunk may repeat them."""
         if content in self._seen:
             return
-        if opcode == Opcode.SCHEMA:
-            schema = parse(Schema, content, "schema record")
-            if self.schemas.setdefault(schema.id, schema) != schema:
-                raise Damaged(f"schema {schema.id} is defined twice, differently")
-        else:
-            channel = parse(Channel, content, "channel record")
-            if self.channels.setdefault(channel.id, channel) != channel:
-                raise Damaged(f"channel {channel.id} is defined twice, differently")
+        is_schema = opcode == Opcode.SCHEMA
+        name, known = ("schema", self.schemas) if is_schema else ("channel", self.channels)
+        record: Any = parse(Schema if is_schema else Channel, content, f"{name} record")
+        if known.setdefault(record.id, record) != record:
+            raise Damaged(f"{name} {record.id} is defined twice, differently")
         self._seen.add(content)
+
+    def names(self, prefix: str = "") -> list[str]:
+        """The topics whose names begin so."""
+        return sorted(c.topic for c in self.channels.values() if c.topic.startswith(prefix))
 
     def topic(self, channel: int) -> Topic | None:
         """Topic of a channel; None where it holds no samples."""
@@ -118,19 +140,64 @@ class Topics:
             self._topics[channel] = self._open(channel)
         return self._topics[channel]
 
-    def _open(self, channel_id: int) -> Topic | None:
-        channel = self.channels.get(channel_id)
+    def _open(self, number: int) -> Topic | None:
+        channel = self.channels.get(number)
         if channel is None:
-            raise Damaged(f"a message belongs to channel {channel_id}, which is not defined")
-        for prefix in (AXIS_PREFIX, TRUTH_PREFIX):
-            if channel.topic.startswith(prefix) and IDENTIFIER.fullmatch(
-                channel.topic.removeprefix(prefix)
-            ):
-                break
-        else:
+            raise Damaged(f"a message belongs to channel {number}, which is not defined")
+        axis = axis_of(channel.topic)
+        known = channel.topic in (AXIS_PREFIX + axis, TRUTH_PREFIX + axis)
+        if not known or not IDENTIFIER.fullmatch(axis):
             return None
         with at(channel.topic):
-            numbers = fields_of(channel, self.schemas.get(channel.schema_id))
-        there = tuple(numbers.values())
-        fields = there if prefix == TRUTH_PREFIX else tuple(f for f in FIELDS if f in there)
-        return Topic(channel.topic, fields, channel.metadata, numbers)
+            numbers = field_numbers(channel, self.schemas.get(channel.schema_id))
+        return Topic(channel.topic, channel.metadata, MessageLayout(number, numbers))
+
+    def blocks(self, data: bytes) -> list[Block]:
+        """Samples of a chunk by channel; raises InputError, Damaged for broken framing.
+
+        The messages of a chunk must all be laid out as the first ones, as this program writes them.
+        """
+        offset = self._register_leading(data)
+        if offset == len(data):
+            return []
+        channels = tuple(self._row(data, offset))
+        if self.topic(channels[0]) is None:
+            return []
+        topics = [self.topic(channel) for channel in channels]
+        if None not in topics:
+            if channels not in self._layouts:
+                self._layouts[channels] = RowLayout(tuple(t.layout for t in topics if t))
+            blocks = self._layouts[channels].blocks(data, offset)
+            if blocks is not None:
+                return blocks
+        raise InputError(
+            "its messages are not laid out as this program writes them; convert the log with: "
+            "twin import"
+        )
+
+    def _register_leading(self, data: bytes) -> int:
+        """Take the schemas and channels that a chunk begins with; where its messages begin."""
+        offset = registered = 0
+        while offset < len(data):
+            opcode, content, end = record_at(data, offset)
+            if opcode == Opcode.MESSAGE:
+                break
+            registered += 1
+            if registered > MOST_DEFINITIONS:
+                raise Damaged(f"more than {MOST_DEFINITIONS} schemas and channels in one chunk")
+            self.register(opcode, content)
+            offset = end
+        return offset
+
+    def _row(self, data: bytes, offset: int) -> Iterator[int]:
+        """The channels of the messages up to the one whose channel comes a second time."""
+        seen: set[int] = set()
+        while offset < len(data):
+            if len(data) - offset < _MESSAGE.size:
+                raise Damaged(f"a record is cut off, {offset} bytes into it")
+            _, length, channel = _MESSAGE.unpack_from(data, offset)
+            if channel in seen:
+                return
+            yield channel
+            seen.add(channel)
+            offset += RECORD_HEAD.size + length

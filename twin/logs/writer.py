@@ -20,7 +20,6 @@ from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
     AttachmentIndex,
-    Channel,
     Chunk,
     ChunkIndex,
     DataEnd,
@@ -29,19 +28,28 @@ from mcap.records import (
     McapRecord,
     Metadata,
     MetadataIndex,
-    Schema,
     Statistics,
     SummaryOffset,
 )
-from numpy.typing import NDArray
 
 from twin.files import atomic_writer, recording
-from twin.logs.assemble import CHECKSUM, METADATA_NAME, checksum
 from twin.logs.container import MAGIC
-from twin.logs.layout import sample_times
+from twin.logs.decode import CHECKSUM, METADATA_NAME, checksum
 from twin.logs.log import Array, Log
-from twin.logs.outline import Outline, Planned, Samples, outline, outline_of_topics, samples_of
+from twin.logs.messages import numbered, sample_times
+from twin.logs.outline import (
+    Outline,
+    Planned,
+    Samples,
+    Signals,
+    checked,
+    outline_of,
+    samples_of,
+)
 
+CHUNK_BYTES = 1 << 20  # of the samples in all chunks of a stretch, as the format recommends
+WORKERS = 2  # threads that compress; more would wait for the disk
+SERIES = "twin.Series"  # the message of a topic that no log of a machine has
 # Made for messages that repeat every few hundred bytes: tables that soon forget find the last one.
 # With the tags of `numbered` 8 % smaller than level 3, which most writers use, in half of its time.
 _COMPRESSION = zstandard.ZstdCompressionParameters(
@@ -51,177 +59,21 @@ _COMPRESSION = zstandard.ZstdCompressionParameters(
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _MEDIA_TYPES = {".toml": "application/toml", ".xml": "application/xml"}
 
-
-def encoded(records: Iterable[McapRecord]) -> bytes:
-    """Records as bytes, one after the other."""
-    builder = RecordBuilder()
-    for record in records:
-        record.write(builder)
-    return builder.end()
-
-
-@dataclass(frozen=True)
-class PackedChunk:
-    """A chunk ready to be written.
-
-    times: (n,) in ns; channel: of all its messages; offsets: (n,) byte of each in the chunk.
-    """
-
-    chunk: Chunk
-    times: NDArray[np.int64]
-    channel: int
-    offsets: NDArray
-
-
-def pack(
-    payload: memoryview, times: NDArray[np.int64], channel: int, offsets: NDArray
-) -> PackedChunk:
-    """Compress a chunk; takes most of the time of writing, and may run on any thread."""
-    chunk = Chunk(
-        compression="zstd",
-        data=zstandard.ZstdCompressor(compression_params=_COMPRESSION).compress(payload),
-        message_start_time=int(times[0]),
-        message_end_time=int(times[-1]),
-        uncompressed_crc=zlib.crc32(payload),
-        uncompressed_size=len(payload),
-    )
-    return PackedChunk(chunk, times, channel, offsets)
-
-
-class McapWriter:
-    """Writes to ``stream`` from its beginning: metadata and attachments, chunks, ``finish``."""
-
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream = stream
-        self._offset = 0
-        self._crc = 0
-        self._metadata: list[MetadataIndex] = []
-        self._attachments: list[AttachmentIndex] = []
-        self._chunks: list[ChunkIndex] = []
-        self._counts: defaultdict[int, int] = defaultdict(int)
-        self._write(MAGIC)
-        self._write(encoded([Header(profile="", library=f"proton-twin {software_version()}")]))
-
-    def add_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
-        """Write a metadata record."""
-        offset, length = self._write(encoded([Metadata(name, dict(metadata))]))
-        self._metadata.append(MetadataIndex(offset, length, name))
-
-    def add_attachment(self, name: str, data: bytes) -> None:
-        """Write an attachment; its times are 0 so that the same log gives the same bytes."""
-        media_type = _MEDIA_TYPES.get(PurePath(name).suffix, "application/octet-stream")
-        offset, length = self._write(encoded([Attachment(0, 0, name, media_type, data)]))
-        self._attachments.append(AttachmentIndex(offset, length, 0, 0, len(data), name, media_type))
-
-    def add_chunk(self, packed: PackedChunk) -> None:
-        """Write a chunk and its message index."""
-        chunk = packed.chunk
-        start, length = self._write(encoded([chunk]))
-        index_start = self._offset
-        index_offset = self._write_index(packed.channel, packed.times, packed.offsets)
-        self._chunks.append(
-            ChunkIndex(
-                chunk_length=length,
-                chunk_start_offset=start,
-                compression=chunk.compression,
-                compressed_size=len(chunk.data),
-                message_end_time=chunk.message_end_time,
-                message_index_length=self._offset - index_start,
-                message_index_offsets={packed.channel: index_offset},
-                message_start_time=chunk.message_start_time,
-                uncompressed_size=chunk.uncompressed_size,
-            )
-        )
-
-    def _write_index(self, channel: int, times: NDArray[np.int64], offsets: NDArray) -> int:
-        # mcap.records.MessageIndex takes a list of tuples, which costs more than all the rest
-        entries = np.empty(len(times), _INDEX_ENTRY)
-        entries["time"] = times
-        entries["offset"] = offsets
-        builder = RecordBuilder()
-        builder.start_record(Opcode.MESSAGE_INDEX)
-        builder.write2(channel)
-        builder.write4(entries.nbytes)
-        builder.write(entries.tobytes())
-        builder.finish_record()
-        self._counts[channel] += len(times)
-        return self._write(builder.end())[0]
-
-    def finish(self, schemas: Sequence[Schema], channels: Sequence[Channel]) -> None:
-        """Close the data section and write summary, footer and magic."""
-        self._write(encoded([DataEnd(self._crc)]))
-        start, self._crc = self._offset, 0
-        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
-            (Opcode.SCHEMA, schemas),
-            (Opcode.CHANNEL, channels),
-            (Opcode.STATISTICS, [self._statistics(len(schemas), len(channels))]),
-            (Opcode.CHUNK_INDEX, self._chunks),
-            (Opcode.ATTACHMENT_INDEX, self._attachments),
-            (Opcode.METADATA_INDEX, self._metadata),
-        ]
-        places = [(opcode, *self._write(encoded(group))) for opcode, group in groups if group]
-        offsets_start = self._offset
-        self._write(encoded(SummaryOffset(*place) for place in places))
-        # the checksum of the summary covers the footer up to the checksum itself
-        unchecked = encoded([Footer(start, offsets_start, 0)])[:-4]
-        self._write(unchecked)
-        self._write(self._crc.to_bytes(4, "little") + MAGIC)
-
-    def _statistics(self, schemas: int, channels: int) -> Statistics:
-        return Statistics(
-            attachment_count=len(self._attachments),
-            channel_count=channels,
-            channel_message_counts=dict(self._counts),
-            chunk_count=len(self._chunks),
-            message_count=sum(self._counts.values()),
-            message_end_time=self._chunks[-1].message_end_time,
-            message_start_time=self._chunks[0].message_start_time,
-            metadata_count=len(self._metadata),
-            schema_count=schemas,
-        )
-
-    def _write(self, data: bytes) -> tuple[int, int]:
-        """Write bytes; returns where they begin and how many they are."""
-        start = self._offset
-        self._stream.write(data)
-        self._offset += len(data)
-        self._crc = zlib.crc32(data, self._crc)
-        return start, len(data)
-
-
-@cache  # a package's metadata are pages, parsed line by line
-def software_version(package: str = "proton-twin") -> str:
-    """The version of a package, or that it is not installed."""
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "uninstalled"
-
-
-CHUNK_BYTES = 1 << 20
-WORKERS = 2
-
 S = TypeVar("S")
 T = TypeVar("T")
 
-Progress = Callable[[int, int], None]
-"""Called with the samples written so far and their total."""
 
-
-def write_log(log: Log, path: str | Path, progress: Progress | None = None) -> None:
+def write_log(log: Log, path: str | Path, *, chunk_bytes: int = CHUNK_BYTES) -> None:
     """Write ``log`` as MCAP; the same log gives the same bytes.
 
-    ``path`` appears only when it is complete. Raises InputError for a log that could not be read
-    back (a NaN, columns of different length, no position, ...) and where writing fails.
+    ``path`` appears only when it is complete. chunk_bytes: of the samples in all chunks of a
+    stretch; what damage costs at least. Raises InputError for a log that could not be read back (a
+    NaN, columns of different length, no position, ...) and where writing fails.
     """
-    plan, samples = outline(log), samples_of(log)
-    with atomic_writer(Path(path)) as stream:
-        for written in _written(stream, plan, [samples], log.sample_rate, log.attachments):
-            if progress is not None:
-                progress(written, len(log))
+    write_parts([log], path, chunk_bytes=chunk_bytes)
 
 
-def record_log(parts: Iterable[Log], path: str | Path) -> int:
+def record_log(parts: Iterable[Log], path: str | Path, *, chunk_bytes: int = CHUNK_BYTES) -> int:
     """Write a log part by part while it is being recorded; returns the number of samples.
 
     The parts follow each other without a gap. The bytes are those that ``write_log`` writes of the
@@ -230,21 +82,28 @@ def record_log(parts: Iterable[Log], path: str | Path) -> int:
     Raises InputError as write_log does.
     """
     with recording(Path(path)) as stream:
-        return _recorded(stream, parts)
+        return _recorded(stream, parts, chunk_bytes)
 
 
-def write_parts(parts: Iterable[Log], path: str | Path) -> int:
+def write_parts(parts: Iterable[Log], path: str | Path, *, chunk_bytes: int = CHUNK_BYTES) -> int:
     """``record_log`` for what is there already: nothing is left of it where it is not finished."""
     with atomic_writer(Path(path)) as stream:
-        return _recorded(stream, parts)
+        return _recorded(stream, parts, chunk_bytes)
 
 
-def _recorded(stream: BinaryIO, parts: Iterable[Log]) -> int:
+def _recorded(stream: BinaryIO, parts: Iterable[Log], chunk_bytes: int) -> int:
     coming = iter(parts)
     first = next(coming)
-    samples = _counted(chain([first], coming))
-    written = _written(stream, outline(first), samples, first.sample_rate, first.attachments)
-    return deque(written, maxlen=1).pop()
+    samples = _numbered(chain([first], coming))
+    return _written(stream, outline_of(first), samples, chunk_bytes)
+
+
+def _numbered(parts: Iterable[Log]) -> Iterator[Samples]:
+    """The samples of parts that follow each other."""
+    first = 0
+    for part in parts:
+        yield samples_of(part, first)
+        first += len(part)
 
 
 def write_topics(
@@ -257,56 +116,46 @@ def write_topics(
 
     units: "/model/x/force" -> unit. Raises InputError as write_log does.
     """
-    plan, samples = outline_of_topics(topics, units, sample_rate)
+    signals = [
+        Signals(
+            topic, SERIES, columns, numbered(columns),
+            {"sample_rate_hz": repr(float(sample_rate)),
+             **{f"unit.{c}": u for c in columns if (u := units.get(f"{topic}/{c}"))}},
+        )
+        for topic, columns in topics.items()
+    ]  # fmt: skip
+    count = len(next(iter(signals[0].columns.values())))
+    samples = checked(signals, count, sample_rate)
+    outline = Outline.of(signals, sample_rate, {"source": "comparison"}, {})
     with atomic_writer(Path(path)) as stream:
-        for _ in _written(stream, plan, [samples], sample_rate, {}):
-            pass
+        _written(stream, outline, [samples], CHUNK_BYTES)
 
 
-def _counted(parts: Iterable[Log]) -> Iterator[Samples]:
-    """The samples of parts that follow each other."""
-    first = 0
-    for part in parts:
-        yield samples_of(part, first)
-        first += len(part)
-
-
-def _written(
-    stream: BinaryIO,
-    plan: Outline,
-    parts: Iterable[Samples],
-    sample_rate: float,
-    attachments: Mapping[str, bytes],
-) -> Iterator[int]:
-    """Write a whole file; yields the number of samples written after each stretch of them.
+def _written(stream: BinaryIO, outline: Outline, parts: Iterable[Samples], chunk_bytes: int) -> int:
+    """Write a whole file; returns the number of samples of each topic.
 
     Of a stretch every topic has a chunk of its own, so that one can be read without the others.
     Every chunk begins with its schema and channel: any one of them can be read alone.
     """
     writer = McapWriter(stream)
-    proof = {CHECKSUM: checksum(plan.metadata)}
-    writer.add_metadata(METADATA_NAME, {**plan.metadata, **proof})
-    for name, data in attachments.items():
+    proof = {CHECKSUM: checksum(outline.metadata)}
+    writer.add_metadata(METADATA_NAME, {**outline.metadata, **proof})
+    for name, data in outline.attachments.items():
         writer.add_attachment(name, data)
-    most = max(1, CHUNK_BYTES // plan.row_bytes)
-    stretches = _in_chunks(parts, most)
+    stretches = _in_chunks(parts, max(1, chunk_bytes // outline.row_bytes))
     # The axes come last, so that what a killed run leaves of a stretch is seldom some axes alone.
     chunks = (
         (topic, first, columns)
         for first, samples in stretches
-        for topic, columns in reversed(list(zip(plan.topics, samples, strict=True)))
+        for topic, columns in reversed(list(zip(outline.topics, samples, strict=True)))
     )
 
     def chunk(item: tuple[Planned, int, Mapping[str, Array]]) -> PackedChunk:
-        return _packed(*item, sample_rate)
+        return _packed(*item, outline.sample_rate)
 
-    written = 0
     for packed in _ordered(chunk, chunks):
         writer.add_chunk(packed)
-        if packed.channel == plan.topics[0].channel.id:
-            written += len(packed.times)
-            yield written
-    writer.finish(plan.schemas, [topic.channel for topic in plan.topics])
+    return writer.finish(outline.topics)
 
 
 def _in_chunks(parts: Iterable[Samples], most: int) -> Iterator[tuple[int, Samples]]:
@@ -338,10 +187,23 @@ def _behind(before: Samples, after: Samples) -> Samples:
     )
 
 
+@dataclass(frozen=True)
+class PackedChunk:
+    """A chunk of ``count`` messages of a channel and their index, ready to be written."""
+
+    chunk: Chunk
+    index: bytes
+    channel: int
+    count: int
+
+
 def _packed(
     topic: Planned, first: int, columns: Mapping[str, Array], sample_rate: float
 ) -> PackedChunk:
-    """The chunk of a topic's samples from number ``first`` on."""
+    """The chunk of a topic's samples from number ``first`` on; takes most of the time of writing.
+
+    May run on any thread.
+    """
     head, layout = encoded([topic.schema, topic.channel]), topic.layout
     times = sample_times(first, len(next(iter(columns.values()))), sample_rate)
     size = layout.dtype.itemsize
@@ -353,8 +215,29 @@ def _packed(
     messages[".log_time"] = messages[".publish_time"] = times
     for name, column in columns.items():
         messages[name] = column
-    offsets = len(head) + size * np.arange(len(times))
-    return pack(buffer.data, times, topic.channel.id, offsets)
+    chunk = Chunk(
+        compression="zstd",
+        data=zstandard.ZstdCompressor(compression_params=_COMPRESSION).compress(buffer.data),
+        message_start_time=int(times[0]),
+        message_end_time=int(times[-1]),
+        uncompressed_crc=zlib.crc32(buffer.data),
+        uncompressed_size=len(buffer),
+    )
+    index = np.empty(len(times), _INDEX_ENTRY)
+    index["time"] = times
+    index["offset"] = len(head) + size * np.arange(len(times))
+    return PackedChunk(chunk, _message_index(topic.channel.id, index), topic.channel.id, len(times))
+
+
+def _message_index(channel: int, entries: np.ndarray) -> bytes:
+    # mcap.records.MessageIndex takes a list of tuples, which costs more than all the rest
+    builder = RecordBuilder()
+    builder.start_record(Opcode.MESSAGE_INDEX)
+    builder.write2(channel)
+    builder.write4(entries.nbytes)
+    builder.write(entries.tobytes())
+    builder.finish_record()
+    return builder.end()
 
 
 def _ordered(function: Callable[[S], T], items: Iterable[S]) -> Iterator[T]:
@@ -367,3 +250,109 @@ def _ordered(function: Callable[[S], T], items: Iterable[S]) -> Iterator[T]:
                 yield pending.popleft().result()
         while pending:
             yield pending.popleft().result()
+
+
+def encoded(records: Iterable[McapRecord]) -> bytes:
+    """Records as bytes, one after the other."""
+    builder = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    return builder.end()
+
+
+class McapWriter:
+    """Writes to ``stream`` from its beginning: metadata and attachments, chunks, ``finish``."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self._offset = 0
+        self._crc = 0
+        self._metadata: list[MetadataIndex] = []
+        self._attachments: list[AttachmentIndex] = []
+        self._chunks: list[ChunkIndex] = []
+        self._counts: defaultdict[int, int] = defaultdict(int)
+        self._write(MAGIC)
+        self._write(encoded([Header(profile="", library=f"proton-twin {software_version()}")]))
+
+    def add_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
+        """Write a metadata record."""
+        offset, length = self._write(encoded([Metadata(name, dict(metadata))]))
+        self._metadata.append(MetadataIndex(offset, length, name))
+
+    def add_attachment(self, name: str, data: bytes) -> None:
+        """Write an attachment; its times are 0 so that the same log gives the same bytes."""
+        media_type = _MEDIA_TYPES.get(PurePath(name).suffix, "application/octet-stream")
+        offset, length = self._write(encoded([Attachment(0, 0, name, media_type, data)]))
+        self._attachments.append(AttachmentIndex(offset, length, 0, 0, len(data), name, media_type))
+
+    def add_chunk(self, packed: PackedChunk) -> None:
+        """Write a chunk and its message index."""
+        chunk = packed.chunk
+        start, length = self._write(encoded([chunk]))
+        index_start, index_length = self._write(packed.index)
+        self._counts[packed.channel] += packed.count
+        self._chunks.append(
+            ChunkIndex(
+                chunk_length=length,
+                chunk_start_offset=start,
+                compression=chunk.compression,
+                compressed_size=len(chunk.data),
+                message_end_time=chunk.message_end_time,
+                message_index_length=index_length,
+                message_index_offsets={packed.channel: index_start},
+                message_start_time=chunk.message_start_time,
+                uncompressed_size=chunk.uncompressed_size,
+            )
+        )
+
+    def finish(self, topics: Sequence[Planned]) -> int:
+        """Close the data section, write summary, footer and magic; the samples of each topic."""
+        self._write(encoded([DataEnd(self._crc)]))
+        start, self._crc = self._offset, 0
+        schemas = list({topic.schema.id: topic.schema for topic in topics}.values())
+        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
+            (Opcode.SCHEMA, schemas),
+            (Opcode.CHANNEL, [topic.channel for topic in topics]),
+            (Opcode.STATISTICS, [self._statistics(len(schemas), len(topics))]),
+            (Opcode.CHUNK_INDEX, self._chunks),
+            (Opcode.ATTACHMENT_INDEX, self._attachments),
+            (Opcode.METADATA_INDEX, self._metadata),
+        ]
+        places = [(opcode, *self._write(encoded(group))) for opcode, group in groups if group]
+        offsets_start = self._offset
+        self._write(encoded(SummaryOffset(*place) for place in places))
+        # the checksum of the summary covers the footer up to the checksum itself
+        unchecked = encoded([Footer(start, offsets_start, 0)])[:-4]
+        self._write(unchecked)
+        self._write(self._crc.to_bytes(4, "little") + MAGIC)
+        return self._counts[topics[0].channel.id]
+
+    def _statistics(self, schemas: int, channels: int) -> Statistics:
+        return Statistics(
+            attachment_count=len(self._attachments),
+            channel_count=channels,
+            channel_message_counts=dict(self._counts),
+            chunk_count=len(self._chunks),
+            message_count=sum(self._counts.values()),
+            message_end_time=self._chunks[-1].message_end_time,
+            message_start_time=self._chunks[0].message_start_time,
+            metadata_count=len(self._metadata),
+            schema_count=schemas,
+        )
+
+    def _write(self, data: bytes) -> tuple[int, int]:
+        """Write bytes; returns where they begin and how many they are."""
+        start = self._offset
+        self._stream.write(data)
+        self._offset += len(data)
+        self._crc = zlib.crc32(data, self._crc)
+        return start, len(data)
+
+
+@cache  # a package's metadata are pages, parsed line by line
+def software_version(package: str = "proton-twin") -> str:
+    """The version of a package, or that it is not installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "uninstalled"

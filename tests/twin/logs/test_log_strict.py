@@ -1,16 +1,19 @@
 """Laws of what a log says about itself: definitions agree, times are even, fields stay apart.
 
-Files are put together record by record. Clashes are one clear error each.
+Files are put together record by record. Clashes are one clear error each, and so is what is no log.
 """
 
 import json
+import zlib
 
 import numpy as np
 import pytest
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.message_factory import GetMessages
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, DataEnd, Footer, Header, Message, Metadata, Schema
-from mcap_bytes import MAGIC, joined, log_file, plain_file
+from mcap_bytes import MAGIC, joined, json_channel, log_file, plain_file
 from plain_cases import (
     HEAD,
     MS,
@@ -25,10 +28,8 @@ from plain_cases import (
 )
 
 from twin.errors import InputError
-from twin.importers.units import field_unit
-from twin.logs import FIELDS, read_log, recover_log
-from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
-from twin.logs.topics import complete_units
+from twin.logs import FIELDS, LINEAR_UNITS, ROTARY_UNITS, read_log, recover_log
+from twin.logs.messages import file_descriptor_set
 
 OWN = schema()
 CLASHES = {
@@ -62,14 +63,22 @@ def test_a_topic_on_two_channels_is_refused_and_one_that_is_not_wanted_is_not(tm
 
 
 @pytest.mark.parametrize("name", FIELDS)
-def test_a_unit_of_each_field_is_that_of_a_linear_or_of_a_rotary_axis(name):
+def test_a_unit_of_each_field_is_that_of_a_linear_or_of_a_rotary_axis(tmp_path, name):
+    def with_unit(unit: str):
+        stated = {f"unit.{name}": unit}
+        return [
+            schema(1, FIELDS),
+            channel(1, "/axis/x", stated),
+            message(1, 0, dict.fromkeys(FIELDS, 1.0)),
+        ]
+
     linear, rotary = LINEAR_UNITS[name], ROTARY_UNITS[name]
-    assert field_unit(name, linear).si == linear
-    assert complete_units({name: linear}) == {**LINEAR_UNITS, name: linear}
-    assert complete_units({name: rotary}) == (ROTARY_UNITS if linear != rotary else LINEAR_UNITS)
+    units = accepted(tmp_path / "a.mcap", with_unit(linear)).axes["x"].units
+    assert units == {**LINEAR_UNITS, name: linear}
+    units = accepted(tmp_path / "a.mcap", with_unit(rotary)).axes["x"].units
+    assert units == (ROTARY_UNITS if linear != rotary else LINEAR_UNITS)
     for wrong in ("mm", "kN", "", "g"):
-        with pytest.raises(InputError, match=f"unit of {name} is '{wrong}'"):
-            complete_units({name: wrong})
+        refused(tmp_path / "a.mcap", with_unit(wrong), f"unit of {name} is '{wrong}'")
 
 
 FOREIGN = {
@@ -223,3 +232,78 @@ def test_every_chunk_states_its_checksum(tmp_path):
     (tmp_path / "a.mcap").write_bytes(plain_file([Chunk("", content, 0, 0, 0, len(content))]))
     with pytest.raises(InputError, match=r"chunk at byte .*: states no checksum of its samples"):
         read_log(tmp_path / "a.mcap")
+
+
+def in_one_chunk(content: bytes) -> bytes:
+    """A file of these schema, channel and message records, with their checksum."""
+    return plain_file([Chunk("", content, 0, 0, zlib.crc32(content), len(content))])
+
+
+def test_of_a_message_only_values_and_the_publish_time_may_be_any(tmp_path):
+    """Opcode, length, channel, number, time and tags are what they must be, in every message."""
+    path, content = tmp_path / "a.mcap", joined([*HEAD, *SAMPLES])
+    size = len(joined(SAMPLES[-1:]))
+    free = {*range(23, 31), *range(32, 40), *range(41, 49)}
+    for place in range(size):
+        spoilt = bytearray(content)
+        spoilt[len(content) - size + place] ^= 0x10
+        path.write_bytes(in_one_chunk(bytes(spoilt)))
+        if place in free:
+            assert len(read_log(path)) == len(SAMPLES), place
+        else:
+            with pytest.raises(InputError, match="chunk at byte"):
+                read_log(path)
+
+
+def test_a_record_cut_off_within_a_chunk_is_refused(tmp_path):
+    content, path = joined([*HEAD, *SAMPLES]), tmp_path / "a.mcap"
+    head = len(joined(HEAD))
+    size = len(joined(SAMPLES[:1]))
+    for cut in (1, 8, 10, 20, head - 1, head + 1, head + 9, head + 12, len(content) - size + 31):
+        path.write_bytes(in_one_chunk(content[:cut]))
+        with pytest.raises(InputError):
+            read_log(path)
+
+
+@pytest.mark.parametrize("numbers", [(1, 2), (15, 16), (2047, 2048), (300_000, 3)], ids=str)
+def test_fields_may_have_any_numbers_but_are_in_the_order_of_the_schema(tmp_path, numbers):
+    """Of tags of one to four bytes; the library writes them in the order of their numbers."""
+    kinds = dict(zip(("position", "force"), numbers, strict=True))
+    descriptors = file_descriptor_set("twin.AxisSample", kinds)
+    items = [Schema(1, descriptors, "protobuf", "twin.AxisSample"), HEAD[1]]
+    kind = GetMessages(FileDescriptorSet.FromString(descriptors).file)["twin.AxisSample"]
+    for k in range(4):
+        data = kind(position=k + 1.0, force=-k - 1.0).SerializeToString()
+        items.append(Message(1, MS * k, data, MS * k, k))
+    if numbers[0] > numbers[1]:
+        refused(tmp_path / "a.mcap", items, "not laid out")
+    else:
+        axis = accepted(tmp_path / "a.mcap", items).axes["x"]
+        assert axis.position.tolist() == (-axis.force).tolist() == [1.0, 2.0, 3.0, 4.0]
+
+
+def test_chunks_of_no_axis_are_passed_over_and_of_no_channel_are_not(tmp_path):
+    for topic in ("/camera", "/axis/1x", "/axis/x/y", "/axes/x"):
+        items = [json_channel(5, topic), Message(5, 0, b"{}", 0, 0)]
+        refused(tmp_path / "a.mcap", items, f"topics in the file: {topic}; rename them")
+    refused(tmp_path / "a.mcap", [Message(77, 0, b"{}", 0, 0)], "channel 77, which is not defined")
+
+
+@pytest.mark.parametrize("read", [read_log, recover_log])
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda p: None, "cannot be read: No such file or directory"),
+        (lambda p: p.mkdir(), "cannot be read: Is a directory"),
+        (lambda p: p.write_bytes(b""), "the file is empty|nothing can be recovered"),
+        (lambda p: p.write_bytes(b"time,position\n" * 50), "not an MCAP file|nothing can be"),
+        (lambda p: p.write_bytes(MAGIC), "truncated: ends at byte 8|nothing can be"),
+    ],
+)
+def test_what_is_no_log_is_one_clear_line(tmp_path, read, make, text):
+    path = tmp_path / "a.mcap"
+    make(path)
+    with pytest.raises(InputError, match=text) as caught:
+        read(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)

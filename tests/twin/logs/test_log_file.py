@@ -1,0 +1,311 @@
+"""The written file: every number in it is what a recount of the bytes gives.
+
+The file is taken apart with ``struct`` and the stock record classes; checksums, offsets, counts and
+times are computed anew, times with exact fractions. What is read of it is what was written.
+"""
+
+import tracemalloc
+import zlib
+from fractions import Fraction
+from io import BytesIO
+
+import numpy as np
+import pytest
+import zstandard
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.message_factory import GetMessages
+from log_cases import assert_same_log, two_axes, write_together
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+from mcap_bytes import (
+    ATTACHMENT,
+    ATTACHMENT_INDEX,
+    CHANNEL,
+    CHUNK,
+    CHUNK_INDEX,
+    DATA_END,
+    FOOTER,
+    HEADER,
+    MESSAGE,
+    MESSAGE_INDEX,
+    METADATA,
+    METADATA_INDEX,
+    SCHEMA,
+    STATISTICS,
+    SUMMARY_OFFSET,
+    parsed,
+    parsed_message,
+    pieces,
+    records,
+)
+
+from twin.logs import FIELDS, ROTARY_UNITS, AxisLog, Log, read_log, write_log
+
+RATE, COUNT, PER_CHUNK = 3000.0, 45, 7
+TRUTH = ("position", *(f"state{k}" for k in range(17)))
+
+
+def distinct(name: str, axis: str) -> np.ndarray:
+    """A column whose values occur in no other column."""
+    number = 100.0 * (1 + (*FIELDS, *TRUTH).index(name)) + 10_000.0 * (1 + "xyzt".index(axis))
+    return number + np.arange(COUNT) / 64.0
+
+
+LOG = Log(
+    RATE,
+    {
+        "x": AxisLog({f: distinct(f, "x") for f in FIELDS}, force_constant=7.25),
+        "y": AxisLog({f: distinct(f, "y") for f in ("position", "current")}, force_constant=3.5),
+        "z": AxisLog({f: distinct(f, "z") for f in ("position", "current")}, force_constant=2.0),
+    },
+    {"source": "a test"},
+    {"x": {f: distinct(f, "t") for f in TRUTH}},
+    {"model.toml": b"mass = 1\n", "stage.xml": b"<mujoco/>", "raw": bytes(range(200))},
+)
+FIRST_NUMBER = 1 << 18  # of the fields: their tags have four bytes
+ROW = (31 + 7 * 12) + 2 * (31 + 2 * 12) + (31 + 18 * 12)  # bytes of a sample on four topics
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory) -> bytes:
+    path = tmp_path_factory.mktemp("log") / "a.mcap"
+    write_log(LOG, path, chunk_bytes=PER_CHUNK * ROW + ROW - 1)
+    return path.read_bytes()
+
+
+def of(data: bytes, opcode: int):
+    return [p for p in records(data) if p.opcode == opcode]
+
+
+def payload(chunk: Chunk) -> bytes:
+    return zstandard.ZstdDecompressor().decompress(chunk.data)
+
+
+def in_chunks(data: bytes) -> list[list]:
+    """The records in every chunk, chunk by chunk."""
+    contents = [payload(parsed(Chunk, p)) for p in of(data, CHUNK)]
+    return [pieces(content, 0, len(content)) for content in contents]
+
+
+def exact(k: int, rate: float) -> int:
+    return round(Fraction(k * 10**9) / Fraction(rate))
+
+
+def test_the_checksums_are_those_of_the_bytes(data):
+    end = of(data, DATA_END)[0]
+    assert parsed(DataEnd, end).data_section_crc == zlib.crc32(data[: end.start]) != 0
+    footer_piece = of(data, FOOTER)[0]
+    footer = parsed(Footer, footer_piece)
+    assert footer.summary_start == end.end
+    assert footer.summary_crc == zlib.crc32(data[end.end : footer_piece.end - 4]) != 0
+    for piece in of(data, CHUNK):
+        chunk = parsed(Chunk, piece)
+        assert chunk.uncompressed_crc == zlib.crc32(payload(chunk)) != 0
+        assert chunk.uncompressed_size == len(payload(chunk))
+    for body in (p.body for p in of(data, ATTACHMENT)):
+        assert int.from_bytes(body[-4:], "little") == zlib.crc32(body[:-4])
+
+
+def test_the_sections_follow_each_other_as_the_format_orders(data):
+    count = -(-COUNT // PER_CHUNK)
+    assert [p.opcode for p in records(data)] == [
+        HEADER, METADATA, *[ATTACHMENT] * 3, *[CHUNK, MESSAGE_INDEX] * count * 4, DATA_END,
+        *[SCHEMA] * 3, *[CHANNEL] * 4, STATISTICS, *[CHUNK_INDEX] * count * 4,
+        *[ATTACHMENT_INDEX] * 3, METADATA_INDEX, *[SUMMARY_OFFSET] * 6, FOOTER,
+    ]  # fmt: skip
+    assert parsed(Header, of(data, HEADER)[0]).library.startswith("proton-twin ")
+    footer = parsed(Footer, of(data, FOOTER)[0])
+    place = footer.summary_start
+    for offset in (parsed(SummaryOffset, p) for p in of(data, SUMMARY_OFFSET)):
+        assert offset.group_start == place
+        place += offset.group_length
+        assert {p.opcode for p in pieces(data, offset.group_start, place)} == {offset.group_opcode}
+    assert place == footer.summary_offset_start == of(data, SUMMARY_OFFSET)[0].start
+
+
+def test_every_chunk_holds_one_topic_can_be_read_alone_and_is_indexed(data):
+    """The axes come last of each stretch: what a killed run leaves is seldom some axes alone."""
+    schemas = {parsed(Schema, p).id: p.body for p in of(data, SCHEMA)}
+    channels = {parsed(Channel, p).id: p.body for p in of(data, CHANNEL)}
+    everything, order = records(data), []
+    indexes = [parsed(ChunkIndex, p) for p in of(data, CHUNK_INDEX)]
+    for index, piece, content in zip(indexes, of(data, CHUNK), in_chunks(data), strict=True):
+        chunk, (schema, channel, *sent) = parsed(Chunk, piece), content
+        messages = [parsed_message(p) for p in sent]
+        (number,) = {m.channel_id for m in messages}
+        assert channel.body == channels[number]
+        assert schema.body == schemas[parsed(Channel, channel).schema_id]
+        behind = everything[everything.index(piece) + 1]
+        assert index == ChunkIndex(
+            chunk_length=piece.end - piece.start,
+            chunk_start_offset=piece.start,
+            compression=chunk.compression,
+            compressed_size=len(chunk.data),
+            message_end_time=max(m.log_time for m in messages),
+            message_index_length=behind.end - piece.end,
+            message_index_offsets={number: behind.start},
+            message_start_time=min(m.log_time for m in messages),
+            uncompressed_size=len(payload(chunk)),
+        )
+        times = chunk.message_start_time, chunk.message_end_time
+        assert times == (index.message_start_time, index.message_end_time)
+        entries = [(m.log_time, p.start) for m, p in zip(messages, sent, strict=True)]
+        assert parsed(MessageIndex, behind) == MessageIndex(number, entries)
+        order.append((number, len(messages)))
+    full = [(number, PER_CHUNK) for number in (4, 3, 2, 1)] * (COUNT // PER_CHUNK)
+    assert order == full + [(number, COUNT % PER_CHUNK) for number in (4, 3, 2, 1)]
+
+
+def test_every_message_has_its_number_exact_time_and_each_value_in_its_own_field(data):
+    """Field numbers are those the file format promises, not those of one program."""
+    schemas = {s.id: s for s in (parsed(Schema, p) for p in of(data, SCHEMA))}
+    channels = {c.id: c for c in (parsed(Channel, p) for p in of(data, CHANNEL))}
+    wanted = {f"/axis/{n}": a.columns for n, a in LOG.axes.items()} | {"/truth/x": LOG.truth["x"]}
+    assert [c.topic for c in channels.values()] == list(wanted)
+    sent: dict[int, list] = {}
+    for piece in (p for content in in_chunks(data) for p in content if p.opcode == MESSAGE):
+        sent.setdefault(parsed_message(piece).channel_id, []).append(parsed_message(piece))
+    counts = {number: len(own) for number, own in sent.items()}
+    assert parsed(Statistics, of(data, STATISTICS)[0]) == Statistics(
+        attachment_count=3, channel_count=4, channel_message_counts=counts,
+        chunk_count=len(of(data, CHUNK)), message_count=4 * COUNT, metadata_count=1,
+        message_end_time=exact(COUNT - 1, RATE), message_start_time=0, schema_count=3,
+    )  # fmt: skip
+    for number, messages in sent.items():
+        assert [m.sequence for m in messages] == list(range(COUNT))
+        times = [exact(k, RATE) for k in range(COUNT)]
+        assert [m.log_time for m in messages] == [m.publish_time for m in messages] == times
+        schema, columns = schemas[channels[number].schema_id], wanted[channels[number].topic]
+        names = TRUTH if channels[number].topic == "/truth/x" else FIELDS
+        assert schema.name == ("twin.AxisTruth" if names is TRUTH else "twin.AxisSample")
+        kind = GetMessages(FileDescriptorSet.FromString(schema.data).file)[schema.name]
+        numbers = {f.name: f.number for f in kind.DESCRIPTOR.fields}
+        assert numbers == {n: names.index(n) + FIRST_NUMBER for n in columns}
+        for k, message in enumerate(messages):
+            sample = kind.FromString(message.data)
+            assert {n: getattr(sample, n) for n in columns} == {n: c[k] for n, c in columns.items()}
+
+
+def test_metadata_attachments_and_channels_say_what_the_log_holds(data):
+    attachments = [(p, parsed(Attachment, p)) for p in of(data, ATTACHMENT)]
+    assert {a.name: a.data for _, a in attachments} == LOG.attachments
+    assert {(a.log_time, a.create_time) for _, a in attachments} == {(0, 0)}
+    types = [a.media_type for _, a in attachments]
+    assert types == ["application/toml", "application/xml", "application/octet-stream"]
+    assert [parsed(AttachmentIndex, p) for p in of(data, ATTACHMENT_INDEX)] == [
+        AttachmentIndex(p.start, p.end - p.start, 0, 0, len(a.data), a.name, a.media_type)
+        for p, a in attachments
+    ]
+    metadata = of(data, METADATA)[0]
+    assert [parsed(MetadataIndex, p) for p in of(data, METADATA_INDEX)] == [
+        MetadataIndex(metadata.start, metadata.end - metadata.start, "twin")
+    ]
+    entries = parsed(Metadata, metadata).metadata
+    proof = entries.pop("checksum")
+    assert entries == {
+        "source": "a test", "schema_version": "1", "sample_rate_hz": "3000.0", "axes": "x,y,z",
+    }  # fmt: skip
+    texts = [text.encode() for entry in sorted(entries.items()) for text in entry]
+    stated = b"".join(len(text).to_bytes(8, "little") + text for text in texts)
+    assert proof == f"{zlib.crc32(stated):08x}"
+    channels = [parsed(Channel, p).metadata for p in of(data, CHANNEL)]
+    assert channels[1] == {
+        "axis": "y", "sample_rate_hz": "3000.0", "unit.position": "m", "unit.current": "A",
+        "force_constant": "3.5",
+    }  # fmt: skip
+    assert channels[3] == {"axis": "x", "sample_rate_hz": "3000.0", "unit.position": "m"}
+
+
+def test_equal_axes_share_one_schema(data):
+    assert [parsed(Schema, p).id for p in of(data, SCHEMA)] == [1, 2, 3]
+    found = [(parsed(Channel, p).id, parsed(Channel, p).schema_id) for p in of(data, CHANNEL)]
+    assert found == [(1, 1), (2, 2), (3, 2), (4, 3)]
+
+
+def test_stock_readers_accept_every_checksum_and_find_samples_by_time(data):
+    for reader in (make_reader(BytesIO(data), validate_crcs=True),
+                   NonSeekingReader(BytesIO(data), validate_crcs=True)):  # fmt: skip
+        assert sum(1 for _ in reader.iter_messages()) == 4 * COUNT
+    last = make_reader(BytesIO(data)).iter_messages("/axis/y", starting_at=exact(COUNT - 1, RATE))
+    assert [m.sequence for _, _, m in last] == [COUNT - 1]
+
+
+@pytest.mark.parametrize("rows", [0.5, 1, 2, 5, 44, 45, 46])
+def test_the_size_of_the_chunks_changes_no_sample(tmp_path, rows):
+    """Of one row at least, though it is larger than a chunk."""
+    write_log(LOG, tmp_path / "a.mcap", chunk_bytes=int(rows * ROW))
+    chunks = of((tmp_path / "a.mcap").read_bytes(), CHUNK)
+    assert len(chunks) == 4 * -(-COUNT // max(1, int(rows)))
+    assert_same_log(read_log(tmp_path / "a.mcap"), LOG)
+
+
+def test_writing_what_was_read_gives_the_same_bytes(tmp_path):
+    """Numbers bit for bit, -0.0 too, metadata and attachments."""
+    first, second, third = (tmp_path / name for name in ("a.mcap", "b.mcap", "c.mcap"))
+    log = two_axes(6000)  # of several chunks as they are by default
+    write_log(log, first)
+    write_log(log, second)
+    assert_same_log(read_log(first), log)
+    write_log(read_log(first), third)
+    assert first.read_bytes() == second.read_bytes() == third.read_bytes()
+
+
+@pytest.mark.parametrize("rate", [1.0, 3.0, 50.0, 999.5, 1000.0, 44_100.5, 65_537.0, 1e6 / 7.0])
+def test_times_are_exact_at_every_rate(tmp_path, rate):
+    for count in (1, 5000):
+        axis = AxisLog({"position": np.arange(float(count)), "force": np.zeros(count)})
+        write_log(Log(rate, {"motor": axis}), tmp_path / "a.mcap")
+        assert_same_log(read_log(tmp_path / "a.mcap"), Log(rate, {"motor": axis}))
+    (content,) = in_chunks((tmp_path / "a.mcap").read_bytes())
+    times = [parsed_message(p).log_time for p in content[2:]]
+    assert times == [exact(k, rate) for k in range(5000)]
+
+
+def test_a_rotary_axis_keeps_its_units(tmp_path):
+    columns = {"position": np.ones(3), "current": np.ones(3)}
+    write_log(Log(1e3, {"motor": AxisLog(columns, ROTARY_UNITS, 0.1)}), tmp_path / "a.mcap")
+    assert read_log(tmp_path / "a.mcap").axes["motor"].units == ROTARY_UNITS
+
+
+def test_reading_needs_little_more_memory_than_the_result(tmp_path):
+    count = 200_000
+    axis = AxisLog({"position": np.arange(float(count)), "force": np.ones(count)})
+    write_log(Log(1e4, {"x": axis, "y": axis}), tmp_path / "a.mcap")
+    tracemalloc.start()
+    read_log(tmp_path / "a.mcap")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 4 * 8 * count + 6 * (1 << 20)
+
+
+def test_a_log_is_smaller_than_the_stock_writers(tmp_path):
+    """Though that has all topics in one chunk, whose messages repeat the head of the one before."""
+    count, rng = 4000, np.random.default_rng(1)
+    t = np.arange(count) / 1e4
+
+    def axis(phase: float) -> AxisLog:
+        motion = 0.1 * np.sin(9.0 * t + phase)
+        noisy = {"position": 1e-9, "force": 0.05, "current": 1e-3}
+        read = {n: motion + size * rng.standard_normal(count) for n, size in noisy.items()}
+        return AxisLog({f: read.get(f, motion) for f in FIELDS if f != "velocity"})
+
+    log = Log(1e4, {"x": axis(0.0), "y": axis(1.0)})
+    write_log(log, tmp_path / "own.mcap")
+    write_together(tmp_path / "stock.mcap", log, rows=4000)
+    own, stock = ((tmp_path / f"{n}.mcap").stat().st_size for n in ("own", "stock"))
+    assert own < stock

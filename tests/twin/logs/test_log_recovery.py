@@ -1,0 +1,360 @@
+"""Laws of recovery: every damaged place is named, and no sample disappears without a word.
+
+One log of five chunks is cut, flipped, thinned and doubled in many places. What was kept, what is
+left out and the samples of the places named as damaged must together be all samples, and every
+sample that is kept must be the one that was written.
+"""
+
+import re
+import tracemalloc
+
+import numpy as np
+import pytest
+from damage_cases import (
+    CHUNKS,
+    COUNT,
+    CRC_AT,
+    DRAWN,
+    LOG,
+    RATE,
+    Case,
+    account,
+    flipped,
+    kept,
+    recovered,
+    runs_without,
+    samples_of,
+    spoilt,
+    written,
+)
+from log_cases import assert_same_log, assert_same_samples, two_axes, write_together
+from mcap.records import Attachment, ChunkIndex
+from mcap_bytes import ATTACHMENT, CHUNK, CHUNK_INDEX, METADATA, parsed, records
+
+from twin.errors import InputError
+from twin.files import UNFINISHED
+from twin.logs import AxisLog, Log, read_log, recover_file, recover_log, write_log
+
+
+@pytest.fixture(scope="module")
+def intact(tmp_path_factory) -> Case:
+    case = written(tmp_path_factory.mktemp("log") / "a.mcap")
+    assert len(case.chunks) == CHUNKS
+    return case
+
+
+PAIRS = [(i, j) for i in range(CHUNKS) for j in range(i, CHUNKS)]
+
+
+@pytest.mark.parametrize("chunks", PAIRS, ids=str)
+def test_kept_left_out_and_damaged_are_all_samples(tmp_path, intact, chunks):
+    _, recovery = recovered(tmp_path / "a.mcap", spoilt(intact, *set(chunks)))
+    got = account(intact, recovery)
+    runs = runs_without(*chunks)
+    assert got.damaged == samples_of(*chunks)
+    assert len(got.kept) == max(len(r) for r in runs)
+    runs.remove(got.kept)
+    assert sorted(got.left_out, key=min) == runs
+    assert len(recovery.others) == len(runs)
+    gaps = len(set(chunks)) - (chunks[1] == chunks[0] + 1)
+    assert len(recovery.lost) == len(set(chunks)) + len(runs) + gaps
+
+
+@pytest.mark.parametrize("chunks", PAIRS, ids=str)
+def test_chunks_that_are_gone_are_told(tmp_path, intact, chunks):
+    """Message indexes and summary still speak of them."""
+    data = bytearray(intact.data)
+    for number in sorted(set(chunks), reverse=True):
+        del data[intact.chunks[number].start : intact.chunks[number].end]
+    _, recovery = recovered(tmp_path / "a.mcap", bytes(data))
+    got = account(intact, recovery)
+    runs = runs_without(*chunks)
+    assert len(got.kept) == max(len(r) for r in runs)
+    runs.remove(got.kept)
+    assert sorted(got.left_out, key=min) == runs
+    assert got.all == set(range(COUNT)), recovery.lost
+
+
+@pytest.mark.parametrize(("gone", "bad"), [(a, b) for a in range(5) for b in range(5) if a != b])
+def test_one_chunk_gone_and_one_damaged_are_both_told(tmp_path, intact, gone, bad):
+    data = bytearray(spoilt(intact, bad))
+    del data[intact.chunks[gone].start : intact.chunks[gone].end]
+    _, recovery = recovered(tmp_path / "a.mcap", bytes(data))
+    shift = intact.chunks[gone].end - intact.chunks[gone].start if bad > gone else 0
+    place = intact.chunks[bad].start - shift
+    assert any(f"chunk at byte {place}:" in loss for loss in recovery.lost)
+    told = account(Case(intact.data, []), recovery).all
+    assert told | samples_of(bad) == set(range(COUNT)), recovery.lost
+
+
+@pytest.mark.parametrize("number", range(CHUNKS - 1))
+def test_a_chunk_written_twice_or_too_late_costs_no_sample_without_a_word(tmp_path, intact, number):
+    data, start = intact.data, intact.chunks[number].start
+    middle, end = intact.behind(number), intact.behind(number + 1)
+    twice = data[:end] + data[start:middle] + data[end:]
+    late = data[:start] + data[middle:end] + data[start:middle] + data[end:]
+    for changed in (twice, late):
+        _, recovery = recovered(tmp_path / "a.mcap", changed)
+        assert account(intact, recovery).all == set(range(COUNT))
+
+
+def test_a_file_cut_off_keeps_every_chunk_before_the_cut(tmp_path, intact):
+    """Cut at, before and behind every end of a record, and within each."""
+    ends = [r.end for r in intact.records]
+    cuts = {c + d for c in ends for d in (0, 1)} | {c.end - 9 for c in intact.chunks}
+    for cut in sorted(c for c in cuts if intact.chunks[0].end <= c < len(intact.data)):
+        _, recovery = recovered(tmp_path / "a.mcap", intact.data[:cut])
+        whole = [n for n, c in enumerate(intact.chunks) if c.end <= cut]
+        assert account(intact, recovery).kept == samples_of(*whole)
+        assert recovery.lost[0].startswith(f"truncated: ends at byte {cut} without")
+        told: set[int] = set()
+        for first, last in re.findall(r"bytes (\d+) to (\d+): ", " ".join(recovery.lost)):
+            told |= set(range(int(first), int(last) + 1))
+        assert told >= set(range(max(e for e in ends if e <= cut), cut))
+        assert max(told, default=cut - 1) == cut - 1
+        assert bool(told) == (cut not in ends)
+
+
+def test_a_bit_flipped_in_any_kind_of_record_is_told_and_costs_its_chunk_at_most(tmp_path, intact):
+    """The opcode, bytes of the length and of the content, of a record of each kind; the magic."""
+    first_of = {r.opcode: r for r in reversed(intact.records)}
+    for record in (*first_of.values(), intact.chunks[2]):
+        size, chunk = record.end - record.start, record.opcode == CHUNK
+        every = (0, 1, 2, 4, 8, 9, 17, 25, 33, 37, 41, size // 2, size - 1)
+        for at in every if chunk else (0, 1, 8, 9, size - 1):
+            data = flipped(intact.data, record.start + at, mask=1 << at % 8)
+            _, recovery = recovered(tmp_path / "a.mcap", data)
+            got = account(intact, recovery)
+            assert got.all == set(range(COUNT)), (record.opcode, at, recovery.lost)
+            if at >= 9 and not chunk:
+                assert len(got.kept) == COUNT, (record.opcode, at, recovery.lost)
+    for place in (0, 5, 7, -8, -3, -1):
+        data = flipped(intact.data, place % len(intact.data), mask=4)
+        _, recovery = recovered(tmp_path / "a.mcap", data)
+        assert account(intact, recovery).kept == set(range(COUNT))
+
+
+@pytest.mark.parametrize("chunks", [(0, 1), (0, 3), (1, 3), (2, 4)], ids=str)
+def test_two_lengths_that_are_damaged_are_two_places(tmp_path, intact, chunks):
+    places = [intact.chunks[c].start + 4 for c in chunks]
+    _, recovery = recovered(tmp_path / "a.mcap", flipped(intact.data, *places, mask=0x10))
+    ranges = re.findall(r"bytes (\d+) to (\d+): ", " ".join(recovery.lost))
+    for place in places:
+        assert any(int(a) <= place <= int(b) for a, b in ranges), recovery.lost
+
+
+def test_each_extra_that_is_damaged_is_named_and_the_others_are_kept(tmp_path, intact):
+    attachment = next(r for r in intact.records if r.opcode == ATTACHMENT)
+    place = intact.data.index(parsed(Attachment, attachment).data)
+    log, recovery = recovered(tmp_path / "a.mcap", flipped(intact.data, place))
+    assert not log.attachments
+    assert log.metadata["source"] == "a test"
+    assert any(f"attachment at byte {attachment.start}: wrong checksum" in s for s in recovery.lost)
+    metadata = next(r for r in intact.records if r.opcode == METADATA)
+    for word in (b"a test", b"500.0"):  # a rate that the chunks deny gives way
+        place = intact.data.index(word, metadata.start)
+        log, recovery = recovered(tmp_path / "a.mcap", flipped(intact.data, place))
+        assert f"metadata at byte {metadata.start}: wrong checksum" in recovery.lost[0]
+        assert log.attachments == LOG.attachments
+        assert (log.sample_rate, len(log)) == (RATE, COUNT)
+        assert not recovery.unproved
+        assert "source" not in log.metadata
+
+
+def test_a_log_of_which_every_chunk_is_damaged_is_refused_and_names_each(tmp_path, intact):
+    (tmp_path / "a.mcap").write_bytes(spoilt(intact, *range(CHUNKS)))
+    with pytest.raises(InputError, match="nothing can be recovered") as caught:
+        recover_log(tmp_path / "a.mcap")
+    for chunk in intact.chunks:
+        assert f"chunk at byte {chunk.start}:" in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", DRAWN, ids=lambda k: k.__name__)
+def test_chunks_that_the_damage_did_not_touch_come_back_whole(tmp_path, intact, kind):
+    rng = np.random.default_rng(1)
+    for _ in range(12):
+        data, touched = kind(intact, rng)
+        whole = samples_of(*set(range(CHUNKS)) - touched)
+        try:
+            log, recovery = recovered(tmp_path / "a.mcap", data)
+        except InputError:
+            assert not whole
+            continue
+        parts = (log, *recovery.others)
+        assert whole <= set().union(*(kept(part.metadata["recovered"]) for part in parts))
+
+
+def test_what_no_checksum_proves_comes_back_only_on_request(tmp_path, intact):
+    path, chunk = tmp_path / "a.mcap", intact.chunks[2]
+    data = bytearray(intact.data)
+    data[chunk.start + CRC_AT : chunk.start + CRC_AT + 4] = bytes(4)
+    log, recovery = recovered(path, bytes(data))
+    assert len(log) + sum(map(len, recovery.others)) == COUNT - len(samples_of(2))
+    assert f"chunk at byte {chunk.start}: has no checksum" in "; ".join(recovery.lost)
+    log, recovery = recover_log(path, unproved=True)
+    assert len(log) == COUNT
+    assert "no checksum" in log.metadata["not_proved"]
+    assert f"chunk at byte {chunk.start}: has no checksum" in "; ".join(recovery.unproved)
+
+
+def test_every_cut_and_every_flipped_bit_is_refused(tmp_path, intact):
+    data, path, rng = intact.data, tmp_path / "a.mcap", np.random.default_rng(1)
+    first, end = intact.chunks[0].start, intact.chunks[-1].end
+    bits = {*range(8 * 40), *range(8 * (len(data) - 40), 8 * len(data))}
+    bits |= {int(b) for b in rng.integers(0, 8 * len(data), 100)}
+    bits |= {int(b) for b in rng.integers(0, 8 * first, 100)}  # outside the chunks
+    bits |= {int(b) for b in rng.integers(8 * end, 8 * len(data), 100)}
+    cuts = {*range(60), *(int(n) for n in rng.integers(0, len(data), 100)), len(data) - 1}
+    damaged = [flipped(data, bit // 8, mask=1 << bit % 8) for bit in bits]
+    for content in [*damaged, *(data[:size] for size in cuts)]:
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=re.escape(str(path))) as caught:
+            read_log(path)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_nan_splits_a_recovered_log(tmp_path):
+    position = np.arange(100.0)
+    position[70] = np.nan
+    log = Log(RATE, {"x": AxisLog({"position": position, "force": np.ones(100)})})
+    write_together(tmp_path / "a.mcap", log, rows=8)
+    got, recovery = recover_log(tmp_path / "a.mcap")
+    assert_same_samples(got, log, slice(0, 64))
+    assert "position is nan at 0.14 s" in recovery.lost[0]
+
+
+# Several topics, and files
+
+
+TWO = two_axes()
+
+
+def test_an_intact_log_is_recovered_whole(tmp_path):
+    write_log(TWO, tmp_path / "a.mcap")
+    log, recovery = recover_log(tmp_path / "a.mcap")
+    assert_same_log(log, TWO)
+    assert str(recovery) == "kept all 500 samples\nnothing was lost"
+    recovery, files = recover_file(tmp_path / "a.mcap", tmp_path / "b.mcap")
+    assert files == {tmp_path / "b.mcap": recovery.kept}
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_damage_did_not_touch_comes_back_whatever_else_is_lost(tmp_path, seed):
+    """Every sample of every topic, in the log or in those beside it; and each is as written."""
+    rng, path = np.random.default_rng(seed), tmp_path / "a.mcap"
+    write_log(TWO, path, chunk_bytes=20_000)
+    data, whole = bytearray(path.read_bytes()), {1: set(), 2: set(), 3: set()}
+    for index in [parsed(ChunkIndex, p) for p in records(bytes(data)) if p.opcode == CHUNK_INDEX]:
+        (channel,) = index.message_index_offsets
+        if rng.random() < 0.2:
+            place = index.chunk_start_offset + index.chunk_length - 1 - int(rng.integers(20))
+            data[place] ^= 1 << int(rng.integers(8))
+        else:
+            times = index.message_start_time, index.message_end_time
+            first, last = (round(t * 1e-9 * TWO.sample_rate) for t in times)
+            whole[channel] |= set(range(first, last + 1))
+    path.write_bytes(data)
+    log, recovery = recover_log(path)
+    found: dict[int, set[int]] = {1: set(), 2: set(), 3: set()}
+    for part in (log, *recovery.others):
+        assert len(part) * (len(part.axes) + len(part.truth)) <= len(log) * 3
+        first = round(float(part.metadata["recovered"].split(" from ")[1].split()[0]) * 1e4)
+        where = slice(first, first + len(part))
+        axes = {name: TWO.axes[name] for name in part.axes}
+        truth = {name: TWO.truth[name] for name in part.truth}
+        assert_same_samples(part, Log(TWO.sample_rate, axes, truth=truth), where)
+        for channel, there in ((1, "x" in axes), (2, "y" in axes), (3, bool(truth))):
+            found[channel] |= set(range(first, first + len(part))) if there else set()
+    assert (found[1], found[2]) == (whole[1], whole[2])
+    assert found[3] == whole[3] & (whole[1] | whole[2])  # truth alone is no log
+
+
+@pytest.mark.parametrize("layout", ["apart", "together"])
+def test_what_is_written_piece_by_piece_is_what_is_read_as_a_whole(tmp_path, layout):
+    """Of more samples than are held at a time."""
+    path, count = tmp_path / "a.mcap", 40_000 if layout == "apart" else 2_000
+    column = np.arange(float(count))
+    axis = AxisLog({"position": column, "force": -column})
+    log = Log(1e4, {"x": axis, "y": AxisLog({"position": column + 0.5, "force": column})})
+    if layout == "apart":
+        write_log(log, path, chunk_bytes=200_000)
+    else:
+        write_together(path, log)
+    ends = [r.end for r in records(path.read_bytes()) if r.opcode == CHUNK]
+    path.write_bytes(flipped(path.read_bytes(), ends[4] - 50, ends[5] - 50))
+    log, wanted = recover_log(path)
+    recovery, files = recover_file(path, tmp_path / "good.mcap")
+    assert (recovery.kept, recovery.lost) == (wanted.kept, wanted.lost)
+    assert list(files) == [
+        tmp_path / "good.mcap",
+        *(tmp_path / f"good.part{n}.mcap" for n in range(1, 1 + len(wanted.others))),
+    ]
+    assert len(files) > 1
+    assert next(iter(files.values())) == recovery.kept
+    for file, part in zip(files, (log, *wanted.others), strict=True):
+        write_log(part, tmp_path / "b.mcap")
+        assert file.read_bytes() == (tmp_path / "b.mcap").read_bytes()
+
+
+def test_a_recovery_takes_little_memory(tmp_path):
+    """As much as the steps that it takes, whatever the length of the log."""
+    noise = np.random.default_rng(1).standard_normal((2, 1_000_000))
+    path = tmp_path / "a.mcap"
+    write_log(Log(1e4, {"x": AxisLog({"position": noise[0], "force": noise[1]})}), path)
+    ends = [r.end for r in records(path.read_bytes()) if r.opcode == CHUNK]
+    path.write_bytes(flipped(path.read_bytes(), ends[20] - 50))
+    tracemalloc.start()
+    recover_file(path, tmp_path / "b.mcap")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < noise.nbytes
+
+
+def test_a_chunk_is_found_wherever_it_lies(tmp_path):
+    """At every place beside the borders of what is searched at a time."""
+    path, log = tmp_path / "a.mcap", Log(RATE, {"x": LOG.axes["x"]})
+    for border in (1 << 16, 1 << 18):
+        for before in range(-20, 80, 7):
+            write_log(Log(RATE, log.axes, attachments={"a": bytes(border - 300)}), path)
+            start = next(r.start for r in records(path.read_bytes()) if r.opcode == CHUNK)
+            size = border - 300 + border - before - start
+            write_log(Log(RATE, log.axes, attachments={"a": bytes(size)}), path)
+            data = path.read_bytes()
+            chunk = next(r for r in records(data) if r.opcode == CHUNK)
+            assert chunk.start == border - before
+            path.write_bytes(flipped(data, chunk.start + 5))  # its length
+            assert_same_samples(recover_log(path)[0], log)
+
+
+def test_what_is_recovered_from_is_there_to_the_last(tmp_path):
+    """Also where it bears the name of the recording that it becomes, but not of what is written."""
+    write_log(TWO, tmp_path / "b.mcap", chunk_bytes=20_000)
+    ends = [r.end for r in records((tmp_path / "b.mcap").read_bytes()) if r.opcode == CHUNK]
+    source = (tmp_path / "b.mcap").rename(tmp_path / f"a.mcap{UNFINISHED}")
+    source.write_bytes(flipped(source.read_bytes(), *(end - 50 for end in ends[12:15])))
+    wanted, told = recover_log(source)
+    _, files = recover_file(source, tmp_path / "a.mcap")
+    assert len(files) == 2
+    for file, log in zip(files, (wanted, *told.others), strict=True):
+        assert_same_samples(read_log(file), log)
+    named = source.rename(tmp_path / "good.part1.mcap")
+    broken = named.read_bytes()
+    with pytest.raises(InputError, match="would be overwritten; give another name"):
+        recover_file(named, tmp_path / "good.mcap")
+    assert not (tmp_path / "good.mcap").exists()
+    assert named.read_bytes() == broken
+
+
+def test_records_behind_an_attached_log_are_read(tmp_path):
+    """The chunks in the attachment are not those of the log around it."""
+    log = Log(TWO.sample_rate, {"x": TWO.axes["x"]}, {"source": "a test"})
+    write_log(log.part(0, 50), tmp_path / "inner.mcap")
+    attachments = {"inner.mcap": (tmp_path / "inner.mcap").read_bytes(), "b.txt": b"behind"}
+    path = tmp_path / "a.mcap"
+    write_log(Log(log.sample_rate, log.axes, log.metadata, {}, attachments), path)
+    path.write_bytes(path.read_bytes()[:-3])
+    got, recovery = recover_log(path)
+    assert_same_samples(got, log)
+    assert got.attachments == attachments
+    assert not any("unreadable" in loss for loss in recovery.lost[1:-1])

@@ -1,0 +1,192 @@
+"""Messages of doubles in protobuf, as they lie in a chunk: all of a topic have the same size.
+
+A message record is opcode u1, length u8, channel u2, sequence u4, log_time u8, publish_time u8
+(little-endian), then the payload: for each field its tag and 8 bytes. Every field is written, also
+those that are 0, in the order of the schema. So one packed NumPy structure describes a message, or
+a row of one of each channel, and a chunk is written and read column by column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from google.protobuf.descriptor_pb2 import (
+    FieldDescriptorProto,
+    FileDescriptorProto,
+    FileDescriptorSet,
+)
+from google.protobuf.message import DecodeError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.logs.log import FIELDS, Array
+
+AXIS_SAMPLE = "twin.AxisSample"
+AXIS_TRUTH = "twin.AxisTruth"
+
+_DOUBLE_ON_WIRE = 1  # the type of a field, in the low three bits of its tag
+
+
+def numbered(names: Iterable[str]) -> dict[str, int]:
+    """The field numbers of columns; from this first one on, the tag of a field has four bytes.
+
+    No fast compressor takes a repetition of less. So a number's tag, with what the number has in
+    common with the one a sample before, is taken in one step, and costs nothing.
+    """
+    return {name: number for number, name in enumerate(names, 1 << 18)}
+
+
+FIELD_NUMBERS = numbered(FIELDS)
+
+
+def file_descriptor_set(message: str, numbers: Mapping[str, int]) -> bytes:
+    """Serialized schema of ``message`` ("package.Name") with a double for each name: number."""
+    package, name = message.split(".")
+    file = FileDescriptorProto(name=f"{package}/{name}.proto", package=package, syntax="proto3")
+    descriptor = file.message_type.add(name=name)
+    for field, number in numbers.items():
+        descriptor.field.add(
+            name=field,
+            number=number,
+            type=FieldDescriptorProto.TYPE_DOUBLE,
+            label=FieldDescriptorProto.LABEL_OPTIONAL,
+        )
+    return FileDescriptorSet(file=[file]).SerializeToString(deterministic=True)
+
+
+def field_numbers(channel: Channel, schema: Schema | None) -> dict[str, int]:
+    """The doubles of a channel's messages in the order of the schema: name -> number.
+
+    Raises InputError where there is anything else in them.
+    """
+    if schema is None or (channel.message_encoding, schema.encoding) != ("protobuf", "protobuf"):
+        raise InputError(
+            f"messages are encoded as {channel.message_encoding!r} with "
+            f"{schema.encoding if schema else 'no'!r} schema; only logs of this program are read, "
+            "in protobuf; convert the log with: twin import"
+        )
+    try:
+        files = FileDescriptorSet.FromString(schema.data).file
+    except DecodeError as error:
+        raise InputError(f"the protobuf schema {schema.name!r} cannot be used") from error
+    found = [m for f in files for m in f.message_type if f"{f.package}.{m.name}" == schema.name]
+    numbers = {f.name: f.number for f in found[0].field if _is_double(f)} if found else {}
+    if not found or len(numbers) != len(found[0].field):
+        raise InputError(
+            f"the protobuf schema {schema.name!r} is not of doubles alone; convert the log with: "
+            "twin import"
+        )
+    return numbers
+
+
+def _is_double(field: FieldDescriptorProto) -> bool:
+    is_one = field.type == FieldDescriptorProto.TYPE_DOUBLE
+    return is_one and field.name.isidentifier() and field.number > 0
+
+
+def tag(number: int) -> bytes:
+    """The bytes before the double of a field: 7 bits each, the low ones first."""
+    value, out = number << 3 | _DOUBLE_ON_WIRE, bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*out, value])
+
+
+# A column is an identifier, so no column can be called like one of these.
+_HEAD = [
+    (".opcode", "u1"),
+    (".length", "<u8"),
+    (".channel", "<u2"),
+    (".sequence", "<u4"),
+    (".log_time", "<u8"),
+    (".publish_time", "<u8"),
+]
+HEAD_BYTES = np.dtype(_HEAD).itemsize
+_OUTSIDE_LENGTH = 9  # opcode and length, which the record's length does not count
+_VARYING = (".sequence", ".log_time", ".publish_time")
+
+
+def sample_times(first: int, count: int, sample_rate: float) -> NDArray[np.int64]:
+    """(count,) times in ns of the samples from number ``first``: round(k dt)."""
+    k = np.arange(first, first + count, dtype=np.float64)
+    return np.rint(k * 1e9 / sample_rate).astype(np.int64)
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive samples of one channel.
+
+    sequence, log_time (ns): (n,); columns: name -> (n,).
+    """
+
+    channel: int
+    sequence: NDArray[np.uint32]
+    log_time: NDArray[np.uint64]
+    columns: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class MessageLayout:
+    """The message record of one channel; numbers: field -> its number, in the order written."""
+
+    channel: int
+    numbers: Mapping[str, int]
+
+    @cached_property
+    def dtype(self) -> np.dtype:
+        """Packed structure of the record; the tag of a field is called "field.tag"."""
+        payload = []
+        for name, number in self.numbers.items():
+            size = len(tag(number))
+            # one number is compared faster than its bytes
+            of_tag = f"<u{size}" if size in (1, 2, 4) else f"V{size}"
+            payload += [(f"{name}.tag", of_tag), (name, "<f8")]
+        return np.dtype(_HEAD + payload)
+
+    @cached_property
+    def template(self) -> np.ndarray:
+        """(1,) record with every constant filled in, everything else 0."""
+        record = np.zeros(1, self.dtype)
+        record[".opcode"] = Opcode.MESSAGE
+        record[".length"] = self.dtype.itemsize - _OUTSIDE_LENGTH
+        record[".channel"] = self.channel
+        for name, number in self.numbers.items():
+            record[f"{name}.tag"] = np.frombuffer(tag(number), self.dtype[f"{name}.tag"])
+        return record
+
+    def matches(self, records: np.ndarray) -> bool:
+        """True where every record has this layout's opcode, length, channel and tags."""
+        names = [n for n in self.dtype.names or () if "." in n and n not in _VARYING]
+        return all(bool((records[name] == self.template[name]).all()) for name in names)
+
+
+@dataclass(frozen=True)
+class RowLayout:
+    """One message of each channel, in the order they are written for every sample."""
+
+    messages: tuple[MessageLayout, ...]
+
+    @cached_property
+    def dtype(self) -> np.dtype:
+        """Packed structure of a row; its fields are the message records "0", "1", ..."""
+        return np.dtype([(str(i), m.dtype) for i, m in enumerate(self.messages)])
+
+    def blocks(self, data: bytes, offset: int) -> list[Block] | None:
+        """The samples from ``offset`` on, as views; None where they are not rows to the end."""
+        count, rest = divmod(len(data) - offset, self.dtype.itemsize)
+        if rest:
+            return None
+        rows = np.frombuffer(data, self.dtype, count, offset)
+        records = [rows[str(i)] for i in range(len(self.messages))]
+        if not all(m.matches(r) for m, r in zip(self.messages, records, strict=True)):
+            return None
+        return [
+            Block(m.channel, r[".sequence"], r[".log_time"], {n: r[n] for n in m.numbers})
+            for m, r in zip(self.messages, records, strict=True)
+        ]
