@@ -1,4 +1,4 @@
-"""Axes pushed by a given force without feedback, in both simulations, for the laws of structure."""
+"""Axes pushed by a given force without feedback, in both simulations."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from effect_runs import CATALOGUE
 from twin.core.control import Controller
 from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
 from twin.experiments.trajectory import Setpoint
-from twin.laws.trials import Array
 from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.signals import Array
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 
 RATE = 5000.0  # Hz

@@ -7,29 +7,33 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Excitation:
-    """What a log's motion covers; start rules and scans are computed from it.
-
-    position_low, position_high (m, of the axis' travel where the model gives it), speed_max (m/s),
-    dry_level (N, half the gap between the force in the two directions), duration (s), period (s,
-    sample period), force_max (N, largest command), lines (Hz, frequencies at which the force
-    repeats in time; strongest first), resolution (m, step of the readings; 0 where none shows),
-    ripples (m, periods at which the reading's error may repeat in position; strongest first),
-    pitches, thrust_pitches (m, periods at which what a model leaves of the force, or of the motor's
-    force in proportion to it, repeats along the track; strongest first; empty without a model).
-    """
+    """What a log's motion covers; start rules and scans are computed from it."""
 
     position_low: float
+    """Low end, m: of the axis' travel where the model gives it."""
     position_high: float
+    """High end, m."""
     speed_max: float
+    """Highest speed, m/s."""
     dry_level: float
+    """Half the gap between the force in the two directions, N."""
     duration: float
+    """Of the logs, s."""
     period: float
+    """Sample period, s."""
     force_max: float = 1.0
+    """Largest command, N."""
     lines: tuple[float, ...] = ()
+    """Frequencies at which the force repeats in time, Hz; strongest first."""
     ripples: tuple[float, ...] = ()
+    """Periods at which the reading's error may repeat in position, m; strongest first."""
     resolution: float = 0.0
+    """Step of the readings, m; 0 where none shows."""
     pitches: tuple[float, ...] = ()
+    """Periods at which what a model leaves of the force repeats along the track, m; strongest
+    first, none without a model."""
     thrust_pitches: tuple[float, ...] = ()
+    """The same of the motor's force in proportion to it, m."""
 
     @property
     def travel(self) -> float:

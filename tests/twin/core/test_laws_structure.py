@@ -5,16 +5,17 @@ mass. The momentum of all parts is the impulse of what pushes from outside. The 
 motion to the forces along it, gives the forces of the way there.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from axis_runs import BOTH, RATE, Stepper, effect, pushed, shoves
 from effect_runs import CATALOGUE
+from scipy.integrate import solve_ivp
 
-from twin.core.native import slope
-from twin.core.walks import walk
-from twin.laws.trials import Array
-from twin.model.machine import AxisModel, Fitted, axis_table
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.laws.trials import Motion, forces
+from twin.model.machine import Fitted
+from twin.signals import Array
 
 EACH = pytest.mark.parametrize("stage", BOTH)
 MASS = 3.7  # kg
@@ -163,19 +164,6 @@ def test_a_free_axis_swings_at_the_frequency_and_damping_of_two_masses(
 # --- along a measured motion ----------------------------------------------------------------------
 
 
-def walked(effects: tuple[Fitted, ...], v: Array, u: Array, dt: float, mass: float) -> dict:
-    """Force of each effect along a motion, N."""
-    table = axis_table({"x": AxisModel(mass, effects=effects)})
-    first, last, at, _, _ = table.axes[0]
-    rows = np.zeros((len(table.entries), len(v)))
-    motion = np.stack([np.cumsum(v) * dt, v, u])
-    walk(
-        table.entries, first, last, table.parameters, np.zeros(table.n_states), at, motion,
-        np.zeros_like(motion), dt, 0, rows, mass,
-    )  # fmt: skip
-    return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
-
-
 @SETS
 def test_the_way_back_gives_the_forces_of_the_way_there(names: tuple[str, ...]) -> None:
     """Blocks of eight samples of a smooth run: their mean speeds tell the mean forces."""
@@ -185,31 +173,75 @@ def test_the_way_back_gives_the_forces_of_the_way_there(names: tuple[str, ...]) 
     run = pushed(MASS, parts, force)
     block = 8
     mean = 0.5 * (run.v[1:] + run.v[:-1])[:3992].reshape(-1, block).mean(axis=1)
-    back = walked(parts, mean, np.zeros(len(mean)), block * H, MASS)
+    still = np.zeros_like(mean)
+    back = forces(parts, Motion(block * H, still, mean, still))  # of 1 kg
     for name in (p.effect.name for p in parts):
         wanted = run.rows[name][:3992].reshape(-1, block).mean(axis=1)
-        error = np.abs(back[name] - wanted)[2:-2]
+        error = np.abs(MASS * back[name] - wanted)[2:-2]
         # a base is stepped once a block: first order in its w h; what rides is of higher order
         assert error.max() < (0.015 if "base_vibration" in names else 2e-4) * np.abs(wanted).max()
 
 
-@pytest.mark.parametrize("degree", range(5))
-@pytest.mark.parametrize("dt", [0.1, 0.7])
-def test_the_slope_of_block_means_is_exact_for_polynomials(degree: int, dt: float) -> None:
-    """Of the fourth degree where two blocks lie on each side, of the first at the ends."""
-    rng = np.random.default_rng(71 + degree)
-    curve = np.polynomial.Polynomial(rng.normal(size=degree + 1))
-    edges = dt * (np.arange(9) - 3.0)
-    means = np.diff(curve.integ()(edges)) / dt
-    # means differ from values: the mean's own slope, which the exact slope's mean is
-    wanted = np.diff(curve(edges)) / dt
-    exact = range(8) if degree <= 1 else range(1, 7) if degree == 2 else range(2, 6)
-    for k in exact:
-        assert slope.py_func(means, k, dt) == pytest.approx(wanted[k], rel=1e-9, abs=1e-9)
+# --- the continuous equations ---------------------------------------------------------------------
+
+CONTINUOUS = {
+    "flexible_mode": {"load": 0.3, "frequency": 20.0, "damping": 0.05},
+    "base_vibration": {"recoil": 0.2, "frequency": 5.0, "damping": 0.1},
+    "backlash": {"load": 0.3, "play": 2e-3, "frequency": 25.0, "damping": 0.1},
+    "payload_mass": {"ratio": 0.4},
+}
+
+
+def shaken(t: Array | float) -> Array | float:
+    """A force, N."""
+    return 8.0 * np.sin(2.0 * np.pi * 3.0 * t) + 5.0 * np.sin(2.0 * np.pi * 11.0 * t + 0.4)
+
+
+def equations(name: str) -> Callable[[float, Array], tuple]:
+    """Right side of the continuous equations of position, attached displacement and speeds."""
+    p = CONTINUOUS[name]
+    if name == "payload_mass":
+        return lambda t, z: (z[2], 0.0, shaken(t) / (MASS * (1.0 + p["ratio"])), 0.0)
+    w, share = 2.0 * np.pi * p["frequency"], p.get("load", p.get("recoil"))
+
+    def right(t: float, z: Array) -> tuple:
+        half = 0.5 * p.get("play", 0.0)
+        pull = w**2 * (z[1] - np.clip(z[1], -half, half)) + 2.0 * p["damping"] * w * z[3]
+        if name == "base_vibration":  # m (q'' + b'') = F; the rest, m/share - m, feels -F - K b
+            carriage = shaken(t) / MASS
+            frame = (-shaken(t) - MASS / share * pull) / (MASS / share - MASS)
+            return z[2], z[3], carriage - frame, frame
+        motor = (shaken(t) + share * MASS * pull) / ((1.0 - share) * MASS)
+        return z[2], z[3], motor, -pull - motor
+
+    return right
+
+
+@EACH
+@pytest.mark.parametrize("name", CONTINUOUS)
+def test_it_converges_to_the_continuous_equations(name: str, stage: Stepper) -> None:
+    t = np.arange(1, 101) * 5e-3
+    exact = solve_ivp(
+        equations(name), (0.0, t[-1]), np.zeros(4), "DOP853", t, rtol=1e-11, atol=1e-14,
+        max_step=1e-3,
+    ).y[0]  # fmt: skip
+
+    def error(rate: float, **changed: float) -> float:
+        """Largest error of the position, m; the force is held at its mean."""
+        points, weights = np.polynomial.legendre.leggauss(5)
+        begins = np.arange(round(t[-1] * rate) + 1) / rate
+        force = 0.5 * shaken(begins[:, None] + 0.5 * (1.0 + points) / rate) @ weights
+        part = effect(name, **{**CONTINUOUS[name], **changed})
+        found = pushed(MASS, (part,), force, stage, rate=rate).x
+        return float(np.abs(found[np.rint(t * rate).astype(int)] - exact).max())
+
+    coarse, fine = error(2000.0), error(8000.0)
+    assert fine < 1e-4 * np.ptp(exact)
+    assert fine < 0.4 * coarse or coarse < 1e-9 * np.ptp(exact)
+    off = {p: 1.1 * v for p, v in CONTINUOUS[name].items() if p in ("frequency", "ratio")}
+    assert error(8000.0, **off) > 4.0 * fine, "blind"
 
 
 def test_no_attached_part_is_left_out_of_the_tests() -> None:
     structures = {e.name for e in CATALOGUE.values() if e.attach or e.added_mass}
-    assert structures == set(PARTS)
-    assert MujocoSimulator in BOTH
-    assert ReducedSimulator in BOTH
+    assert structures == set(PARTS) == set(CONTINUOUS)

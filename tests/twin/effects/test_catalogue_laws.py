@@ -10,6 +10,7 @@ from math import copysign, sin
 import mujoco
 import numpy as np
 import pytest
+from axis_runs import BOTH, Stepper
 from effect_runs import CATALOGUE, FRICTIONS
 
 from twin.effect import DRY, INDEX, OUT, READING, TIME, VISCOUS, Effect, Kind, Parameter, V, X
@@ -22,7 +23,7 @@ from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
 from twin.mujoco.callback import passive_callback
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.simulator import MujocoSimulator
 
 STAGE = load_model("proton_xy", CATALOGUE)
 EVERY = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda e: e.name)
@@ -39,10 +40,6 @@ PAIRS = [
 # These laws try each parameter by itself. The forty knots of a curve are alike: three tell as much.
 ONE_BY_ONE = (checks.check_declared, checks.check_finite)
 FEW_KNOTS = 3
-
-
-def label(item: object) -> str:
-    return getattr(item, "name", None) or getattr(item, "__name__", "none")
 
 
 @pytest.mark.parametrize(
@@ -66,19 +63,8 @@ def with_x(fitted: Fitted) -> MachineModel:
     return STAGE.with_axis("x", STAGE.axes["x"].with_effect(fitted))
 
 
-def replaced(effect: Effect) -> tuple[str, ...]:
-    """Names of what that effect would replace on x: itself, or the friction."""
-    return tuple(
-        f.effect.name
-        for f in STAGE.axes["x"].effects
-        if f.effect.name == effect.name or effect.kind is f.effect.kind is Kind.FRICTION
-    )
-
-
 @cache
-def logged_without(
-    names: tuple[str, ...], stage: type[MujocoSimulator] | type[ReducedSimulator]
-) -> Log:
+def without(names: tuple[str, ...], stage: Stepper) -> Log:
     """A log of the stage without those effects on x."""
     axis = STAGE.axes["x"]
     for name in names:
@@ -86,22 +72,24 @@ def logged_without(
     return logged(STAGE.with_axis("x", axis), stage)
 
 
-def logged(model: MachineModel, stage: type[MujocoSimulator] | type[ReducedSimulator]) -> Log:
+def logged(model: MachineModel, stage: Stepper) -> Log:
     return simulate(model, "moves", seed=3, duration=0.1, simulator=stage)
 
 
 @EVERY
-@pytest.mark.parametrize("stage", [MujocoSimulator, ReducedSimulator])
-def test_simulation_with_zero_strength_is_that_without(
-    effect: Effect, stage: type[MujocoSimulator] | type[ReducedSimulator]
-) -> None:
+@pytest.mark.parametrize("stage", BOTH)
+def test_simulation_with_zero_strength_is_that_without(effect: Effect, stage: Stepper) -> None:
+    replaced = tuple(
+        f.effect.name
+        for f in STAGE.axes["x"].effects
+        if f.effect.name == effect.name or effect.kind is f.effect.kind is Kind.FRICTION
+    )
     zero = logged(with_x(Fitted.at_start(effect, absent(effect))), stage)
-    without = logged_without(replaced(effect), stage)
     assert len(zero) > 500
-    for axis in STAGE.axes:
+    for axis, wanted in without(replaced, stage).axes.items():
         for name in ("position", "force"):
-            one, other = zero.axes[axis].columns[name], without.axes[axis].columns[name]
-            np.testing.assert_array_equal(one, other, f"{axis} {name}")
+            found = zero.axes[axis].columns[name]
+            np.testing.assert_array_equal(found, wanted.columns[name], f"{axis} {name}")
 
 
 @EVERY
@@ -245,18 +233,20 @@ def test_a_broken_effect_fails(check: Callable[[Effect], None], effect: Effect, 
         check(effect)
 
 
-@pytest.mark.parametrize("friction", FRICTIONS, ids=label)
+@pytest.mark.parametrize("friction", FRICTIONS, ids=lambda e: e.name)
 def test_a_modifier_that_turns_friction_round_fails(friction: Effect) -> None:
     with pytest.raises(LawBroken, match="gives"):
         physics.check_dissipative(friction, broken(Kind.MODIFIER, reversing))
 
 
-def test_a_law_that_reads_a_changing_global_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_law_that_reads_a_changing_global_fails() -> None:
+    global GAIN
     effect = broken(Kind.FORCE, frozen_global)
     checks.check_compiled_equals_python(effect)
-    monkeypatch.setitem(globals(), "GAIN", 2.0)
+    GAIN = 2.0
     with pytest.raises(LawBroken, match="differ"):
         checks.check_compiled_equals_python(effect)
+    GAIN = 1.0
 
 
 def test_a_damped_spring_is_not_conservative() -> None:

@@ -13,7 +13,8 @@ from references import REFERENCES
 
 from twin import effect as slots
 from twin.effect import IO_SIZE, OUT, Effect, Kind, V
-from twin.laws.trials import Array, compiled
+from twin.laws.trials import compiled
+from twin.signals import Array
 
 SINGLE = ("dt", "when", "mass", "moved")
 WHENS = pytest.mark.parametrize("when", [1.0, 0.5])

@@ -72,10 +72,3 @@ def test_the_stage_with_a_cable_keeps_its_names() -> None:
     for axis in stage.axes.values():
         assert not GENERAL & offered(axis)
         assert "cable_hysteresis" in offered(axis)
-
-
-def test_one_effect_may_be_had_ten_times() -> None:
-    names = ["cogging", *(f"cogging_{k}" for k in range(2, 11))]
-    assert all(n in CATALOGUE for n in names)
-    assert "cogging_11" in offered(having(*names))
-    assert not any(n in CATALOGUE for n in ("cogging_1", "cogging_01", "cogging_99", "lugre_2"))

@@ -11,10 +11,10 @@ from effect_runs import CATALOGUE, with_all
 from mujoco.batch import Batch
 
 from twin.experiments.named import simulate
-from twin.laws.trials import Array
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import Offsets, offsets, passive_callback
+from twin.signals import Array
 from twin.simulator import MujocoSimulator
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION

@@ -1,0 +1,111 @@
+"""Walks of the laws along a motion agree: for several sets of parameters, for columns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from effect_runs import CATALOGUE
+
+from identify.dataset.motion import Motion
+from identify.dataset.prepared_log import total_force, total_forces
+from twin.core.native import Table, build_table
+from twin.core.walks import averaged_columns, reading_columns, walk, walk_sensing
+from twin.effect import Effect, Kind
+from twin.model.machine import AxisModel, Fitted, axis_table
+from twin.signals import Array
+
+PERIOD, N = 1e-3, 400  # s, samples
+PHYSICS = [e for e in CATALOGUE.values() if e.kind is not Kind.SENSING]
+
+
+def motion(n: int = N) -> Motion:
+    """With a rest, beside an axis that moves otherwise."""
+    t, rng = PERIOD * np.arange(n), np.random.default_rng(7)
+    x = 0.03 * np.sin(9.0 * t) + 0.002 * np.sin(70.0 * t)
+    x[150:160] = x[150]
+    signals = np.stack([x, np.gradient(x, PERIOD), 3.0 * np.cos(11.0 * t)])
+    others = np.stack([0.5 * x, rng.normal(0.0, 0.1, n), rng.normal(0.0, 1.0, n)])
+    return Motion("run", "x", signals, others, PERIOD, 0.5 * PERIOD, PERIOD, 0.0, signals[1:],
+                  time_origin=0.013)  # fmt: skip
+
+
+def drawn(effect: Effect, seed: int) -> Fitted:
+    """Values between start and a tenth of the way to a bound within reach."""
+    rng, values = np.random.default_rng(seed), effect.starts()
+    for p in effect.parameters:
+        if not p.fixed:
+            step = 0.3 * max(abs(p.start), 1e-2 * min(p.upper - p.lower, 1.0))
+            values[p.name] = float(np.clip(p.start + rng.uniform(0, 1) * step, p.lower, p.upper))
+        if p.at_least:
+            values[p.name] = max(values[p.name], values[p.at_least])
+    return Fitted.at_start(effect, values)
+
+
+def by_effect(table: Table, along: Motion) -> Array:
+    """Sum of the rows of a walk that gives the force of each effect by itself."""
+    rows = np.zeros((len(table.entries), N))
+    first, last, state, _, _ = table.axes[0]
+    walk(
+        table.entries, first, last, table.parameters, np.zeros(table.n_states), state,
+        along.signals, along.others, along.period, 0, rows, table.masses[0], along.time_origin,
+    )  # fmt: skip
+    return rows.sum(axis=0)
+
+
+@pytest.mark.parametrize("effect", PHYSICS, ids=lambda e: e.name)
+def test_all_effects_together_give_the_sum_of_each(effect: Effect) -> None:
+    along = motion()
+    lugre = () if effect.kind is Kind.FRICTION else (drawn(CATALOGUE["lugre"], 1),)
+    spring = () if effect.name == "cable_slab" else (drawn(CATALOGUE["cable_slab"], 2),)
+    axes = [AxisModel(5.0, effects=(*lugre, *spring, drawn(effect, s))) for s in (3, 4, 5, 5)]
+    tables = [axis_table({"": axis}) for axis in axes]
+    together = total_forces(tables[0], np.stack([t.parameters for t in tables]), along)
+    for found, table in zip(together, tables, strict=True):
+        expected = by_effect(table, along)
+        size = np.abs(expected).max()
+        assert size > 0.0
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * size)
+        np.testing.assert_array_equal(found, total_force(table, along))
+    np.testing.assert_array_equal(together[3], together[2])  # no set knows of those before it
+
+
+def test_no_effects_give_no_force() -> None:
+    table = axis_table({"": AxisModel(5.0)})
+    assert not total_forces(table, table.parameters[None], motion()).any()
+
+
+# --- columns of a law of many strengths: times the strengths they are the law ---------------------
+
+COLUMNS = [e for e in CATALOGUE.values() if e.columns]
+LAID = ({}, {"closed": 1.0, "per_metre": 40.0}, {"per_metre": 0.0, "per_speed": 5.0, "rest": 0.02})
+
+
+@pytest.mark.parametrize("effect", COLUMNS, ids=lambda e: e.name)
+@pytest.mark.parametrize("laid", LAID)
+def test_columns_times_strengths_are_the_law(effect: Effect, laid: dict[str, float]) -> None:
+    strengths = np.random.default_rng(3).normal(size=len(effect.strengths))
+    names = [p.name for p in effect.strengths]
+    laid = {name: value for name, value in laid.items() if name in effect.starts()}
+    values = {**effect.starts(), **laid, **dict(zip(names, strengths, strict=True))}
+    vector, along = [values[p.name] for p in effect.parameters], motion()
+    table = build_table({"x": [(effect, vector)]}, [1.0])
+    if effect.kind is Kind.SENSING:
+        columns = reading_columns(effect, vector, along.signals[:2], PERIOD)
+        wanted = np.empty(N)
+        walk_sensing(
+            table.entries, 0, 1, table.parameters, np.zeros(table.n_states), along.signals, PERIOD,
+            wanted,
+        )  # fmt: skip
+        wanted -= along.signals[0]
+    else:
+        weights, stride = np.hanning(42)[1:-1] / np.hanning(42)[1:-1].sum(), 10
+        columns = averaged_columns(
+            effect, vector, along.signals, PERIOD, along.time_origin, weights, stride
+        )
+        force = total_force(table, along)
+        wanted = np.lib.stride_tricks.sliding_window_view(force, 40)[::stride] @ weights
+    np.testing.assert_allclose(columns.T @ strengths, wanted, atol=1e-13)
+
+
+def test_some_force_and_some_sensing_effect_have_columns() -> None:
+    assert {e.kind for e in COLUMNS} >= {Kind.FORCE, Kind.SENSING}
