@@ -79,23 +79,6 @@ def test_what_is_no_finite_number_is_refused(value):
         Fitted.at_start(PAIR, {"low": value})
 
 
-SIZED = next(n for n in CATALOGUE if CATALOGUE[n].of_size is not None)
-
-
-@pytest.mark.parametrize("count", [1, 2, 3, 7.0])
-def test_an_effect_of_any_size_has_as_many_elements_as_asked(count):
-    fitted = Fitted.at_start(CATALOGUE[SIZED], {"elements": count})
-    assert fitted.values["elements"] == count
-    same = CATALOGUE[SIZED].of_size(int(count))
-    assert [p.name for p in fitted.effect.parameters] == [p.name for p in same.parameters]
-
-
-@pytest.mark.parametrize("count", [0, -1, 1.5, 1001, math.nan, math.inf, "2"])
-def test_a_count_of_elements_is_whole_and_from_one_to_a_thousand(count):
-    with pytest.raises(InputError, match=f"{SIZED}.elements = {count}: .* from 1 to 1000"):
-        Fitted.at_start(CATALOGUE[SIZED], {"elements": count})
-
-
 @pytest.mark.parametrize("mass", [-5e-324, -1.0, math.nan, math.inf])
 def test_a_mass_is_finite_and_not_below_zero(mass):
     with pytest.raises(InputError, match="must be a positive number of kg"):

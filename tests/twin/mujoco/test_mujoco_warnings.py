@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import chdir
 from math import nan, sqrt
 from pathlib import Path
 from threading import Barrier
@@ -56,11 +57,8 @@ def ramp() -> Setpoint:
 
 
 @BOTH
-def test_a_law_that_breaks_in_the_travel_ends_the_run(
-    simulator: type, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(CannotRun) as refused:
+def test_a_law_that_breaks_in_the_travel_ends_the_run(simulator: type, tmp_path: Path) -> None:
+    with chdir(tmp_path), pytest.raises(CannotRun) as refused:
         run(machine({}), ramp(), np.random.default_rng(0), simulator=simulator)
     text = str(refused.value)
     assert "on axis y: effect test_mujoco_warnings gives nan N" in text
