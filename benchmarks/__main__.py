@@ -21,11 +21,12 @@ from twin.errors import InputError
 MEASURED = (
     "simulation", "second_start", "peer_fits", "diagnosis", "passes", "kinds", "stages",
     "mcap_logs", "effect_cost", "import_time", "emps", "withheld", "foreign", "thesis", "selftest",
-    "rule", "fuzz", "mutation",
+    "rule", "fuzz", "mutation", "size",
 )  # fmt: skip
 # What takes options, or half an hour, by its name alone, and the module.
 RUNS = {
     "selftest": "selftest", "confidence": "selftest.confidence", "intervals": "selftest.intervals",
+    "size": "size",
 }  # fmt: skip
 RESULTS = "--results"
 
