@@ -59,7 +59,7 @@ class Code:
 
     @property
     def constants(self) -> list[tuple[int, bool]]:
-        """Numbers at the top of a module: how many names a line binds, and whether a comment is beside.
+        """Numbers at the top of a module: names bound at once, and whether a comment is beside.
 
         Less the slots of a law's ``io``, which are an enumeration.
         """
