@@ -19,8 +19,8 @@ from twin.errors import InputError
 
 # Each is loaded when it runs: some need packages that the others do without.
 MEASURED = (
-    "simulation", "second_start", "peer_fits", "diagnosis", "passes", "kinds", "stages",
-    "mcap_logs", "effect_cost", "import_time", "emps", "withheld", "foreign", "thesis", "selftest",
+    "simulation", "starts", "peer_fits", "diagnosis", "passes", "kinds", "stages",
+    "mcap_logs", "effect_cost", "emps", "withheld", "foreign", "thesis", "selftest",
     "rule", "fuzz", "mutation", "size",
 )  # fmt: skip
 # What takes options, or half an hour, by its name alone, and the module.

@@ -19,10 +19,8 @@ import numpy as np
 from benchmarks.figures import Figure, Target, told
 from benchmarks.judgement import Expected, Row, fitted, judged, row_of, stated_wrong
 from benchmarks.second_simulator.effects import INSIDE, OUTSIDE, Planted
-from benchmarks.second_simulator.machine import (
-    AHEAD,
-    BEHIND,
-    FORCE,
+from benchmarks.second_simulator.kernel import AHEAD, BEHIND, FORCE
+from benchmarks.second_simulator.machine import (  # fmt: skip
     PITCH,
     PLACE,
     WIDTH,
@@ -32,7 +30,7 @@ from benchmarks.second_simulator.machine import (
     logs_of,
     run,
     train,
-)  # fmt: skip
+)
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.findings import FindingKind
 from twin.effects import Catalogue, load_catalogue

@@ -15,13 +15,11 @@ import numpy as np
 
 from benchmarks import workload
 from benchmarks.figures import Figure, Target
-from benchmarks.processes import twin
 from benchmarks.selftest.laws import BUMPS
 from benchmarks.selftest.variations import drawn_values
+from benchmarks.timing import twin
 from benchmarks.workload import AXIS, HIDDEN, Workload, saved
-from identify.estimation.force_balance import residual
-from identify.experiment_design.planting import added_force, strength_for
-from identify.workflow import diagnose, fit
+from identify.workflow import diagnose
 from twin.effects import load_catalogue
 from twin.logs import Log
 from twin.model.machine import Fitted
@@ -35,8 +33,6 @@ KINDS = (
 )  # fmt: skip
 FLOORS = 8.0  # RMS force of the effect over the noise floor
 MEDIAN, DEAREST = 200.0, 600.0  # passes
-MEMORY = 2.0  # times the arrays of the logs
-MB = 1e6
 
 
 def measure() -> list[Figure]:
@@ -70,12 +66,7 @@ def _memory(work: Workload) -> Figure:
     with saved(work) as (model, logs, _):
         twin("diagnose", model, *logs)  # fills numba's caches
         effects, cost = twin("effects"), twin("diagnose", model, *logs)
-    return Figure(
-        f"peak memory of a diagnosis over the arrays of its logs, {HIDDEN}",
-        (cost.memory - effects.memory) / work.log_bytes, "1", Target(high=MEMORY),
-        f"{cost.memory / MB:.0f} MB, arrays {work.log_bytes / MB:.0f} MB, of which measured "
-        f"{work.measured_bytes / MB:.0f} MB",
-    )  # fmt: skip
+    return workload.memory(f", {HIDDEN}", cost, effects, work)
 
 
 def _logs(work: Workload, name: str) -> dict[str, Log]:
@@ -84,19 +75,8 @@ def _logs(work: Workload, name: str) -> dict[str, Log]:
     own, bumps = axis["roller_spikes"].values, BUMPS[0]
     values = {p.name: own[p.name] for p in bumps.parameters if p.name in own}
     axis = axis.without("roller_spikes").with_effect(Fitted.at_start(bumps, values))
-    axis = axis.with_effect(_sized(work, name))
-    return workload.recorded(work.machine.with_axis(AXIS, axis), workload.DURATION)
-
-
-def _sized(work: Workload, name: str) -> Fitted:
-    """The effect with a force of FLOORS on the first log, as the model's fit sees it."""
-    effect, first = load_catalogue()[name], dict([next(iter(work.plain.items()))])
-    found = fit(work.model, first)
-    base, covered = found.fits[AXIS], found.datasets[AXIS].excitation
-    without = residual(base.axis, base.logs)
-    return strength_for(
-        effect,
-        lambda fitted: added_force(fitted, base.axis, base.logs, without),
-        FLOORS * base.floor,
-        drawn_values(effect, covered, np.random.default_rng(1)),
-    )
+    hidden = workload.planted(
+        work.model, work.plain, name, FLOORS,
+        lambda effect, seen: drawn_values(effect, seen, np.random.default_rng(1)),
+    )  # fmt: skip
+    return workload.recorded(work.machine.with_axis(AXIS, axis.with_effect(hidden)))

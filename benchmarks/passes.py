@@ -16,15 +16,14 @@ import numpy as np
 
 from benchmarks import workload
 from benchmarks.figures import Figure, Target
-from benchmarks.processes import Cost, twin
-from benchmarks.workload import Workload, saved
+from benchmarks.timing import Cost, twin
+from benchmarks.workload import MB, Workload, megabytes, saved
 from twin.experiments.named import simulate
 from twin.logs import write_log
 
 TITLE = "Commands in passes: CPU of a process, over that of the fused laws over all its samples"
 ROUNDS = 3  # of a command
 SMALL = 2.0  # s of the small log
-MB = 1e6
 
 
 def measure() -> list[Figure]:
@@ -48,10 +47,10 @@ def _short(work: Workload, effects: Cost) -> list[Figure]:
     return [
         Figure("twin --help", front.cpu, "s CPU", Target(high=0.2)),
         Figure("twin --help, peak memory", front.memory / MB, "MB", Target(high=60.0)),
-        Figure("twin effects", effects.cpu, "s CPU", Target(high=0.4), _megabytes(effects)),
+        Figure("twin effects", effects.cpu, "s CPU", Target(high=0.4), megabytes(effects)),
         Figure(
             f"twin check, log of {SMALL:g} s", check.cpu, "s CPU", Target(high=0.5),
-            _megabytes(check),
+            megabytes(check),
         ),
     ]  # fmt: skip
 
@@ -85,7 +84,7 @@ def _long(work: Workload, effects: Cost) -> list[Figure]:
         note = (
             f"median of {each}; {middle.cost.cpu - effects.cpu:.2f} s CPU at "
             f"{1e3 * middle.one_pass:.0f} ms a pass, {middle.cost.wall:.1f} s wall, "
-            f"{_megabytes(middle.cost)}"
+            f"{megabytes(middle.cost)}"
         )
         return Figure(what, middle.passes(effects), "passes", Target(high=most), note)
 
@@ -100,12 +99,7 @@ def _long(work: Workload, effects: Cost) -> list[Figure]:
         figure(f"twin fit, {len(plain)} logs of one axis", fitted, 40.0),
         figure(f"twin diagnose, {workload.HIDDEN} hidden", found, 250.0),
         figure("twin diagnose, nothing hidden", nothing, 150.0),
-        Figure(
-            "peak memory of a diagnosis over the arrays of its logs",
-            (found[0].cost.memory - effects.memory) / work.log_bytes, "1", Target(high=2.0),
-            f"arrays {work.log_bytes / MB:.0f} MB, of which measured "
-            f"{work.measured_bytes / MB:.0f} MB",
-        ),
+        workload.memory("", found[0].cost, effects, work),
     ]  # fmt: skip
 
 
@@ -113,7 +107,3 @@ def _demo() -> list[Figure]:
     with TemporaryDirectory() as folder:
         cost = _least("demo", "--out", Path(folder, "demo"))
     return [Figure("twin demo", cost.cpu, "s CPU", Target(high=15.0), f"{cost.wall:.1f} s wall")]
-
-
-def _megabytes(cost: Cost) -> str:
-    return f"{cost.memory / MB:.0f} MB"

@@ -1,11 +1,11 @@
-"""The work that `passes` and `stages` measure: five logs of one axis, and what a pass over them is.
+"""What `passes`, `stages` and `kinds` measure: five logs of one axis, and a pass over them.
 
 A pass is the CPU time of the baseline's laws, fused by hand, over every sample of the logs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,10 +16,12 @@ from time import thread_time
 import numpy as np
 
 from benchmarks import fused
-from benchmarks.timing import interleaved
+from benchmarks.figures import Figure, Target
+from benchmarks.timing import Cost, interleaved
 from identify.estimation.force_balance import residual
 from identify.experiment_design.planting import added_force, other_machine, strength_for
 from identify.workflow import fit
+from twin.effect import Effect, Excitation
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.logs import Log, write_log
@@ -33,6 +35,8 @@ AXIS = "x"
 HIDDEN, FLOORS = "cogging", 4.0  # effect, and its RMS force over the noise floor
 PITCH = 0.024  # m
 ROUNDS = 9
+MEMORY = 2.0  # times the arrays of the logs
+MB = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,26 +113,51 @@ def make(duration: float = DURATION) -> Workload:
     model = replace(whole, axes={AXIS: whole.axes[AXIS]}, mjcf=None, mjcf_name=None)
     machine = model.with_axis(AXIS, other_machine(model.axes[AXIS], np.random.default_rng(1)))
     plain = recorded(machine, duration)
-    hidden = machine.axes[AXIS].with_effect(_hidden_effect(model, plain))
-    return Workload(model, machine, plain, recorded(machine.with_axis(AXIS, hidden), duration))
+    cogging = planted(model, plain, HIDDEN, FLOORS, lambda e, _: {**e.starts(), "p": PITCH})
+    hidden = machine.with_axis(AXIS, machine.axes[AXIS].with_effect(cogging))
+    return Workload(model, machine, plain, recorded(hidden, duration))
 
 
-def recorded(machine: MachineModel, duration: float) -> dict[str, Log]:
+def recorded(machine: MachineModel, duration: float = DURATION) -> dict[str, Log]:
     """Logs of random moves of a machine, each that long (s)."""
     return {
         f"log_{i}": simulate(machine, "tracking", seed=i, duration=duration) for i in range(LOGS)
     }
 
 
-def _hidden_effect(model: MachineModel, logs: dict[str, Log]) -> Fitted:
-    """Cogging whose force stands a few noise floors out of the residual."""
-    effect = load_catalogue()[HIDDEN]
-    name, log = next(iter(logs.items()))
-    base = fit(model, {name: log}).fits[AXIS]
+def planted(
+    model: MachineModel,
+    logs: Mapping[str, Log],
+    name: str,
+    floors: float,
+    values: Callable[[Effect, Excitation], Mapping[str, float]],
+) -> Fitted:
+    """An effect whose force has an RMS of so many noise floors on the first log.
+
+    As the model's fit sees it. values: those of the effect, of what the log excites.
+    """
+    effect, first = load_catalogue()[name], dict([next(iter(logs.items()))])
+    found = fit(model, first)
+    base = found.fits[AXIS]
     without = residual(base.axis, base.logs)
     return strength_for(
         effect,
         lambda fitted: added_force(fitted, base.axis, base.logs, without),
-        FLOORS * base.floor,
-        {**effect.starts(), "p": PITCH},
+        floors * base.floor,
+        values(effect, found.datasets[AXIS].excitation),
     )
+
+
+def memory(what: str, cost: Cost, idle: Cost, work: Workload) -> Figure:
+    """Peak memory of a command, less that of one that does nothing, over the arrays of the logs."""
+    return Figure(
+        f"peak memory of a diagnosis over the arrays of its logs{what}",
+        (cost.memory - idle.memory) / work.log_bytes, "1", Target(high=MEMORY),
+        f"{megabytes(cost)}, arrays {work.log_bytes / MB:.0f} MB, of which measured "
+        f"{work.measured_bytes / MB:.0f} MB",
+    )  # fmt: skip
+
+
+def megabytes(cost: Cost) -> str:
+    """The peak memory of a command."""
+    return f"{cost.memory / MB:.0f} MB"

@@ -39,10 +39,9 @@ SYMMETRIC_IN_TWO = {
     "minimum", "maximum", "hypot", "convolve", "array_equal", "union1d", "intersect1d",
     "logical_and", "logical_or", "multiply", "gcd",
 }  # fmt: skip
-# whether zip looks at the lengths of sequences that are of one length,
+# whether zip looks at the lengths of sequences that are of one length, and what type checkers alone
+# read: annotations, which are never evaluated, type variables.
 GUARDS = ("strict=",)
-# and what type checkers alone read: annotations (they are never evaluated) and these calls.
-TYPING = {"TypeVar", "ParamSpec"}
 
 
 class SwapArguments(Operator):
@@ -149,63 +148,52 @@ def faults_on(path: str, source: str, line: int) -> list[Fault]:
     if line in _idle_lines(source):
         return []
     found, text = [], source.splitlines()[line - 1]
-    tree = get_ast(source)
-    nodes = list(ast_nodes(tree))
+    nodes = list(ast_nodes(get_ast(source)))
     for kind, operator in operators().items():
-        occurrence = 0
-        for node in nodes:
-            for begin, _ in operator.mutation_positions(node):
-                guarded = text[: begin[1]].endswith(GUARDS)
-                if begin[0] == line and not guarded and not _annotates(source, begin):
-                    found.append(Fault(path, line, kind, occurrence))
-                occurrence += 1
+        places = [place for node in nodes for place, _ in operator.mutation_positions(node)]
+        found += [
+            Fault(path, line, kind, occurrence)
+            for occurrence, place in enumerate(places)
+            if place[0] == line
+            and not text[: place[1]].endswith(GUARDS)
+            and not any(begin <= place < end for begin, end in _annotations(source))
+        ]
     return [f for f in found if _compiles(f.applied(source), source)]
 
 
 def _compiles(altered: str, source: str) -> bool:
-    if altered == source:
-        return False
     try:
         compile(altered, "altered", "exec")
     except SyntaxError:
         return False
-    return True
+    return altered != source
 
 
 @cache
 def _idle_lines(source: str) -> frozenset[int]:
     """Lines that no result depends on: annotations, imports, decorators and texts."""
     idle: set[int] = set()
-
-    def add(node: ast.AST) -> None:
-        idle.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))  # type: ignore[attr-defined]
-
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, (ast.Import, ast.ImportFrom, ast.AnnAssign)) and not getattr(
-            node, "value", None
-        ):
-            add(node)
-        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
-            for decorator in node.decorator_list:
-                add(decorator)
+        whole: list[ast.AST] = []
+        match node:
+            case ast.Import() | ast.ImportFrom() | ast.AnnAssign(value=None):
+                whole = [node]
+            case (
+                ast.Expr(value=ast.Constant()) | ast.Call(func=ast.Name(id="TypeVar" | "ParamSpec"))
+            ):
+                whole = [node]
+            case ast.FunctionDef() | ast.ClassDef():
+                whole = list(node.decorator_list)
+        for part in whole:
+            idle.update(range(part.lineno, part.end_lineno + 1))  # type: ignore[attr-defined]
         if isinstance(node, ast.FunctionDef):
-            body = node.body[0].lineno
-            idle.update(range(node.lineno, body))
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-            add(node)
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in TYPING:
-            add(node)
+            idle.update(range(node.lineno, node.body[0].lineno))
     return frozenset(idle)
-
-
-def _annotates(source: str, place: tuple[int, int]) -> bool:
-    """Whether a place (line, column) is within an annotation."""
-    return any(begin <= place < end for begin, end in _annotations(source))
 
 
 @cache
 def _annotations(source: str) -> tuple[tuple[tuple[int, int], tuple[int, int]], ...]:
-    """Begin and end of the annotation of every variable."""
+    """Begin and end (line, column) of the annotation of every variable."""
     nodes = [n.annotation for n in ast.walk(ast.parse(source)) if isinstance(n, ast.AnnAssign)]
     return tuple(
         ((n.lineno, n.col_offset), (n.end_lineno or 0, n.end_col_offset or 0)) for n in nodes
@@ -223,27 +211,20 @@ def is_native(source: str, line: int) -> bool:
     return False
 
 
-def files(root: Path) -> list[str]:
-    """The product's Python files, by their path from the root."""
-    found = [p for package in PACKAGES for p in sorted((root / package).rglob("*.py"))]
-    return [str(p.relative_to(root)) for p in found]
-
-
 def draw(root: Path, count: int, seed: int, least: int = LEAST) -> list[Fault]:
     """Faults in lines drawn at random: ``least`` of each folder, the rest by its lines.
 
     Where ``count`` is too few for that, as many of each folder as there are for all.
     """
     rng = np.random.default_rng(seed)
-    sources = {path: (root / path).read_text() for path in files(root)}
+    paths = [p for package in PACKAGES for p in sorted((root / package).rglob("*.py"))]
+    sources = {str(p.relative_to(root)): p.read_text() for p in paths}
     folders: dict[str, list[tuple[str, int]]] = {}
     for path, source in sources.items():
         lines = [(path, i + 1) for i, text in enumerate(source.splitlines()) if text.strip()]
         folders.setdefault(str(Path(path).parent), []).extend(lines)
-    drawn: list[Fault] = []
-    for folder, wanted in _shares({f: len(v) for f, v in folders.items()}, count, least).items():
-        drawn += list(_drawn(folders[folder], sources, wanted, rng))
-    return drawn
+    parts = shares({f: len(v) for f, v in folders.items()}, count, least)
+    return [fault for f, n in parts.items() for fault in _drawn(folders[f], sources, n, rng)]
 
 
 def _drawn(
@@ -258,7 +239,7 @@ def _drawn(
             wanted -= 1
 
 
-def _shares(sizes: dict[str, int], count: int, least: int) -> dict[str, int]:
+def shares(sizes: dict[str, int], count: int, least: int) -> dict[str, int]:
     """How many of each folder: ``least``, and what is left goes where its part is missed most."""
     total = sum(sizes.values())
     each = min(least, count // len(sizes))

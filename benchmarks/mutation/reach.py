@@ -111,12 +111,12 @@ def _contexts(data: Path, root: Path) -> dict[str, dict[int, frozenset[str]]]:
     out: dict[str, dict[int, frozenset[str]]] = {}
     for file in measured.measured_files():
         lines = measured.contexts_by_lineno(file).items()
-        tests = {line: frozenset(map(_teller, filter(None, names))) for line, names in lines}
+        tests = {line: frozenset(map(teller, filter(None, names))) for line, names in lines}
         out[os.path.relpath(file, root)] = {line: t for line, t in tests.items() if t}
     return out
 
 
-def _teller(context: str) -> str:
+def teller(context: str) -> str:
     """The test of a context such as "tests/test_a.py::test_b|run"; of a set-up its file."""
     test, _, phase = context.partition("|")
     return test.partition("::")[0] if phase == "setup" else test

@@ -7,22 +7,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.second_simulator.kernel import COULOMB, DAHL, SLIP_ELEMENTS
-from benchmarks.second_simulator.machine import (
+from benchmarks.second_simulator.kernel import (
     AHEAD,
     BEHIND,
+    COULOMB,
+    DAHL,
     FORCE,
     FRICTION,
     MOTOR,
-    PLACE,
     READING,
-    SPEED,
+    SLIP_ELEMENTS,
     STRIBECK,
+)
+from benchmarks.second_simulator.machine import (  # fmt: skip
+    PLACE,
+    SPEED,
     Machine,
     gaussian,
     raised_cosine,
     train,
-)  # fmt: skip
+)
 
 TURN = 2.0 * np.pi
 
@@ -120,6 +124,10 @@ def value(name, scale=1.0):
     return lambda m, size, rng: m.having(**{name: scale * size})
 
 
+def of_kind(kind):
+    return lambda m, size, rng: m.having(kind=kind)
+
+
 INSIDE = {
     "cogging": Planted(cogging, ("cogging",)),
     "force_constant_ripple": Planted(motor_ripple, ("force_constant_ripple",), largest=0.3),
@@ -183,21 +191,13 @@ INSIDE = {
         value("reading_delay", 5e-3), ("encoder_delay", "actuator_delay"), ("actuator_lag",)
     ),
     "friction: slip elements": Planted(
-        value("kind", 0.0), ("gms",), ("leuven", "modified_leuven"), fixed=True
+        of_kind(SLIP_ELEMENTS), ("gms",), ("leuven", "modified_leuven"), fixed=True
     ),
-    "friction: Dahl": Planted(value("kind", 0.0), ("dahl",), fixed=True),
+    "friction: Dahl": Planted(of_kind(DAHL), ("dahl",), fixed=True),
     "friction: Coulomb": Planted(
-        value("kind", 0.0), ("coulomb_viscous", "stribeck"), ("gms",), fixed=True
+        of_kind(COULOMB), ("coulomb_viscous", "stribeck"), ("gms",), fixed=True
     ),
 }  # fmt: skip
-
-
-def of_kind(kind):
-    return lambda m, size, rng: m.having(kind=kind)
-
-
-for _name, _kind in (("slip elements", SLIP_ELEMENTS), ("Dahl", DAHL), ("Coulomb", COULOMB)):
-    INSIDE[f"friction: {_name}"] = replace(INSIDE[f"friction: {_name}"], make=of_kind(_kind))
 
 
 def sawtooth(m, size, rng):

@@ -11,10 +11,9 @@ import pytest
 
 pytest.importorskip("cosmic_ray", reason="comes with the extra `bench`")
 
-from benchmarks.mutation.faults import Fault, _shares, draw, faults_on, is_native, operators
-from benchmarks.mutation.noticed import figures
-from benchmarks.mutation.reach import Reach, _teller
-from benchmarks.mutation.trial import Trial
+from benchmarks.mutation.faults import Fault, draw, faults_on, is_native, operators, shares
+from benchmarks.mutation.noticed import Trial, figures
+from benchmarks.mutation.reach import Reach, teller
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -35,7 +34,7 @@ def test_the_same_seed_draws_the_same_faults_and_each_changes_the_code(tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("count", "least", "shares"),
+    ("count", "least", "expected"),
     [
         (10, 3, {"a": 4, "b": 3, "c": 3}),  # the rest goes to the largest
         (30, 3, {"a": 23, "b": 4, "c": 3}),  # by their lines, where these ask for more
@@ -43,8 +42,8 @@ def test_the_same_seed_draws_the_same_faults_and_each_changes_the_code(tmp_path:
         (500, 5, {"a": 80, "b": 15, "c": 5}),  # no more than there are lines
     ],
 )
-def test_each_folder_has_its_least_and_the_rest_by_its_lines(count, least, shares) -> None:
-    assert _shares({"a": 80, "b": 15, "c": 5}, count, least) == shares
+def test_each_folder_has_its_least_and_the_rest_by_its_lines(count, least, expected) -> None:
+    assert shares({"a": 80, "b": 15, "c": 5}, count, least) == expected
 
 
 @pytest.mark.parametrize(
@@ -90,7 +89,7 @@ def test_tests_of_a_line_come_quickest_first_and_within_the_budget() -> None:
     assert known.tests_for(Fault("x.py", 7, "k", 0), 1.0, native=True) == ["d"]
     shared = Reach({"t.py::a": 1.0, "t.py::b": 2.0, "c": 0.1}, {"x.py": {7: frozenset({"t.py"})}})
     assert shared.tests_for(Fault("x.py", 7, "k", 0), 10.0) == ["t.py::a", "t.py::b"]
-    assert [_teller(f"t.py::a|{phase}") for phase in ("run", "setup")] == ["t.py::a", "t.py"]
+    assert [teller(f"t.py::a|{phase}") for phase in ("run", "setup")] == ["t.py::a", "t.py"]
     rooms = Reach({"tests/a/t.py::x": 2.0, "tests/b/t.py::y": 1.0}, {})
     assert rooms.tests_for(Fault("a/m.py", 1, "k", 0), 2.5) == ["tests/a/t.py::x"]
     named = Reach({"a": 0.1, "b[gms]": 2.0}, {"gms.py": {1: frozenset({"a", "b[gms]"})}})

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from machines import one_axis
 
-from benchmarks.second_simulator.machine import PLACE, READING, drawn, run
+from benchmarks.second_simulator.kernel import READING
+from benchmarks.second_simulator.machine import PLACE, drawn, run
 from identify import workflow
 from identify.dataset.floor import noise_beside
 from identify.dataset.whittle import levels_with_dip

@@ -7,17 +7,8 @@ import pytest
 
 from benchmarks.foreign import CATALOGUE, STAGE, diagnosed, model_for
 from benchmarks.second_simulator.effects import INSIDE, OUTSIDE
-from benchmarks.second_simulator.kernel import SLIP_ELEMENTS
-from benchmarks.second_simulator.machine import (
-    AHEAD,
-    BEHIND,
-    FORCE,
-    PLACE,
-    drawn,
-    gaussian,
-    logs_of,
-    run,
-)
+from benchmarks.second_simulator.kernel import AHEAD, BEHIND, FORCE, SLIP_ELEMENTS
+from benchmarks.second_simulator.machine import PLACE, drawn, gaussian, logs_of, run
 from identify import workflow
 from identify.selection.diagnosis import Verdict
 from twin.curve import Coordinate
