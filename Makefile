@@ -53,11 +53,11 @@ $(VENV)/runtime: pyproject.toml
 	@touch $@
 
 $(VENV)/tests: $(VENV)/runtime
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[test,import]"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[test,import,view]"
 	@touch $@
 
 $(VENV)/benchmarks: $(VENV)/tests
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[test,import,bench]"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[test,import,view,bench]"
 	@touch $@
 
 $(VENV)/docs: $(VENV)/runtime

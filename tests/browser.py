@@ -122,6 +122,7 @@ def browser(folder: Path) -> Iterator[Browser]:
         pytest.skip(f"no browser: none of {', '.join(NAMES)} is installed")
     (to_read, sent), (told, to_write) = os.pipe(), os.pipe()
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run"]
+    options += ["--enable-unsafe-swiftshader"]  # WebGL without a graphics card
     quiet = ["--disable-extensions", "--disable-background-networking", "--remote-debugging-pipe"]
     at = {3: to_read, 4: to_write}  # where the browser's end of the pipes is looked for
     high = {fd: fcntl.fcntl(pipe, fcntl.F_DUPFD, 10) for fd, pipe in at.items()}

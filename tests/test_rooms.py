@@ -18,7 +18,7 @@ IDENTIFY, TWIN = (Path(package.__file__).parent for package in (identify, twin))
 # In the order in which data pass them: a room imports only from those before it.
 ROOMS = (
     "rules", "dataset", "estimation", "analysis", "selection", "validation", "experiment_design",
-    "results", "output", "workflow", "testing", "demo", "cli", "start",
+    "results", "output", "workflow", "view", "testing", "demo", "cli", "start",
 )  # fmt: skip
 LOG_ROOMS = {"logs", "importers", "checks"}
 MOST_FLOORS = 10

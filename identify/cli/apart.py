@@ -12,7 +12,8 @@ from typer.core import TyperCommand
 from twin.errors import InputError
 from twin.files import is_same_file
 
-OUTPUTS = ("out", "mcap", "plot", "setpoints")  # parameters that name what is written
+# Parameters that name what is written.
+OUTPUTS = ("out", "mcap", "plot", "setpoints", "html", "video")
 UPDATED = {"fit": "model", "add": "model"}  # what a command may write over: it holds all of it
 
 

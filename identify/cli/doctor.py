@@ -119,7 +119,7 @@ def _display() -> Line:
     native = sys.platform in ("win32", "darwin")
     shown = "of the system" if native else screen or "none"
     egl = find_library("EGL") or "none"
-    found = f"display {shown}, EGL {egl}; twin draws into files and needs neither"
+    found = f"display {shown}, EGL {egl}; for `twin view` alone, a page (--html) needs neither"
     return Line("display", found)
 
 

@@ -195,6 +195,20 @@ class LogAnswer(Answer):
     setpoints: str | None = None
 
 
+class ViewAnswer(Answer):
+    """What `twin view` prints; gain: by how much differences are drawn larger than they are."""
+
+    log: str
+    html: str | None
+    video: str | None
+    axes: list[str]
+    duration: float
+    duration_unit: Literal["s"] = "s"
+    gain: float
+    notes: list[str]
+    left_out: list[str]
+
+
 class RecoveryAnswer(Answer):
     """What `twin recover` prints."""
 

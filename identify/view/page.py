@@ -1,0 +1,200 @@
+"""A replay as one HTML file that needs nothing else: shapes and signals inside, drawn by WebGL."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from base64 import b64encode
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from numpy.typing import ArrayLike
+
+from identify.view.replay import AxisReplay, Replay
+from identify.view.stage import Stage
+from twin.files import write_atomically
+from twin.signals import Array
+
+OF_MESHES = 900_000  # bytes, so that the page has 3 MB at most: see identify.view.replay
+STEPS = 32_767  # of a signal on either side of its middle; -32768 stands for none
+CELLS = (65_535, 512, 256, 128, 64, 32, 16, 8)  # of a mesh along its longest side, until it fits
+VISIBLE = 3  # groups of geoms that MuJoCo shows by default
+CLEAR = 0.05  # alpha below which a shape is not drawn
+SHAPES = {
+    mujoco.mjtGeom.mjGEOM_PLANE: "plane",
+    mujoco.mjtGeom.mjGEOM_SPHERE: "ellipsoid",
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
+    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
+    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
+    mujoco.mjtGeom.mjGEOM_BOX: "box",
+    mujoco.mjtGeom.mjGEOM_MESH: "mesh",
+}
+
+
+def write_page(path: Path, replay: Replay, gain: float, speed: float) -> None:
+    """Write the page; gain: by how much differences are drawn larger; speed: 1 is real time."""
+    environment = Environment(
+        loader=PackageLoader("identify.view", "."), autoescape=True, undefined=StrictUndefined
+    )
+    text = environment.get_template("page.html.j2").render(
+        title=": ".join(dict.fromkeys((replay.machine.name, replay.log))),
+        notes=replay.notes,
+        data={
+            "gain": gain, "speed": speed, "horizon": replay.horizon, "start": replay.start,
+            "rate": replay.rate, "frames": len(replay),
+            "axes": [_axis(name, axis) for name, axis in replay.axes.items()],
+            **_scene(Stage.of(replay), replay),
+        },
+        version=importlib.metadata.version("proton-twin"),
+    )  # fmt: skip
+    write_atomically(path, text.encode("utf-8"))
+
+
+def _axis(name: str, axis: AxisReplay) -> dict[str, Any]:
+    return {
+        "name": name,
+        "unit": axis.units.position,
+        "force": axis.units.force,
+        "measured": _base64(axis.measured, "<f4"),
+        "setpoint": _packed(axis.setpoint - axis.measured),
+        "modelled": _packed(axis.modelled - axis.measured),
+        "forces": [{"name": n, "values": _packed(f)} for n, f in axis.forces.items()],
+        "strips": [
+            {"label": s.label, "unit": s.unit, "low": _packed(s.range[0]),
+             "high": _packed(s.range[1])}
+            for s in axis.strips
+        ],
+    }  # fmt: skip
+
+
+def _packed(signal: Array) -> dict[str, Any]:
+    """A signal in 16 bits a value."""
+    known = signal[np.isfinite(signal)]
+    low, high = (known.min(), known.max()) if len(known) else (0.0, 0.0)
+    middle, size = 0.5 * (low + high), max((high - low) / (2 * STEPS), 1e-300)
+    steps = np.full(len(signal), -STEPS - 1)
+    steps[np.isfinite(signal)] = np.rint((known - middle) / size)
+    return {"middle": float(middle), "size": float(size), "steps": _base64(steps, "<i2")}
+
+
+def _base64(values: ArrayLike, kind: str) -> str:
+    return b64encode(np.asarray(values).astype(kind).tobytes()).decode()
+
+
+def _scene(stage: Stage, replay: Replay) -> dict[str, Any]:
+    """Shapes where they stand at rest, the joints that move them, camera and marks."""
+    model, data = stage.model, mujoco.MjData(stage.model)
+    mujoco.mj_forward(model, data)
+    names = {int(model.joint(axis).id): i for i, axis in enumerate(replay.axes)}
+    chains = [_chain(model, data, body, names) for body in range(model.nbody)]
+    links: list[list] = []
+    for chain in chains:
+        if chain not in links:
+            links.append(chain)
+    link_of = [links.index(chain) for chain in chains]
+    meshes: dict[int, int] = {}
+    geoms = []
+    for i in range(model.ngeom):
+        shape, rgba = SHAPES.get(mujoco.mjtGeom(model.geom_type[i])), _colour(model, i)
+        if shape is None or rgba[3] < CLEAR or model.geom_group[i] >= VISIBLE:
+            continue
+        geom = {
+            "shape": shape, "size": _short(model.geom_size[i]), "at": _short(data.geom_xpos[i]),
+            "turned": _short(data.geom_xmat[i]), "rgb": _short(rgba[:3]),
+            "link": link_of[model.geom_bodyid[i]],
+        }  # fmt: skip
+        if shape == "mesh":
+            geom["mesh"] = meshes.setdefault(int(model.geom_dataid[i]), len(meshes))
+        geoms.append(geom)
+    marks = [
+        {"link": link_of[body],
+         "at": _short(data.xpos[body] + data.xmat[body].reshape(3, 3) @ place)}
+        for body, place in stage.marks.values()
+    ]  # fmt: skip
+    share = OF_MESHES // max(len(meshes), 1)
+    return {
+        "links": links, "geoms": geoms, "marks": marks,
+        "meshes": [_mesh(model, m, share) for m in meshes],
+        "extent": float(model.stat.extent), "centre": _short(model.stat.center),
+        **_camera(model, data),
+    }  # fmt: skip
+
+
+def _chain(
+    model: mujoco.MjModel, data: mujoco.MjData, body: int, names: dict[int, int]
+) -> list[dict[str, Any]]:
+    """The axes that move a body, from the world on."""
+    chain = [] if body == 0 else _chain(model, data, int(model.body_parentid[body]), names)
+    first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+    return chain + [
+        {
+            "axis": names[j],
+            "hinge": bool(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE),
+            "along": _short(data.xaxis[j]),
+            "through": _short(data.xanchor[j]),
+            "zero": float(model.qpos0[model.jnt_qposadr[j]]),
+        }
+        for j in range(first, first + count)
+        if j in names
+    ]
+
+
+def _camera(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, Any]:
+    """Where the first camera of the model stands; without one, where MuJoCo's would."""
+    if model.ncam:
+        return {"eye": _short(data.cam_xpos[0]), "fovy": float(model.cam_fovy[0])}
+    away = 1.5 * model.stat.extent * np.array([0.5, -0.7, 0.5])
+    return {"eye": _short(model.stat.center + away), "fovy": 45.0}
+
+
+def _colour(model: mujoco.MjModel, geom: int) -> Array:
+    """Red, green, blue, alpha of a geom: of its material with the mean of its texture."""
+    material = int(model.geom_matid[geom])
+    if material < 0:
+        return np.asarray(model.geom_rgba[geom], dtype=float)
+    rgba = np.array(model.mat_rgba[material], dtype=float)
+    texture = int(model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB])
+    if texture >= 0:
+        channels, begin = int(model.tex_nchannel[texture]), int(model.tex_adr[texture])
+        end = begin + channels * int(model.tex_width[texture]) * int(model.tex_height[texture])
+        mean = model.tex_data[begin:end].reshape(-1, channels).mean(axis=0) / 255.0
+        rgba[:3] *= mean[:3] if channels >= 3 else mean[0]
+    return rgba
+
+
+def _mesh(model: mujoco.MjModel, mesh: int, most: int) -> dict[str, Any]:
+    """A mesh with its vertices on a grid, as fine as its share of bytes allows."""
+    places, corners = (
+        array[begin : begin + count]
+        for array, begin, count in (
+            (model.mesh_vert, int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])),
+            (model.mesh_face, int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])),
+        )
+    )
+    low = places.min(axis=0)
+    for cells, grid, faces in _coarser(places - low, corners):
+        size = float(np.ptp(places, axis=0).max()) / cells
+        if (len(grid) * 6 + len(faces) * 12) * 4 / 3 <= most:
+            break
+    return {
+        "low": _short(low), "size": size, "grid": _base64(grid, "<u2"),
+        "faces": _base64(faces, "<u4"),
+    }  # fmt: skip
+
+
+def _coarser(places: Array, corners: Any) -> Iterator[tuple[int, Any, Any]]:
+    """Cells, vertices as cells of a grid and faces, ever fewer, none without an area."""
+    longest = float(np.ptp(places, axis=0).max()) or 1.0
+    for cells in CELLS:
+        near = np.rint(places * (cells / longest)).astype(np.int64)
+        grid, index = np.unique(near, axis=0, return_inverse=True)
+        faces = index.reshape(-1)[corners]
+        flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+        yield cells, grid, faces[~flat]
+
+
+def _short(values: ArrayLike) -> list[float]:
+    return [float(f"{v:.6g}") for v in np.ravel(np.asarray(values, dtype=float))]

@@ -1,0 +1,216 @@
+"""What a log measured, what the model makes of its command and what is left, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.dataset import datasets
+from identify.dataset.drive import actual_force, parts_of, true_motion
+from identify.dataset.prepared_log import PreparedLog, sticks
+from identify.dataset.silent_logs import telling
+from identify.estimation.channel_delay import aligned
+from identify.estimation.force_balance import residual
+from identify.validation.free_run import free_run
+from twin.core.walks import walk
+from twin.effect import Kind
+from twin.errors import InputError
+from twin.logs import AxisLog, Log
+from twin.model.machine import AxisModel, MachineModel, axis_table
+from twin.model.units import AxisUnits
+from twin.parallel import parallel
+from twin.signals import Array
+
+FRAMES = 60.0  # 1/s, what a screen shows
+MOST_VALUES = 700_000  # of all signals together: 1.9 MB of a page, which has 3 MB at most
+OF_AXIS = 8  # signals beside the forces, that which was measured twice as exact
+SEEN = 0.1  # of the motion: as far as a difference is drawn, 19 times of 20
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """A signal as lowest and highest value within each frame: (2, n), so that no spike is lost."""
+
+    label: str
+    unit: str
+    range: Array
+
+
+@dataclass(frozen=True, eq=False)
+class AxisReplay:
+    """One axis at the beginning of each frame: (n,) m; NaN where there is none.
+
+    modelled: of the free run. forces: mean (n,) N over each frame, by effect.
+    """
+
+    units: AxisUnits
+    measured: Array
+    setpoint: Array
+    modelled: Array
+    forces: Mapping[str, Array] = field(default_factory=dict)
+    strips: tuple[Strip, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """A log as it is shown. rate: frames a second; start: s, of the log, at the first of them.
+
+    machine: with the axes that are shown. horizon: s between restarts of the free run; 0 where
+    there is no model. notes: what a reader should know, one sentence each.
+    """
+
+    log: str
+    machine: MachineModel
+    rate: float
+    start: float
+    axes: Mapping[str, AxisReplay]
+    horizon: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(next(iter(self.axes.values())).measured)
+
+    @property
+    def gain(self) -> float:
+        """By how much the differences to the measured motion are drawn larger, so as to be seen.
+
+        1, 2 or 5 times a power of ten; of the model where there is one, else of the setpoint.
+        """
+        for other in ("modelled", "setpoint"):
+            ratios = [
+                np.ptp(axis.measured) / usual
+                for axis in self.axes.values()
+                if (usual := _usual(getattr(axis, other) - axis.measured)) > 0.0
+            ]
+            if wanted := SEEN * min(filter(None, ratios), default=0.0):
+                power = 10.0 ** np.floor(np.log10(wanted))
+                return max(float(power * max(n for n in (1, 2, 5) if n * power <= wanted)), 1.0)
+        return 1.0
+
+
+def _usual(difference: Array) -> float:
+    """What nearly all of a difference stays below; 0 where it is not known."""
+    known = np.abs(difference[np.isfinite(difference)])
+    return float(np.percentile(known, 95)) if len(known) else 0.0
+
+
+@parallel()
+def replay(model: MachineModel | None, log: Log, name: str) -> Replay:
+    """A log with what a model makes of it; without one what was measured. Raises InputError."""
+    if model is None:
+        plain = {a: AxisModel(1.0, rotary=one.kind.rotary) for a, one in log.axes.items()}
+        return _replay(MachineModel(name, plain, log.sample_rate), log, name, {})
+    shown = [axis for axis in model.axes if axis in log.axes]
+    if not shown:
+        raise InputError(
+            f"{name}: has the axes {', '.join(log.axes)}, the model {', '.join(model.axes)}; "
+            "give the model of this machine, or none"
+        )
+    parts = {}
+    for axis, dataset in datasets(model, {name: log}, {}).items():
+        own = model.axes[axis]
+        parts[axis] = aligned(own, telling(dataset, sticks(own))).fit[0]
+    return _replay(model, log, name, parts)
+
+
+def _replay(model: MachineModel, log: Log, name: str, parts: Mapping[str, PreparedLog]) -> Replay:
+    """parts: the log prepared for each axis that is compared; the others are as measured."""
+    run = free_run(model, parts) if parts and not model.is_imposed else None
+    begun = max((part.motion.left_out for part in parts.values()), default=0)
+    lengths = (part.motion.raw.shape[1] + part.motion.left_out for part in parts.values())
+    cut = _Cut.of(model, log, begun, min(lengths, default=len(log)))
+    axes = {
+        axis: _axis(cut, own, log.axes[axis], parts.get(axis), None if run is None else run.error)
+        for axis, own in model.axes.items()
+        if axis in log.axes
+    }
+    still = [f"axis {a} stands still: there is nothing to compare" for a in axes if a not in parts]
+    notes = still if parts else []
+    if parts and run is None:
+        notes.append("the motion is imposed, so that the model has none of its own")
+    horizon = run.horizon if run else 0.0
+    return Replay(name, model, cut.rate, begun * log.period, axes, horizon, tuple(notes))
+
+
+def _axis(
+    cut: _Cut, own: AxisModel, log: AxisLog, part: PreparedLog | None,
+    error: Mapping[str, Array] | None,
+) -> AxisReplay:  # fmt: skip
+    """One axis; part: where it is compared with the model. error: m, of the free run, by axis."""
+    units, nothing = log.kind, np.full(cut.count, np.nan)
+    setpoint = log.columns.get("setpoint_position")
+    wanted = nothing if setpoint is None else setpoint[cut.begun :][: cut.count]
+    if part is None:
+        position = log.position[cut.begun :][: cut.count]
+        missed = Strip("position - setpoint", units.position, cut.range(position - wanted))
+        strips = () if setpoint is None else (missed,)
+        return AxisReplay(units, cut.at(position), cut.at(wanted), cut.at(nothing), {}, strips)
+    position = part.motion.position_at_samples(0.0)[cut.begun - part.motion.left_out :][: cut.count]
+    off = nothing if error is None else error[part.motion.axis]
+    left = cut.interpolated(part.time, residual(own, [part]))
+    force = Strip(f"{units.words('force')} left over", units.force, cut.range(left))
+    drift = Strip("model - measured", units.position, cut.range(off))
+    added = {
+        name: cut.mean(cut.interpolated(part.motion.time, f))
+        for name, f in forces(own, part).items()
+    }
+    return AxisReplay(
+        units, cut.at(position), cut.at(wanted), cut.at(position + off), added,
+        (force,) if error is None else (force, drift),
+    )  # fmt: skip
+
+
+def forces(axis: AxisModel, log: PreparedLog) -> dict[str, Array]:
+    """The force of each effect along the measured motion, (n,) N over the blocks of the motion."""
+    motion = true_motion(axis, log.motion)[0]
+    motion = motion.with_force(actual_force(axis, motion))
+    table = axis_table({"": parts_of(axis, *(set(Kind) - {Kind.SENSING, Kind.ACTUATION}))})
+    rows = np.zeros((len(table.entries), motion.signals.shape[1]))
+    first, last, at, *_ = table.axes[0]
+    walk(
+        table.entries, first, last, table.parameters, np.zeros(table.n_states), at, motion.signals,
+        motion.others, motion.period, 0, rows, axis.mass, motion.time_origin,
+    )  # fmt: skip
+    found = {effect: row for (_, effect), row in zip(table.labels, rows, strict=True)}
+    driven = [f.effect.name for f in axis.effects if f.effect.kind is Kind.ACTUATION]
+    if driven:
+        found[" + ".join(driven)] = motion.command - log.motion.command
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """``count`` samples of a log from ``begun`` on, cut into frames: ``first`` sample of each."""
+
+    begun: int
+    count: int
+    period: float
+    rate: float
+    first: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, machine: MachineModel, log: Log, begun: int, end: int) -> _Cut:
+        signals = sum(OF_AXIS + len(axis.effects) for axis in machine.axes.values())
+        step = max(log.sample_rate / FRAMES, 1.0, (end - begun) * signals / MOST_VALUES)
+        first = np.arange(int(np.ceil((end - begun) / step))) * step
+        return cls(begun, end - begun, log.period, log.sample_rate / step, first.astype(np.int64))
+
+    def at(self, signal: Array) -> Array:
+        """A signal at the first sample of each frame."""
+        return np.asarray(signal[self.first], dtype=float)
+
+    def range(self, signal: Array) -> Array:
+        """Lowest and highest value of a signal in each frame, (2, n)."""
+        used = signal[: self.count]
+        return np.stack([f.reduceat(used, self.first) for f in (np.fmin, np.fmax)])
+
+    def mean(self, signal: Array) -> Array:
+        """Mean of a signal over each frame."""
+        return np.add.reduceat(signal, self.first) / np.diff([*self.first, self.count])
+
+    def interpolated(self, time: Array, signal: Array) -> Array:
+        """A signal at times (s) of the log, at each sample."""
+        return np.interp(self.period * (self.begun + np.arange(self.count)), time, signal)

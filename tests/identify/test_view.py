@@ -1,0 +1,271 @@
+"""`twin view`: the replay is what was logged and modelled, and page, video and viewer show it."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from axis_kinds import MACHINES, machine
+from browser import Browser, browser
+from cli_runs import RATE, in_small, process, refusal, twin
+
+import identify
+from identify.view.live import HOME, LEAP, LEFT, RIGHT, SPACE, UP, Player
+from identify.view.page import write_page
+from identify.view.replay import Replay, replay
+from identify.view.stage import Stage
+from twin import load_model, simulate
+from twin.logs import AxisLog, Log
+from twin.model.machine import MachineModel
+
+BYTES = 3_000_000  # of a page
+MESH = """<mujoco><asset><mesh name="m" vertex="{points}"/></asset><worldbody>
+<body><joint name="x" type="slide" axis="1 0 0"/><geom type="mesh" mesh="m" mass="1"/></body>
+<geom type="capsule" size="0.1 0.2" pos="0 1 0"/><geom type="ellipsoid" size="0.1 0.2 0.3"/>
+</worldbody><actuator><motor name="motor_x" joint="x"/></actuator></mujoco>"""
+PIXELS = """
+const pixels = () => {
+  const p = new Uint8Array(4 * canvas.width * canvas.height);
+  gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, p);
+  return p;
+};
+const apart = (a, b) => a.reduce((n, v, i) => n + (Math.abs(v - b[i]) > 8), 0);
+"""
+
+
+@pytest.fixture(scope="module")
+def chrome(tmp_path_factory) -> Iterator[Browser]:
+    with browser(tmp_path_factory.mktemp("browser")) as running:
+        yield running
+
+
+def found_in(chrome: Browser, page: Path, script: str) -> dict[str, Any]:
+    """What a script puts into ``found`` in a page, which asks for nothing and has no errors."""
+    chrome.open(page, 1000, 800)
+    found: dict[str, Any] = chrome.run(f"const found = {{}}; {PIXELS} {script} return found;")
+    assert not [e for e in chrome.errors if "ReadPixels" not in e]  # that is the script's
+    assert [r for r in chrome.requests if r != "data:,"] == [page.resolve().as_uri()]
+    return found
+
+
+@pytest.fixture(scope="module")
+def stage() -> MachineModel:
+    return replace(load_model("proton_xy"), sample_rate=RATE)
+
+
+@pytest.fixture(scope="module")
+def lighter(stage) -> MachineModel:
+    """A model that is wrong: it lacks the cable of x."""
+    axis = stage.axes["x"].without("cable_slab")
+    return stage.with_axis("x", axis)
+
+
+@pytest.fixture(scope="module")
+def log(stage) -> Log:
+    return simulate(stage, "tracking", seed=4, duration=3.0)
+
+
+@pytest.fixture(scope="module")
+def shown(lighter, log) -> Replay:
+    return replay(lighter, log, "log")
+
+
+def test_it_shows_the_log_and_the_free_run_of_a_comparison(shown, lighter, log) -> None:
+    from identify.workflow import side_by_side_of
+
+    topics = side_by_side_of(identify.compare(lighter, {"log": log})).topics
+    for name, axis in shown.axes.items():
+        at = round(shown.start * RATE) + (np.arange(len(shown)) * (RATE / 60.0)).astype(int)
+        signals = log.axes[name].columns
+        np.testing.assert_allclose(axis.measured, signals["position"][at], atol=1e-8)
+        np.testing.assert_allclose(axis.setpoint, signals["setpoint_position"][at], atol=1e-12)
+        left, off = (strip.range for strip in axis.strips)
+        compared = topics[f"/residual/{name}"]
+        assert np.nanmax(off) == pytest.approx(-compared["position"].min())
+        assert np.nanmin(off) == pytest.approx(-compared["position"].max())
+        assert left.max() == pytest.approx(compared["force"].max(), rel=0.02)
+        assert np.nanmax(axis.modelled - axis.measured) <= np.nanmax(off)
+        assert set(axis.forces) == set(lighter.axes[name].names)
+
+
+def test_forces_of_the_effects_are_those_of_their_laws() -> None:
+    plain = machine(MACHINES["linear"][0] + "[axes.x.effects.constant_force]\nF0 = 0.5\n")
+    run = simulate(plain, "tracking", seed=1, duration=2.0)
+    axis = replay(plain, run, "run").axes["x"]
+    np.testing.assert_allclose(axis.forces["constant_force"], 0.5)
+    velocity = np.gradient(axis.measured) * 60.0
+    fast = np.abs(velocity) > 0.05
+    friction = -np.sign(velocity) - 2.0 * velocity  # Fc = 1 N, sigma2 = 2 N s/m
+    np.testing.assert_allclose(
+        axis.forces["coulomb_viscous"][fast][1:-1], friction[fast][1:-1], atol=0.1
+    )
+
+
+def test_no_spike_is_lost_and_an_hour_is_3_mb(tmp_path) -> None:
+    t = 0.01 * np.arange(360_000)
+    wanted = np.sin(t)
+    position = wanted.copy()
+    position[77_777] += 0.5
+    hour = Log(
+        100.0, {a: AxisLog({"position": position, "setpoint_position": wanted}) for a in "xyz"}
+    )
+    shown = replay(None, hour, "hour")
+    assert shown.axes["y"].strips[0].range.max() == pytest.approx(0.5)
+    write_page(tmp_path / "hour.html", shown, 1.0, 1.0)
+    assert 0.3 * BYTES < (tmp_path / "hour.html").stat().st_size < BYTES
+
+
+def test_differences_are_drawn_so_large_that_they_are_seen(shown) -> None:
+    for gain in (shown.gain, 2.0):
+        stage, frame = Stage.of(shown), len(shown) // 2
+        stage.pose(shown, frame, gain)
+        axis = shown.axes["x"]
+        off = stage.ghost.qpos[stage.at["x"]] - stage.data.qpos[stage.at["x"]]
+        assert off == pytest.approx(gain * (axis.modelled - axis.measured)[frame])
+    drawn = shown.gain * np.nanmax(np.abs(axis.modelled - axis.measured)) / np.ptp(axis.measured)
+    assert 0.02 < drawn < 0.5
+
+
+def test_the_page_moves_in_a_browser(shown, chrome, tmp_path) -> None:
+    write_page(tmp_path / "page.html", shown, shown.gain, 2.0)
+    found = found_in(chrome, tmp_path / "page.html", """
+    const scrub = (part) => {
+      at("scrub").value = part;
+      at("scrub").dispatchEvent(new Event("input"));
+      return pixels();
+    };
+    const first = scrub(0.3), other = scrub(0.8);
+    found.colours = new Set(new Uint32Array(first.buffer)).size;
+    found.moved = apart(first, other);
+    at("ghost").click();
+    found.ghost = apart(other, pixels());
+    found.hidden = state.ghost;
+    const size = at("gain"); size.value = "1"; size.dispatchEvent(new Event("change"));
+    found.gain = state.gain;
+    found.cells = [...document.querySelectorAll("#panel td")].map((c) => c.textContent);
+    found.time = state.time;
+    found.strips = strips.length;
+    const column = Math.round((chart.width * state.time) / duration);
+    found.cursor = [...chart.getContext("2d").getImageData(column, 5, 1, 1).data];
+    scrub(0);
+    at("play").click();
+    for (let i = 0; i < 10 && state.time < 0.2; i++) await frame();
+    at("play").click();
+    found.played = state.time;
+    """)  # fmt: skip
+    assert found["colours"] > 50
+    assert found["moved"] > 500
+    assert found["ghost"] > 100
+    assert (found["hidden"], found["gain"], found["strips"]) == (False, 1, 4)
+    frame = round(found["time"] * shown.rate)
+    assert found["cells"][0] == f"{1e3 * shown.axes['x'].measured[frame]:.3f} mm".replace("-", "−")
+    assert found["cursor"][3] == 255
+    assert 0.0 < found["played"] <= (len(shown) - 1) / shown.rate
+
+
+@pytest.mark.parametrize("kind", ["proton", "mesh", *MACHINES])
+def test_each_body_of_the_page_is_where_mujoco_has_it(kind, shown, chrome, tmp_path) -> None:
+    if kind == "proton":
+        what = shown
+    else:
+        plain = machine(MACHINES["linear" if kind == "mesh" else kind][0])
+        if kind == "mesh":
+            points = np.random.default_rng(1).normal(size=(60, 3)).ravel()
+            mjcf = MESH.format(points=" ".join(map(str, points)))
+            plain = replace(plain, mjcf=mjcf, mjcf_name="mesh.xml")
+        what = replay(plain, simulate(plain, "tracking", seed=2, duration=1.5), "log")
+    write_page(tmp_path / "page.html", what, 1.0, 1.0)
+    found = found_in(chrome, tmp_path / "page.html", """
+    seek(0.7 * duration);
+    found.colours = new Set(new Uint32Array(pixels().buffer)).size;
+    found.frame = Math.round(state.time * data.rate);
+    found.geoms = data.geoms.map((g) => [...moved(placed(g.link, standing.measured), g.at)]);
+    """)  # fmt: skip
+    stage = Stage.of(what)
+    stage.pose(what, found["frame"], 1.0)
+    at = [
+        p
+        for p, rgba in zip(stage.data.geom_xpos, stage.model.geom_rgba, strict=True)
+        if rgba[3] > 0
+    ]
+    np.testing.assert_allclose(found["geoms"], at, atol=2e-5)
+    assert found["colours"] > 5
+
+
+def test_the_command_writes_a_page_and_says_so(tmp_path) -> None:
+    with in_small(duration=2.0):
+        twin("simulate", "tracking", "-o", "l.mcap", folder=tmp_path)
+        done = twin("view", "l.mcap", "proton_xy", "--html", "p.html", folder=tmp_path)
+        alone = twin("view", "l.mcap", "--html", "q.html", "--json", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert re.match(r"p.html: 2 s of l.mcap, differences drawn \d+ times as large\n", done.stdout)
+    assert "://" not in (tmp_path / "p.html").read_text(encoding="utf-8")
+    found = json.loads(alone.stdout)
+    assert (found["html"], found["axes"], found["duration_unit"]) == ("q.html", ["x", "y"], "s")
+
+
+def test_what_cannot_be_shown_is_one_line(log, tmp_path, monkeypatch) -> None:
+    from twin.logs import write_log
+
+    write_log(log, tmp_path / "l.mcap")
+    said = refusal("view", "l.mcap", "--html", "p.html", "--speed", "0", folder=tmp_path)
+    assert "--speed 0: must be above 0" in said
+    (tmp_path / "z.toml").write_text(MACHINES["rotary"][0])
+    said = refusal("view", "l.mcap", "z.toml", "--html", "p.html", folder=tmp_path)
+    assert "has the axes x, y, the model c" in said
+    assert ".html file" in refusal("view", "l.mcap", "--html", "p.txt", folder=tmp_path)
+    assert "give another name" in refusal("view", "l.mcap", "--video", "l.mcap", folder=tmp_path)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    if sys.platform == "linux":
+        assert "no display" in refusal("view", "l.mcap", folder=tmp_path)
+
+
+def test_a_video_has_pictures_that_differ(log, tmp_path) -> None:
+    from twin.logs import write_log
+
+    write_log(log, tmp_path / "l.mcap")
+    command = ("view", "l.mcap", "proton_xy", "--video", "v.mp4", "--speed", 30)
+    done = process(*command, folder=tmp_path)
+    if done.returncode == 2 and ("needs ffmpeg" in done.stderr or "draws with" in done.stderr):
+        assert len(done.stderr.splitlines()) == 1
+        pytest.skip(done.stderr)
+    assert done.returncode == 0, done.stderr
+    assert b"ftyp" in (tmp_path / "v.mp4").read_bytes()[:16]
+    encoder = shutil.which("ffmpeg") or pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
+    raw = subprocess.run(
+        [encoder, "-loglevel", "error", "-i", tmp_path / "v.mp4", "-f", "rawvideo", "-pix_fmt",
+         "gray", "-"],
+        capture_output=True, check=True,
+    ).stdout  # fmt: skip
+    pictures = np.frombuffer(raw, np.uint8).reshape(-1, 1000, 1280)
+    assert len(pictures) == 3
+    assert all(picture[:720].std() > 10 for picture in pictures)
+    assert np.abs(np.diff(pictures[:, :720].astype(int), axis=0)).max() > 50
+
+
+def test_keys_move_the_replay() -> None:
+    player = Player(duration=3.0, speed=1.0)
+    player.press(RIGHT)
+    player.press(RIGHT)
+    assert player.time == 2 * LEAP
+    player.press(LEFT)
+    player.go(100.0)
+    assert player.time == 3.0
+    player.press(SPACE)
+    assert (player.playing, player.time) == (False, 0.0)
+    player.press(UP)
+    player.press(ord("G"))
+    assert (player.speed, player.ghost) == (2.0, False)
+    player.go(1.0)
+    player.press(HOME)
+    assert player.time == 0.0
