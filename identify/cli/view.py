@@ -85,8 +85,8 @@ def view(
         log=str(log), html=written.get("html"), video=written.get("video"), axes=list(shown.axes),
         duration=seconds, gain=times, notes=list(shown.notes), left_out=silent,
     )  # fmt: skip
+    drawn = "at their true size" if times == 1.0 else f"{times:g} times as large"
     text = "\n".join(
-        f"{path}: {seconds:.3g} s of {log}, differences drawn {times:g} times as large"
-        for path in written.values()
+        f"{path}: {seconds:.3g} s of {log}, differences drawn {drawn}" for path in written.values()
     )
     say(text, answer, as_json_, [*silent, *shown.notes])

@@ -58,6 +58,7 @@ def _axis(name: str, axis: AxisReplay) -> dict[str, Any]:
         "name": name,
         "unit": axis.units.position,
         "force": axis.units.force,
+        "bars": axis.units.words("Force of each effect"),
         "measured": _base64(axis.measured, "<f4"),
         "setpoint": _packed(axis.setpoint - axis.measured),
         "modelled": _packed(axis.modelled - axis.measured),

@@ -124,7 +124,10 @@ def _dress(spec: mujoco.MjSpec, replay: Replay) -> None:
         add(body, box, [0.12, 0.09, 0.03], [0, 0, 0.07], GREY)
         add(body, box, [0.09, 0.06, 0.015], [0, 0, 0.115], BLUE)
     centre = np.array([0.0, -0.25 * size * (len(spans) - 1), 0.05 * size])
-    spec.stat.center, spec.stat.extent = centre, size * max(1.2, 0.6 * len(spans))
+    spec.stat.center, spec.stat.extent = (
+        centre,
+        size * max(1.2 if slides else 0.6, 0.6 * len(spans)),
+    )
     spec.worldbody.add_light(pos=[0, 0, 3 * size], dir=[0.2, 0.3, -1], type=1)
     away = spec.stat.extent * np.array([0.4, -1.5, 1.03])
     spec.worldbody.add_camera(

@@ -10,6 +10,7 @@ const values = (s) =>
     k === -32768 ? NaN : s.middle + s.size * k);
 for (const axis of data.axes) {
   axis.measured = new Float32Array(bytes(axis.measured));
+  axis.large = axis.measured.some((v) => Math.abs(v) >= 1); // is told in whole units
   for (const name of ["setpoint", "modelled"]) axis[name] = values(axis[name]); // less measured
   for (const force of axis.forces) {
     force.values = values(force.values);
@@ -23,7 +24,8 @@ const duration = Math.max(data.frames - 1, 1) / data.rate;
 
 function quantity(value, unit) {
   if (!Number.isFinite(value)) return "–";
-  const size = Math.abs(value) || 1;
+  if (value === 0) return `0 ${unit.replace(" ", "·")}`;
+  const size = Math.abs(value);
   const [step, prefix] = [[1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]].find(
     ([s]) => size >= 0.5 * s) || [1e-9, "n"];
   return `${(value / step).toPrecision(3).replace("-", "−")} ${prefix}${unit.replace(" ", "·")}`;
@@ -268,11 +270,12 @@ function drawChart() {
 }
 
 // The panel beside the scene.
+const html = (text) => text.replace(/[&<>]/g, (c) => `&#${c.charCodeAt(0)};`).replaceAll("_", "_<wbr>");
 for (const axis of data.axes) {
-  const bars = axis.forces.map((f) => `<dt>${f.name}</dt><dd><i></i></dd><dd></dd>`).join("");
+  const bars = axis.forces.map((f) => `<dt>${html(f.name)}</dt><dd><i></i></dd><dd></dd>`).join("");
   const part = document.createElement("section");
-  part.innerHTML = `<h2>Axis ${axis.name}</h2><table><tbody><tr><th>measured<td><tr><th class="mark">setpoint<td><tr${data.horizon ? "" : " hidden"}><th class="ghost">model<td></table>` +
-    (bars && `<h3>Force of each effect</h3><dl>${bars}</dl>`);
+  part.innerHTML = `<h2>Axis ${html(axis.name)}</h2><table><tbody><tr><th>measured<td><tr><th class="mark">setpoint<td><tr${data.horizon ? "" : " hidden"}><th class="ghost">model<td></table>` +
+    (bars && `<h3>${axis.bars}</h3><dl>${bars}</dl>`);
   at("panel").append(part);
   axis.cells = part.querySelectorAll("td");
   axis.bars = [...part.querySelectorAll("i")].map((bar) => [bar, bar.parentNode.nextSibling]);
@@ -280,7 +283,8 @@ for (const axis of data.axes) {
 function drawPanel() {
   for (const axis of data.axes) {
     const k = frame(), far = (v) => (Number.isFinite(v) ? `${v < 0 ? "" : "+"}${quantity(v, axis.unit)}` : "–");
-    axis.cells[0].textContent = `${(1e3 * axis.measured[k]).toFixed(3).replace("-", "−")} m${axis.unit}`;
+    const [step, prefix] = axis.large ? [1, ""] : [1e-3, "m"];
+    axis.cells[0].textContent = `${(axis.measured[k] / step).toFixed(3).replace("-", "−")} ${prefix}${axis.unit}`;
     axis.cells[1].textContent = far(axis.setpoint[k]);
     axis.cells[2].textContent = far(axis.modelled[k]);
     axis.forces.forEach((force, i) => {
