@@ -34,8 +34,8 @@ from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
 from identify.selection.trying import reshape, try_effect
 from identify.validation.agreement import Agreement, agreement
-from identify.validation.misfit_maps import compare_axis, position_errors, worst_region
-from identify.validation.side_by_side import SideBySide, side_by_side
+from identify.validation.comparison import SideBySide, compare_axis, position_errors, side_by_side
+from identify.validation.misfit_maps import (worst_region)
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError

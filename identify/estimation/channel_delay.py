@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog
@@ -22,8 +21,6 @@ from identify.estimation.time_origin import depends_on_time_origin, synchronised
 from identify.estimation.variable_projection import fit_thoroughly
 from identify.rules import RULE
 from twin.model.machine import AxisModel
-
-Array = NDArray[np.float64]
 
 ROUNDS = 3
 

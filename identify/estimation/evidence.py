@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from twin.signals import Array
 
 BLOCKS = 24  # over which the standard error of a gain on selection logs is taken
 

@@ -173,14 +173,6 @@ class Fit:
         return self.ratio < RULE.at_floor
 
     @property
-    def may_be_noise(self) -> bool:
-        """Whether what is left may be noise: at the floor, or no more than it can be.
-
-        How noisy the force is, which the readings hide, is no more than a guess.
-        """
-        return self.at_floor or self.error < self.noise.high
-
-    @property
     def ratio(self) -> float:
         """Error over noise floor."""
         return self.error / self.floor
@@ -190,37 +182,32 @@ def fit_axis(
     axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int = MOST_EVALUATIONS
 ) -> Fit:
     """Fit the free parameters of an axis from its present values."""
-    problem = FitProblem(axis, logs, most_evaluations)
-    internal, converged = problem.start, True
-    if len(internal):
-        problem.set_priors(internal)
-        internal, _ = problem.solve(internal, ROUGHLY)
-        internal, converged = _weighed_again(problem, internal)
-    return _ended(problem, internal, converged)
-
-
-def _weighed_again(problem: FitProblem, internal: Array) -> tuple[Array, bool]:
-    """The fit with priors weighed by the error that it leaves, and whether it converged.
-
-    Weighed by a much larger one they hold the fit back, and so what is left; hence once more.
-    """
+    problem, internal = _begun(axis, logs, most_evaluations)
     converged = True
-    for _ in range(MOST_WEIGHINGS):
+    # Priors weighed by a much larger error than what is left hold the fit back; hence once more.
+    for _ in range(MOST_WEIGHINGS if len(internal) else 0):
         before, samples = rms(problem.force(internal)), problem.set_priors(internal)
         internal, converged = problem.solve(internal, NEGLIGIBLE / samples)
         if not converged or rms(problem.force(internal)) > WEIGHED * before:
             break
-    return internal, converged
+    return _ended(problem, internal, converged)
 
 
 def fit_roughly(axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int) -> Fit:
     """Fit the free parameters until the squared error falls by less than a thousandth."""
+    return _ended(*_begun(axis, logs, most_evaluations), converged=False)
+
+
+def _begun(
+    axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int
+) -> tuple[FitProblem, Array]:
+    """The problem, and the variables at which the squared error hardly falls further."""
     problem = FitProblem(axis, logs, most_evaluations)
     internal = problem.start
     if len(internal):
         problem.set_priors(internal)
         internal, _ = problem.solve(internal, ROUGHLY)
-    return _ended(problem, internal, converged=False)
+    return problem, internal
 
 
 def _ended(problem: FitProblem, internal: Array, converged: bool) -> Fit:
@@ -276,8 +263,3 @@ def error_if_any(role: Role, fit: Fit, dataset: Dataset) -> float | None:
     """The same, or None where there are none, or none that say anything of this model."""
     logs = dataset.having(role)
     return error_in(role, fit, dataset) if logs and moving(logs, sticks(fit.axis)).any() else None
-
-
-def holdout_error(fit: Fit, dataset: Dataset) -> float | None:
-    """RMS force error on the selection logs in N, or None where there are none."""
-    return error_if_any(Role.SELECTION, fit, dataset)

@@ -99,7 +99,9 @@ class FitProblem:
         columns = self.columns(internal)
         size = np.linalg.norm(columns, axis=0) / np.sqrt(max(len(left), 1))
         expected = max(PRIOR_FORCE * explained, noise)
-        alike = self._of_alike(size)
+        alike = np.zeros(len(size))
+        np.maximum.at(alike, self.alike, size)
+        alike = alike[self.alike]
         unseen = self.added & (size < UNSEEN * alike)
         self.centre = np.where(unseen, self.start, self.neutral)
         self.pull = np.where(self.added, noise * np.where(unseen, alike, size) / expected, 0.0)
@@ -108,12 +110,6 @@ class FitProblem:
         beyond = self.excess & (least > 0.0)
         self.pull[beyond] = noise / (PRIOR_EXCESS * least[beyond])
         return samples
-
-    def _of_alike(self, size: Array) -> Array:
-        """For each parameter the largest size (k,) among those of its effect in the same unit."""
-        largest = np.zeros(len(size))
-        np.maximum.at(largest, self.alike, size)
-        return np.asarray(largest[self.alike])
 
     def _where(self, mask: NDArray[np.bool_]) -> list[ParameterReference]:
         return [c for c, wanted in zip(self.scaling.where, mask, strict=True) if wanted]

@@ -18,11 +18,10 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 
-from identify.estimation.evidence import left_out
+from identify.estimation.evidence import blocks_of, by_blocks, left_out
 from identify.estimation.fit import Fit
 from identify.estimation.fit_problem import is_linear
 from identify.estimation.force_balance import changes
@@ -40,6 +39,7 @@ GROUPS = 10  # of like influence; wide, as a law differs from the machine's over
 GROUPS_QUANTILE = 1.8331129326562374  # of Student's t for GROUPS - 1
 TINY = 1e-12  # of the squared influence, which may lie in one group
 FAR = 4.0  # half widths to either side at which the error must have risen
+BAND_STEP = 0.1  # of a half width, the step of a difference for the band of a curve
 LEAST_RISE = 0.1  # of the rise that the linearised residual predicts
 # Of error to noise floor. Above it the error is more than noise, and what parameters took over of a
 # missing effect, which no residual shows, exceeds their intervals: of 73 given up to twice the
@@ -106,7 +106,10 @@ class Estimate:
 def estimates(fit: Fit) -> tuple[Estimate, ...]:
     """Estimates of all parameters of a fitted axis, free ones first."""
     half = half_widths(fit)
-    reasons = _reasons(fit, half)
+    if (common := refusal(fit)) is None:
+        reasons = _undetermined(fit, half)
+    else:
+        reasons = {c.label: common for c in fit.scaling.where}
     values = read(fit.axis, fit.scaling.where)
     free = []
     for c, value, width in zip(fit.scaling.where, values, half, strict=True):
@@ -116,13 +119,6 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
         unit = fit.axis.units(p.unit)
         free.append(Estimate(c.label, float(value), unit, low, high, True, why))
     return (*free, *_held(fit))
-
-
-def _reasons(fit: Fit, half: Array) -> dict[str, NoInterval]:
-    """Why free parameters have no interval, by label; those that have one are left out."""
-    if (common := refusal(fit)) is not None:
-        return {c.label: common for c in fit.scaling.where}
-    return _undetermined(fit, half)
 
 
 def _undetermined(fit: Fit, half: Array) -> dict[str, NoInterval]:
@@ -239,36 +235,29 @@ def half_widths_of(fit: Fit, weights: Array) -> Array:
         return out
     columns = fit.jacobian[:, excited] / norms[excited]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-12, hermitian=True)
-    edges = np.linspace(0, len(fit.residual), BLOCKS + 1).astype(int)
     # The fit makes the residuals of a block smaller than its errors, so the residuals of a fit
     # without the block are used (jackknife, CR3).
     honest = left_out(fit.residual, columns, np.full(columns.shape[1], RIDGE), BLOCKS)
-    scores = np.stack([columns[a:b].T @ honest[a:b] for a, b in pairwise(edges)])
+    scores = by_blocks(columns, honest, blocks_of(len(honest), BLOCKS))
     covariance = inverse @ (scores.T @ scores * (BLOCKS - 1) / BLOCKS) @ inverse
     own = weights[excited][:, known] / norms[excited][:, None]
     # A prior or a bound shifts the estimate from the least-squares solution by this much.
     shift = np.abs(own.T @ inverse @ (columns.T @ fit.residual))
     variance = np.einsum("ij,ik,kj->j", own, covariance, own)
     over_time = QUANTILE * np.sqrt(np.maximum(variance, 0.0))
-    out[known] = (
-        np.maximum(over_time, _by_influence(columns @ (inverse @ own), fit.residual)) + shift
-    )
+    influence = columns @ (inverse @ own)
+    over_influence = [_by_influence(column, fit.residual) for column in influence.T]
+    out[known] = np.maximum(over_time, over_influence) + shift
     return out
 
 
-def _by_influence(influence: Array, residual: Array) -> Array:
-    """Half widths (m,) by the scatter between test functions of more and of less influence.
+def _by_influence(influence: Array, residual: Array) -> float:
+    """Half width by the scatter between test functions of more and of less influence.
 
-    influence (n, m): what one newton of the residual (n,) adds to each estimate. Each group holds
-    an equal share of the squared influence, which is what the data tell of the estimate with the
-    other parameters held. So all groups count alike, and the fit takes as much from each (CR2).
+    influence (n,): what one newton of the residual (n,) adds to the estimate. Each group holds an
+    equal share of the squared influence, which is what the data tell of the estimate with the other
+    parameters held. So all groups count alike, and the fit takes as much from each (CR2).
     """
-    out = [_by_groups(column, residual) for column in influence.T]
-    return GROUPS_QUANTILE * np.array(out)
-
-
-def _by_groups(influence: Array, residual: Array) -> float:
-    """The same of one estimate, as one standard deviation; influence (n,)."""
     size = np.abs(influence)
     told = np.sort(size) ** 2
     whole = told.sum() or 1.0  # of a sum of no parameters
@@ -277,24 +266,25 @@ def _by_groups(influence: Array, residual: Array) -> float:
     group = np.count_nonzero(size >= edges[:, None], axis=0)
     left = np.maximum(1.0 - np.bincount(group, size**2, GROUPS) / whole, TINY)
     moved = np.bincount(group, influence * residual, GROUPS)
-    return float(np.sqrt((moved**2 / left).sum()))
+    return GROUPS_QUANTILE * float(np.sqrt((moved**2 / left).sum()))
 
 
 def _held(fit: Fit) -> list[Estimate]:
+    """The parameters that were not fitted, the mass first."""
+    mass = fit.axis.mass_parameter
+    every = [(mass.name, fit.axis.mass, mass.unit)]
+    every += [
+        (f"{f.effect.name}.{p.name}", f.values[p.name], p.unit)
+        for f in fit.axis.effects
+        for p in f.effect.parameters
+    ]
     free = {c.label for c in fit.scaling.where}
-    units, mass = fit.axis.units, fit.axis.mass_parameter
-    out = []
-    if mass.name not in free:
-        out.append(Estimate(mass.name, fit.axis.mass, units(mass.unit), None, None, False))
-    for f in fit.axis.effects:
-        for p in f.effect.parameters:
-            label = f"{f.effect.name}.{p.name}"
-            if label not in free:
-                out.append(Estimate(label, f.values[p.name], units(p.unit), None, None, False))
-    return out
-
-
-BAND_STEP = 0.1  # of a half width, the step of a difference
+    units = fit.axis.units
+    return [
+        Estimate(label, value, units(unit), None, None, False)
+        for label, value, unit in every
+        if label not in free
+    ]
 
 
 def with_band(

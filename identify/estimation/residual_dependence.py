@@ -159,20 +159,14 @@ def line(
     if span == 0.0:
         return None
     parts = zip(np.split(coordinate, runs), np.split(residual, runs), strict=True)
-    found = find_lines(
-        [Record(*part) for part in parts],
-        FEWEST_CYCLES / span,
-        len(residual) / (WINDOWS_A_PERIOD * span),
-        most=TRIED,
-        chance=RULE.line_chance,
-    )
-    best = max(found, key=lambda f: f.share, default=None)
+    records = [Record(*part) for part in parts]
+    highest = len(residual) / (WINDOWS_A_PERIOD * span)
+    best = _strongest(records, FEWEST_CYCLES / span, highest)
     return (best.period, best.share) if best and best.share > RULE.line_share else None
 
 
 FEWEST_REPEATS = 10  # over the travel
 MOST_REPEATS = 4096  # over the travel
-TRIED = 6  # lines that are no chance, of which the strongest counts
 SHARED = 0.02  # relative difference of two periods that are one
 SAME = 0.5  # difference of two terms over the larger, below which they are one
 
@@ -203,11 +197,11 @@ def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:
     if len(logs) < 2:
         return None
     records = [Record(log.motion.position, _left_on_blocks(fit, log)) for log in logs]
-    lines = [_strongest([record]) for record in records]
+    lines = [_repeat([record]) for record in records]
     periods = [line.period for line in lines if line is not None]
     if len(periods) < len(logs) or np.ptp(periods) > SHARED * periods[0]:
         return None
-    common = _strongest(records)
+    common = _repeat(records)
     period = float(np.median(periods))
     if common is not None and abs(common.period - period) <= SHARED * period:
         period = common.period
@@ -229,16 +223,20 @@ def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:
 def _left_on_blocks(fit: Fit, log: PreparedLog) -> Array:
     """Force (n,) N that the model leaves in each block."""
     m = log.motion
-    inertia = fit.axis.mass * m.acceleration
-    return np.asarray(m.command + total_force(on_blocks(fit.axis), m) - inertia)
+    force = total_force(on_blocks(fit.axis), m)
+    return np.asarray(m.command + force - fit.axis.mass * m.acceleration)
 
 
-def _strongest(records: Sequence[Record]) -> SpectralLine | None:
+def _repeat(records: Sequence[Record]) -> SpectralLine | None:
     """The strongest line in position that all the records share, if one stands out."""
     span = max(r.span for r in records)
     if span <= 0.0:
         return None
-    lowest, highest = FEWEST_REPEATS / span, MOST_REPEATS / span
+    return _strongest(records, FEWEST_REPEATS / span, MOST_REPEATS / span)
+
+
+def _strongest(records: Sequence[Record], lowest: float, highest: float) -> SpectralLine | None:
+    """The strongest line between two frequencies that is no chance, if there is one."""
     found = find_lines(records, lowest, highest, most=TRIED, chance=RULE.line_chance)
     return max(found, key=lambda line: line.share, default=None)
 

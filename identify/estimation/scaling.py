@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,8 @@ from twin.effect import Parameter
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters, read, write
 from twin.model.units import Scale, dimension, has_size
+from twin.signals import Array
 
-Array = NDArray[np.float64]
 Limits = tuple[float, float]
 
 BEYOND = 4.0  # times the travel or the top speed: what is longer or faster shows as a constant
@@ -76,84 +77,61 @@ class Scaling:
             for value, limits in zip(values.tolist(), self.limits, strict=True)
         ]
 
-    def _floors(self, axis: AxisModel) -> list[tuple[int | None, float]]:
-        """For each parameter: index of the free parameter that bounds it below, or its value."""
-        floors: list[tuple[int | None, float]] = []
-        for c in self.where:
-            other = c.parameter.at_least
-            if other is None:
-                floors.append((None, 0.0))
-                continue
-            index = next(
-                (
-                    i
-                    for i, d in enumerate(self.where)
-                    if d.effect == c.effect and d.parameter.name == other
-                ),
-                None,
-            )
-            floors.append((index, 0.0 if index is not None else axis[c.effect].values[other]))
-        return floors
+    @cached_property
+    def _index(self) -> dict[tuple[str, str | None], int]:
+        return {(c.effect, c.parameter.name): i for i, c in enumerate(self.where)}
+
+    def _below(self, c: ParameterReference) -> int | None:
+        """Index of the free parameter that bounds a parameter below; None where it is held."""
+        return self._index.get((c.effect, c.parameter.at_least))
+
+    def _floor(self, axis: AxisModel, c: ParameterReference, values: Array) -> float:
+        """What a parameter may not fall below, with these values (k,) of the free ones."""
+        index, other = self._below(c), c.parameter.at_least
+        if index is not None:
+            return float(values[index])
+        return axis[c.effect].values[other] if other else 0.0
 
     def least(self, axis: AxisModel) -> Array:
         """Values (k,) of the parameters below which these may not fall; zero without one."""
-        pairs = ((c.effect, c.parameter.at_least) for c in self.where)
-        return np.array([axis[e].values[other] if other else 0.0 for e, other in pairs])
+        values = read(axis, self.where)
+        return np.array([self._floor(axis, c, values) for c in self.where])
 
     def inside(self, axis: AxisModel) -> Array:
         """The internal variables for the values of this axis."""
         values = read(axis, self.where)
-        out = np.empty_like(values)
-        for i, (c, (index, fixed)) in enumerate(zip(self.where, self._floors(axis), strict=True)):
-            if c.parameter.at_least is not None:
-                out[i] = values[i] - (values[index] if index is not None else fixed)
-            else:
-                out[i] = np.log(values[i]) if c.parameter.lower > 0 else values[i]
+        out = values - self.least(axis)
+        log = self.is_logarithm()
+        out[log] = np.log(values[log])
         return out
 
     def outside(self, axis: AxisModel, internal: Array) -> AxisModel:
         """The axis with the values of these internal variables."""
-        values = np.empty_like(internal)
-        floors = self._floors(axis)
-        for i, c in enumerate(self.where):
-            if c.parameter.at_least is None:
-                values[i] = np.exp(internal[i]) if c.parameter.lower > 0 else internal[i]
-        for i, (c, (index, fixed)) in enumerate(zip(self.where, floors, strict=True)):
-            if c.parameter.at_least is not None:
-                values[i] = internal[i] + (values[index] if index is not None else fixed)
-            low, high = self.limits[i]
-            values[i] = min(max(values[i], low), high)
+        values, log = internal.copy(), self.is_logarithm()
+        values[log] = np.exp(internal[log])
+        for i, (c, (low, high)) in enumerate(zip(self.where, self.limits, strict=True)):
+            values[i] = min(max(values[i] + self._floor(axis, c, values), low), high)
         return write(axis, self.where, values)
 
     def chain(self, axis: AxisModel, columns: Array) -> Array:
         """Derivatives by the parameters (n, k) -> by the internal variables (n, k)."""
-        out = columns.copy()
-        values = read(axis, self.where)
-        for i, (c, (index, _)) in enumerate(zip(self.where, self._floors(axis), strict=True)):
-            if c.parameter.at_least is not None:
-                if index is not None:
-                    out[:, index] += columns[:, i]
-            elif c.parameter.lower > 0:
-                out[:, i] *= values[i]
+        log = self.is_logarithm()
+        out = columns * np.where(log, read(axis, self.where), 1.0)
+        for i, c in enumerate(self.where):
+            if (index := self._below(c)) is not None:
+                out[:, index] += columns[:, i]
         return out
 
     def bounds(self) -> tuple[Array, Array]:
         """Bounds of the internal variables."""
-        low, high = [], []
-        for c, (lower, upper) in zip(self.where, self.limits, strict=True):
-            if c.parameter.at_least is not None:
-                low.append(0.0)
-                high.append(upper - lower)
-            elif c.parameter.lower > 0:
-                low.append(np.log(lower))
-                high.append(np.log(upper))
-            else:
-                low.append(lower)
-                high.append(upper)
-        return np.array(low), np.array(high)
+        low, high = np.array(self.limits).reshape(-1, 2).T.copy()
+        log = self.is_logarithm()
+        excess = np.array([bool(c.parameter.at_least) for c in self.where], dtype=bool)
+        low[log], high[log] = np.log(low[log]), np.log(high[log])
+        low[excess], high[excess] = 0.0, (high - low)[excess]
+        return low, high
 
     def is_logarithm(self) -> NDArray[np.bool_]:
         """Which variables are logarithms."""
-        return np.array(
-            [c.parameter.lower > 0 and c.parameter.at_least is None for c in self.where]
-        )
+        own = (c.parameter for c in self.where)
+        return np.array([p.lower > 0 and p.at_least is None for p in own], dtype=bool)

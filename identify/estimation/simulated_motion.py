@@ -35,7 +35,6 @@ from identify.estimation.open_loop import (
 from identify.estimation.scaling import Scaling
 from twin.errors import InputError
 from twin.model.machine import AxisModel
-from twin.model.parameters import ParameterReference
 from twin.signals import Array
 
 STARTS = 4  # of the search: the axis as given, and places around it
@@ -144,7 +143,10 @@ class _Problem:
         self.start = self.off_bounds(np.r_[np.clip(self.scaling.inside(axis), low, high), begun])
         self.parameters = len(low)
         sizes = np.where(self.scaling.is_logarithm(), 1.0, np.abs(self.start[: len(low)]))
-        self.sizes = np.where(sizes > 0.0, sizes, _usual_sizes(self.scaling.where))
+        usual = [
+            abs(c.parameter.start) or 1.0 for c in self.scaling.where
+        ]  # of those that are zero
+        self.sizes = np.where(sizes > 0.0, sizes, usual)
         self.steps = np.r_[FIRST_STEP * self.sizes, begun + 1.0]
         self.weight = 0.0
         self.weigh(self.start, white=True)
@@ -280,11 +282,6 @@ class _Problem:
             self.rows, self.slopes, start, self.bounds,
             tolerance=TOLERANCE, most_evaluations=evaluations,
         )  # fmt: skip
-
-
-def _usual_sizes(where: Sequence[ParameterReference]) -> Array:
-    """Sizes (k,) of parameters that are zero: their start value, or one."""
-    return np.array([abs(c.parameter.start) or 1.0 for c in where])
 
 
 def _require_alone(axis: AxisModel, logs: Sequence[PreparedLog]) -> None:

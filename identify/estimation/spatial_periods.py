@@ -8,13 +8,11 @@ would imitate; and spectral lines, which reach to pitches far below.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identify.dataset.spectral_lines import find_lines
 from identify.dataset.spectrum import FINEST_CYCLES, Record
 from identify.estimation.least_squares import orthonormal, unabsorbed
-
-Array = NDArray[np.float64]
+from twin.signals import Array
 
 FEWEST_CYCLES = 3  # over the travel
 MOST_CYCLES = 120  # over the travel, of the first look

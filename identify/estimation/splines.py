@@ -21,8 +21,7 @@ from identify.estimation.force_balance import jacobian
 from twin.curve import Part
 from twin.model.machine import Fitted
 from twin.model.parameters import ParameterReference
-
-Array = NDArray[np.float64]
+from twin.signals import Array
 
 STIFFNESS = tuple(10.0 ** np.arange(1.0, -5.1, -0.5))  # tried for each part
 WORTH = 0.99  # a further part must lower the squared cross-validated error below this part

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
@@ -21,8 +20,7 @@ from identify.estimation.force_balance import averaged_force, residual
 from identify.rules import RULE
 from twin.effect import Kind
 from twin.model.machine import AxisModel
-
-Array = NDArray[np.float64]
+from twin.signals import Array
 
 TRIED = 6  # frequencies at which the residual repeats
 LATER = 1e-3  # s, by which a clock is moved to see what reads it

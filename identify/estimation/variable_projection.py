@@ -96,7 +96,7 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     unseen = [s for s in found if s.is_silent]
     found = [s for s in found if not s.is_silent][:FULL_SHAPES] or unseen[:1]
     first = _try(whole, found[0].shape, effect.strengths)
-    likely = found[1:] if _beyond_chance(base, first) else []
+    likely = found[1:] if first.gain(base) > CHANCE * len(effect.strengths) else []
     others = [_try(whole, s.shape, effect.strengths) for s in (*likely, *unseen)]
     return sorted((first, *others), key=lambda s: s.squared_error)[:REFINED_STARTS]
 
@@ -112,11 +112,6 @@ def _seen_to_repeat(
     longest = (max(highs) - min(lows)) / RULE.fewest_cycles
     repeating = [p.name for p in effect.parameters if p.period]
     return [s for s in shapes if all(s.get(p, 0.0) <= longest for p in repeating)] or shapes
-
-
-def _beyond_chance(base: Fit, start: Start) -> bool:
-    """Whether a shape gains more on all of the logs than a scan of noise would."""
-    return start.gain(base) > CHANCE * len(start.fitted.effect.strengths)
 
 
 def _best(
@@ -187,7 +182,9 @@ class _Ground:
     def of(
         cls, base: Fit, dataset: Dataset, effect: Effect, excitation: Excitation, *, on_heads: bool
     ) -> _Ground:
-        rest = _without_friction(base.axis) if effect.kind is Kind.FRICTION else base.axis
+        rest = base.axis
+        if effect.kind is Kind.FRICTION:
+            rest = parts_of(rest, *(set(Kind) - {Kind.FRICTION}))
         among = dataset.in_heads if on_heads else np.ones(len(base.kept), dtype=bool)
         return cls(
             excitation=excitation,
@@ -211,7 +208,9 @@ def _basis(base: Fit, heads: Dataset | None, names: tuple[str, ...]) -> Array:
 def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter]) -> Start:
     """Best strengths at one shape, by a linear step with the base parameters free."""
     effect = ground.effect
-    first = Fitted.at_start(effect, _clipped(effect, ground.excitation, shape))
+    values = {**effect.starts(ground.excitation), **shape}
+    clipped = {p.name: float(min(max(values[p.name], p.lower), p.upper)) for p in effect.parameters}
+    first = Fitted.at_start(effect, clipped)
     axis = ground.rest.with_effect(first)
     where = [ParameterReference(effect.name, p) for p in strengths if p.name not in first.fixed]
     silent = all(first.values[p.name] == 0.0 for p in effect.strengths)
@@ -220,23 +219,12 @@ def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter
     alone = parts_of(axis, Kind.SENSING) if effect.kind is Kind.SENSING else axis
     columns = jacobian(alone, ground.logs, where)[ground.kept]
     step = _bounded_step(ground.basis, force, columns, where, first)
-    values = read(axis, where) + step
-    moved = {c.parameter.name: v for c, v in zip(where, values, strict=True)}
+    ends = read(axis, where) + step
+    moved = {c.parameter.name: v for c, v in zip(where, ends, strict=True)}
     added = force + columns @ step
     fitted = replace(first, values={**first.values, **moved})
     left = unabsorbed(added, ground.basis)
     return Start(shape, fitted, added, left, is_silent=not columns.any())
-
-
-def _clipped(effect: Effect, excitation: Excitation, shape: dict[str, float]) -> dict[str, float]:
-    values = {**effect.starts(excitation), **shape}
-    return {p.name: float(min(max(values[p.name], p.lower), p.upper)) for p in effect.parameters}
-
-
-def _without_friction(axis: AxisModel) -> AxisModel:
-    return replace(
-        axis, effects=tuple(f for f in axis.effects if f.effect.kind is not Kind.FRICTION)
-    )
 
 
 def _bounded_step(

@@ -38,9 +38,8 @@ from twin.model.parameters import free_parameters, read
 from twin.model.units import AxisUnits
 from twin.parallel import spread
 from twin.progress import Progress, silent
+from twin.signals import Array
 from twin.simulator import ReducedSimulator
-
-Array = NDArray[np.float64]
 
 SEED = 0  # of the random moves and the noise; `twin simulate` draws the same moves by default
 

@@ -6,14 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identify.dataset.coordinates import since_reversal
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, at_rest
 from twin.model.units import LINEAR
-
-Array = NDArray[np.float64]
+from twin.signals import Array
 
 HEART = (0.25, 0.75)  # quantiles of the squared difference that bound the range of a feature
 SELDOM = 0.01  # share of the data below which all motions count as equally rare
@@ -88,34 +86,28 @@ def _rest(log: PreparedLog) -> Array:
     return np.round(log.test_function.mean(stood[ended] * m.period), 1)
 
 
-def _force_rate(log: PreparedLog) -> Array:
-    return np.abs(log.test_function.acceleration(log.motion.command))
-
-
-def _reversal(log: PreparedLog) -> Array:
-    return log.test_function.mean(since_reversal(log.motion.velocity, log.motion.period))
-
-
 FEATURES = (
     Feature("speed", LINEAR.velocity, _speed),
     Feature("acceleration", LINEAR.acceleration, _acceleration),
-    Feature("motor force", LINEAR.force, lambda log: np.abs(log.command)),
-    Feature("rate of change of the motor force", "N/s", _force_rate),
-    Feature("distance since the last reversal", LINEAR.position, _reversal),
+    Feature("motor force", LINEAR.force, lambda w: np.abs(w.command)),
+    Feature(
+        "rate of change of the motor force", "N/s",
+        lambda w: np.abs(w.test_function.acceleration(w.motion.command)),
+    ),
+    Feature(
+        "distance since the last reversal", LINEAR.position,
+        lambda w: w.test_function.mean(since_reversal(w.motion.velocity, w.motion.period)),
+    ),
     Feature("rest before the motion", "s", _rest),
     Feature(
-        "speed of the other axis",
-        LINEAR.velocity,
-        lambda log: np.abs(log.test_function.mean(log.motion.others[1])),
-        own=_speed,
+        "speed of the other axis", LINEAR.velocity,
+        lambda w: np.abs(w.test_function.mean(w.motion.others[1])), own=_speed,
     ),
     Feature(
-        "acceleration of the other axis",
-        LINEAR.acceleration,
-        lambda log: np.abs(log.test_function.mean(log.motion.others[2])),
-        own=_acceleration,
+        "acceleration of the other axis", LINEAR.acceleration,
+        lambda w: np.abs(w.test_function.mean(w.motion.others[2])), own=_acceleration,
     ),
-)
+)  # fmt: skip
 
 
 def gap(motion: PreparedLog, where: Array, logs: Sequence[PreparedLog]) -> Gap:

@@ -121,7 +121,8 @@ def plan(
         _arena(model, dataset, bool(logs), between, catalogue, progress),
         test_function=test_function,
     )
-    return _planned(arena, duration, VERIFIED, not logs, _named(between, catalogue), progress)
+    effects = {**catalogue, **{r.name: r for r in between if isinstance(r, Effect)}}
+    return _planned(arena, duration, VERIFIED, not logs, effects, progress)
 
 
 def next_experiment(
@@ -218,10 +219,6 @@ def _verified(
     return [*done, *waiting]
 
 
-def _named(between: Sequence[Rival], catalogue: Catalogue) -> dict[str, Effect]:
-    return {**catalogue, **{r.name: r for r in between if isinstance(r, Effect)}}
-
-
 def _dataset(
     model: MachineModel,
     logs: GivenLogs,
@@ -267,7 +264,11 @@ def _arena(
         if found.best is not None and len(found.ranking) > 1:
             rivals = _rivals(found)
             if len(rivals) < 2:
-                rivals = [_refitted(c, found) for c in found.ranking[:2]]
+                # Of one that promised little only a linear step was taken: it is fitted now.
+                rivals = [
+                    c if c.score is not None else try_effect(found.base, found.dataset, c.effect)
+                    for c in found.ranking[:2]
+                ]
             return _between_candidates(model, dataset, rivals)
     return Arena(model, dataset.axis, (Explanation(model.name, own),), logs)
 
@@ -281,13 +282,6 @@ def _rivals(found: AxisDiagnosis) -> list[Candidate]:
     level = {t.change.name: t.candidate for t in step.level}
     others = [level[name] for name in found.ambiguous_with if name in level]
     return [step.tried.candidate, *others][:MOST_RIVALS]
-
-
-def _refitted(candidate: Candidate, found: AxisDiagnosis) -> Candidate:
-    """A candidate with fitted values: of one that promised little only a look was taken."""
-    if candidate.score is not None:
-        return candidate
-    return try_effect(found.base, found.dataset, candidate.effect)
 
 
 def _between_candidates(

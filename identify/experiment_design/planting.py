@@ -34,18 +34,12 @@ def other_machine(axis: AxisModel, rng: np.random.Generator) -> AxisModel:
     """The axis with every free value of its effects moved by up to 20 %."""
     where = [c for c in free_parameters(axis) if c.effect]
     values = read(axis, where) * (1.0 + SPREAD * rng.uniform(-1.0, 1.0, len(where)))
+    index = {(c.effect, c.parameter.name): i for i, c in enumerate(where)}
     for i, c in enumerate(where):
-        if c.parameter.at_least:
-            floor = next(
-                (
-                    values[j]
-                    for j, d in enumerate(where)
-                    if d.effect == c.effect and d.parameter.name == c.parameter.at_least
-                ),
-                c.parameter.lower,
-            )
-            values[i] = max(values[i], floor)
-        values[i] = min(max(values[i], c.parameter.lower), c.parameter.upper)
+        p = c.parameter
+        below = index.get((c.effect, p.at_least or ""))
+        floor = p.lower if below is None else max(values[below], p.lower)
+        values[i] = min(max(values[i], floor), p.upper)
     return write(axis, where, values)
 
 
@@ -104,7 +98,12 @@ def strength_for(
     values: the other parameters. rng: draws the ratios of the strengths; all are equal where None.
     """
     values = values or effect.starts()
-    direction = {p.name: _direction(p.lower, rng) for p in effect.strengths}
+    direction = dict.fromkeys((p.name for p in effect.strengths), 1.0)
+    for p in effect.strengths:
+        if rng is None:
+            break
+        size = float(rng.uniform(0.5, 1.5))
+        direction[p.name] = size if p.lower >= 0 else float(size * rng.choice((-1.0, 1.0)))
     limits = {p.name: p.at_least for p in effect.parameters if p.at_least}
 
     def at(scale: float) -> Fitted:
@@ -118,13 +117,6 @@ def strength_for(
         return Fitted.at_start(effect, drawn)
 
     return at(_scale(lambda scale: rms(added(at(scale))), force))
-
-
-def _direction(lower: float, rng: np.random.Generator | None) -> float:
-    if rng is None:
-        return 1.0
-    size = rng.uniform(0.5, 1.5)
-    return float(size if lower >= 0 else size * rng.choice((-1.0, 1.0)))
 
 
 def _scale(size: Callable[[float], float], wanted: float) -> float:

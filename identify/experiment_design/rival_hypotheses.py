@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from identify.dataset.dataset import Dataset, datasets
 from identify.dataset.noise_floor import floor_of
 from identify.estimation.fit import fit_axis
@@ -23,9 +20,8 @@ from twin.experiments.kinds import Tracking
 from twin.experiments.named import simulate
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.signals import Array
 from twin.simulator import ReducedSimulator
-
-Array = NDArray[np.float64]
 
 STRENGTH = 10.0  # times the noise floor: assumed force of an effect when there are no logs
 SIMULATED = 10.0  # s of simulated tracking on which such an effect is scaled to that force

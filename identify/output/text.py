@@ -47,7 +47,7 @@ from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.nonparametric import nonparametric_labels
 from identify.validation.agreement import Agreement
-from identify.validation.misfit_maps import AxisComparison
+from identify.validation.comparison import AxisComparison
 from twin.experiments.file import in_short
 from twin.model.parameters import free_parameters, read
 

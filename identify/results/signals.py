@@ -13,7 +13,7 @@ from identify.dataset.given_logs import Role
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.force_balance import averaged_force, residual
 from identify.estimation.residual_dependence import UNITS, unit_of
-from identify.validation.misfit_maps import periods, phase_name
+from identify.validation.misfit_maps import (periods, phase_name)
 from twin.model.machine import AxisModel
 from twin.model.units import LINEAR
 

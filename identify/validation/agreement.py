@@ -8,11 +8,11 @@ An effect that only one of the fits has is, in the other, an effect of no streng
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import hypot, inf
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identify.dataset.dataset import datasets
 from identify.estimation.evidence import rms
@@ -25,11 +25,10 @@ from identify.selection.confounded import linear_bases
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.named import simulate
-from twin.model.machine import AxisModel, MachineModel
+from twin.model.machine import MachineModel
 from twin.model.parameters import ParameterReference, free_parameters, write
+from twin.signals import Array
 from twin.simulator import ReducedSimulator
-
-Array = NDArray[np.float64]
 
 FALSE_ALARM = 0.01  # chance that two fits of one machine are said to differ
 LEAST_SHARE = 0.05  # of the squared force of the difference, for an effect to be a cause of it
@@ -154,67 +153,57 @@ def _what_to_do(a: MachineModel, b: MachineModel) -> str:
 def _compared(a: MachineModel, b: MachineModel, axis: str) -> AxisAgreement:
     one, two = _numbers(a, axis), _numbers(b, axis)
     own, other = set(a.axes[axis].names), set(b.axes[axis].names)
-    pairs, skipped = {}, []
-    for label in {**one, **two}:
-        first, second = one.get(label), two.get(label)
-        if first is None or second is None:
-            known = one.get(label) or two[label]
-            if not known.reference.parameter.strength:
-                continue  # a shape of an effect that the other has not
-            absent = _Number(0.0, 0.0, known.reference)
-            first, second = first or absent, second or absent
-        if first.error is None or second.error is None:
-            skipped.append(label)
-        elif error := hypot(first.error, second.error):
-            pairs[label] = first, second, error
-        elif first.value != second.value:
-            skipped.append(label)
     units = a.axes[axis].units
+    pairs: dict[str, tuple[float, float, float, str]] = {}
+    skipped = []
+    for label in {**one, **two}:
+        parameter = (one.get(label) or two[label]).reference.parameter
+        if not parameter.strength and (label in one) != (label in two):
+            continue  # a shape of an effect that the other has not
+        first, second = (side[label][1:] if label in side else (0.0, 0.0) for side in (one, two))
+        if first[1] is None or second[1] is None:
+            skipped.append(label)
+        elif error := hypot(first[1], second[1]):
+            pairs[label] = first[0], second[0], error, units(parameter.unit)
+        elif first[0] != second[0]:
+            skipped.append(label)
     limit = _limit(len(pairs))
-    differences = tuple(
-        Difference(
-            label, first.value, second.value, error, units(first.reference.parameter.unit), limit
-        )
-        for label, (first, second, error) in pairs.items()
-    )
     return AxisAgreement(
-        differences, tuple(skipped), tuple(sorted(own - other)), tuple(sorted(other - own)),
+        tuple(Difference(label, *pair, limit) for label, pair in pairs.items()),
+        tuple(skipped), tuple(sorted(own - other)), tuple(sorted(other - own)),
         (a.intervals[axis].above_floor, b.intervals[axis].above_floor),
         units.force,
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Number:
+class _Number(NamedTuple):
     """A parameter with its standard error, 0 where it was held; None where it is not known."""
 
+    reference: ParameterReference
     value: float
     error: float | None
-    reference: ParameterReference
 
 
 def _numbers(model: MachineModel, axis: str) -> dict[str, _Number]:
-    """All parameters of an axis by label, the mass too."""
+    """All parameters of an axis by label, the mass first."""
     stage, intervals = model.axes[axis], model.intervals[axis].ends
     free = {c.label for c in free_parameters(stage)}
-    out = {}
-    for reference, value in _values(stage):
-        label = reference.label
-        error: float | None = None if label in free else 0.0
-        if label in intervals:
-            low, high = intervals[label]
-            error = max(high - value, value - low) / QUANTILE
-        out[label] = _Number(value, error, reference)
-    return out
-
-
-def _values(axis: AxisModel) -> list[tuple[ParameterReference, float]]:
-    own = [
-        (ParameterReference(f.effect.name, p), float(f.values[p.name]))
-        for f in axis.effects
-        for p in f.effect.parameters
+    every = [
+        (ParameterReference("", stage.mass_parameter), stage.mass),
+        *(
+            (ParameterReference(f.effect.name, p), float(f.values[p.name]))
+            for f in stage.effects
+            for p in f.effect.parameters
+        ),
     ]
-    return [(ParameterReference("", axis.mass_parameter), axis.mass), *own]
+    out = {}
+    for reference, value in every:
+        error: float | None = None if reference.label in free else 0.0
+        if reference.label in intervals:
+            low, high = intervals[reference.label]
+            error = max(high - value, value - low) / QUANTILE
+        out[reference.label] = _Number(reference, value, error)
+    return out
 
 
 def _limit(count: int) -> float:
@@ -230,20 +219,16 @@ def _explained(
 ) -> AxisAgreement:
     """The same with the force of the difference and the effects that could make it."""
     base = _along_a_motion(a, axis)
-    differing = {d.label for d in found.differing}
-    moved = [(r, v) for r, v in _values(b.axes[axis]) if r.label in differing]
-    moved = [(r, v) for r, v in moved if not r.effect or r.effect in a.axes[axis].names]
+    there = _numbers(b, axis)
+    moved = [there[d.label] for d in found.differences if d.differs and d.label in there]
+    moved = [n for n in moved if n.reference.effect in ("", *a.axes[axis].names)]
     if base is None or not moved:
         return found
-    changed = write(base.axis, [r for r, _ in moved], [v for _, v in moved])
+    changed = write(base.axis, [n.reference for n in moved], [n.value for n in moved])
     force = (residual(changed, base.logs) - residual(base.axis, base.logs))[base.kept]
     known = usable(catalogue, a)
-    apart = [n for n in known if n not in b.axes[axis].names]
-    bases = linear_bases(base, Catalogue([known[n] for n in apart]))
-    return AxisAgreement(
-        found.differences, found.not_compared, found.only_a, found.only_b,
-        found.above_floor, found.unit, rms(force), _causes(force, bases),
-    )  # fmt: skip
+    apart = Catalogue([known[n] for n in known if n not in b.axes[axis].names])
+    return replace(found, force=rms(force), causes=_causes(force, linear_bases(base, apart)))
 
 
 def _causes(force: Array, bases: Mapping[str, Array]) -> tuple[Cause, ...]:

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog, split_by_log
+from twin.signals import Array
 
-Array = NDArray[np.float64]
 NORMAL = NormalDist()
 
 WITHIN = 0.90  # part of a white residual's correlations within the bounds
@@ -99,12 +99,20 @@ def residual_tests(
     logs: Sequence[PreparedLog], force: Array, kept: NDArray[np.bool_], floor: float, loop: Loop
 ) -> ResidualTests:
     """Tests of the force residual (n,) N of some logs; kept (n,): which values are used."""
-    parts = zip(logs, split_by_log(force, logs), split_by_log(kept, logs), strict=True)
-    series = [_series(log, own, used) for log, own, used in parts]
-    residual = [s["residual"] for s in series]
-    left = np.concatenate(residual)
+    # From one test function to the next that does not overlap with it.
+    apart = [-(-len(w.test_function.weights) // w.test_function.stride) for w in logs]
+    series = {
+        "residual": split_by_log(np.where(kept, force, np.nan), logs),
+        "command": [log.command for log in logs],
+        "velocity": [log.test_function.mean(log.motion.velocity) for log in logs],
+    }
+    series = {
+        name: [row[::step] for row, step in zip(rows, apart, strict=True)]
+        for name, rows in series.items()
+    }
+    left = np.concatenate(series["residual"])
     left = left[np.isfinite(left)]
-    spacing = logs[0].test_function.stride * _step(logs[0]) * logs[0].motion.period
+    spacing = logs[0].test_function.stride * apart[0] * logs[0].motion.period
     reach = max(REACH * floor, float(np.quantile(np.abs(left), 0.995)))
     edges = np.linspace(-reach, reach, BINS + 1)
     count, _ = np.histogram(left, edges)
@@ -116,25 +124,10 @@ def residual_tests(
         density=count / (len(left) * np.diff(edges)),
         within=float(np.mean(np.abs(left) < NORMAL.inv_cdf(0.5 + WITHIN / 2.0) * floor)),
         correlations=tuple(
-            correlation(name, residual, [s[name] for s in series], spacing, loop)
-            for name in ("residual", "command", "velocity")
+            correlation(name, series["residual"], rows, spacing, loop)
+            for name, rows in series.items()
         ),
     )
-
-
-def _step(log: PreparedLog) -> int:
-    """Stride, in test functions, from one to the next that does not overlap with it."""
-    return -(-len(log.test_function.weights) // log.test_function.stride)
-
-
-def _series(log: PreparedLog, force: Array, kept: NDArray[np.bool_]) -> dict[str, Array]:
-    """Residual (nan where it is not used), command and speed on separate test functions."""
-    apart = slice(None, None, _step(log))
-    return {
-        "residual": np.where(kept, force, np.nan)[apart],
-        "command": log.command[apart],
-        "velocity": log.test_function.mean(log.motion.velocity)[apart],
-    }
 
 
 def correlation(

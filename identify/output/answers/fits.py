@@ -18,7 +18,7 @@ from identify.output.words.fit import (
 from identify.output.words.residual import loop_in_words, region_in_words
 from identify.results.results import Comparison, FitResult, SimulationFit
 from identify.validation.agreement import Agreement, AxisAgreement
-from identify.validation.misfit_maps import AxisComparison
+from identify.validation.comparison import AxisComparison
 from twin.model.parameters import free_parameters
 from twin.model.parameters import read as values_of
 

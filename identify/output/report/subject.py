@@ -16,7 +16,7 @@ from identify.results.results import Comparison, Diagnosis
 from identify.results.signals import Signals, signals_of
 from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.validation.misfit_maps import AxisComparison
+from identify.validation.comparison import AxisComparison
 from twin.model.machine import AxisModel, HistoryStep
 from twin.model.units import AxisUnits
 

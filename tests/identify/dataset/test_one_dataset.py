@@ -17,8 +17,8 @@ from identify.dataset.shared_samples import share_samples
 from identify.estimation.channel_delay import aligned
 from identify.output.as_json import json_of
 from identify.output.text import fit_text
+from identify.validation.comparison import AxisComparison
 from identify.validation.free_run import HORIZON, free_run, rms_error
-from identify.validation.misfit_maps import AxisComparison
 from identify.workflow import compare, diagnose, fit
 from twin.checks import Fault, check_log, moves
 from twin.effects import Catalogue

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from identify.estimation.fit import holdout_error
+from identify.dataset.given_logs import Role
+from identify.estimation.fit import error_in
 from identify.selection.diagnosis import Verdict
 from identify.workflow import add, diagnose
 from twin.effects import load_catalogue
@@ -97,4 +98,6 @@ def test_a_friction_that_yields_is_named_and_explains_what_it_can(model, logs, t
     own = least_squares(lambda p: own_dahl(dataset.fit, p), start, x_scale=[1, 1, 1e3, 1e2]).x
     reference = np.sqrt(np.mean(own_dahl(dataset.holdout, own) ** 2))
     assert added.step.holdout_error_after < 1.05 * reference
-    assert holdout_error(answer.base, dataset) > 4.0 * reference  # Coulomb, viscous and constant
+    assert (
+        error_in(Role.SELECTION, answer.base, dataset) > 4.0 * reference
+    )  # Coulomb, viscous and constant

@@ -7,7 +7,7 @@ import pytest
 from constructed import windowed
 from noisy_motion import MASS, PUSH, RATE, noisy
 
-from identify.validation.misfit_maps import _edges, bands
+from identify.validation.misfit_maps import (misfit_by_frequency)
 from twin.model.machine import AxisModel
 
 
@@ -21,16 +21,18 @@ def test_the_error_by_frequency_is_the_residual_in_its_band():
         signals = log.motion.signals.copy()
         signals[2] = raw[1].reshape(signals.shape[1], -1).mean(axis=1)
         pumped = windowed(replace(log.motion, raw=raw, signals=signals))
-        found = bands(AxisModel(MASS), [pumped])
+        found = misfit_by_frequency(AxisModel(MASS), [pumped])
         own = (found.low <= frequency) & (frequency < found.high)
-        assert found.error[own] == pytest.approx(height / np.sqrt(2.0), rel=0.06)
-        assert found.error[~own].max() < 0.2 * found.error[own][0]
+        assert found.rms[own] == pytest.approx(height / np.sqrt(2.0), rel=0.06)
+        assert found.rms[~own].max() < 0.2 * found.rms[own][0]
     width = np.sqrt(found.high - found.low)
-    np.testing.assert_allclose(found.noise, width * 1e-3 * np.sqrt(2.0 / RATE), rtol=0.3)
-    explain = found.to_explain[(found.low < 1.3) & (found.high > 1.3)]
-    assert explain[0] < 0.05  # the inertia takes it up
-    heavy = bands(AxisModel(2.0 * MASS), [pumped])
-    low = np.sqrt(np.sum(heavy.to_explain[heavy.low < 4.0] ** 2))
+    np.testing.assert_allclose(found.floor, width * 1e-3 * np.sqrt(2.0 / RATE), rtol=0.3)
+    assert found.share.sum() == pytest.approx(1.0)
+    near = (found.low < 1.3) & (found.high > 1.3)
+    heavy = misfit_by_frequency(AxisModel(2.0 * MASS), [pumped])
+    # The inertia takes up the force of the motion at 1.3 Hz.
+    assert found.visited[near][0] < 0.05 * heavy.visited[near][0]
+    low = np.sqrt(np.sum(heavy.rms[heavy.low < 4.0] ** 2))
     pushes = PUSH(np.arange(8000) / RATE)
     assert low == pytest.approx(MASS * np.std(pushes), rel=0.1)
 
@@ -38,22 +40,20 @@ def test_the_error_by_frequency_is_the_residual_in_its_band():
 def test_the_power_of_logs_is_weighed_by_their_lengths():
     axis = AxisModel(MASS)
     logs = [noisy(15, 0.02, duration=5.0), noisy(16, 0.025, duration=9.0)]
-    one, two, both = (bands(axis, part) for part in (logs[:1], logs[1:], logs))
+    one, two, both = (misfit_by_frequency(axis, part) for part in (logs[:1], logs[1:], logs))
     ends = [log.motion.time[-1] for log in logs]
     wide = one.low > 10.0
-    wanted = (ends[0] * one.error**2 + ends[1] * two.error**2) / sum(ends)
-    np.testing.assert_allclose(both.error[wide] ** 2, wanted[wide], rtol=0.02)
-    noise = (ends[0] * one.noise**2 + ends[1] * two.noise**2) / sum(ends)
-    np.testing.assert_allclose(both.noise[wide] ** 2, noise[wide], rtol=0.02)
+    wanted = (ends[0] * one.rms**2 + ends[1] * two.rms**2) / sum(ends)
+    np.testing.assert_allclose(both.rms[wide] ** 2, wanted[wide], rtol=0.02)
+    noise = (ends[0] * one.floor**2 + ends[1] * two.floor**2) / sum(ends)
+    np.testing.assert_allclose(both.floor[wide] ** 2, noise[wide], rtol=0.02)
 
 
 def test_bands_cover_all_frequencies_once_in_half_octaves():
-    frequency = 0.25 * np.arange(1, 700)
-    edges = _edges(frequency)
-    assert edges[0] == 0.125
-    assert edges[-1] == pytest.approx(frequency[-1] + 0.125)
-    counts, _ = np.histogram(frequency, edges)
-    assert counts.min() >= 1
-    assert counts.sum() == len(frequency)
-    wide = edges[edges > 1.5]
-    np.testing.assert_allclose(wide[1:] / wide[:-1], np.sqrt(2.0))
+    found = misfit_by_frequency(AxisModel(MASS), [noisy(14, 1e-3, duration=12.0)])
+    np.testing.assert_array_equal(found.low[1:], found.high[:-1])
+    np.testing.assert_allclose(found.centre**2, found.low * found.high)
+    wide = found.low > 1.5
+    np.testing.assert_allclose(found.high[wide] / found.low[wide], np.sqrt(2.0))
+    assert (found.coordinate, found.unit) == ("frequency", "Hz")
+    assert np.isnan(found.mean).all()

@@ -13,16 +13,8 @@ from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.force_balance import residual
 from identify.estimation.residual_dependence import UNITS
 from identify.output.words.residual import region_in_words
-from identify.validation.misfit_maps import (
-    ABOVE_FLOOR,
-    LEAST_SHARE,
-    MisfitMap,
-    bands,
-    compare_axis,
-    misfit_by_frequency,
-    misfit_map,
-    worst_regions,
-)
+from identify.validation.comparison import compare_axis
+from identify.validation.misfit_maps import (ABOVE_FLOOR, LEAST_SHARE, MisfitMap, misfit_map, worst_regions)
 from identify.validation.whiteness import Loop
 from twin.model.machine import AxisModel, MachineModel
 
@@ -182,17 +174,3 @@ def test_a_comparison_gathers_what_the_residual_says():
     worst = worst_regions(found.maps, effective_samples(found.residual))
     assert [r.coordinate for r in found.worst] == [r.coordinate for r in worst]
     assert found.tests.loop is Loop.UNKNOWN
-
-
-def test_the_map_by_frequency_is_that_of_the_bands():
-    log = windowed(moved(np.random.default_rng(43), 3.0, 1000.0))
-    axis = AxisModel(1.7, effects=(effect("cable_slab", {"k1": 9.0}),))
-    found, wanted = misfit_by_frequency(axis, [log]), bands(axis, [log])
-    np.testing.assert_array_equal(found.rms, wanted.error)
-    np.testing.assert_array_equal(found.floor, wanted.noise)
-    np.testing.assert_allclose(found.share, wanted.error**2 / np.sum(wanted.error**2))
-    np.testing.assert_allclose(found.visited, wanted.to_explain**2 / np.sum(wanted.to_explain**2))
-    np.testing.assert_array_equal([found.low, found.high], [wanted.low, wanted.high])
-    np.testing.assert_allclose(found.centre**2, wanted.low * wanted.high)
-    assert np.isnan(found.mean).all()
-    assert (found.coordinate, found.unit) == ("frequency", "Hz")

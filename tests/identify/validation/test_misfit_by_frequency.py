@@ -6,7 +6,7 @@ from machines import one_axis
 
 from identify.output import as_json
 from identify.output.words.residual import region_in_words
-from identify.validation.misfit_maps import bands
+from identify.validation.misfit_maps import (misfit_by_frequency)
 from identify.workflow import compare, fit
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
@@ -38,11 +38,11 @@ def by_frequency(compared):
 @pytest.mark.parametrize("window", [0.02, 0.1])
 def test_noise_alone_fills_the_noise_band_whatever_the_window(window):
     result = fit(STAGE, logs(3), test_function=window)
-    found = bands(result.fits["x"].axis, result.datasets["x"].fit)
+    found = misfit_by_frequency(result.fits["x"].axis, result.datasets["x"].fit)
     assert found.high[-1] > 100.0
     wide = found.low > 2.0
-    assert found.error[wide] == pytest.approx(found.noise[wide], rel=0.4)
-    assert np.mean(found.error[wide] / found.noise[wide]) == pytest.approx(1.0, abs=0.15)
+    assert found.rms[wide] == pytest.approx(found.floor[wide], rel=0.4)
+    assert np.mean(found.rms[wide] / found.floor[wide]) == pytest.approx(1.0, abs=0.15)
 
 
 def test_a_planted_line_has_its_height_in_newtons_in_its_band_alone(pumped):

@@ -9,7 +9,7 @@ import pytest
 from built_fits import PLAIN, built_dataset
 
 from identify.estimation.fit import Outcome, finished
-from identify.validation.misfit_maps import worst_region
+from identify.validation.misfit_maps import (worst_region)
 
 
 @pytest.mark.parametrize("place", [-0.02, 0.015])

@@ -1,0 +1,205 @@
+"""A model beside logs: its errors of force and of motion, where they are, and the signals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.dataset import Dataset, by_log
+from identify.dataset.floor import noise_beside
+from identify.dataset.prepared_log import (
+    PreparedLog,
+    moving,
+    on_blocks,
+    split_by_log,
+    sticks,
+    total_force,
+)
+from identify.estimation.evidence import effective_samples, rms
+from identify.estimation.fit import error_on
+from identify.estimation.force_balance import residual
+from identify.validation.free_run import drift_of_noise, free_run, rms_error
+from identify.validation.misfit_maps import (
+    MisfitMap,
+    Region,
+    coordinates,
+    misfit_by_frequency,
+    misfit_maps,
+    periods,
+    worst_regions,
+)
+from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
+from twin.logs import write_topics
+from twin.model.machine import AxisModel, MachineModel
+from twin.model.units import AxisUnits
+from twin.parallel import spread
+from twin.signals import Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AxisComparison:
+    """One axis over some logs.
+
+    force_error: N RMS of the force residual, by log. floor: N. position_error: m RMS of the free
+    run, by log; position_floor: the same from measurement noise alone. residual (n,) N, coordinates
+    name -> (n,). kept: which test functions of the logs in a row (all,) tell something, n of them.
+    periods: lengths (m) at which effects of the model repeat along the track, by the coordinate
+    that is the phase. curves: force (m,) N of each nonparametric effect along the motion of the
+    logs in a row, by name.
+    """
+
+    axis: str
+    force_error: Mapping[str, float]
+    floor: float
+    position_error: Mapping[str, float]
+    position_floor: Mapping[str, float]
+    residual: Array
+    logs: Sequence[PreparedLog]
+    coordinates: Mapping[str, Array]
+    maps: Sequence[MisfitMap]
+    worst: Sequence[Region]
+    tests: ResidualTests
+    kept: NDArray[np.bool_]
+    periods: Mapping[str, float] = field(default_factory=dict)
+    curves: Mapping[str, Array] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"<AxisComparison of {self.axis}: {self.total_error:.4g} N>"
+
+    @property
+    def units(self) -> AxisUnits:
+        """The units of the axis."""
+        return self.logs[0].motion.units
+
+    @property
+    def total_error(self) -> float:
+        """RMS force error over all logs, N."""
+        return rms(self.residual)
+
+    @property
+    def ratio(self) -> float:
+        """Force error over the noise floor."""
+        return self.total_error / self.floor
+
+
+def compare_axis(
+    model: MachineModel,
+    dataset: Dataset,
+    position_error: Mapping[str, float],
+    position_floor: Mapping[str, float],
+    floor: float | None = None,
+) -> AxisComparison:
+    """Force errors of one axis over the dataset's training logs, with maps of where they are.
+
+    floor: noise floor, N RMS; as the model and what it leaves tell it where None.
+    """
+    axis, logs = model.axes[dataset.axis], dataset.fit
+    kept = moving(logs, sticks(axis))
+    every = residual(axis, logs)
+    force = every[kept]
+    if floor is None:
+        floor = noise_beside(axis, logs, split_by_log(np.where(kept, every, 0.0), logs)).value
+    where = {k: v[kept] for k, v in coordinates(axis, logs).items()}
+    maps = [*misfit_maps(axis, logs, floor, force, where), misfit_by_frequency(axis, logs)]
+    return AxisComparison(
+        axis=dataset.axis,
+        force_error={log.motion.name: rms(error_on(axis, [log])) for log in logs},
+        floor=floor,
+        position_error=position_error,
+        position_floor=position_floor,
+        residual=force,
+        logs=logs,
+        coordinates=where,
+        maps=maps,
+        worst=worst_regions(maps, effective_samples(force)),
+        tests=residual_tests(logs, every, kept, floor, loop_of(logs)),
+        kept=kept,
+        periods=periods(axis),
+        curves=_nonparametric_forces(axis, logs),
+    )
+
+
+def _nonparametric_forces(axis: AxisModel, logs: Sequence[PreparedLog]) -> dict[str, Array]:
+    """The force (m,) N of each nonparametric effect along the motion of logs in a row."""
+    rotary = logs[0].motion.units.rotary
+    alone = {
+        f.effect.name: AxisModel(1.0, effects=(f,), rotary=rotary)
+        for f in axis.effects
+        if f.effect.is_nonparametric
+    }
+    return {
+        name: np.concatenate([total_force(on_blocks(own), log.motion) for log in logs])
+        for name, own in alone.items()
+    }
+
+
+def position_errors(
+    model: MachineModel, found: Mapping[str, Dataset], progress: Callable[[int, int], None]
+) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
+    """Free-running position error, and that of noise alone: axis -> log -> m RMS.
+
+    There is none where the motion is imposed.
+    """
+    logs = {} if model.is_imposed else by_log(found)
+
+    def run(parts: Mapping[str, PreparedLog]) -> dict[str, tuple[float, float]]:
+        own = free_run(model, parts)
+        noise = drift_of_noise(model, parts, own)
+        return {axis: (rms_error(own, axis), rms_error(noise, axis)) for axis in parts}
+
+    errors: dict[str, dict[str, float]] = {a: {} for a in found}
+    floors: dict[str, dict[str, float]] = {a: {} for a in found}
+    for name, by_axis in zip(logs, spread(run, logs.values(), progress), strict=True):
+        for axis, both in by_axis.items():
+            errors[axis][name], floors[axis][name] = both
+    return errors, floors
+
+
+@dataclass(frozen=True, eq=False)
+class SideBySide:
+    """Of one log what was measured, what the model says and what is left, on one clock.
+
+    sample_rate: Hz; topics: "/measured/x" -> column -> (n,) in units of the axis. The position of
+    the model is that of the free run; its force is averaged by test functions. units: by axis.
+    """
+
+    sample_rate: float
+    topics: Mapping[str, Mapping[str, Array]]
+    units: Mapping[str, AxisUnits]
+
+    def write(self, path: Path) -> None:
+        """As MCAP, for Foxglove, PlotJuggler or rerun; raises InputError."""
+        units = {
+            f"{topic}/{column}": getattr(self.units[topic.rpartition("/")[2]], column)
+            for topic, columns in self.topics.items()
+            for column in columns
+        }
+        write_topics(self.topics, units, self.sample_rate, path)
+
+
+def side_by_side(model: MachineModel, parts: Mapping[str, PreparedLog]) -> SideBySide:
+    """Measured, model and residual of the axes of one log; raises CannotRun."""
+    run = free_run(model, parts)
+    first = max(int(np.argmax(np.isfinite(error))) for error in run.error.values())
+    topics: dict[str, dict[str, Array]] = {}
+    for axis, log in parts.items():
+        off = np.nan_to_num(run.error[axis])
+        # Blocks of another length may end at another sample; the run is as long as the shorter.
+        skip = run.begun - log.motion.left_out
+        position, velocity, command = log.motion.at_samples(0.0)[:, skip : skip + len(off)]
+        times = log.motion.sample_period * np.arange(skip, skip + len(off))
+        left = np.interp(times, log.time - log.motion.time[0], residual(model.axes[axis], [log]))
+        force = np.interp(times, log.time - log.motion.time[0], log.command)
+        columns = {
+            "measured": {"position": position, "velocity": velocity, "force": command},
+            "model": {"position": position + off, "force": force - left},
+            "residual": {"position": -off, "force": left},
+        }
+        for kind, signals in columns.items():
+            topics[f"/{kind}/{axis}"] = {n: c[first:] for n, c in signals.items()}
+    units = {axis: log.motion.units for axis, log in parts.items()}
+    return SideBySide(1.0 / next(iter(parts.values())).motion.sample_period, topics, units)
