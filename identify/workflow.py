@@ -35,7 +35,7 @@ from identify.selection.nonparametric import fit_nonparametric, physics_alone
 from identify.selection.trying import reshape, try_effect
 from identify.validation.agreement import Agreement, agreement
 from identify.validation.comparison import SideBySide, compare_axis, position_errors, side_by_side
-from identify.validation.misfit_maps import (worst_region)
+from identify.validation.misfit_maps import worst_region
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError

@@ -23,7 +23,7 @@ from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding
 from identify.validation.comparison import AxisComparison
-from identify.validation.misfit_maps import (MisfitMap, Region)
+from identify.validation.misfit_maps import MisfitMap, Region
 from identify.validation.whiteness import Correlation, Loop, ResidualTests
 from twin.experiments.kinds import Passes, Tracking
 from twin.model.machine import HistoryStep, MachineModel

@@ -143,9 +143,7 @@ class _Problem:
         self.start = self.off_bounds(np.r_[np.clip(self.scaling.inside(axis), low, high), begun])
         self.parameters = len(low)
         sizes = np.where(self.scaling.is_logarithm(), 1.0, np.abs(self.start[: len(low)]))
-        usual = [
-            abs(c.parameter.start) or 1.0 for c in self.scaling.where
-        ]  # of those that are zero
+        usual = [abs(c.parameter.start) or 1.0 for c in self.scaling.where]
         self.sizes = np.where(sizes > 0.0, sizes, usual)
         self.steps = np.r_[FIRST_STEP * self.sizes, begun + 1.0]
         self.weight = 0.0

@@ -15,7 +15,7 @@ from identify.results.told import Told
 from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.comparison import AxisComparison
-from identify.validation.misfit_maps import (Region)
+from identify.validation.misfit_maps import Region
 from twin.effect import Effect
 from twin.model.machine import MachineModel
 from twin.model.parameters import ParameterReference, free_parameters, read

@@ -13,7 +13,7 @@ from identify.dataset.given_logs import Role
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.force_balance import averaged_force, residual
 from identify.estimation.residual_dependence import UNITS, unit_of
-from identify.validation.misfit_maps import (periods, phase_name)
+from identify.validation.misfit_maps import periods
 from twin.model.machine import AxisModel
 from twin.model.units import LINEAR
 
@@ -51,8 +51,8 @@ def signals_of(
     final = after or before
     command = np.concatenate([log.command for log in every])
     where = gathered(every)
-    for name, period in periods(final).items():
-        where[phase_name(name)] = np.mod(where["position"], period)
+    for phase, period in periods(final).items():
+        where[phase] = np.mod(where["position"], period)
     known = {**UNITS, "command": LINEAR.force}
     whole = averaged_force(final, every)
     return Signals(

@@ -24,7 +24,7 @@ from identify.results.results import Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import FindingKind
-from identify.validation.misfit_maps import (Region)
+from identify.validation.misfit_maps import Region
 from twin.curve import Coordinate
 from twin.experiments.file import parameters
 from twin.experiments.kinds import kind_of

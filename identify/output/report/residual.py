@@ -30,9 +30,9 @@ from identify.output.report.page import (
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.residual import correlation_in_words, loop_in_words, place_in_words
 from identify.rules import RULE
-from identify.validation.free_run import HORIZON
 from identify.validation.comparison import AxisComparison
-from identify.validation.misfit_maps import (MisfitMap, Region)
+from identify.validation.free_run import HORIZON
+from identify.validation.misfit_maps import MisfitMap, Region
 from identify.validation.whiteness import Correlation, ResidualTests
 from twin.model.units import AxisUnits, units_of
 

@@ -12,7 +12,7 @@ from identify.output.numbers import (
     spaced,
     span,
 )
-from identify.validation.misfit_maps import (Region)
+from identify.validation.misfit_maps import Region
 from identify.validation.whiteness import Correlation, Loop
 from twin.model.units import units_of
 

@@ -1,23 +1,24 @@
-"""Laws of what a residual depends on, and of its whiteness; each against a plain loop."""
+"""Laws of what a residual depends on, and of a force that repeats along the track."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from constructed import dataset_of, log_of, moved, windowed
+from constructed import dataset_of, effect, fit_of, moved, ridden, windowed
 
 from identify.dataset.coordinates import coordinates_of
-from identify.dataset.motion import _follows, motion_of
 from identify.estimation.residual_dependence import (
     BINS,
-    _shares,
+    Repeat,
     dependences,
     find_dependence,
     line,
+    not_general,
     share,
 )
-from identify.rules import RULE
-from identify.validation.whiteness import Loop, correlation, loop_of
+from identify.output.words.residual import repeat_in_words
+from twin.model.machine import AxisModel
 
 RNG = np.random.default_rng(51)
 
@@ -49,16 +50,11 @@ def test_a_line_of_the_residual_has_its_period_and_share(period):
     assert (moved_, again) == pytest.approx((3.0 * found, strength), rel=1e-6)
     assert line(RNG.normal(size=3000), x) is None
     assert line(r, 0.0 * x) is None
-    assert RULE.line_share < 0.5
-
-
-def where_of(log) -> dict:
-    return coordinates_of(log)
 
 
 LONG = [windowed(moved(np.random.default_rng(s), 6.0, 1000.0), 0.02) for s in (1, 2)]
 DATASET = dataset_of(*LONG)
-WHERE = {k: np.concatenate([where_of(w)[k] for w in LONG]) for k in where_of(LONG[0])}
+WHERE = {k: np.concatenate([coordinates_of(w)[k] for w in LONG]) for k in coordinates_of(LONG[0])}
 KEPT = np.ones(len(WHERE["time"]), bool)
 
 
@@ -92,54 +88,44 @@ def test_a_residual_that_repeats_has_a_period_in_position_or_time():
     found = find_dependence(fit_leaving(pump + noise), DATASET)
     assert (found.depends_on, found.unit) == ("time", "s")
     assert found.period == pytest.approx(0.113, rel=0.01)
-    shares, periods = _shares(pump + noise, WHERE, np.array([len(LONG[0])]))
-    assert list(periods) == ["time"]
-    assert shares["time"] > 0.9
+    assert found.share_of_error > 0.9
 
 
-# --- whiteness ----------------------------------------------------------------------------------
+# --- what repeats ---------------------------------------------------------------------------
 
 
-def test_correlations_are_the_plain_sums_at_their_lags():
-    logs = [RNG.normal(0.3, 1.0, n) for n in (200, 170)]
-    signals = [RNG.normal(-2.0, 3.0, n) for n in (200, 170)]
-    for name, other in (("command", signals), ("residual", logs)):
-        found = correlation(name, logs, other, 0.02, Loop.OPEN)
-        a, b = (np.concatenate(rows).mean() for rows in (logs, other))
-        a, b = [r - a for r in logs], [r - b for r in other]
-        size = np.sqrt(sum(np.sum(r**2) for r in a) * sum(np.sum(r**2) for r in b))
-        lags = np.rint(found.lag / 0.02).astype(int)
-        assert lags.tolist() == list(range(1 if name == "residual" else -40, 41))
-        for lag, value in zip(lags, found.value, strict=True):
-            total = sum(
-                x[k] * y[k - lag]
-                for x, y in zip(a, b, strict=True)
-                for k in range(len(x))
-                if 0 <= k - lag < len(x)
-            )
-            assert value == pytest.approx(total / size)
-        assert found.tested.all()
-    short = correlation(
-        "command", [*logs, logs[0][:40]], [*signals, signals[0][:40]], 1.0, Loop.OPEN
-    )
-    assert np.abs(short.lag).max() == 10
+def test_a_repeat_is_general_where_its_terms_are_alike():
+    def repeat(phase, height=1.0):
+        return Repeat(2.5e-3, {"a": 1.0, "b": height}, {"a": 0.3, "b": 0.3 + phase})
+
+    turned = 2.0 * np.arcsin(0.25)  # of a unit vector, which moves its end by 1/2
+    assert repeat(0.99 * turned).general
+    assert not repeat(1.01 * turned).general
+    assert repeat(0.0, 0.51).general
+    assert not repeat(0.0, 0.49).general
+    assert repeat(2.0 * np.pi).general
+    words = repeat_in_words(repeat(1.0))
+    assert "repeats every 2.50 mm of travel (1.00 N in a, 1.00 N in b)" in words
+    assert "by 57 degrees" in words
 
 
-def test_a_loop_is_closed_where_the_position_follows_its_setpoint():
-    t = np.arange(4000) / 1000.0
-    a, b = np.sin(6.0 * t), RNG.normal(size=len(t))
-    b -= a * (a @ b) / (a @ a)
-    b *= np.std(a) / np.std(b)
+def test_a_force_with_another_phase_in_each_log_is_told():
+    def log(phase, name, pitch=2.3e-3, size=0.3):
+        m = ridden(lambda m: size * np.sin(2.0 * np.pi * m.position / pitch + phase))
+        return windowed(replace(m, name=name))
 
-    def log(setpoint=None):
-        more = {} if setpoint is None else {"setpoint_position": setpoint}
-        return windowed(motion_of(log_of(1000.0, a, t, **more), "x", "l"))
-
-    for angle, wanted in ((0.24, Loop.CLOSED), (0.26, Loop.OPEN), (1.0, Loop.CLOSED)):
-        mixed = np.cos(np.pi * angle) * a + np.sin(np.pi * angle) * b
-        assert loop_of([log(mixed)]) is wanted
-    assert loop_of([log(0.0 * a)]) is Loop.OPEN
-    assert loop_of([log()]) is Loop.UNKNOWN
-    assert loop_of([log(a), log()]) is Loop.UNKNOWN
-    assert loop_of([log(0.0 * a), log(a)]) is Loop.CLOSED
-    assert _follows(log_of(1000.0, 0.0 * a, t, setpoint_position=a).axes["x"]) is False
+    coulomb = effect("coulomb_viscous", {"Fc": 0.7, "Fs": 0.7, "sigma2": 0.9})
+    cable = effect("cable_slab", {"offset": 0.2, "k1": -3.0, "k3": 40.0})
+    fit = fit_of(AxisModel(1.3, effects=(coulomb, cable)), log(0.3, "a"))
+    found = not_general(fit, dataset_of(log(0.3, "a"), holdout=(log(1.8, "b"),)))
+    assert found.period == pytest.approx(2.3e-3, rel=5e-3)
+    assert found.amplitude == pytest.approx({"a": 0.3, "b": 0.3}, rel=0.1)
+    turn = found.phase["b"] - found.phase["a"]
+    assert np.mod(turn + np.pi, 2.0 * np.pi) - np.pi == pytest.approx(1.5, abs=0.1)
+    same = dataset_of(log(0.3, "a"), log(0.3, "b"))
+    assert not_general(fit, same) is None
+    assert not_general(fit, dataset_of(log(0.3, "a"))) is None
+    other = dataset_of(log(0.3, "a"), log(1.8, "b", 2.6e-3))
+    assert not_general(fit, other) is None
+    none = dataset_of(log(0.3, "a"), log(1.8, "b", size=0.0))
+    assert not_general(fit, none) is None

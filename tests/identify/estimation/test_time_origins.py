@@ -1,14 +1,24 @@
-"""Logs started at any moment: a force that repeats in time has a phase of its own in each."""
+"""Laws of clocks: a time origin follows the beginning of a log, by a line that logs share."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from constructed import dataset_of, effect, fit_of, moved, ridden, windowed
 from machines import one_axis
 
 from identify.dataset.dataset import Dataset, datasets
 from identify.estimation.fit import fit_axis
-from identify.estimation.time_origin import time_origins, with_time_origins
+from identify.estimation.force_balance import residual
+from identify.estimation.time_origin import (
+    depends_on_time_origin,
+    phases_found,
+    synchronised,
+    time_origins,
+    with_time_origins,
+    without_timed_forces,
+)
+from identify.rules import RULE
 from identify.selection.diagnosis import Verdict, diagnose_axis
 from identify.selection.trying import try_effect
 from identify.workflow import compare, fit
@@ -16,49 +26,163 @@ from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
 from twin.logs import Log
 from twin.model.file import load_model
-from twin.model.machine import Fitted
+from twin.model.machine import AxisModel, Fitted
+
+PUMP = effect("periodic_disturbance", {"f": 23.7, "a": 0.05, "b": 0.02})
+STAGE = AxisModel(1.3, effects=(effect("coulomb_viscous", {"Fc": 0.7, "Fs": 0.7, "sigma2": 0.9}),))
+REST = effect("cable_slab", {"offset": 0.2, "k1": -3.0, "k3": 40.0})
+
+
+def started(late: float, seed: int = 0, f: float = 23.7):
+    """A log that began so long after the pump; the pump pushes, so the command has to hold."""
+    turn = lambda t: 2.0 * np.pi * f * (t + late)  # noqa: E731
+    rng = np.random.default_rng(seed)
+    motion = ridden(
+        lambda m: -0.05 * np.sin(turn(m.time)) - 0.02 * np.cos(turn(m.time))
+        + rng.normal(0.0, 0.01, len(m.time))
+    )  # fmt: skip
+    return windowed(replace(motion, name=f"{late}"), 0.02)
+
+
+def turns(found, f=23.7):
+    return np.mod(time_origins(found) * f + 0.5, 1.0) - 0.5
+
+
+LATE = np.array([0.0, 0.0131, 0.0347])
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    logs = [started(late, seed) for seed, late in enumerate(LATE)]
+    return dataset_of(*logs[:2], holdout=(logs[2],))
+
+
+def test_a_log_begun_later_has_its_clock_later_modulo_the_period(dataset):
+    axis = STAGE.with_effect(REST)
+    wanted = np.mod(LATE * 23.7 + 0.5, 1.0) - 0.5
+    np.testing.assert_allclose(turns(with_time_origins(axis, dataset)), wanted, atol=0.01)
+    # by the model's own pump: the clock of the first is zero too, for it began with the pump
+    np.testing.assert_allclose(
+        turns(with_time_origins(axis.with_effect(PUMP), dataset)), wanted, atol=0.01
+    )
+    early = {**PUMP.values, "a": -0.02, "b": 0.05}  # a quarter of a turn ahead
+    ahead = axis.with_effect(effect("periodic_disturbance", early))
+    shifted = np.mod(wanted - 0.25 + 0.5, 1.0) - 0.5
+    np.testing.assert_allclose(turns(with_time_origins(ahead, dataset)), shifted, atol=0.01)
+    late = (
+        time_origins(with_time_origins(ahead, dataset_of(*dataset.fit, started(0.0211, 3)))) * 23.7
+    )
+    assert (np.abs(late) <= 0.5).all()  # the nearest of all turns alike
+    near = dataset_of(started(0.0), started(0.015 / 23.7, 1))
+    assert not time_origins(with_time_origins(axis, near)).any()  # within two hundredths of a turn
+
+
+def test_a_clock_is_set_by_no_line_that_may_be_chance(dataset):
+    axis = STAGE.with_effect(REST)
+    assert with_time_origins(axis, dataset_of(dataset.fit[0])) is not None
+    assert not time_origins(with_time_origins(axis, dataset_of(dataset.fit[0]))).any()
+    quiet = [
+        windowed(
+            replace(
+                ridden(lambda m, s=s: np.random.default_rng(s).normal(0, 0.01, len(m.time))),
+                name=f"{s}",
+            ),
+            0.02,
+        )
+        for s in (1, 2)
+    ]
+    assert not time_origins(with_time_origins(axis, dataset_of(*quiet))).any()
+
+
+def test_the_effects_that_read_the_clock_are_told(dataset):
+    axis = STAGE.with_effect(PUMP)
+    assert without_timed_forces(axis, dataset.fit[0]).names == STAGE.names
+    assert without_timed_forces(STAGE, dataset.fit[0]) == STAGE
+    assert depends_on_time_origin(axis, dataset)
+    assert not depends_on_time_origin(STAGE, dataset)
+    assert phases_found(axis, "periodic_disturbance", dataset) == 0
+    known = with_time_origins(axis, dataset)
+    set_ = sum(log.motion.time_origin != 0.0 for log in known.fit)
+    assert phases_found(axis, "periodic_disturbance", known) == set_ == 1
+    assert phases_found(axis, "coulomb_viscous", known) == 0
+
+
+# --- lines of known heights ------------------------------------------------------------------
+
+LOGS = [windowed(moved(np.random.default_rng(s), 6.0, 1000.0), 0.02) for s in range(4)]
+N, F = len(LOGS[0]), 23.7  # F: Hz
+
+
+def pushed(heights, size=1.0):
+    """Logs that leave white residuals with a line of those heights, each with its own phase."""
+    return [
+        replace(w, command=w.command - residual(AxisModel(1.7), [w]) + size * (
+            np.random.default_rng(90 + k).normal(size=N) + a * np.cos(2 * np.pi * F * w.time + k)
+        ))
+        for k, (w, a) in enumerate(zip(LOGS, heights, strict=True))
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [1e-6, 0.01, 1e4])
+def test_a_fit_is_synchronised_unless_it_reads_the_clock(size):
+    logs = pushed([0.8, 0.5, 0.7, 0.6], size)
+    dataset = dataset_of(*logs)
+    found, fit = synchronised(fit_of(AxisModel(1.7), *logs), dataset)
+    np.testing.assert_allclose(turns(found), np.arange(4) / (2.0 * np.pi), atol=0.05)
+    assert fit.logs is found.fit
+    pump = AxisModel(1.7, effects=(effect("periodic_disturbance", {"f": F, "a": 0.01}),))
+    own = fit_of(pump, *logs)
+    assert synchronised(own, dataset) == (dataset, own)
+
+
+def test_a_line_of_less_evidence_than_its_phases_cost_is_chance():
+    """Samples x gain must exceed two numbers a log: in all logs it does, in one it does not."""
+    height = 11.5 / np.sqrt(N)
+    needed = 2 * 4 * np.log(4 * N) + RULE.least_bic
+    assert 0.5 * height**2 * N < needed < 4.0 * 0.5 * height**2 * N
+    alone = dataset_of(*pushed([height, 0.0, 0.0, 0.0]))
+    assert not time_origins(with_time_origins(AxisModel(1.7), alone)).any()
+    every = dataset_of(*pushed([height] * 4))
+    assert time_origins(with_time_origins(AxisModel(1.7), every)).any()
+
+
+# --- simulated logs -------------------------------------------------------------------------
 
 CATALOGUE = load_catalogue()
-STAGE = one_axis(load_model("proton_xy", CATALOGUE))
-PUMP = Fitted.at_start(CATALOGUE["periodic_disturbance"], {"f": 23.7, "a": 0.02, "b": 0.01})
+SLIDE = one_axis(load_model("proton_xy", CATALOGUE))
+BESIDE = Fitted.at_start(CATALOGUE["periodic_disturbance"], {"f": 23.7, "a": 0.02, "b": 0.01})
 FEW = Catalogue(CATALOGUE[n] for n in ("periodic_disturbance", "cogging", "quadratic_drag"))
-LATE = (0.0, 0.313, 0.871)  # s
+BEGUN = (0.0, 0.313, 0.871)  # s
 
 
 @pytest.fixture(scope="module")
 def logs() -> list[Log]:
     """Logs of a stage beside a pump that had run for a while when each began."""
     out = []
-    for i, late in enumerate(LATE):
-        phase = 2.0 * np.pi * PUMP.values["f"] * late
-        turned = (PUMP.values["a"] + 1j * PUMP.values["b"]) * np.exp(1j * phase)
-        values = {**PUMP.values, "a": turned.real, "b": turned.imag}
-        axis = STAGE.axes["x"].with_effect(Fitted.at_start(PUMP.effect, values))
-        out.append(simulate(replace(STAGE, axes={"x": axis}), "tracking", seed=i, duration=8.0))
+    for i, late in enumerate(BEGUN):
+        phase = 2.0 * np.pi * BESIDE.values["f"] * late
+        turned = (BESIDE.values["a"] + 1j * BESIDE.values["b"]) * np.exp(1j * phase)
+        values = {**BESIDE.values, "a": turned.real, "b": turned.imag}
+        axis = SLIDE.axes["x"].with_effect(Fitted.at_start(BESIDE.effect, values))
+        out.append(simulate(replace(SLIDE, axes={"x": axis}), "tracking", seed=i, duration=8.0))
     return out
 
 
 @pytest.fixture(scope="module")
-def dataset(logs) -> Dataset:
+def simulated(logs) -> Dataset:
     """The last log is held out."""
-    return datasets(STAGE, {"a": logs[0], "b": logs[1]}, {"c": logs[2]})["x"]
+    return datasets(SLIDE, {"a": logs[0], "b": logs[1]}, {"c": logs[2]})["x"]
 
 
-def turns(dataset: Dataset) -> np.ndarray:
-    """Clocks in periods of the pump, between -1/2 and 1/2."""
-    found = time_origins(dataset) * PUMP.values["f"]
-    return found - np.rint(found)
-
-
-def test_clocks_are_when_the_logs_began(dataset):
-    found = turns(with_time_origins(STAGE.axes["x"], dataset))
-    late = np.array(LATE) * PUMP.values["f"]
+def test_clocks_are_when_the_logs_began(simulated):
+    found = turns(with_time_origins(SLIDE.axes["x"], simulated))
+    late = np.array(BEGUN) * BESIDE.values["f"]
     np.testing.assert_allclose(found, late - np.rint(late), atol=0.02)
 
 
-def test_a_pump_is_named_whatever_its_phase_in_each_log(dataset):
-    known = with_time_origins(STAGE.axes["x"], dataset)
-    found = diagnose_axis(fit_axis(STAGE.axes["x"], known.fit), known, FEW)
+def test_a_pump_is_named_whatever_its_phase_in_each_log(simulated):
+    known = with_time_origins(SLIDE.axes["x"], simulated)
+    found = diagnose_axis(fit_axis(SLIDE.axes["x"], known.fit), known, FEW)
     assert found.verdict is Verdict.MISSING_EFFECTS
     assert found.named == ("periodic_disturbance",)
     values = found.final.axis["periodic_disturbance"].values
@@ -66,13 +190,13 @@ def test_a_pump_is_named_whatever_its_phase_in_each_log(dataset):
     assert np.hypot(values["a"], values["b"]) == pytest.approx(np.hypot(0.02, 0.01), rel=0.02)
 
 
-def test_with_one_clock_for_all_logs_it_is_not(dataset):
-    base = fit_axis(STAGE.axes["x"], dataset.fit)
+def test_with_one_clock_for_all_logs_it_is_not(simulated):
+    base = fit_axis(SLIDE.axes["x"], simulated.fit)
     pump = CATALOGUE["periodic_disturbance"]
-    assert not try_effect(base, dataset, pump).fit.at_floor
+    assert not try_effect(base, simulated, pump).fit.at_floor
 
 
-WITH_PUMP = replace(STAGE, axes={"x": STAGE.axes["x"].with_effect(PUMP)})
+WITH_PUMP = replace(SLIDE, axes={"x": SLIDE.axes["x"].with_effect(BESIDE)})
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from identify.output.report.residual import logs
 from identify.output.report.subject import Subject
 from identify.output.words.fit import no_interval_in_words
 from identify.output.words.residual import place_in_words
-from identify.validation.misfit_maps import (Region)
+from identify.validation.misfit_maps import Region
 
 TABLES = ("answer", "regions", "ranking", "growth", "equations", "parameters", "logs", "notes")
 

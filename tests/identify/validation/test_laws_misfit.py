@@ -4,17 +4,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built_fits import PLAIN, built_dataset
 from constructed import SHORT, dataset_of, effect, moved, windowed
 
 from identify.dataset.coordinates import coordinates_of, gathered, since_reversal
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.evidence import effective_samples, rms
+from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.estimation.residual_dependence import UNITS
 from identify.output.words.residual import region_in_words
 from identify.validation.comparison import compare_axis
-from identify.validation.misfit_maps import (ABOVE_FLOOR, LEAST_SHARE, MisfitMap, misfit_map, worst_regions)
+from identify.validation.misfit_maps import (
+    ABOVE_FLOOR,
+    LEAST_SHARE,
+    MisfitMap,
+    misfit_map,
+    worst_region,
+    worst_regions,
+)
 from identify.validation.whiteness import Loop
 from twin.model.machine import AxisModel, MachineModel
 
@@ -174,3 +183,21 @@ def test_a_comparison_gathers_what_the_residual_says():
     worst = worst_regions(found.maps, effective_samples(found.residual))
     assert [r.coordinate for r in found.worst] == [r.coordinate for r in worst]
     assert found.tests.loop is Loop.UNKNOWN
+
+
+@pytest.mark.parametrize("place", [-0.02, 0.015])
+def test_it_is_where_the_force_is_that_the_model_lacks(place: float) -> None:
+    dataset = built_dataset("one", "two")
+    fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
+    assert worst_region(fit, dataset) is None
+
+    def bumped(log):
+        bump = np.exp(-(((log.motion.position - place) / 0.002) ** 2))
+        return replace(log, command=log.command + log.test_function.mean(0.5 * bump))
+
+    there = replace(dataset, fit=tuple(map(bumped, dataset.fit)))
+    region = worst_region(finished(PLAIN, PLAIN, there.fit, Outcome.CONVERGED), there)
+    assert region is not None
+    assert (region.coordinate, region.unit) == ("position", "m")
+    assert abs(0.5 * (region.low + region.high) - place) < 0.004
+    assert region.ratio > 2.0

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from constructed import log_of, windowed
 from machines import one_axis
 from scipy.signal import lfilter
 
 from identify.dataset.dataset import datasets
+from identify.dataset.motion import motion_of
 from identify.estimation.force_balance import residual
 from identify.output import as_json
 from identify.output import text as as_text
@@ -150,3 +152,48 @@ def test_the_reason_and_the_bounds_are_said(compared):
     text = as_text.compare_text(compared)
     assert loop_in_words(Loop.CLOSED) in text
     assert "beyond the 90 % bounds" in text
+
+
+def test_correlations_are_the_plain_sums_at_their_lags():
+    rng = np.random.default_rng(51)
+    logs = [rng.normal(0.3, 1.0, n) for n in (200, 170)]
+    signals = [rng.normal(-2.0, 3.0, n) for n in (200, 170)]
+    for name, other in (("command", signals), ("residual", logs)):
+        found = correlation(name, logs, other, 0.02, Loop.OPEN)
+        a, b = (np.concatenate(rows).mean() for rows in (logs, other))
+        a, b = [r - a for r in logs], [r - b for r in other]
+        size = np.sqrt(sum(np.sum(r**2) for r in a) * sum(np.sum(r**2) for r in b))
+        lags = np.rint(found.lag / 0.02).astype(int)
+        assert lags.tolist() == list(range(1 if name == "residual" else -40, 41))
+        for lag, value in zip(lags, found.value, strict=True):
+            total = sum(
+                x[k] * y[k - lag]
+                for x, y in zip(a, b, strict=True)
+                for k in range(len(x))
+                if 0 <= k - lag < len(x)
+            )
+            assert value == pytest.approx(total / size)
+        assert found.tested.all()
+    short = correlation(
+        "command", [*logs, logs[0][:40]], [*signals, signals[0][:40]], 1.0, Loop.OPEN
+    )
+    assert np.abs(short.lag).max() == 10
+
+
+def test_a_loop_is_closed_where_the_position_follows_its_setpoint():
+    t = np.arange(4000) / 1000.0
+    a, b = np.sin(6.0 * t), np.random.default_rng(51).normal(size=len(t))
+    b -= a * (a @ b) / (a @ a)
+    b *= np.std(a) / np.std(b)
+
+    def log(setpoint=None):
+        more = {} if setpoint is None else {"setpoint_position": setpoint}
+        return windowed(motion_of(log_of(1000.0, a, t, **more), "x", "l"))
+
+    for angle, wanted in ((0.24, Loop.CLOSED), (0.26, Loop.OPEN), (1.0, Loop.CLOSED)):
+        mixed = np.cos(np.pi * angle) * a + np.sin(np.pi * angle) * b
+        assert loop_of([log(mixed)]) is wanted
+    assert loop_of([log(0.0 * a)]) is Loop.OPEN
+    assert loop_of([log()]) is Loop.UNKNOWN
+    assert loop_of([log(a), log()]) is Loop.UNKNOWN
+    assert loop_of([log(0.0 * a), log(a)]) is Loop.CLOSED
