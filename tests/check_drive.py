@@ -4,12 +4,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from twin.checks import CheckReport, Fault, Finding, check_log
+from twin.checks import Fault, Finding, check_log
 from twin.checks.axis import Axis
-from twin.checks.breaks import check_breaks, check_outliers
-from twin.checks.channels import check_timing, check_units
-from twin.checks.command import check_saturation
-from twin.checks.content import check_content, check_excitation
 from twin.logs import LINEAR_UNITS, AxisLog, Log
 from twin.logs.log import Array
 
@@ -22,10 +18,10 @@ def motion(t: Array, derivative: int = 0) -> Array:
     return sum(a * w**derivative * np.sin(w * t + p + derivative * np.pi / 2) for a, w, p in WAVES)
 
 
-def command(t: Array) -> Array:
-    """Force in N that this motion takes."""
+def command(t: Array, coulomb: float = COULOMB) -> Array:
+    """Force in N that this motion takes; without Coulomb friction it has no edges."""
     v = motion(t, 1)
-    return MASS * motion(t, 2) + DAMPING * v + COULOMB * np.tanh(v / 1e-3) + BIAS
+    return MASS * motion(t, 2) + DAMPING * v + coulomb * np.tanh(v / 1e-3) + BIAS
 
 
 def drive(
@@ -37,14 +33,15 @@ def drive(
     signals: tuple[str, ...] = ("position", "force"),
     kind: Mapping[str, str] = LINEAR_UNITS,
     change: Callable[[dict[str, Array]], None] | None = None,
+    coulomb: float = COULOMB,
 ) -> Log:
     """A log of the drive; signals ``late`` by seconds, multiplied by a ``factor``, or changed."""
     t = 10.0 + np.arange(round(rate * seconds)) / rate
     of: dict[str, Callable[[Array], Array]] = {
         "position": motion,
         "velocity": lambda t: motion(t, 1),
-        "force": lambda t: command(t + 0.5 / rate),  # held over the sample
-        "current": lambda t: command(t + 0.5 / rate) / 7.0,
+        "force": lambda t: command(t + 0.5 / rate, coulomb),  # held over the sample
+        "current": lambda t: command(t + 0.5 / rate, coulomb) / 7.0,
         "setpoint_position": motion,
         "setpoint_velocity": lambda t: motion(t, 1),
         "setpoint_acceleration": lambda t: motion(t, 2),
@@ -58,24 +55,16 @@ def drive(
     return Log(rate, {"x": AxisLog(columns, kind, 7.0)})
 
 
-CHECKS = {
-    Fault.UNIT: check_units,
-    Fault.SIGN: check_units,
-    Fault.LAG: check_timing,
-    Fault.SATURATION: check_saturation,
-    Fault.OUTLIERS: lambda axis: [*check_breaks(axis), *check_outliers(axis)],
-    Fault.COARSE_POSITION: check_excitation,
-    Fault.WEAK_EXCITATION: check_excitation,
-}
+def axis_of(log: Log) -> Axis:
+    """What the checks see of axis x."""
+    return Axis("x", log.sample_rate, log.axes["x"])
 
 
 def findings(log: Log, fault: Fault) -> list[Finding]:
-    """What the check of one kind of fault finds on axis x; other checks are not run."""
-    check = CHECKS.get(fault, check_content)
-    axis = Axis("x", log.sample_rate, log.axes["x"])
-    return [f for f in check(axis) if f.fault is fault]
+    """What is found of one kind of fault."""
+    return [f for f in check_log(log).findings if f.fault is fault]
 
 
-def report(log: Log) -> CheckReport:
-    """All that is found."""
-    return check_log(log)
+def stated(finding: Finding, words: str) -> float:
+    """The number behind these words."""
+    return float(finding.what.partition(words)[2].split()[0])

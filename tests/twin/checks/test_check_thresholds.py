@@ -5,10 +5,9 @@ The drive is a closed form, so that a signal may be late by any time and wrong b
 
 import numpy as np
 import pytest
-from check_drive import drive, findings, report
+from check_drive import axis_of, drive, findings
 
 from twin.checks import Fault, Severity, check_log
-from twin.checks.axis import Axis
 from twin.logs import ROTARY_UNITS
 
 ALL = (
@@ -19,7 +18,7 @@ ALL = (
 
 @pytest.mark.parametrize("rate", [500.0, 1000.0, 3000.0])
 def test_a_sound_drive_gives_no_finding(rate):
-    assert report(drive(rate, signals=ALL)).findings == ()
+    assert check_log(drive(rate, signals=ALL)).findings == ()
 
 
 # Units and signs
@@ -241,7 +240,7 @@ def test_a_level_under_noise_is_told_where_it_is_as_long_as_the_low_pass(millise
 def test_a_level_may_droop_by_ten_times_its_noise(noises, told):
     """What droops farther is no limit, but a motion with a slow top."""
     rng = np.random.default_rng(9)
-    smoother = Axis("x", 1000.0, drive().axes["x"]).smoother
+    smoother = axis_of(drive()).smoother
     droop = noises * smoother.held_noise(1e-3)
 
     def level(columns):

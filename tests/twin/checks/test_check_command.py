@@ -2,27 +2,16 @@
 
 import numpy as np
 import pytest
-from check_drive import command, drive, motion
+from check_drive import axis_of, command, drive, motion, stated
 
 from twin.checks import Fault, Severity, breaks
 from twin.checks import channels as timing
 from twin.checks import command as commands
-from twin.checks.axis import Axis, held_samples
-from twin.checks.explain import Trend, find_trend
-from twin.checks.report import Finding
+from twin.checks.axis import held_samples
+from twin.checks.explain import find_trend
 from twin.logs import AxisLog, Log
 
 RATE = 1000.0
-BOTH = ("position", "force", "setpoint_position")
-
-
-def axis_of(log: Log) -> Axis:
-    return Axis("x", log.sample_rate, log.axes["x"])
-
-
-def stated(finding: Finding, words: str) -> float:
-    """The number behind these words."""
-    return float(finding.what.partition(words)[2].split()[0])
 
 
 # --- held values ---------------------------------------------------------------------------
@@ -69,14 +58,13 @@ def test_a_sample_is_off_the_median_of_five():
 
 
 @pytest.mark.parametrize(("part", "told"), [(0.25, False), (0.35, True)])
-def test_a_single_sample_is_off_by_three_tenths_of_the_command(part, told, monkeypatch):
-    monkeypatch.setattr("check_drive.COULOMB", 0.0)  # no edges
-    size = part * axis_of(drive(RATE)).force_size
+def test_a_single_sample_is_off_by_three_tenths_of_the_command(part, told):
+    size = part * axis_of(drive(RATE, coulomb=0.0)).force_size
 
     def change(columns):
         columns["force"][[1200, 2600]] += size
 
-    found = list(commands.check_command(axis_of(drive(RATE, change=change))))
+    found = list(commands.check_command(axis_of(drive(RATE, change=change, coulomb=0.0))))
     assert len(found) == told
     if told:
         assert found[0].fault is Fault.OUTLIERS
@@ -133,25 +121,6 @@ def test_two_clocks_that_drift_by_sixty_millionths_are_told(ppm, told):
         assert ("later" in found[0].what) == (ppm > 0.0)
         assert float(found[0].what.partition("(")[2].split()[0]) == pytest.approx(90.0, abs=9.0)
         assert float(found[0].what.split()[3]) == pytest.approx(0.09, abs=0.011)  # ms a second
-
-
-def test_a_trend_is_the_median_and_the_median_slope_of_the_parts(monkeypatch):
-    """Eight parts of 1 s; the lags of seven go on evenly, that of one is far off."""
-    from twin.checks import explain as module
-
-    lags = iter(1e-3 * np.array([1.0, 1.2, 1.4, 9.0, 1.8, 2.0, 2.2, 2.4]))
-    monkeypatch.setattr(module, "find_lag", lambda *_: module.Lag(next(lags), True))
-    signal = np.sin(np.arange(8000.0))
-    found = find_trend(signal, signal[:, None], np.ones(8000), 1e-3)
-    assert isinstance(found, Trend)
-    assert found.seconds == pytest.approx(1.9e-3)
-    assert found.drift == pytest.approx(0.2e-3, rel=1e-6)
-    lags = 1e-3 * np.array([1.0, 1.2, 1.4, 9.0, 1.8, 2.0, 2.2, 2.4])
-    times = np.arange(8.0) - 3.5
-    spread = 1.4826 * np.median(np.abs(lags - 1.9e-3))
-    left = 1.4826 * np.median(np.abs(lags - 1.9e-3 - 0.2e-3 * times))
-    assert found.error == pytest.approx(1.25 * spread / 8**0.5)
-    assert found.drift_error == pytest.approx(1.25 * left / np.linalg.norm(times))
 
 
 @pytest.mark.parametrize(("parts", "enough"), [(4, False), (5, True)])

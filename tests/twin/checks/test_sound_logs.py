@@ -1,17 +1,78 @@
-"""True machines of a few lines of NumPy: a soft loop, friction with a memory, one count. No fault.
+"""Sound logs give no findings: of the twin, of a public drive, of machines in a few lines of NumPy.
 
-And beside each the fault that it looks like, which is still found.
+Beside each of these machines the fault that it looks like is still found.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
-from check_cases import faults
+from check_cases import clean_log, faults, stage
 
 from twin.checks import Fault, check_log
+from twin.experiments.named import simulate
+from twin.importers import import_log, load_mapping
 from twin.logs import ROTARY_UNITS, AxisLog, Log
 from twin.logs.log import Array
+
+EMPS_MAP = Path(__file__).parents[3] / "examples" / "import_emps.toml"
+
+# The twin and a public drive
+
+
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in range(1, 5))]
+)
+def test_tracking_is_clean(seed: int) -> None:
+    assert check_log(simulate(stage(), "tracking", seed=seed, duration=10.0)).findings == ()
+
+
+@pytest.mark.parametrize("experiment", ["moves", "open_loop_sine"])
+def test_experiments_of_both_axes_are_clean(experiment: str) -> None:
+    assert check_log(simulate(stage(), experiment, seed=1, duration=10.0)).findings == ()
+
+
+@pytest.mark.parametrize("experiment", ["cable_pass", "velocity_map", "reversals"])
+def test_experiments_of_one_axis_have_no_errors(experiment: str) -> None:
+    report = check_log(simulate(stage(), experiment, duration=10.0))
+    assert report.ok
+    assert faults(report) == {Fault.WEAK_EXCITATION}
+    idle = [f for f in report.findings if f.axis == "y"]
+    assert len(idle) == 1
+    assert "hardly moves" in idle[0].what
+
+
+@pytest.mark.parametrize("rate", [5000.0, 1000.0, 200.0])
+def test_a_slower_log_is_clean(rate: float) -> None:
+    clean = clean_log()
+    every = round(clean.sample_rate / rate)
+    axes = {
+        name: replace(axis, columns={n: c[::every] for n, c in axis.columns.items()})
+        for name, axis in clean.axes.items()
+    }
+    assert check_log(replace(clean, sample_rate=rate, axes=axes)).findings == ()
+
+
+@pytest.mark.parametrize("file", ["DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"])
+def test_the_emps_drive_is_clean(shared_data: Path, file: str) -> None:
+    """Commanded force pulses and a position loop 6 ms behind are no faults."""
+    assert check_log(import_log(shared_data / "emps" / file, load_mapping(EMPS_MAP))).findings == ()
+
+
+def test_a_drive_at_its_limit() -> None:
+    """The current is measured, so its noise rides on the limit."""
+    axis = stage().axes["y"]
+    weak = stage().with_axis("y", replace(axis, hardware=replace(axis.hardware, force_limit=9.0)))
+    report = check_log(simulate(weak, "moves", seed=3, duration=10.0))
+    found = [f for f in report.findings if f.fault is Fault.SATURATION]
+    assert {f.axis for f in found} == {"y"}
+    assert all("extreme of 9.0" in f.what or "extreme of -9.0" in f.what for f in found)
+
+
+# True machines of a few lines: a soft loop, friction with a memory, one count
 
 RATE, FINER = 1000.0, 10  # Hz, of the loop; steps of the integration a sample
 INERTIA, VISCOUS = 0.02, 0.02  # kg m^2, N m s/rad

@@ -2,19 +2,14 @@
 
 import numpy as np
 import pytest
-from check_drive import command, drive, motion
+from check_drive import axis_of, command, drive, motion, stated
 
 from twin.checks import Fault, Severity, breaks
-from twin.checks.axis import Axis
 from twin.checks.report import Finding
 from twin.logs import AxisLog, Log
 
 RATE = 1000.0
 BOTH = ("position", "force", "setpoint_position")
-
-
-def axis_of(log: Log) -> Axis:
-    return Axis("x", log.sample_rate, log.axes["x"])
 
 
 def broken(change, signals=("position", "force"), seconds=4.0, **more) -> list[Finding]:
@@ -36,11 +31,6 @@ def farther(places, size, *names):
 
 def speed(at: int) -> float:
     return float(motion(10.0 + at / RATE, 1))
-
-
-def stated(finding: Finding, words: str) -> float:
-    """The number behind these words."""
-    return float(finding.what.partition(words)[2].split()[0])
 
 
 FAST = 1000 + int(np.argmax(np.abs(motion(11.0 + np.arange(2000) / RATE, 1))))

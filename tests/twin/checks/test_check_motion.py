@@ -8,16 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from check_drive import command, drive, findings, motion
+from check_drive import axis_of, command, drive, findings, motion, stated
 
 from twin.checks import Fault, Severity, check_log
-from twin.checks.axis import Axis
 from twin.logs import ROTARY_UNITS, AxisLog, Log
-
-
-def axis_of(log: Log) -> Axis:
-    return Axis("x", log.sample_rate, log.axes["x"])
-
 
 T = np.arange(6000) / 1000.0
 
@@ -101,8 +95,7 @@ def test_a_command_that_contradicts_the_motion_is_placed_and_sized(size, told):
         first, _, last, _ = found[0].where.split()[:4]
         assert float(first) == pytest.approx(2.0, abs=0.012)
         assert float(last) == pytest.approx(2.03, abs=0.012)
-        stated = float(found[0].what.partition("up to ")[2].split()[0])
-        assert stated == pytest.approx(size, rel=0.1)
+        assert stated(found[0], "up to ") == pytest.approx(size, rel=0.1)
         assert found[0].what.startswith("force and motion contradict each other")
 
 
@@ -110,14 +103,13 @@ def test_a_command_that_contradicts_the_motion_is_placed_and_sized(size, told):
 @pytest.mark.parametrize(("part", "told"), [(0.85, False), (1.2, True)])
 @pytest.mark.parametrize("kind", ["contradict", "to and fro"])
 def test_a_tenth_of_the_command_is_the_least_that_counts_whatever_its_mean(
-    monkeypatch, offset, part, told, kind
+    offset, part, told, kind
 ):
     """A push counts by its height, alternating noise by its second difference, four times it.
 
     Without Coulomb friction, whose steps at every reversal are bends of the command too.
     """
-    monkeypatch.setattr("check_drive.COULOMB", 0.0)
-    force = drive().axes["x"].force
+    force = drive(coulomb=0.0).axes["x"].force
     tenth = 0.1 * np.quantile(np.abs(force - np.median(force)), 0.99)
 
     def disturb(columns):
@@ -127,7 +119,9 @@ def test_a_tenth_of_the_command_is_the_least_that_counts_whatever_its_mean(
         else:
             columns["force"][2000:2020] += part * tenth / 4.0 * (-1.0) ** np.arange(20)
 
-    found = [f for f in findings(drive(change=disturb), Fault.OUTLIERS) if kind in f.what]
+    found = [
+        f for f in findings(drive(change=disturb, coulomb=0.0), Fault.OUTLIERS) if kind in f.what
+    ]
     assert len(found) == told
 
 
@@ -191,8 +185,7 @@ def test_a_fiftieth_of_the_time_the_other_way_is_enough(share, told, sign):
     if told:
         side = "forwards" if sign > 0.0 else "backwards"
         assert found[0].what.startswith(f"the axis moves only {side} (")
-        stated = float(found[0].what.partition("(")[2].split()[0])
-        assert stated == pytest.approx(100.0 * (1.0 - share), abs=0.3)
+        assert stated(found[0], "(") == pytest.approx(100.0 * (1.0 - share), abs=0.3)
 
 
 @pytest.mark.parametrize("units", [None, ROTARY_UNITS])
@@ -225,10 +218,8 @@ def test_a_position_is_too_coarse_where_its_noise_is_three_tenths_of_the_acceler
     assert len(found) == told
     if told:
         assert found[0].severity is Severity.WARNING
-        stated = float(found[0].what.partition("good to ")[2].split()[0])
-        assert stated == pytest.approx(noise, rel=0.1)
-        seen = float(found[0].what.partition(" of the ")[2].split()[0])
-        assert seen == pytest.approx(rms, rel=0.1)
+        assert stated(found[0], "good to ") == pytest.approx(noise, rel=0.1)
+        assert stated(found[0], " of the ") == pytest.approx(rms, rel=0.1)
         assert "over 21 ms makes" in found[0].what
 
 
@@ -246,8 +237,7 @@ def test_an_axis_that_moves_a_tenth_of_the_time_moves(moving, told):
     assert bool([f for f in found if "hardly moves" in f.what]) == told
     assert axis_of(log).moves_often == (not told)
     if told:
-        stated = float(found[0].what.partition("noise of its position (")[2].split()[0])
-        assert stated == pytest.approx(1e-6, rel=0.1)
+        assert stated(found[0], "noise of its position (") == pytest.approx(1e-6, rel=0.1)
 
 
 def test_an_axis_lacking_something_is_told_that_alone_and_the_other_axis_is_checked():
