@@ -28,7 +28,7 @@ def view(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="MCAP log.")],
     model: Annotated[
         str | None,
-        typer.Argument(metavar="[MODEL]", help="Machine model (.toml); the log alone if left out."),
+        typer.Argument(metavar="MODEL", help="Machine model (.toml); the log alone if left out."),
     ] = None,
     html: Annotated[
         Path | None, typer.Option(help="Page to write, which replays it in any browser.")

@@ -52,18 +52,17 @@ def write_video(path: Path, replay: Replay, gain: float, speed: float, progress:
 def pictures(replay: Replay, gain: float, frames: Sequence[int]) -> Iterator[Pixels]:
     """Pictures of some frames, the first of them twice. Raises InputError where nothing draws."""
     os.environ.setdefault("MUJOCO_GL", "egl")  # read once, as MuJoCo is imported
-    import mujoco
-
+    try:
+        import mujoco
+    except Exception as error:  # each library for drawing has errors of its own
+        raise _nothing_draws() from error
     from identify.view.stage import Stage
 
     stage, below = Stage.of(replay), strips(replay, WIDTH, BELOW)
     try:
         renderer = mujoco.Renderer(stage.model, HEIGHT, WIDTH)
-    except Exception as error:  # each library for drawing has errors of its own
-        raise InputError(
-            f"--video draws with {os.environ['MUJOCO_GL']}, which does not work here; install EGL "
-            "(libegl1) or OSMesa (libosmesa6, and set MUJOCO_GL=osmesa), or give --html"
-        ) from error
+    except Exception as error:
+        raise _nothing_draws() from error
     with renderer:
         for frame in [*frames[:1], *frames]:
             stage.pose(replay, frame, gain)
@@ -72,6 +71,13 @@ def pictures(replay: Replay, gain: float, frames: Sequence[int]) -> Iterator[Pix
             picture, beside = renderer.render().copy(), panel(replay, frame, gain)
             picture[: len(beside), :WIDE] = beside[:HEIGHT]
             yield np.concatenate([picture, at_time(below, frame / len(replay))])
+
+
+def _nothing_draws() -> InputError:
+    return InputError(
+        f"--video draws with {os.environ['MUJOCO_GL']}, which does not work here; install EGL "
+        "(libegl1) or OSMesa (libosmesa6, and set MUJOCO_GL=osmesa), or give --html"
+    )
 
 
 def _encoder() -> str:

@@ -230,6 +230,17 @@ def test_what_cannot_be_shown_is_one_line(log, tmp_path, monkeypatch) -> None:
         assert "no display" in refusal("view", "l.mcap", folder=tmp_path)
 
 
+def test_a_video_without_what_draws_is_one_line(log, tmp_path, monkeypatch) -> None:
+    from twin.logs import write_log
+
+    write_log(log, tmp_path / "l.mcap")
+    monkeypatch.setenv("MUJOCO_GL", "pencil")
+    done = process("view", "l.mcap", "--video", "v.mp4", folder=tmp_path)
+    assert done.returncode == 2
+    assert re.fullmatch(r"twin: --video (draws with pencil|needs ffmpeg), .*\n", done.stderr)
+    assert not (tmp_path / "v.mp4").exists()
+
+
 def test_a_video_has_pictures_that_differ(log, tmp_path) -> None:
     from twin.logs import write_log
 
