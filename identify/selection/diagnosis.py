@@ -139,12 +139,13 @@ def _proved(found: Found) -> tuple[Found, tuple[Finding, ...]]:
     findings = findings_of(found)
     # A curve whose band holds the law everywhere tells nothing beside other findings.
     sure = [f for f in findings if f.is_sure] or findings
-    doubted = [f for f in findings if replace(f.score, among=1).refused or f not in sure]
+    no = {f.effect: f.doubt or replace(f.score, among=1).refused for f in findings}
+    doubted = [f for f in findings if no[f.effect] or f not in sure]
     if not doubted:
         return found, findings
     weakest = min(doubted, key=lambda f: f.score.part)
     rest = _proved(without_law(weakest.effect, found))
-    if weakest.score.refused or len(rest[1]) == len(findings) - 1:
+    if no[weakest.effect] or len(rest[1]) == len(findings) - 1:
         return rest
     return found, findings  # others need the curve, whatever its band
 

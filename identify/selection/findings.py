@@ -12,10 +12,11 @@ from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.bends import Bend
 from identify.selection.bent_curve import bent_curve
+from identify.selection.candidates import doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.confidence import confidence
 from identify.selection.found_shape import FoundShape, found_shape
-from identify.selection.search import Found, Step
+from identify.selection.search import Found, Step, parameters
 from twin.model.machine import AxisModel
 
 
@@ -59,6 +60,7 @@ class Finding:
     bend: Bend | None = None
     left: float = 1.0
     left_fitted: float = 1.0
+    doubt: str | None = None
     parameter_units: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -154,6 +156,7 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
         score=beside,
         kind=FindingKind.MISSING if added else FindingKind.WRONG_SHAPE,
         together=tuple(others) if any(s.with_others for s in steps) else (),
+        doubt=doubt(less, final.fit, steps[0].change.effect, parameters(steps[0].change)),
     )
     for step in steps:
         finding = _shaped(finding, step.change, less.fit, found)
