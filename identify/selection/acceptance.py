@@ -10,7 +10,8 @@ thresholds (``RULE``):
   that were not fitted, whichever is less, as either alone can be imitated. Nothing is taken
   typically by what makes the whole error rise.
 * t: the logarithmic gain over blocks over its standard error; on the training logs less what as
-  many parameters take of noise. The more changes were tried, the more is asked (Bonferroni).
+  many parameters take of noise. Each group of logs has to show it by itself, and the more changes
+  were tried, the more is asked of both together (Bonferroni, Stouffer).
 * control: the part that the same change takes where it is true to nothing (``controls``).
 """
 
@@ -76,6 +77,11 @@ class Score:
         return min(self.training.t, self.other.t)
 
     @property
+    def together(self) -> float:
+        """The t of both groups of logs together (S. A. Stouffer)."""
+        return float((self.training.t + self.other.t) / np.sqrt(2.0))
+
+    @property
     def part(self) -> float:
         """The smaller of the two."""
         return min(self.training.part, self.other.part)
@@ -85,8 +91,9 @@ class Score:
         """Why the change is not accepted, in words; None where it is."""
         if self.part < RULE.least_part:
             return f"takes {100.0 * max(self.part, 0.0):.0f} % of what is left"
-        if self.t < (least := least_t(self.among)):
-            return f"gain uncertain: t = {self.t:.1f}, where {least:.1f} is sure"
+        for t, least in ((self.t, least_t(1)), (self.together, least_t(self.among))):
+            if t < least:
+                return f"gain uncertain: t = {t:.1f}, where {least:.1f} is sure"
         if self.part <= self.control:
             return f"its controls take {100.0 * self.control:.0f} %"
         return None

@@ -44,7 +44,7 @@ from identify.selection.changes import (
     reshaped_of,
 )
 from identify.selection.controls import Trial
-from twin.effect import Effect
+from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.memory import give_back
 from twin.model.machine import AxisModel
@@ -437,6 +437,13 @@ def _is_held(change: Change, without: Judged, fit: Judged) -> bool:
     return bool(np.sum(unabsorbed(own, without.fit.basis) ** 2) < OUTSIDE * np.sum(own**2))
 
 
+def _is_of_another(change: Change, axis: AxisModel) -> bool:
+    """Whether a change is a curve of a friction in whose place the axis has another by now."""
+    if not isinstance(change, Reshaped) or change.law.effect.kind is not Kind.FRICTION:
+        return False
+    return any(f.effect.kind is Kind.FRICTION and f.effect.name != change.name for f in axis.effects)
+
+
 def _needed(
     judged: Judged, steps: tuple[Step, ...], first: Judged
 ) -> tuple[Judged, tuple[Step, ...]]:
@@ -450,7 +457,9 @@ def _needed(
             if isinstance(steps[-1].change, Reshaped) and _is_held(step.change, without, judged):
                 steps = tuple(replace(s, held=True) if s is step else s for s in steps)
                 continue
-            if _is_needed(step.change, without, judged):
+            if not _is_of_another(step.change, judged.fit.axis) and _is_needed(
+                step.change, without, judged
+            ):
                 # The shapes of later effects were found beside this one; they may differ without.
                 again = fit_thoroughly(without.fit.axis, judged.dataset, judged.fit.begun)
                 without = Judged(again, judged.dataset)
