@@ -15,7 +15,9 @@ from identify.selection.candidates import Candidate
 from identify.selection.changes import Added
 from identify.selection.findings import Finding, FindingKind, findings_of, without_law
 from identify.selection.search import Found, Step, Tried, is_level, search
+from twin.effect import Kind
 from twin.effects import Catalogue
+from twin.model.machine import Fitted
 from twin.progress import Progress, silent
 
 SEEN = (3.0, 0.02)  # t and part from which a change is real, and worth a word, though too small
@@ -174,7 +176,7 @@ def _compared_again(step: Step, found: Found) -> Step:
     final = found.final
     names = {s.change.name for s in found.steps}
     axis = step.change.undone(final.fit.axis, found.base.fit.axis)
-    if axis is None or not step.level:
+    if axis is None:
         return replace(step, level=())
     own = replace(step.tried, judged=final)
 
@@ -184,10 +186,20 @@ def _compared_again(step: Step, found: Found) -> Step:
         if rival.change.name in names:
             return False
         law = rival.judged.fit.axis[rival.change.name]
-        fit = fit_axis(axis.with_effect(law), found.dataset.fit)
+        laws = [law]
+        if law.effect.kind is Kind.FRICTION:  # whose values were those of another model
+            laws.append(_with_values_of(final.fit.axis[step.change.name], law))
+        fits = (fit_axis(axis.with_effect(each), found.dataset.fit) for each in laws)
+        fit = min(fits, key=lambda f: f.error)
         return is_level(replace(rival, judged=Judged(fit, found.dataset)), own)
 
-    return replace(step, level=tuple(t for t in step.level if beside(t)))
+    return replace(step, level=tuple(t for t in (*step.level, *step.rivals) if beside(t)))
+
+
+def _with_values_of(other: Fitted, law: Fitted) -> Fitted:
+    """A law with the values of another, where both have a parameter of that name."""
+    free = {n: v for n, v in other.values.items() if n in law.values and n not in law.fixed}
+    return replace(law, values={**law.values, **free})
 
 
 def _small(found: Found) -> tuple[str, ...]:

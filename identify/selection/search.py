@@ -72,6 +72,7 @@ class Tried:
 class Step:
     """A change that was accepted, and those that are level with it.
 
+    rivals: other frictions that were accepted in its place; beside later changes they may be level.
     with_others: whether it is accepted only together with another step. held: whether a later free
     curve can make its force too, and so tells nothing against it. dropped: names of earlier changes
     that were not needed any more beside it.
@@ -79,6 +80,7 @@ class Step:
 
     tried: Tried
     level: tuple[Tried, ...] = ()
+    rivals: tuple[Tried, ...] = ()
     with_others: bool = False
     held: bool = False
     dropped: tuple[str, ...] = ()
@@ -175,12 +177,13 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         step("all values refitted", 0, 1)
         judged, steps = _needed(new[-1].tried.judged, (*steps, *new), first)
         passed[-1] = steps[-1]  # which tells what it made needless
+        judged, bent = _bent(judged, steps)
+        passed, steps = [*passed, *bent], (*steps, *bent)
         if judged.at_floor:
             break
         fit = fit_thoroughly(judged.fit.axis, judged.dataset, judged.fit.begun)
         dataset, fit = synchronised(fit, judged.dataset)
         judged = _settled(Judged(fit, dataset))
-    judged, steps = _bent(judged, steps)
     first = (
         first if first.dataset is judged.dataset else _refitted_on(first.fit.axis, first, judged)
     )
@@ -188,18 +191,19 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
 
 
 def _bent(judged: Judged, steps: tuple[Step, ...]) -> tuple[Judged, tuple[Step, ...]]:
-    """The fit and the steps with exponents set free that are others than their laws hold.
+    """The fit with the exponents of added laws free that are others than these hold, and the steps.
 
     A law of another exponent is another law, however little its exponent takes of what is left.
     """
     added = {s.change.name for s in steps if isinstance(s.change, Added)}
+    out: tuple[Step, ...] = ()
     for change in (c for c in freed_of(judged.fit.axis) if c.name in added):
         look = Look(change, 0.0, (change.free(judged.fit.axis),))
         freed = judged_change(judged, look, change.refit(judged, look))
         asked = freed.candidate.delta_bic > RULE.least_bic and not freed.candidate.doubt
         if asked and freed.candidate.gain.t > -least_t(1):  # other logs do not contradict it
-            judged, steps = freed.judged, (*steps, Step(freed))
-    return judged, steps
+            judged, out = freed.judged, (*out, Step(freed))
+    return judged, out
 
 
 def _settled(judged: Judged) -> Judged:
@@ -380,7 +384,14 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         best = max(lowering, key=lambda t: t.candidate.part)
     level = [t for t in lowering if t is not best and is_level(t, best)]
     first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))
-    return [Step(first, tuple(t for t in (best, *level) if t is not first))]
+    level = [t for t in (best, *level) if t is not first]
+    frictions = [t for t in proved if t not in (first, *level) and _is_friction(t.change)]
+    rivals = frictions if _is_friction(first.change) else []
+    return [Step(first, tuple(level), tuple(rivals))]
+
+
+def _is_friction(change: Change) -> bool:
+    return isinstance(change, Added) and change.effect.kind is Kind.FRICTION
 
 
 def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Tried]:
