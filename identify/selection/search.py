@@ -452,7 +452,8 @@ def _is_of_another(change: Change, axis: AxisModel) -> bool:
     """Whether a change is a curve of a friction in whose place the axis has another by now."""
     if not isinstance(change, Reshaped) or change.law.effect.kind is not Kind.FRICTION:
         return False
-    return any(f.effect.kind is Kind.FRICTION and f.effect.name != change.name for f in axis.effects)
+    frictions = (f.effect for f in axis.effects if f.effect.kind is Kind.FRICTION)
+    return any(e.name != change.name for e in frictions)
 
 
 def _needed(
