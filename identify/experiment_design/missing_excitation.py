@@ -110,14 +110,19 @@ FEATURES = (
 )  # fmt: skip
 
 
-def gap(motion: PreparedLog, where: Array, logs: Sequence[PreparedLog]) -> Gap:
+def gap(
+    motion: PreparedLog,
+    where: Array,
+    logs: Sequence[PreparedLog],
+    features: Sequence[Feature] = FEATURES,
+) -> Gap:
     """The property of motion for which the logs have least data where the explanations differ.
 
     where: squared difference (n_test_functions,) on the planned motion. Among properties with
     equally few data, the one whose range singles out the difference best.
     """
     found = []
-    for feature in FEATURES:
+    for feature in features:
         values = feature.of(motion)
         low, high = _weighted_quantiles(values, where)
         if not high > 0.0 or feature.at_rest(motion, high):

@@ -8,14 +8,11 @@ import pytest
 from constructed import SHORT, moved, windowed
 
 from identify.dataset.prepared_log import REST_SPEED
-from identify.experiment_design import missing_excitation as coverage
 from identify.experiment_design.missing_excitation import (
     FEATURES,
     RARE,
     Feature,
     Gap,
-    _inside,
-    _weighted_quantiles,
     gap,
 )
 from identify.output.words.plan import gap_in_words
@@ -57,18 +54,6 @@ def test_a_rest_is_the_time_stood_before_the_motion():
         np.testing.assert_allclose(FEATURE["rest before the motion"].of(log), wanted)
         assert wanted.max() == pytest.approx(rounded)
     assert FEATURE["distance since the last reversal"].unit == "m"
-
-
-def test_quantiles_are_those_of_the_weight():
-    rng = np.random.default_rng(1)
-    values, weights = rng.normal(size=200), rng.integers(0, 5, 200).astype(float)
-    repeated = np.sort(np.repeat(values, weights.astype(int)))
-    n = len(repeated)
-    low, high = _weighted_quantiles(values, weights)
-    assert low == repeated[int(np.ceil(0.25 * n)) - 1]
-    assert high == repeated[int(np.ceil(0.75 * n)) - 1]
-    assert _weighted_quantiles(values, 0.0 * weights) == (values.min(), values.max())
-    assert _inside(np.array([1.0, 2.0, 3.0, 4.0]), 2.0, 3.0) == 0.5
 
 
 def test_the_gap_is_where_the_difference_is_and_the_data_are_not():
@@ -122,7 +107,7 @@ class Windows(dict):
         ((10, 20), (1, 0), "a"),
     ],
 )
-def test_a_gap_weighs_how_much_is_missed_by_how_well_it_tells(monkeypatch, inside, shares, wanted):
+def test_a_gap_weighs_how_much_is_missed_by_how_well_it_tells(inside, shares, wanted):
     """Windows of the difference have 1 to 2 of a feature, so have some others, and some data."""
     names = ("a", "b")
     ones = np.tile([1.0, 1.5, 1.5, 1.5, 2.0], 2)
@@ -131,12 +116,10 @@ def test_a_gap_weighs_how_much_is_missed_by_how_well_it_tells(monkeypatch, insid
         parts = [np.concatenate([first, np.full(n, 1.5), np.full(100 - n, 9.0)]) for n in counts]
         return Windows(zip(names, parts, strict=True), still=np.zeros(len(parts[0])))
 
-    monkeypatch.setattr(
-        coverage, "FEATURES", [Feature(n, "m", lambda log, n=n: log[n]) for n in ("still", *names)]
-    )
+    features = [Feature(n, "m", lambda log, n=n: log[n]) for n in ("still", *names)]
     planned = log([n - 10 for n in inside], ones)
     where = np.concatenate([np.ones(10), np.zeros(100)])
-    found = gap(planned, where, [log(shares, np.zeros(0))])
+    found = gap(planned, where, [log(shares, np.zeros(0))], features)
     assert found.feature == wanted
     assert found.share == pytest.approx(shares[names.index(wanted)] / 100.0)
     assert (found.low, found.high) == (1.5, 1.5)
