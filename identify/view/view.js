@@ -1,7 +1,7 @@
 "use strict";
 const data = JSON.parse(document.getElementById("data").textContent);
 const at = (id) => document.getElementById(id);
-const AHEAD = 0.998, FINE = 32, GHOST = [0.2, 0.55, 1.0, 0.45], MARK = [1.0, 0.45, 0.05, 1.0];
+const FINE = 32, GHOST = [0.08, 0.42, 1.0, 0.55], MARK = [1.0, 0.45, 0.05, 1.0];
 
 // Signals: 16 bits a value, NaN where there is none.
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
