@@ -23,15 +23,19 @@ LONGEST_WAIT = 300.0  # s for what another worker compiles
 # begin first, so that the workers end together.
 LONGEST = (
     "test_types",
+    "test_points",
     "test_catalogue_laws",
     "test_catalogue_recovery",
     "test_readme",
-    "test_compiled",
+    "test_laws_units",
     "test_chapters",
+    "test_one_dataset",
+    "test_laws_command_line",
     "test_plan",
+    "test_search",
+    "test_machines",
     "test_report",
-    "test_any_machine",
-    "test_nonparametric",
+    "test_floor",
 )
 
 

@@ -134,20 +134,24 @@ def test_nothing_planted_nothing_named(seed):
     assert any(h.given for h in found.held)
 
 
-def test_trials_in_small_name_what_is_planted_and_nothing_else():
-    """Among a few effects, on logs of 5 s at a low rate; machines of every kind take long."""
+def in_small(*rivals: str) -> Setting:
+    """Logs of 4 s at a low rate, and these effects beside the stage's own."""
     stage = load_model(STANDARD, CATALOGUE)
-    rivals = ("cogging", "quadratic_drag", "actuator_delay", "coulomb_viscous", "wear")
     own = {n for axis in stage.axes.values() for n in axis.names}
     few = Catalogue([e for n, e in CATALOGUE.items() if n in own.union(rivals)])
-    setting = Setting(replace(stage, sample_rate=2500.0), few, 5.0)
-    # Twenty times the floor: far above what a log of 5 s needs, so any seed will do.
-    hidden = run(Case(("quadratic_drag",), 20.0, 1), setting)
+    return Setting(replace(stage, sample_rate=2500.0), few, 4.0)
+
+
+def test_trials_in_small_name_what_is_planted_and_nothing_else():
+    # Twenty times the floor: far above what a log of 4 s needs, so any seed will do.
+    case = Case(("quadratic_drag",), 20.0, 1)
+    hidden = run(case, in_small("cogging", "quadratic_drag", "coulomb_viscous", "wear"))
     assert hidden.right
     assert hidden.left < 1.3 < 5.0 < hidden.ratio
     assert hidden.tested > 0.8  # noise is left on any log
     assert hidden.held
-    unknown = run(Case(("quadratic_drag",), 20.0, 1, known=False), setting)
+    unknown = run(replace(case, known=False), in_small("quadratic_drag"))
+    assert unknown.shown
     assert not unknown.named
 
 

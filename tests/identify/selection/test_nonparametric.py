@@ -31,6 +31,7 @@ from twin.simulator import MujocoSimulator, ReducedSimulator
 CATALOGUE = load_catalogue()
 RATE = 2500.0  # Hz: quicker than 10 kHz, and enough for curves over the travel
 STAGE = replace(one_axis(load_model("proton_xy", CATALOGUE)), sample_rate=RATE)
+QUICK = replace(STAGE, sample_rate=1000.0)
 MAP, LEARNED = "empirical_map", "learned_residual"
 SLOW = pytest.mark.slow
 DESCRIPTIONS = pytest.mark.parametrize("name", [MAP, LEARNED])
@@ -70,14 +71,14 @@ def chirp(tmp_path_factory: pytest.TempPathFactory) -> Effect:
 @pytest.fixture(scope="module")
 def chirping(chirp: Effect) -> tuple[Logs, Logs]:
     """Two logs of a machine with the chirp, and one held out."""
-    machine = with_x(chirp, a=CHIRP)
-    return recorded(machine, (1, 2), 8.0), recorded(machine, (3,), 8.0)
+    machine = replace(with_x(chirp, a=CHIRP), sample_rate=QUICK.sample_rate)
+    return recorded(machine, (1, 2), SHORT), recorded(machine, (3,), SHORT)
 
 
 @pytest.fixture(scope="module")
 def mapped(chirping: tuple[Logs, Logs]) -> Addition:
     """The stage with a map added for the chirp."""
-    return add(CATALOGUE[MAP], STAGE, *chirping)
+    return add(CATALOGUE[MAP], QUICK, *chirping)
 
 
 @cache
@@ -179,7 +180,7 @@ def test_pure_noise_is_not_described(name: str, judged: str) -> None:
 def test_a_refit_smooths_as_was_chosen(
     name: str, chirping: tuple[Logs, Logs], mapped: Addition
 ) -> None:
-    added = mapped if name == MAP else add(CATALOGUE[name], STAGE, *chirping)
+    added = mapped if name == MAP else add(CATALOGUE[name], QUICK, *chirping)
     first = added.candidate.fit
     again = fit_axis(first.axis, first.logs)
     assert again.error == pytest.approx(first.error, rel=0.05)
