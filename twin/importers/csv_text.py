@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from twin.errors import InputError
-from twin.importers.mapping import CsvLayout, ImportMap
+from twin.importers.mapping import ImportMap
 from twin.importers.table import Table, chosen, parsing
 from twin.logs.log import Array
 
@@ -156,7 +156,7 @@ class _Layout:
 def read(path: Path, mapping: ImportMap) -> Table:
     """Columns of a text table; raises InputError."""
     with parsing("a text table"):
-        layout = _find_layout(path, mapping.csv)
+        layout = _find_layout(path, mapping)
         wanted = chosen(mapping.column_names(), layout.names)
         where = [layout.names.index(name) for name in wanted]
         try:
@@ -185,7 +185,7 @@ def _lines(path: Path, layout: _Layout) -> Generator[str]:
         yield from (line.replace(",", ".") for line in rows) if comma else rows
 
 
-def _find_layout(path: Path, stated: CsvLayout) -> _Layout:
+def _find_layout(path: Path, stated: ImportMap) -> _Layout:
     with open(path, "rb") as stream:
         head = stream.read(_HEAD_BYTES)
         whole = not stream.read(1)
@@ -216,7 +216,7 @@ def _encoding(head: bytes) -> str:
     return "utf-8"
 
 
-def _find_style(lines: Sequence[str], stated: CsvLayout) -> _Style:
+def _find_style(lines: Sequence[str], stated: ImportMap) -> _Style:
     delimiters = (stated.delimiter,) if stated.delimiter else _DELIMITERS
     decimals = (stated.decimal,) if stated.decimal else (".", ",")
     styles = [_Style(d, p) for d in delimiters for p in decimals if d != p]

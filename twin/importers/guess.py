@@ -12,7 +12,7 @@ import numpy as np
 
 from twin.errors import InputError
 from twin.importers.importer import table_of
-from twin.importers.mapping import ImportMap
+from twin.importers.mapping import EVERY_COLUMN
 from twin.importers.signals import (
     ASKED,
     OTHER,
@@ -52,7 +52,7 @@ class Guess:
 def guess_map(path: Path) -> Guess:
     """A map for a file of any of the formats; raises InputError where it has no columns."""
     with reading(path):
-        table = table_of(path, ImportMap({}))
+        table = table_of(path, EVERY_COLUMN)
         columns = _distinct(table.columns)
         if not columns:
             raise InputError("has no column of numbers; give another file")

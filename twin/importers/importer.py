@@ -36,9 +36,10 @@ class Together:
 
 def read_together(paths: Sequence[Path], mapping: ImportMap, read: Read) -> Together:
     """The columns of all files where all have samples; raises InputError."""
-    if len(paths) != len(mapping.files):
+    files = mapping.files or []
+    if len(paths) != len(files):
         raise InputError(
-            f"{len(paths)} files are given, the map has {len(mapping.files)} [[files]] tables; "
+            f"{len(paths)} files are given, the map has {len(files)} [[files]] tables; "
             "give one for each, in the same order"
         )
     assert mapping.resample is not None
@@ -48,7 +49,7 @@ def read_together(paths: Sequence[Path], mapping: ImportMap, read: Read) -> Toge
         own = mapping.of_file(number)
         with reading(path):
             columns, times, digest = read(path, own)
-            times = times + mapping.files[number - 1].offset
+            times = times + files[number - 1].offset
             clocks.append((own, columns, clock_of(times, mapping.resample)))
             digests.append(digest)
     grid = _common(paths, [clock for _, _, clock in clocks], mapping.resample)
@@ -58,7 +59,7 @@ def read_together(paths: Sequence[Path], mapping: ImportMap, read: Read) -> Toge
         notes[f"resampled_{number}"] = shared.costs(own, columns)
         for c in mapping.columns():
             if c.file == number:
-                out[c.key] = shared.resampled(columns[c.column])
+                out[c.key] = shared.resampled(columns[c.name])
     return Together(out, tuple(digests), notes, float(grid[0]))
 
 
@@ -137,7 +138,7 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
         if own.time is None:
             rate, count = _sample_rate(table, own, columns), _common_length(columns)
             return columns, np.arange(count) / rate, facts["original_sha256"]
-        times = own.time.to_si(columns[own.time.column])
+        times = own.time.to_si(columns[own.time.name])
         if start is not None and not is_calendar(times[0]):  # dates: seconds since the first
             times = times - times[0] + int(start) * 1e-9
         return columns, times, facts["original_sha256"]
@@ -185,9 +186,9 @@ def _on_one_clock(
     """The columns resampled, and for the metadata what that cost."""
     assert mapping.time is not None
     assert mapping.resample is not None
-    with at(f"column '{mapping.time.column}'"):
-        clock = clock_of(mapping.time.to_si(columns[mapping.time.column]), mapping.resample)
-    even = {n: clock.resampled(c) for n, c in columns.items() if n != mapping.time.column}
+    with at(f"column '{mapping.time.name}'"):
+        clock = clock_of(mapping.time.to_si(columns[mapping.time.name]), mapping.resample)
+    even = {n: clock.resampled(c) for n, c in columns.items() if n != mapping.time.name}
     return even, {"resampled": clock.costs(mapping, columns)}
 
 
@@ -197,10 +198,10 @@ def _start(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> di
         return {"start_time_unix_ns": str(table.start_ns)}
     if mapping.time is None:
         return {}
-    raw = np.asarray(table.columns[mapping.time.column])
+    raw = np.asarray(table.columns[mapping.time.name])
     if raw.dtype.kind == "M" and len(raw):
         return {"start_time_unix_ns": str(int(raw[0].astype("datetime64[ns]").astype(np.int64)))}
-    first = mapping.time.to_si(columns[mapping.time.column][:1])
+    first = mapping.time.to_si(columns[mapping.time.name][:1])
     if len(first) and is_calendar(first[0]):
         return {"start_time_unix_ns": str(round(float(first[0]) * 1e9))}
     return {}
@@ -238,11 +239,11 @@ def _common_length(columns: Mapping[str, Array]) -> int:
 
 def _sample_rate(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> float:
     if mapping.time is not None:
-        dated = table.columns[mapping.time.column].dtype.kind == "M"
-        if dated and mapping.time.unit.size != 1.0:
-            raise InputError(f"column '{mapping.time.column}' holds dates; state its unit as s")
-        with at(f"column '{mapping.time.column}'"):
-            return rate_of(mapping.time.to_si(columns[mapping.time.column]))
+        dated = table.columns[mapping.time.name].dtype.kind == "M"
+        if dated and mapping.time.seconds != 1.0:
+            raise InputError(f"column '{mapping.time.name}' holds dates; state its unit as s")
+        with at(f"column '{mapping.time.name}'"):
+            return rate_of(mapping.time.to_si(columns[mapping.time.name]))
     rate = mapping.sample_rate or table.sample_rate
     if rate is None:
         raise InputError(

@@ -18,60 +18,133 @@ recorded too late; it is moved back by as many.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field, PrivateAttr
 
-from twin.entries import read_entries, toml_document
+from twin.entries import Entries, read_entries, toml_document
 from twin.errors import InputError, at
 from twin.importers.units import Unit, field_unit, find_unit
 from twin.logs.container import reading
 from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, Array
+from twin.logs.topics import IDENTIFIER
 
-if TYPE_CHECKING:
-    from twin.importers.map_schema import ColumnEntry, MapFile, TimeEntry
+NUMBER = "a finite number"
+AXIS_NAME = rf"^{IDENTIFIER.pattern}$"
+_FORMAT = 'a format in quotes, such as "csv"'
+_TIME = 'a table such as {column = "t", unit = "s"}'
+_RATE = NUMBER + " above 0, in Hz"
 
 
-@dataclass(frozen=True)
-class ColumnMap:
-    """How a column becomes a signal; unit: of the column, file: from 1, the rest as in the map."""
+class TimeMap(Entries):
+    """The column of the time stamps."""
 
-    column: str
-    unit: Unit
-    scale: float = 1.0
-    offset: float = 0.0
-    sign: int = 1
-    delay_samples: int = 0
-    file: int = 1
+    column: str | int = Field(description="a name, or a number where there are no names")
+    unit: str = Field(description='a unit of time in quotes, such as "s", "ms" or "us"')
+
+    @property
+    def name(self) -> str:
+        """Of the column in its file."""
+        return str(self.column)
+
+    @property
+    def seconds(self) -> float:
+        """One of its unit, s; raises InputError for what is no unit of time."""
+        return find_unit(self.unit, "s").size
+
+    def to_si(self, raw: Array) -> Array:
+        """Times (n,) of the column in s."""
+        return np.asarray(self.seconds * raw)
+
+
+class ColumnMap(Entries):
+    """The column of a signal: SI value = sign x (scale x raw + offset) x unit."""
+
+    column: str | int = Field(description="a name, or a number where there are no names")
+    unit: str = Field(description='a unit in quotes, such as "mm", "A", "V" or "counts"')
+    scale: float = Field(1.0, description=NUMBER + " other than 0: SI units a raw one")
+    offset: float = Field(0.0, description=NUMBER + ", in the unit; in SI where a scale brings it")
+    sign: Literal[1, -1] = Field(1, description="1 or -1")
+    delay_samples: int = Field(
+        0, ge=-(10**6), le=10**6,
+        description="a whole number: by how many samples the column was recorded too late",
+    )  # fmt: skip
+    file: int = Field(
+        1, ge=1, le=1000, description="a whole number: which of several files, the first is 1"
+    )
+    _si: Unit = PrivateAttr(Unit(1.0, None))
+
+    @property
+    def name(self) -> str:
+        """Of the column in its file."""
+        return str(self.column)
 
     @property
     def key(self) -> str:
         """A name that no column of another file has."""
-        return self.column if self.file == 1 else f"{self.file}:{self.column}"
+        return self.name if self.file == 1 else f"{self.file}:{self.name}"
+
+    @property
+    def si(self) -> Unit:
+        """Its unit in SI."""
+        return self._si
+
+    def require_unit(self, field: str) -> None:
+        """Find the unit, of a signal of that name; raises InputError where there is none."""
+        self._si = field_unit(field, self.unit)
+        if self.si.si is None and "scale" not in self.model_fields_set:
+            raise InputError(f"unit '{self.unit}' needs a scale: how much one of it is in SI")
+        if self.scale == 0.0:
+            raise InputError("scale = 0: give a number other than 0")
 
     def to_si(self, raw: Array) -> Array:
         """Values (n,) of the column in SI."""
-        factor = self.sign * self.unit.size
+        factor = self.sign * self.si.size
         with np.errstate(over="ignore", invalid="ignore"):  # what is too large is refused later
             return np.asarray(factor * self.scale * raw + factor * self.offset)
 
 
-@dataclass(frozen=True)
-class AxisMap:
-    """Signals of one axis: field of the log -> column; force_constant in N/A (N m/A) or None."""
+_SIGNAL: Any = Field(None, description='a table such as {column = "name in the file", unit = "mm"}')
 
-    columns: Mapping[str, ColumnMap]
-    force_constant: float | None = None
+
+class AxisMap(Entries):
+    """Signals of one axis; force_constant in N/A (N m/A on a rotary axis) or None."""
+
+    force_constant: float | None = Field(
+        None, gt=0.0, description="a number above 0, in N/A (N m/A on a rotary axis)"
+    )
+    setpoint_position: ColumnMap | None = _SIGNAL
+    setpoint_velocity: ColumnMap | None = _SIGNAL
+    setpoint_acceleration: ColumnMap | None = _SIGNAL
+    position: ColumnMap | None = _SIGNAL
+    velocity: ColumnMap | None = _SIGNAL
+    current: ColumnMap | None = _SIGNAL
+    force: ColumnMap | None = _SIGNAL
+
+    @property
+    def columns(self) -> dict[str, ColumnMap]:
+        """Field of the log -> its column."""
+        return {field: c for field in FIELDS if (c := getattr(self, field)) is not None}
 
     @property
     def units(self) -> Mapping[str, str]:
         """SI unit of every field."""
         return ROTARY_UNITS if self._has(ROTARY_UNITS) else LINEAR_UNITS
 
-    def require_one_kind(self) -> None:
-        """Raises InputError where some signals are those of a linear, others of a rotary axis."""
+    def of_file(self, number: int) -> AxisMap:
+        """The same with the columns of one of several files alone."""
+        others = {field: None for field, c in self.columns.items() if c.file != number}
+        return self.model_copy(update=others)
+
+    def require_signals(self) -> None:
+        """Find the units; raises InputError where one or a signal is missing or of another kind."""
+        for field, column in self.columns.items():
+            with at(field):
+                column.require_unit(field)
+        if "position" not in self.columns or not {"current", "force"} & set(self.columns):
+            raise InputError("an axis needs position and one of current and force; map both")
         linear, rotary = self._has(LINEAR_UNITS), self._has(ROTARY_UNITS)
         if linear and rotary:
             raise InputError(
@@ -80,144 +153,120 @@ class AxisMap:
             )
 
     def _has(self, units: Mapping[str, str]) -> list[str]:
-        return [f for f, c in self.columns.items() if c.unit.si == units[f] != "A"]
+        return [f for f, c in self.columns.items() if c.si.si == units[f] != "A"]
 
 
-@dataclass(frozen=True)
-class CsvLayout:
-    """What the map states of a text file; None: found in the file. header_line counts from 1."""
+class FileMap(Entries):
+    """One of several files that are given together, in their order."""
 
-    delimiter: str | None = None
-    decimal: str | None = None
-    header_line: int | None = None
-
-
-@dataclass(frozen=True)
-class FileMap:
-    """One of several files. At most one of sample_rate (Hz) and time; offset: s."""
-
-    sample_rate: float | None
-    time: ColumnMap | None
-    format: str | None
-    offset: float
+    format: str | None = Field(None, description=_FORMAT)
+    sample_rate: float | None = Field(None, gt=0.0, description=_RATE)
+    time: TimeMap | None = Field(None, description=_TIME)
+    offset: float = Field(0.0, description=NUMBER + ", in s, which is added to its times")
 
 
-@dataclass(frozen=True)
-class ImportMap:
-    """A whole map. At most one of sample_rate (Hz) and time. files: where there are several.
+class ImportMap(Entries):
+    """A whole map; at most one of sample_rate and time."""
 
-    resample: Hz of the clock that uneven times are brought onto. text: the map as it was written.
-    """
+    format: str | None = Field(None, description=_FORMAT)
+    sample_rate: float | None = Field(None, gt=0.0, description=_RATE)
+    time: TimeMap | None = Field(None, description=_TIME)
+    resample: float | None = Field(
+        None,
+        gt=0.0,
+        description="a number above 0, in Hz: uneven time stamps are brought onto this clock",
+    )
+    files: list[FileMap] | None = Field(
+        None, min_length=2, description="tables [[files]], one for each file; resample brings "
+        "their columns onto one clock",
+    )  # fmt: skip
+    delimiter: str | None = Field(
+        None, min_length=1, max_length=1, description="one character, such as ';'"
+    )
+    decimal: Literal[".", ","] | None = Field(None, description="'.' or ','")
+    header_line: int | None = Field(None, ge=1, description="a whole number; lines count from 1")
+    axes: dict[Annotated[str, Field(pattern=AXIS_NAME)], AxisMap] = Field(
+        min_length=1,
+        description="a table for each axis, as [axes.x]; an axis name has letters, digits and "
+        "underscores",
+    )  # fmt: skip
+    _text: str = PrivateAttr("")
 
-    axes: Mapping[str, AxisMap]
-    sample_rate: float | None = None
-    time: ColumnMap | None = None
-    format: str | None = None
-    csv: CsvLayout = CsvLayout()
-    text: str = ""
-    resample: float | None = None
-    files: tuple[FileMap, ...] = ()
+    @property
+    def text(self) -> str:
+        """The map as it was written."""
+        return self._text
 
     def columns(self) -> list[ColumnMap]:
         """The columns of all signals."""
         return [c for axis in self.axes.values() for c in axis.columns.values()]
 
-    def of_file(self, number: int) -> ImportMap:
-        """The map of one of several files; raises InputError where no signal is in it."""
-        own = self.files[number - 1]
-        axes = {
-            name: replace(axis, columns={f: c for f, c in axis.columns.items() if c.file == number})
-            for name, axis in self.axes.items()
-        }
-        if not any(axis.columns for axis in axes.values()):
-            raise InputError(f"the map has no signal with file = {number}; leave that file out")
-        return replace(
-            self, axes=axes, files=(), sample_rate=own.sample_rate, time=own.time,
-            format=own.format or self.format,
-        )  # fmt: skip
-
     def column_names(self) -> tuple[str, ...]:
         """The columns that are read, each once."""
-        every = [self.time, *self.columns()] if self.time else self.columns()
-        return tuple(dict.fromkeys(c.column for c in every))
+        names = [self.time.name] if self.time else []
+        return tuple(dict.fromkeys([*names, *(c.name for c in self.columns())]))
+
+    def of_file(self, number: int) -> ImportMap:
+        """The map of one of several files; raises InputError where no signal is in it."""
+        own = (self.files or [])[number - 1]
+        axes = {name: axis.of_file(number) for name, axis in self.axes.items()}
+        if not any(axis.columns for axis in axes.values()):
+            raise InputError(f"the map has no signal with file = {number}; leave that file out")
+        return self.model_copy(
+            update={
+                "axes": axes, "files": None, "sample_rate": own.sample_rate, "time": own.time,
+                "format": own.format or self.format,
+            }
+        )  # fmt: skip
+
+    def require_consistent(self) -> None:
+        """Raise InputError where entries contradict each other, or need one that is not there."""
+        if self.time is not None and self.sample_rate is not None:
+            raise InputError("sample_rate and time are both given; give one of them")
+        if self.files is not None:
+            self._require_clocks(self.files)
+        elif self.resample is not None and self.time is None:
+            raise InputError('resample needs the times; give time = {column = "t", unit = "s"} too')
+        for name, axis in self.axes.items():
+            with at(f"axes.{name}"):
+                axis.require_signals()
+        for time in (self.time, *(file.time for file in self.files or ())):
+            with at("time"):
+                _ = time and time.seconds
+        most, count = max(c.file for c in self.columns()), len(self.files or ())
+        if most > max(count, 1):
+            raise InputError(f"file = {most}: the map has {count} [[files]] tables; add one")
+
+    def _require_clocks(self, files: list[FileMap]) -> None:
+        if self.time is not None or self.sample_rate is not None:
+            raise InputError(
+                "time and sample_rate are those of each file; give them under [[files]]"
+            )
+        if self.resample is None:
+            raise InputError(
+                "several files have several clocks; give resample (Hz), their common one"
+            )
+        for number, file in enumerate(files, 1):
+            if (file.time is None) == (file.sample_rate is None):
+                raise InputError(f"files {number}: give either time or sample_rate (Hz)")
+
+
+EVERY_COLUMN = ImportMap.model_construct(axes={})  # of a file whose columns nobody has named
 
 
 def load_mapping(path: str | Path) -> ImportMap:
     """Read a map; raises InputError naming the file, the entry and what is allowed."""
-    from twin.importers.map_schema import MapFile  # its library takes 0.1 s to load
-
     path = Path(path)
     with reading(path):
         text, document = toml_document(path)
         if not document.get("axes"):
             raise InputError("has no [axes.<name>] table; name at least one axis, as in [axes.x]")
-        return _map(read_entries(MapFile, document), text)
+        mapping = read_entries(ImportMap, document)
+        mapping.require_consistent()
+        mapping._text = text
+        return mapping
 
 
-def _map(entries: MapFile, text: str) -> ImportMap:
-    if entries.time is not None and entries.sample_rate is not None:
-        raise InputError("sample_rate and time are both given; give one of them")
-    if entries.files is not None:
-        _require_files(entries)
-    elif entries.resample is not None and entries.time is None:
-        raise InputError('resample needs the times; give time = {column = "t", unit = "s"} too')
-    axes = {name: _axis(name, entry) for name, entry in entries.axes.items()}
-    files = tuple(
-        FileMap(f.sample_rate, _time(f.time), f.format, f.offset) for f in entries.files or ()
-    )
-    most = max(c.file for axis in axes.values() for c in axis.columns.values())
-    if most > max(len(files), 1):
-        raise InputError(f"file = {most}: the map has {len(files)} [[files]] tables; add one")
-    return ImportMap(
-        axes=axes,
-        sample_rate=entries.sample_rate,
-        time=_time(entries.time),
-        format=entries.format,
-        csv=CsvLayout(entries.delimiter, entries.decimal, entries.header_line),
-        text=text,
-        resample=entries.resample,
-        files=files,
-    )
-
-
-def _require_files(entries: MapFile) -> None:
-    if entries.time is not None or entries.sample_rate is not None:
-        raise InputError("time and sample_rate are those of each file; give them under [[files]]")
-    if entries.resample is None:
-        raise InputError("several files have several clocks; give resample (Hz), their common one")
-    for number, file in enumerate(entries.files or (), 1):
-        if (file.time is None) == (file.sample_rate is None):
-            raise InputError(f"files {number}: give either time or sample_rate (Hz)")
-
-
-def _time(entry: TimeEntry | None) -> ColumnMap | None:
-    if entry is None:
-        return None
-    with at("time"):
-        return ColumnMap(str(entry.column), find_unit(entry.unit, "s"))
-
-
-def _axis(name: str, entry: Any) -> AxisMap:
-    with at(f"axes.{name}"):
-        columns = {}
-        for field in FIELDS:
-            if (column := getattr(entry, field)) is not None:
-                with at(field):
-                    columns[field] = _column(column, field)
-        if "position" not in columns or not {"current", "force"} & set(columns):
-            raise InputError("an axis needs position and one of current and force; map both")
-        axis = AxisMap(columns, entry.force_constant)
-        axis.require_one_kind()
-        return axis
-
-
-def _column(entry: ColumnEntry, field: str) -> ColumnMap:
-    unit = field_unit(field, entry.unit)
-    if unit.si is None and "scale" not in entry.model_fields_set:
-        raise InputError(f"unit '{entry.unit}' needs a scale: how much one of it is in SI")
-    if entry.scale == 0.0:
-        raise InputError("scale = 0: give a number other than 0")
-    return ColumnMap(
-        str(entry.column), unit, entry.scale, entry.offset, entry.sign, entry.delay_samples,
-        entry.file,
-    )  # fmt: skip
+def json_schema() -> dict[str, Any]:
+    """The JSON schema of an import map."""
+    return {**ImportMap.model_json_schema(), "title": "Import map of the Proton twin"}

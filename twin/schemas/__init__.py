@@ -19,12 +19,12 @@ FOLDER = Path(__file__).parent
 def written() -> dict[Path, str]:
     """Each schema file and its text."""
     from twin.effects import load_catalogue
-    from twin.importers import map_schema
+    from twin.importers import mapping
     from twin.model import schema
 
     documents = {
         "model.schema.json": schema.json_schema(load_catalogue()),
-        "map.schema.json": map_schema.json_schema(),
+        "map.schema.json": mapping.json_schema(),
     }
     return {
         FOLDER / name: json.dumps(document, indent=1, ensure_ascii=False) + "\n"
