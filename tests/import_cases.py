@@ -3,6 +3,8 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
+from scipy.io import savemat
 
 from twin.importers import ImportMap, load_mapping
 
@@ -41,3 +43,58 @@ def write_csv(path: Path, columns: dict[str, np.ndarray], delimiter: str = ",") 
     rows = zip(*columns.values(), strict=True)
     lines = [delimiter.join(columns), *(delimiter.join(repr(float(v)) for v in r) for r in rows)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_mat(path: Path, columns: dict[str, np.ndarray]) -> None:
+    savemat(path, {**columns, "gain": 3.0, "title": "run 7"})
+
+
+def write_mat_struct(path: Path, columns: dict[str, np.ndarray]) -> None:
+    savemat(path, {"run": {"data": columns}})
+
+
+def write_mat_matrix(path: Path, columns: dict[str, np.ndarray]) -> None:
+    savemat(path, {"log": np.column_stack(list(columns.values()))})
+
+
+def write_mat73(path: Path, columns: dict[str, np.ndarray]) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, column in columns.items():
+            file[f"run/{name}"] = column[None, :]  # MATLAB writes a column as one row
+        file["#refs#/a"] = np.arange(3.0)
+    with open(path, "r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file".ljust(512, b" "))
+
+
+def write_hdf5(path: Path, columns: dict[str, np.ndarray]) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        for name, column in columns.items():
+            file[f"run/{name}"] = column
+
+
+def write_hdf5_records(path: Path, columns: dict[str, np.ndarray]) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        records = np.empty(
+            len(next(iter(columns.values()))),
+            [(name, column.dtype) for name, column in columns.items()],
+        )
+        for name, column in columns.items():
+            records[name] = column
+        file["log"] = records
+
+
+def write_parquet(path: Path, columns: dict[str, np.ndarray]) -> None:
+    pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    parquet.write_table(pyarrow.table(columns), path, row_group_size=100)
+
+
+def write_tdms(path: Path, columns: dict[str, np.ndarray]) -> None:
+    """Of a waveform at RATE."""
+    nptdms = pytest.importorskip("nptdms")
+    period = {"wf_increment": 1.0 / RATE}
+    channels = [nptdms.ChannelObject("run", n, c, period) for n, c in columns.items()]
+    with nptdms.TdmsWriter(str(path)) as writer:
+        writer.write_segment(channels)

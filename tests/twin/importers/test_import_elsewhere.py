@@ -254,19 +254,3 @@ force = {column = "q", unit = "N"}
 """
     with pytest.raises(InputError, match=r"gap: 2023-11-14 22:13:20\.199 UTC is followed by 2023"):
         imported(tmp_path, "a.csv", text)
-
-
-@pytest.mark.parametrize(
-    ("unit", "size"), [("kip", 4448.2216), ("lbf", 4.4482216), ("in", 0.0254), ("ozf", 0.27801385)]
-)
-def test_units_of_a_library(tmp_path, unit, size):
-    rows = [f"{float(q)!r},{float(q)!r}" for q in Q]
-    (tmp_path / "a.csv").write_text("\n".join(["a,b", *rows]) + "\n")
-    own = {"position": "m", "force": "N"} | {"position" if unit == "in" else "force": unit}
-    text = "sample_rate = 1000.0\n[axes.x]\n" + "\n".join(
-        f'{field} = {{column = "{c}", unit = "{u}"}}'
-        for (field, u), c in zip(own.items(), "ab", strict=True)
-    )
-    axis = imported(tmp_path, "a.csv", text).axes["x"]
-    got = axis.position if unit == "in" else axis.force
-    np.testing.assert_allclose(got, size * Q, rtol=1e-7)

@@ -7,65 +7,29 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from import_cases import COUNT, MAP, RATE, mapping, table, write_csv
-from scipy.io import loadmat, savemat
+from import_cases import (
+    COUNT,
+    MAP,
+    RATE,
+    mapping,
+    table,
+    write_csv,
+    write_hdf5,
+    write_hdf5_records,
+    write_mat,
+    write_mat73,
+    write_mat_matrix,
+    write_mat_struct,
+    write_parquet,
+    write_tdms,
+)
+from scipy.io import loadmat
 
 from twin.errors import InputError
 from twin.importers import import_log, load_mapping
 from twin.logs import read_log, write_log
 
 EMPS_MAP = Path(__file__).parents[3] / "examples" / "import_emps.toml"
-
-
-def write_mat(path: Path, columns: dict[str, np.ndarray]) -> None:
-    savemat(path, {**columns, "gain": 3.0, "title": "run 7"})
-
-
-def write_mat_struct(path: Path, columns: dict[str, np.ndarray]) -> None:
-    savemat(path, {"run": {"data": columns}})
-
-
-def write_mat_matrix(path: Path, columns: dict[str, np.ndarray]) -> None:
-    savemat(path, {"log": np.column_stack(list(columns.values()))})
-
-
-def write_mat73(path: Path, columns: dict[str, np.ndarray]) -> None:
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w", userblock_size=512) as file:
-        for name, column in columns.items():
-            file[f"run/{name}"] = column[None, :]  # MATLAB writes a column as one row
-        file["#refs#/a"] = np.arange(3.0)
-    with open(path, "r+b") as stream:
-        stream.write(b"MATLAB 7.3 MAT-file".ljust(512, b" "))
-
-
-def write_hdf5(path: Path, columns: dict[str, np.ndarray]) -> None:
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w") as file:
-        for name, column in columns.items():
-            file[f"run/{name}"] = column
-
-
-def write_hdf5_records(path: Path, columns: dict[str, np.ndarray]) -> None:
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w") as file:
-        records = np.empty(COUNT, [(name, column.dtype) for name, column in columns.items()])
-        for name, column in columns.items():
-            records[name] = column
-        file["log"] = records
-
-
-def write_parquet(path: Path, columns: dict[str, np.ndarray]) -> None:
-    pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
-    parquet.write_table(pyarrow.table(columns), path, row_group_size=100)
-
-
-def write_tdms(path: Path, columns: dict[str, np.ndarray]) -> None:
-    nptdms = pytest.importorskip("nptdms")
-    period = {"wf_increment": 1.0 / RATE}
-    channels = [nptdms.ChannelObject("run", n, c, period) for n, c in columns.items()]
-    with nptdms.TdmsWriter(str(path)) as writer:
-        writer.write_segment(channels)
 
 
 Write = Callable[[Path, dict[str, np.ndarray]], None]
@@ -188,28 +152,6 @@ def test_columns_of_different_length_are_refused(tmp_path: Path) -> None:
     write_mat(tmp_path / "log.mat", {**table(), "i": np.arange(COUNT - 1)})
     with pytest.raises(InputError, match="column 'q' has 300 rows, 'i' has 299"):
         import_log(tmp_path / "log.mat", mapping(tmp_path))
-
-
-@pytest.mark.parametrize(("delay", "first"), [(3, 0), (-3, 3)])
-def test_a_delay_is_undone(tmp_path: Path, delay: int, first: int) -> None:
-    """The position at t_k stands ``delay`` rows below the current at t_k."""
-    write_mat(tmp_path / "log.mat", table())
-    text = MAP.replace("sign = -1", f"delay_samples = {delay}")
-    log = import_log(tmp_path / "log.mat", mapping(tmp_path, text))
-    axis, columns = log.axes["x"], table()
-    rows = np.arange(first, first + COUNT - 3)
-    assert len(log) == COUNT - 3
-    np.testing.assert_allclose(axis.columns["current"], 1e-3 * columns["i"][rows], rtol=1e-15)
-    np.testing.assert_allclose(
-        axis.position, 1e-3 * (columns["q"][rows + delay] + 2.0), rtol=1e-15, atol=1e-18
-    )
-
-
-def test_a_delay_longer_than_the_log_is_refused(tmp_path: Path) -> None:
-    write_mat(tmp_path / "log.mat", table())
-    text = MAP.replace("sign = -1", "delay_samples = 300")
-    with pytest.raises(InputError, match="leave nothing of 300 rows"):
-        import_log(tmp_path / "log.mat", mapping(tmp_path, text))
 
 
 def test_an_unknown_ending_or_format_is_refused(tmp_path: Path) -> None:

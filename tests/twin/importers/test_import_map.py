@@ -3,12 +3,11 @@
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from twin.errors import InputError
 from twin.importers import ImportMap, load_mapping
-from twin.importers.units import field_unit, find_unit
+from twin.importers.units import find_unit
 
 GOOD = """
 sample_rate = 1000.0
@@ -33,32 +32,6 @@ def test_the_map_keeps_its_text_and_names_its_columns_once(tmp_path: Path) -> No
     assert mapping.sample_rate == 1000.0
     assert mapping.axes["y"].force_constant == 53.4
     assert mapping.axes["x"].units["force"] == "N"
-
-
-@pytest.mark.parametrize(
-    ("field", "unit", "size", "si"),
-    [
-        ("position", "mm", 1e-3, "m"),
-        ("position", "um", 1e-6, "m"),
-        ("position", "µm", 1e-6, "m"),
-        ("position", "μm", 1e-6, "m"),
-        ("position", "nm", 1e-9, "m"),
-        ("position", "deg", np.pi / 180, "rad"),
-        ("position", "rev", 2 * np.pi, "rad"),
-        ("setpoint_velocity", "mm/s", 1e-3, "m/s"),
-        ("velocity", "rpm", 2 * np.pi / 60, "rad/s"),
-        ("setpoint_acceleration", "mm/s²", 1e-3, "m/s^2"),
-        ("setpoint_acceleration", "um/ms2", 1.0, "m/s^2"),
-        ("current", "mA", 1e-3, "A"),
-        ("force", "kN", 1e3, "N"),
-        ("force", "mN·m", 1e-3, "N m"),
-        ("force", "V", 1.0, None),
-    ],
-)
-def test_units(field: str, unit: str, size: float, si: str | None) -> None:
-    found = field_unit(field, unit)
-    assert found.size == pytest.approx(size, rel=1e-12)
-    assert found.si == si
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Uneven time stamps onto one clock, JSON, rarer units, and when a recording began."""
+"""Uneven time stamps onto one clock, JSON, and when a recording began."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import pytest
 
 from twin.errors import InputError
 from twin.importers import import_log, load_mapping
-from twin.importers.units import find_unit
 from twin.logs import Log
 
 MAP = """
@@ -114,20 +113,3 @@ def test_a_damaged_json_file_is_one_line(tmp_path: Path, text: str) -> None:
     with pytest.raises(InputError) as refused:
         import_log(tmp_path / "a.json", load_mapping(tmp_path / "map.toml"))
     assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("unit", "si", "size"),
-    [("kip", "N", 4448.2216), ("lbf", "N", 4.4482216), ("ft", "m", 0.3048),
-     ("lbf*in", "N m", 0.11298483), ("in/s", "m/s", 0.0254)],
-)  # fmt: skip
-def test_rarer_units(unit: str, si: str, size: float) -> None:
-    found = find_unit(unit, si)
-    assert found.si == si
-    assert found.size == pytest.approx(size, rel=1e-6)
-
-
-@pytest.mark.parametrize("unit", ["kip", "lbf*in", "degC", "__import__", "N"])
-def test_a_unit_of_another_quantity_is_refused(unit: str) -> None:
-    with pytest.raises(InputError, match="is not known here"):
-        find_unit(unit, "m")

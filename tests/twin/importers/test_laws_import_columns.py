@@ -11,8 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from import_cases import mapping, write_csv
-from scipy.io import savemat
+from import_cases import (
+    mapping,
+    write_csv,
+    write_hdf5,
+    write_hdf5_records,
+    write_mat,
+    write_mat_matrix,
+    write_parquet,
+)
 
 from twin.errors import InputError
 from twin.importers import import_log
@@ -75,47 +82,14 @@ def expected(signal: Signal) -> np.ndarray:
 Columns = dict[str, np.ndarray]
 
 
-def _mat(path: Path, columns: Columns) -> None:
-    savemat(path, columns)
-
-
-def _mat_rows(path: Path, columns: Columns) -> None:
-    savemat(path, {"m": np.array(list(columns.values()))})
-
-
-def _hdf5(path: Path, columns: Columns) -> None:
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w") as file:
-        for name, column in columns.items():
-            file[f"run/{name}"] = column
-
-
-def _hdf5_matrix(path: Path, columns: Columns) -> None:
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w") as file:
-        file["run/m"] = np.column_stack(list(columns.values()))
-
-
-def _parquet(path: Path, columns: Columns) -> None:
-    pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
-    parquet.write_table(pyarrow.table(columns), path, row_group_size=7)
-
-
-def _tdms(path: Path, columns: Columns) -> None:
-    nptdms = pytest.importorskip("nptdms")
-    with nptdms.TdmsWriter(str(path)) as writer:
-        writer.write_segment([nptdms.ChannelObject("run", n, c) for n, c in columns.items()])
-
-
 Case = tuple[Callable[[Path, Columns], None], str, Callable[[str, int], str]]
 CASES: dict[str, Case] = {
     "csv": (write_csv, "log.csv", lambda name, number: name),
-    "mat": (_mat, "log.mat", lambda name, number: name),
-    "mat rows": (_mat_rows, "log.mat", lambda name, number: f"m[{number}]"),
-    "hdf5": (_hdf5, "log.h5", lambda name, number: f"run/{name}"),
-    "hdf5 matrix": (_hdf5_matrix, "log.he5", lambda name, number: f"run/m[{number}]"),
-    "parquet": (_parquet, "log.pq", lambda name, number: name),
-    "tdms": (_tdms, "log.tdms", lambda name, number: f"run/{name}"),
+    "mat": (write_mat, "log.mat", lambda name, number: name),
+    "mat matrix": (write_mat_matrix, "log.mat", lambda name, number: f"log[{number}]"),
+    "hdf5": (write_hdf5, "log.h5", lambda name, number: f"run/{name}"),
+    "hdf5 records": (write_hdf5_records, "log.he5", lambda name, number: f"log/{name}"),
+    "parquet": (write_parquet, "log.pq", lambda name, number: name),
 }
 
 

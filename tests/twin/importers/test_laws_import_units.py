@@ -29,6 +29,7 @@ OTHERS = {
 def all_units() -> list[tuple[str, str, float]]:
     found = [("s", text, size) for text, size in SECONDS.items()]
     found += [("m/s^2", "g", 9.80665), ("rad/s", "rpm", TURN / 60.0)]
+    found += [("m", "\N{MICRO SIGN}m", 1e-6), ("m", "\N{GREEK SMALL LETTER MU}m", 1e-6)]
     found += [(si, text, size) for si, units in OTHERS.items() for text, size in units.items()]
     for si, lengths in (("m", METRES), ("rad", RADIANS)):
         for length, size in lengths.items():
@@ -50,7 +51,20 @@ def test_every_unit_has_the_size_of_its_definition():
         assert (found.si, found.size) == (si, pytest.approx(size, rel=1e-14)), text
 
 
+@pytest.mark.parametrize(
+    ("unit", "si", "size"),
+    [("kip", "N", 4448.2216), ("lbf", "N", 4.4482216), ("ft", "m", 0.3048),
+     ("lbf*in", "N m", 0.11298483), ("in/s", "m/s", 0.0254), ("ozf", "N", 0.27801385)],
+)  # fmt: skip
+def test_rarer_units_are_those_of_a_library(unit, si, size):
+    found = find_unit(unit, si)
+    assert (found.si, found.size) == (si, pytest.approx(size, rel=1e-6))
+
+
 def test_a_unit_of_another_quantity_is_refused():
+    for unit in ("kip", "lbf*in", "degC", "__import__", "N"):
+        with pytest.raises(InputError, match="is not known here"):
+            find_unit(unit, "m")
     for si, text, _ in all_units()[::5]:
         for other in {"s", "m", "m/s", "rad/s^2", "A", "N", "N m"} - {si}:
             with pytest.raises(InputError, match="is not known here"):
