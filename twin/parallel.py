@@ -45,16 +45,23 @@ def spread(job: Callable[[T], R], items: Iterable[T], done: Done | None = None) 
 
     Outside ``parallel`` it is a loop, and so is what a job spreads in its turn: the parts of parts
     are too short to share. Where jobs fail no other is begun, and the first of them in the order of
-    the items is raised. done: see ``counting``; called as each job ends.
+    the items is raised. done: told done(0, total) now, and (1, total), (2, total), ... as jobs end,
+    one call at a time, from any thread.
     """
     given, pool = list(items), _POOL.get()
-    one_more = counting(len(given), done)
+    lock, numbers = Lock(), itertools.count()
+
+    def one_more() -> None:
+        if done is not None:
+            with lock:
+                done(next(numbers), len(given))
 
     def run(item: T) -> R:
         result = job(item)
         one_more()
         return result
 
+    one_more()
     alone = len(given) < 2  # a single job may spread its own parts
     if alone or not isinstance(pool, ThreadPoolExecutor):
         return [run(item) for item in given]
@@ -67,19 +74,3 @@ def spread(job: Callable[[T], R], items: Iterable[T], done: Done | None = None) 
         for waiting in jobs:
             waiting.cancel()
     return [ended.result() for ended in jobs if not ended.cancelled()]
-
-
-def counting(total: int, done: Done | None) -> Callable[[], None]:
-    """A function that tells ``done`` of one more of so many, from any thread.
-
-    The calls come one at a time and count up: done(0, total) now, done(1, total) and so on.
-    """
-    lock, numbers = Lock(), itertools.count()
-
-    def one_more() -> None:
-        if done is not None:
-            with lock:
-                done(next(numbers), total)
-
-    one_more()
-    return one_more

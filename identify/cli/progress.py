@@ -46,13 +46,12 @@ class Part:
 
     def words(self, now: float) -> str:
         """What is done, how much of it, and how long that still takes."""
-        left = self.left(now)
-        counted = f"{self.done} of {self.total}"
+        words, left = self.what, self.left(now)
         if self.total > COUNTED:
-            counted = f"{100 * self.done // self.total} %"
-        much = "" if self.total < 2 else f": {counted}"
-        long = "" if left is None else f", about {roughly(left)} left of this part"
-        return f"{self.what}{much}{long}"
+            words += f": {100 * self.done // self.total} %"
+        elif self.total > 1:
+            words += f": {self.done} of {self.total}"
+        return words if left is None else f"{words}, about {roughly(left)} left of this part"
 
 
 def roughly(seconds: float) -> str:
