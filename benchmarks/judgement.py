@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from identify.dataset.dataset import Dataset, datasets
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Dataset, Role
+from identify.dataset.preparation import datasets
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.fit import Fit, error_if_any
 from identify.selection.candidates import Candidate

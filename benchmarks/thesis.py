@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 
 from benchmarks.figures import Figure, Target
 from identify.analysis.dynamic_friction import DYNAMIC, dynamic_part_free, fit_bristles
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from studies.thesis.models import overall
 from studies.thesis.reproduction import reproduce
 from studies.thesis.study import friction_of, machine

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from identify import workflow
-from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.dataset import Dataset
+from identify.dataset.preparation import datasets
 from identify.estimation.fit import Fit, fit_axis
 from identify.experiment_design.planting import draw_effect, hidden_part, other_machine
 from identify.output.report import Source, write_report

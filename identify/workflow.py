@@ -10,8 +10,8 @@ from pathlib import Path
 from identify.analysis.cable_force import cable_force
 from identify.analysis.dynamic_friction import dynamic_friction
 from identify.analysis.velocity_map import along_track, friction_map, velocity_map
-from identify.dataset.dataset import Dataset, datasets
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Dataset, Role
+from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import sticks
 from identify.dataset.silent_logs import telling
 from identify.estimation.channel_delay import aligned, fit_aligned

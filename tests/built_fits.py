@@ -9,9 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.dataset import Dataset
+from identify.dataset.dataset import Dataset, Role
 from identify.dataset.floor import NoiseFloor
-from identify.dataset.given_logs import Role
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, total_force
 from identify.estimation.evidence import Evidence, Gain

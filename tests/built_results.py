@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 import numpy as np
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted, step
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.estimation.fit import Errors, Outcome
 from identify.estimation.intervals import Estimate, NotExcited
 from identify.estimation.residual_dependence import Dependence, Repeat

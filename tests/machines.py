@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
 from identify.experiment_design.planting import draw_effect, other_machine
 from twin.effects import Catalogue

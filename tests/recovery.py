@@ -9,8 +9,9 @@ from functools import cache
 import numpy as np
 from effect_runs import CATALOGUE
 
-from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise, parts_of, reading_error
+from identify.dataset.preparation import datasets
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import residual

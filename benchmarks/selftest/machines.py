@@ -20,8 +20,9 @@ from benchmarks.selftest.variations import (
     drawn_values,
     other_exponents,
 )
-from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
+from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis

@@ -19,8 +19,7 @@ from benchmarks.selftest.machines import (
     own_error,
     prepared,
 )
-from identify.dataset.dataset import Dataset
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Dataset, Role
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.fit import Fit, error_in
 from identify.estimation.force_balance import residual

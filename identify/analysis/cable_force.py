@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.analysis.velocity_map import only_axis
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import CONFIDENCE

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from identify.analysis.velocity_map import only_axis
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import minimise

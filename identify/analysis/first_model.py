@@ -14,9 +14,10 @@ import numpy as np
 
 from identify.dataset.excitation import excitation
 from identify.dataset.given_logs import require_samples
-from identify.dataset.motion import Motion, motion_of
+from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import at_rest
 from identify.dataset.reading_ripple import ripples_of_widest
+from identify.dataset.recorded_motion import motion_of
 from identify.dataset.test_function import TestFunction
 from twin.checks import moves
 from twin.effect import Effect, Excitation, Kind

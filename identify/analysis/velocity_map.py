@@ -16,9 +16,10 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from identify.analysis.friction_curve import MapCurve, curve_through
-from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
 from identify.dataset.motion import Motion
+from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import total_force
 from identify.dataset.test_function import TestFunction
 from twin.effect import RUBBING, Kind

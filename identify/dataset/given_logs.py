@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from enum import Enum
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.motion import SHORTEST_LOG, other_axes
+from identify.dataset.dataset import Role
+from identify.dataset.recorded_motion import SHORTEST_LOG, other_axes
 from identify.dataset.shared_samples import share_samples
 from twin.checks import moves
 from twin.errors import InputError
@@ -17,14 +17,6 @@ from twin.logs import Log
 from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]
-
-
-class Role(Enum):
-    """What a log is for: parameters are fitted on it, it chooses effects, or it decides nothing."""
-
-    TRAINING = "training"
-    SELECTION = "selection"
-    TEST = "test"
 
 
 Given = Mapping[Role, Mapping[str, Log]]  # logs by name

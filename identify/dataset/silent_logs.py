@@ -5,8 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import replace
 
-from identify.dataset.dataset import Dataset
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Dataset, Role
 from identify.dataset.prepared_log import PreparedLog, moving
 
 LOGGER = logging.getLogger("identify")  # by itself it writes its lines on standard error

@@ -13,10 +13,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.dataset import Dataset
+from identify.dataset.dataset import Dataset, Role
 from identify.dataset.drive import forces_lessened
 from identify.dataset.floor import NoiseFloor, noise_beside
-from identify.dataset.given_logs import Role
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.dataset.spectral_lines import lines_in_time
 from identify.estimation.evidence import effective_samples, rms

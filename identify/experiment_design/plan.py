@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from identify.dataset.dataset import Dataset, datasets
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Dataset, Role
+from identify.dataset.preparation import datasets
 from identify.dataset.test_function import require_test_function
 from identify.estimation.channel_delay import fit_aligned
 from identify.experiment_design.candidate_experiments import NotRun, proposals

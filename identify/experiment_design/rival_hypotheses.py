@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.dataset import Dataset
 from identify.dataset.noise_floor import floor_of
+from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.variable_projection import fit_thoroughly

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.estimation.fit import Fit
 from identify.experiment_design.plan import Plan
 from identify.output.numbers import Scale, arrow, number, quantity

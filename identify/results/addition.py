@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from identify.dataset.dataset import Dataset, by_log
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Dataset, Role, by_log
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.results.printed import Printed

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.coordinates import gathered
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.force_balance import averaged_force, residual
 from identify.estimation.residual_dependence import UNITS, unit_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from identify.dataset.dataset import Role
 from identify.dataset.floor import NoiseFloor
-from identify.dataset.given_logs import Role
 from identify.dataset.noise_floor import floor_of
 from identify.estimation.fit import Errors, error_in
 from identify.estimation.intervals import Estimate, estimates

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from identify.dataset.dataset import Dataset
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Dataset, Role
 from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.bends import Bend

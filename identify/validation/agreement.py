@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.force_balance import residual

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.dataset import datasets
 from identify.dataset.drive import actual_force, parts_of, true_motion
+from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.dataset.silent_logs import telling
 from identify.estimation.channel_delay import aligned

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from identify.analysis.dynamic_friction import dynamic_part_free, fit_dynamic_part
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Outcome, finished, fit_axis

@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.dataset import Dataset
 from identify.dataset.noise_floor import floor_of
+from identify.dataset.preparation import datasets
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.force_balance import force_along

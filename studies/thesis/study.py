@@ -10,7 +10,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.dataset import Dataset
+from identify.dataset.preparation import datasets
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on
 from identify.output.report.page import Block

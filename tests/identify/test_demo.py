@@ -12,7 +12,7 @@ from cli_runs import in_small, refusal, twin
 from planted_logs import SLIDE
 
 from identify import demo
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.estimation.evidence import rms
 from identify.estimation.fit import error_on
 from twin.effects import Catalogue

@@ -10,7 +10,7 @@ from built_fits import CATALOGUE, built, built_fit
 from report_cases import Case, cogging_case
 
 from identify import workflow
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.output.text import diagnose_text
 from identify.selection.diagnosis import Verdict
 

@@ -10,8 +10,8 @@ import pytest
 from constructed import CATALOGUE, effect
 from machines import one_axis
 
-from identify.dataset.dataset import datasets
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
+from identify.dataset.preparation import datasets
 from identify.estimation.channel_delay import realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import error_on

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import Field
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
 from identify.output.answers.answer import Answer, Entry, Number, answer_of, read

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.output.numbers import quantity
 from identify.output.report import answer, effects, residual
 from identify.output.report.explorer import explored

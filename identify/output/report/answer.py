@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.output.numbers import arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import Answer, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject

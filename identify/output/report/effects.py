@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.estimation.intervals import Estimate, ModelWrong
 from identify.output.numbers import (
     NOTHING,

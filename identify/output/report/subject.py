@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.estimation.fit import Fit
 from identify.output.words.diagnosis import Said, all_found, said_of
 from identify.results.addition import Addition

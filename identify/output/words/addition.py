@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.output.words.fit import moved_in_words, nonparametric_in_words
 from identify.results.addition import Addition
 from twin.model.machine import HistoryStep

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.output.numbers import (
     change,
     percent,

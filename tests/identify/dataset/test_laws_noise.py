@@ -14,7 +14,6 @@ from scipy.signal import welch
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.floor import noise_beside
-from identify.dataset.motion import motion_of
 from identify.dataset.noise_floor import (
     floor_of,
     median_spectrum,
@@ -23,6 +22,7 @@ from identify.dataset.noise_floor import (
     noises_of,
 )
 from identify.dataset.prepared_log import on_blocks, total_force
+from identify.dataset.recorded_motion import motion_of
 from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
 from identify.estimation.force_balance import residual

@@ -9,7 +9,8 @@ import pytest
 from built_fits import axis_of, fitted
 from constructed import log_of, waves
 
-from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.dataset import Dataset
+from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import moving
 from identify.estimation.channel_delay import realigned
 from identify.estimation.evidence import rms

@@ -8,8 +8,8 @@ from constructed import CATALOGUE, log_of
 
 from identify.analysis.first_model import first_model
 from identify.dataset.beginning import FOREIGN, HELD, beginnings
-from identify.dataset.dataset import datasets
-from identify.dataset.motion import motion_of
+from identify.dataset.preparation import datasets
+from identify.dataset.recorded_motion import motion_of
 from identify.dataset.test_function import LEAST_BLOCKS
 from identify.dataset.time_scale import HIDES, QUIET, SHOWS, Scale
 from identify.output.words.fit import prepared_in_words

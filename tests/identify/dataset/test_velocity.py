@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from constructed import log_of, waves
 
-from identify.dataset.motion import motion_of
 from identify.dataset.noise_floor import noise_of
+from identify.dataset.recorded_motion import motion_of
 from identify.dataset.velocity import together
 from twin.model.machine import AxisModel
 from twin.signals import between

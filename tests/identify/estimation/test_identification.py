@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from machines import machine, one_axis
 
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import OpenSided, Side, estimates

@@ -11,7 +11,7 @@ import pytest
 from cli_runs import twin
 
 import identify
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import Outcome
 from identify.estimation.open_loop import (

@@ -7,7 +7,8 @@ import pytest
 from constructed import dataset_of, effect, fit_of, moved, ridden, windowed
 from machines import one_axis
 
-from identify.dataset.dataset import Dataset, datasets
+from identify.dataset.dataset import Dataset
+from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.time_origin import (

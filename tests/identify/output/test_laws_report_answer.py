@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from built_results import Page
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.output.numbers import arrow, capitalised, number, quantity, spaced
 from identify.output.report import SECTIONS, facts, sections
 from identify.output.report.answer import cards as cards_of

@@ -8,7 +8,7 @@ import built_results as made
 import pytest
 from built_fits import NOISE, built, built_fit, step
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.estimation.fit import Outcome
 from identify.output.as_json import json_of
 from identify.output.text import diagnose_text, plan_text

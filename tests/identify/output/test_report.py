@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from report_cases import Case, Outline, cogging_case
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.output.numbers import arrow, quantity, typeset
 from identify.output.report import Source
 from identify.output.report.explorer import shown_of

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.estimation.fit import error_in
 from identify.selection.diagnosis import Verdict
 from identify.workflow import add, diagnose

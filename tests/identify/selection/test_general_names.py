@@ -3,7 +3,7 @@
 import pytest
 from effect_runs import CATALOGUE
 
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
 from identify.selection.candidates import absent_effects
 from identify.selection.trying import try_effect

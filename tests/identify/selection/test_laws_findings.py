@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from built_fits import built_dataset, built_fit
 
-from identify.dataset.given_logs import Role
+from identify.dataset.dataset import Role
 from identify.estimation.fit import Errors
 from identify.selection.findings import share_explained
 

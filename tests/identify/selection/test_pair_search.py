@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.selftest.machines import AXIS, machine
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
 from identify.selection.diagnosis import Verdict, diagnose_axis
 from twin.effects import Catalogue, load_catalogue

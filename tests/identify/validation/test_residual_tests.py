@@ -8,8 +8,8 @@ from constructed import log_of, windowed
 from machines import one_axis
 from scipy.signal import lfilter
 
-from identify.dataset.dataset import datasets
-from identify.dataset.motion import motion_of
+from identify.dataset.preparation import datasets
+from identify.dataset.recorded_motion import motion_of
 from identify.estimation.force_balance import residual
 from identify.output import as_json
 from identify.output import text as as_text

@@ -26,7 +26,7 @@ from axis_kinds import (
 
 from identify import workflow
 from identify.dataset.coordinates import coordinates_of
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.estimation.residual_dependence import unit_of
 from identify.output import as_json, text
 from identify.output.answers.answer import plain

@@ -19,7 +19,7 @@ from axis_kinds import (
 )
 
 from identify import workflow
-from identify.dataset.dataset import datasets
+from identify.dataset.preparation import datasets
 from identify.estimation.residual_dependence import unit_of
 from identify.output import as_json, text
 from twin.errors import InputError

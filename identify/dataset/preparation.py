@@ -1,0 +1,165 @@
+"""Logs made ready for identification: a dataset for each axis that moves in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cache, partial
+from itertools import islice
+
+import numpy as np
+
+from identify.dataset.beginning import beginnings
+from identify.dataset.dataset import Dataset, Role
+from identify.dataset.excitation import excitation
+from identify.dataset.given_logs import (
+    Given,
+    moving_in,
+    nothing_moves,
+    require_apart,
+    require_one_kind,
+    require_samples,
+)
+from identify.dataset.motion import Motion
+from identify.dataset.prepared_log import PreparedLog
+from identify.dataset.reading_ripple import ripples_of_widest
+from identify.dataset.recorded_motion import LONGEST_BLOCK, motion_of
+from identify.dataset.test_function import LEAST_BLOCKS, require_test_function
+from identify.dataset.time_scale import choose_length
+from twin.logs import Log
+from twin.memory import give_back
+from twin.model.machine import MachineModel
+from twin.parallel import spread
+
+MARGIN = 0.05  # of the range of the training logs, by which a log of another role may exceed it
+LEAST_SHARED = 0.2  # part of the logs of a role that must lie within it
+
+
+def datasets(
+    model: MachineModel,
+    logs: Mapping[str, Log],
+    holdout: Mapping[str, Log],
+    test_function: float | None = None,
+    test: Mapping[str, Log] | None = None,
+) -> dict[str, Dataset]:
+    """A dataset for each axis of the model that the logs hold and in which it moves.
+
+    logs, holdout, test: by name, of the roles training, selection, test. test_function: length in
+    s; where None, chosen from what the training and selection logs hold. Raises InputError where no
+    axis of the model moves in any training log, where a log has no samples, where a signal is not a
+    number, and where a log has two roles.
+    """
+    parts = zip(Role, (logs, holdout, test or {}), strict=True)
+    given = {role: dict(part) for role, part in parts}  # each log is read once
+    training = given[Role.TRAINING].values()
+    require_test_function(test_function, max((len(g) * g.period for g in training), default=0.0))
+    out = _prepared(model, given, test_function)
+    give_back()
+    return out
+
+
+def _prepared(model: MachineModel, given: Given, test_function: float | None) -> dict[str, Dataset]:
+    for logs in given.values():
+        require_samples(logs)
+    require_apart(given)
+    out: dict[str, Dataset] = {}
+    for name, axis in model.axes.items():
+        for logs in given.values():
+            require_one_kind(logs, name, axis)
+        found = {role: moving_in(logs, name, tuple(model.axes)) for role, logs in given.items()}
+        going = {role: moving for role, (moving, _) in found.items()}
+        if going[Role.TRAINING]:
+            why = f"axis {name} stands still in it; give one in which it moves"
+            still = {log: why for _, names in found.values() for log in names}
+            out[name] = replace(_of_axis(model, name, going, test_function), left_out=still)
+    if not out:
+        raise nothing_moves(model.axes, given[Role.TRAINING].values())
+    return out
+
+
+def _of_axis(model: MachineModel, name: str, going: Given, test_function: float | None) -> Dataset:
+    """The dataset of one axis from the logs in which it moves; test logs decide nothing of it."""
+    axis, machine = model.axes[name], tuple(model.axes)
+    ripples = ripples_of_widest(going[Role.TRAINING].values(), name)
+
+    def motions_at(*roles: Role) -> Callable[[float | None], tuple[list[Motion], ...]]:
+        made = cache(partial(_motions, [going[r] for r in roles], name, machine, ripples))
+        return partial(_long_enough, made)
+
+    deciding = motions_at(Role.TRAINING, Role.SELECTION)
+    length = test_function or choose_length(deciding, imposed=axis.is_imposed)
+    fit, held = deciding(length)
+    (test,) = motions_at(Role.TEST)(length)
+    begun = {} if axis.is_imposed else _begun(fit, held, test)
+    fit, held, test = (
+        [m.after(begun[m.name]) if m.name in begun else m for m in some]
+        for some in (fit, held, test)
+    )
+    return Dataset(
+        axis=name,
+        fit=tuple(spread(partial(PreparedLog.of, length=length), fit)),
+        holdout=_within_reach(held, length, fit),
+        test=_within_reach(test, length, fit),
+        covered=cache(partial(excitation, fit, axis.hardware.travel)),
+        begun=begun,
+    )
+
+
+def _begun(
+    fit: Sequence[Motion], held: Sequence[Motion], test: Sequence[Motion]
+) -> dict[str, float]:
+    """Ends (s) of beginnings that are left out, by log; test logs tell those of none but them."""
+    begun = dict(beginnings([*fit, *held]))
+    if test:
+        names = {m.name for m in test}
+        own = beginnings([*fit, *test])
+        begun.update({name: end for name, end in own.items() if name in names})
+    return begun
+
+
+def _within_reach(
+    motions: Sequence[Motion], length: float, fit: Sequence[Motion]
+) -> tuple[PreparedLog, ...]:
+    """Logs that test a fit, where its logs have been.
+
+    Beyond, a force of position is extrapolated, and says nothing of what is there. All of them
+    where they have little in common with the training logs.
+    """
+    low, high = min(m.position.min() for m in fit), max(m.position.max() for m in fit)
+    margin = MARGIN * (high - low)
+    reach = (low - margin, high + margin)
+    within = spread(lambda m: PreparedLog.of(m, length, reach), motions)
+    if sum(np.count_nonzero(w.reached) for w in within) < LEAST_SHARED * sum(map(len, within)):
+        return tuple(PreparedLog.of(m, length) for m in motions)
+    return tuple(within)
+
+
+def _long_enough(
+    made: Callable[[float], tuple[list[Motion], ...]], length: float | None
+) -> tuple[list[Motion], ...]:
+    """Motions whose blocks suit test functions of a length (s), made anew only where they do not.
+
+    None: in blocks as long as their noise asks for.
+    """
+    usual = made(LONGEST_BLOCK)
+    longest = max((m.period for some in usual for m in some), default=0.0)
+    if length is None or length >= LEAST_BLOCKS * longest:
+        return usual
+    return made(length / LEAST_BLOCKS)
+
+
+def _motions(
+    parts: Sequence[Mapping[str, Log]],
+    axis: str,
+    machine: tuple[str, ...],
+    ripples: tuple[float, ...],
+    longest: float,
+) -> tuple[list[Motion], ...]:
+    """Motions of each part of the logs, in blocks of at most a length (s); ripples: m."""
+
+    def motion(given: tuple[str, Log]) -> Motion:
+        name, log = given
+        return motion_of(log, axis, name, machine, longest, ripples)
+
+    made = iter(spread(motion, [given for some in parts for given in some.items()]))
+    return tuple([*islice(made, len(some))] for some in parts)
