@@ -20,7 +20,7 @@ from identify.dataset.reading_ripple import ripples_of_widest
 from identify.dataset.recorded_motion import motion_of
 from identify.dataset.test_function import TestFunction
 from twin.checks import moves
-from twin.effect import Effect, Excitation, Kind
+from twin.effect import Excitation, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.logs import Log
@@ -29,7 +29,7 @@ from twin.model.units import AxisUnits
 from twin.signals import Array
 
 LENGTHS = (0.1, 0.05, 0.02)  # s, of the test functions: the first that tells the mass
-BLOCKS = 30
+BLOCKS = 30  # of time, for the scatter of a value
 SURE = 3.0  # t-value from which a value is the logs', and no accident of one of their parts
 LEAST_INERTIAL = 0.005  # of the force's RMS; below, friction that is not known hides the inertia
 ROWS = 4 * BLOCKS  # test functions in motion, that tell the values and how sure they are
@@ -264,30 +264,19 @@ def _first_effects(
     found: FirstValues, catalogue: Catalogue, covered: Excitation, units: AxisUnits
 ) -> tuple[Fitted, ...]:
     """The simplest friction, and a constant force where there is one, with what was found."""
-    friction = _simplest_friction(catalogue)
+    known = [e for e in catalogue.values() if not e.is_nonparametric]
+    frictions = (e for e in known if e.kind is Kind.FRICTION)
+    friction = min(frictions, key=lambda e: (len(e.parameters), len(e.states)))
     static = found.coulomb if found.static is None else found.static
     values = {"Fc": found.coulomb, "Fs": static, "sigma2": found.viscous}
     own = {n: _shown(v) for n, v in values.items() if n in friction.starts(covered)}
     effects = [Fitted.at_start(friction, {**friction.starts(covered), **own}, units)]
-    for force in filter(_is_constant, catalogue.values() if found.constant else ()):
+    forces = (e for e in known if e.kind is Kind.FORCE and not e.states and found.constant)
+    for force in (e for e in forces if [p.unit for p in e.parameters] == ["N"]):
         (own_force,) = force.parameters
         effects.append(Fitted.at_start(force, {own_force.name: _shown(-found.constant)}, units))
     return tuple(effects)
 
 
-def _is_constant(effect: Effect) -> bool:
-    """Whether an effect is one force, N, and nothing else."""
-    force = effect.kind is Kind.FORCE and not effect.states and not effect.is_nonparametric
-    return force and [p.unit for p in effect.parameters] == ["N"]
-
-
 def _shown(value: float) -> float:
     return float(f"{value:.3g}")
-
-
-def _simplest_friction(catalogue: Catalogue) -> Effect:
-    """The friction of the catalogue with the fewest parameters and states."""
-    frictions = [
-        e for e in catalogue.values() if e.kind is Kind.FRICTION and not e.is_nonparametric
-    ]
-    return min(frictions, key=lambda e: (len(e.parameters), len(e.states)))

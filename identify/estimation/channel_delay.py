@@ -18,7 +18,7 @@ from identify.estimation.evidence import evidence, rms
 from identify.estimation.fit import Fit, Outcome, error_on, finished, fit_axis
 from identify.estimation.least_squares import unabsorbed
 from identify.estimation.time_origin import depends_on_time_origin, synchronised, with_time_origins
-from identify.estimation.variable_projection import fit_thoroughly
+from identify.estimation.variable_projection import fit_multistart
 from identify.rules import RULE
 from twin.model.machine import AxisModel
 
@@ -30,20 +30,20 @@ def fit_aligned(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
 
     The time origins of its logs are set by the phase of what repeats in time.
     """
-    fit = fit_thoroughly(axis, dataset)
+    fit = fit_multistart(axis, dataset)
     for _ in range(ROUNDS):
         shift = misalignment(fit, dataset)
         if shift == 0.0:
             break
         moved = realigned(dataset, dataset.channel_delay + shift)
-        again = fit_thoroughly(fit.axis, moved, fit.begun)
+        again = fit_multistart(fit.axis, moved, fit.begun)
         if again.error > np.sqrt(1.0 - RULE.least_fall) * fit.error:
             break
         dataset, fit = moved, again
     if not depends_on_time_origin(fit.axis, dataset):
         return synchronised(fit, dataset)
     dataset = with_time_origins(fit.axis, dataset)
-    return dataset, fit_thoroughly(fit.axis, dataset, fit.begun)
+    return dataset, fit_multistart(fit.axis, dataset, fit.begun)
 
 
 def aligned(axis: AxisModel, dataset: Dataset) -> Dataset:

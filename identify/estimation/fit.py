@@ -23,7 +23,7 @@ from identify.estimation.fit_problem import FitProblem
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.estimation.scaling import AT_EDGE, Scaling
-from identify.estimation.spatial_periods import pitches
+from identify.estimation.spatial_periods import spatial_periods
 from identify.rules import RULE
 from twin.model.machine import AxisModel
 from twin.model.parameters import read
@@ -137,7 +137,7 @@ class Fit:
             )
         )
         weights = np.ones(len(place)), command
-        plain, thrust = (pitches(place, self.residual, w, self.jacobian) for w in weights)
+        plain, thrust = (spatial_periods(place, self.residual, w, self.jacobian) for w in weights)
         return plain, thrust
 
     @cached_property

@@ -30,7 +30,7 @@ from twin.model.machine import AxisIntervals, AxisModel
 from twin.model.parameters import ParameterReference, read, write
 from twin.signals import Array
 
-BLOCKS = 30
+BLOCKS = 30  # of time, for the scatter: many for Student's t, each longer than the memory
 RIDGE = 1e-6  # keeps a fit without one block finite
 INSEPARABLE = 0.9999  # correlation of two estimates from which the data cannot separate them
 CONFIDENCE = 0.90

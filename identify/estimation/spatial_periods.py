@@ -1,4 +1,4 @@
-"""Pitches: periods at which what a model leaves of the force repeats along the track.
+"""Spatial periods, at which what a model leaves of the force repeats along the track.
 
 Two looks. The least-squares gain of a sine in position beside the model's own parameters, for
 pitches half a cycle over the travel apart, which tells what a smooth remainder or the model itself
@@ -22,7 +22,9 @@ MOST_LINES = 3
 EVERY = 1.0  # false-alarm probability up to which a line is tried
 
 
-def pitches(position: Array, force: Array, weight: Array, columns: Array) -> tuple[float, ...]:
+def spatial_periods(
+    position: Array, force: Array, weight: Array, columns: Array
+) -> tuple[float, ...]:
     """Periods (m) at which a residual over a weight repeats along the track, likeliest first.
 
     position (n,) m, force (n,) N: the residual; the repeating part is the weight (n,) times a

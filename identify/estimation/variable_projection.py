@@ -3,7 +3,7 @@
 The linear parameters are called strengths, a set of nonlinear values a shape. The strengths at a
 shape are found by one linear step together with the parameters of a base fit. A fit from given
 values ends in the nearest optimum, such as a pitch of one roller fewer, so where error is left the
-shapes of the effects that a model has are scanned again (`fit_thoroughly`).
+shapes of the effects that a model has are scanned again (`fit_multistart`).
 """
 
 from __future__ import annotations
@@ -255,7 +255,7 @@ def _bounded_step(
 BETTER = 0.99  # part of the error that a new start must reach to be taken
 
 
-def fit_thoroughly(axis: AxisModel, dataset: Dataset, begun: AxisModel | None = None) -> Fit:
+def fit_multistart(axis: AxisModel, dataset: Dataset, begun: AxisModel | None = None) -> Fit:
     """Fit an axis; scan its effects' shapes again where the error is above the noise floor.
 
     begun: what the fit counts as begun with; the axis itself where None.

@@ -71,14 +71,18 @@ def proposals(
     effort, scale = _affordable(model, axis), _scale(model.axes[axis])
     limits[axis] = gentle(limits[axis], effort)
     drafts = (
-        *_random(duration),
+        Tracking(duration),
+        *(Moves(max(int(duration / d), 2), dwell=d, duration=duration) for d in (0.1, 1.0)),
         *_passes(limits, axis, duration, scale),
         *_reversing(limits, axis, duration, scale),
         *_accelerating(limits, axis, duration),
         *_swept(model, limits, axis, duration),
     )
     found, not_run = [], []
-    for experiment in (lasting(_eased(draft, effort), model, duration) for draft in drafts):
+    for draft in drafts:
+        if effort < 1.0 and isinstance(draft, OneAxis):  # its moves no harder than the motor allows
+            draft = replace(draft, effort=neat(effort * draft.effort))
+        experiment = lasting(draft, model, duration)
         try:
             _require_fit(experiment, model, duration)
         except CannotRun as why:
@@ -98,13 +102,6 @@ def _affordable(model: MachineModel, axis: str) -> float:
     return min(1.0, FORCE_USED * h.force_limit / (mass * h.acceleration))
 
 
-def _eased(draft: Experiment, effort: float) -> Experiment:
-    """The experiment with its moves no harder than that part of the limits."""
-    if effort < 1.0 and isinstance(draft, OneAxis):
-        return replace(draft, effort=neat(effort * draft.effort))
-    return draft
-
-
 def _require_fit(experiment: Experiment, model: MachineModel, duration: float) -> None:
     """Raise CannotRun unless the machine can run it, in not more than that time (s)."""
     setpoint = experiment.setpoint(model, np.random.default_rng(0))
@@ -113,12 +110,6 @@ def _require_fit(experiment: Experiment, model: MachineModel, duration: float) -
             f"takes {setpoint.duration:.3g} s, more than the {duration:g} s planned; give a longer "
             "--duration (s)"
         )
-
-
-def _random(duration: float) -> Iterator[Experiment]:
-    yield Tracking(duration)
-    for dwell in (0.1, 1.0):
-        yield Moves(count=max(int(duration / dwell), 2), dwell=dwell, duration=duration)
 
 
 def _other_span(limits: dict[str, Limits], axis: str) -> float:

@@ -10,7 +10,7 @@ from identify.dataset.noise_floor import floor_of
 from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import residual
-from identify.estimation.variable_projection import fit_thoroughly
+from identify.estimation.variable_projection import fit_multistart
 from identify.estimation.variable_projection import starts as start_values
 from identify.experiment_design.discrimination import Explanation
 from identify.experiment_design.planting import strength_for
@@ -51,13 +51,13 @@ def explained(
     own = machine.axis(dataset.axis)
     names = {r.name for r in rivals if isinstance(r, Effect)}
     base = replace(own, effects=tuple(f for f in own.effects if f.effect.name not in names))
-    fit = fit_thoroughly(base, dataset) if fitted else None
+    fit = fit_multistart(base, dataset) if fitted else None
     out = []
     for rival in rivals:
         if isinstance(rival, MachineModel):
             axis = replace(rival.axis(dataset.axis), hardware=own.hardware)
             out.append(
-                Explanation(rival.name, fit_thoroughly(axis, dataset).axis if fitted else axis)
+                Explanation(rival.name, fit_multistart(axis, dataset).axis if fitted else axis)
             )
         elif fit is not None:
             out.append(Explanation(rival.name, try_effect(fit, dataset, rival).fit.axis))

@@ -22,7 +22,7 @@ from identify.estimation.fit import Fit, error_on, finished, fit_axis
 from identify.estimation.least_squares import unabsorbed
 from identify.estimation.scaling import Scaling
 from identify.estimation.time_origin import synchronised, time_origins, with_given_origins
-from identify.estimation.variable_projection import fit_thoroughly, starts
+from identify.estimation.variable_projection import fit_multistart, starts
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, least_t, score
 from identify.selection.candidates import (
@@ -181,7 +181,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         passed, steps = [*passed, *bent], (*steps, *bent)
         if judged.at_floor:
             break
-        fit = fit_thoroughly(judged.fit.axis, judged.dataset, judged.fit.begun)
+        fit = fit_multistart(judged.fit.axis, judged.dataset, judged.fit.begun)
         dataset, fit = synchronised(fit, judged.dataset)
         judged = _settled(Judged(fit, dataset))
     first = (
@@ -473,7 +473,7 @@ def _needed(
                 step.change, without, judged
             ):
                 # The shapes of later effects were found beside this one; they may differ without.
-                again = fit_thoroughly(without.fit.axis, judged.dataset, judged.fit.begun)
+                again = fit_multistart(without.fit.axis, judged.dataset, judged.fit.begun)
                 without = Judged(again, judged.dataset)
                 if _is_needed(step.change, without, judged):
                     continue

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.estimation.fit import Fit
-from identify.estimation.variable_projection import fit_thoroughly
+from identify.estimation.variable_projection import fit_multistart
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, Reshaped, from_all_starts
@@ -29,7 +29,7 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     look = change.look(before, Trial.beside(before))
     fit = change.refit(before, look)
     if not fit.at_floor:
-        fit = fit_thoroughly(from_all_starts(before, look, fit).axis, dataset, base.begun)
+        fit = fit_multistart(from_all_starts(before, look, fit).axis, dataset, base.begun)
     return judged_change(before, look, fit).candidate
 
 

@@ -56,7 +56,8 @@ def free_run(
     side = max(round(START_FIT / period), 2)
     starts = np.arange(side, n - side, count)
     table = model.table()
-    origin = _time_origin(logs)
+    origins = (log.motion.time_origin for log in logs.values())  # one for all axes of the log
+    origin = next(filter(None, origins), 0.0)
     accelerated = any(f.effect.reads("A_OTHER") for a in model.axes.values() for f in a.effects)
     states = states_along(table, position, command, period, starts, origin, accelerated)
     around = position[np.arange(-side, side + 1)[:, None] + starts]
@@ -114,11 +115,6 @@ def _signals(
 def _begun(logs: Mapping[str, PreparedLog]) -> int:
     """Samples of the log before the last axis begins: what one leaves out, no other has."""
     return max(log.motion.left_out for log in logs.values())
-
-
-def _time_origin(logs: Mapping[str, PreparedLog]) -> float:
-    """Time origin of the log, s; the same for all axes."""
-    return next((log.motion.time_origin for log in logs.values() if log.motion.time_origin), 0.0)
 
 
 def rms_error(run: FreeRun, axis: str) -> float:

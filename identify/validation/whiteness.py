@@ -23,8 +23,8 @@ NORMAL = NormalDist()
 
 WITHIN = 0.90  # part of a white residual's correlations within the bounds
 SURE = 0.99  # part of white residuals whose every correlation is within the wider limit
-MOST_LAGS = 40
-BINS = 41
+MOST_LAGS = 40  # that are tested and drawn; what is slower is seen at these, too
+BINS = 41  # of the histogram; odd, so that one is at zero
 REACH = 5.0  # noise floors that the histogram spans at least
 
 

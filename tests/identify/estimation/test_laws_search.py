@@ -24,7 +24,7 @@ from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import (
-    fit_thoroughly,
+    fit_multistart,
     fit_without,
     starts,
     tried_shapes,
@@ -176,12 +176,12 @@ def test_a_shape_is_sought_anew_where_error_is_left_and_nowhere_else():
     right = replace(right, fixed=right.fixed | {"b1"})
     dataset = built_machine(built_dataset("one", "two"), axis_of(right))
     begun = axis_of(replace(right, values={**right.values, "p": 0.031, "a1": 0.01}))
-    stuck, found = fit_axis(begun, dataset.fit), fit_thoroughly(begun, dataset)
+    stuck, found = fit_axis(begun, dataset.fit), fit_multistart(begun, dataset)
     assert found.error < 0.1 * stuck.error
     values = found.axis["cogging"].values
     assert (values["p"], values["a1"]) == pytest.approx((0.02, 0.4), rel=0.01)
     assert (values["b1"], found.axis["cogging"].fixed) == (0.1, right.fixed)
     assert found.begun is begun
-    quiet = fit_thoroughly(found.axis, dataset, begun=begun)
+    quiet = fit_multistart(found.axis, dataset, begun=begun)
     assert quiet.error == pytest.approx(found.error, rel=1e-3)
     assert quiet.begun is begun

@@ -122,7 +122,7 @@ def test_an_effect_or_a_model_is_an_explanation(monkeypatch, dataset):
     base = ("coulomb_viscous", "wear")
     assert second == Explanation("constant_force", ("constant_force", base))
     assert third == Explanation("other", replace(other.axes["x"], hardware=own.hardware))
-    monkeypatch.setattr(explanations, "fit_thoroughly", lambda axis, s: built_fit(1.0, axis=axis))
+    monkeypatch.setattr(explanations, "fit_multistart", lambda axis, s: built_fit(1.0, axis=axis))
     monkeypatch.setattr(
         explanations, "try_effect", lambda fit, s, e: SimpleNamespace(
             fit=SimpleNamespace(axis=(fit.axis.names, e.name)))
