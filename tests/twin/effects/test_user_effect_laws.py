@@ -89,15 +89,11 @@ def test_the_example_and_an_effect_of_the_catalogue_obey(tmp_path: Path) -> None
 
 
 def test_json_is_one_object_of_every_file(tmp_path: Path) -> None:
-    files = [written(tmp_path, "mine"), written(tmp_path, "bad", *FAULTS["never acts"][:2])]
-    done = twin(
-        "effects", "--effects", files[0], "--effects", files[1], "--check", "--json",
-        folder=tmp_path,
-    )  # fmt: skip
-    assert done.returncode == 1
+    good, bad = written(tmp_path, "mine"), written(tmp_path, "bad", *FAULTS["never acts"][:2])
+    command = ("effects", "--effects", good, "--effects", bad, "--check", "--json")
+    done = twin(*command, folder=tmp_path)
     answer = json.loads(done.stdout)
-    assert not answer["ok"]
-    assert list(answer["effects"]) == ["mine", "bad"]
+    assert (done.returncode, answer["ok"], list(answer["effects"])) == (1, False, ["mine", "bad"])
     assert all(law["holds"] and law["fault"] is None for law in answer["effects"]["mine"])
     (broken,) = [law for law in answer["effects"]["bad"] if not law["holds"]]
     assert broken["law"] == "acts within its bounds"

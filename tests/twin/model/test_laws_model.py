@@ -1,6 +1,7 @@
 """Laws of the stage model: bounds, one friction, history, and coordinates read as written."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -47,18 +48,6 @@ def axis() -> AxisModel:
 # Bounds
 
 
-@pytest.mark.parametrize("parameter", [LOW, HIGH, HELD])
-def test_a_value_is_allowed_up_to_its_bounds_and_no_further(parameter):
-    for good in (parameter.lower, parameter.upper):
-        assert Fitted.at_start(PAIR, {parameter.name: good}).values[parameter.name] == good
-    for bad in (np.nextafter(parameter.lower, -np.inf), np.nextafter(parameter.upper, np.inf)):
-        with pytest.raises(InputError) as caught:
-            Fitted.at_start(PAIR, {parameter.name: float(bad)})
-        text = f"outside [{parameter.lower:g}, {parameter.upper:g}] {parameter.unit} ("
-        assert str(caught.value).startswith(f"pair.{parameter.name} = ")
-        assert text in str(caught.value)
-
-
 def test_every_bound_of_the_catalogue_is_kept_on_both_sides():
     """All parameters of an effect at once within; the first ones and the last beyond."""
     for name in CATALOGUE:
@@ -69,8 +58,10 @@ def test_every_bound_of_the_catalogue_is_kept_on_both_sides():
             assert bounds.items() <= dict(Fitted.at_start(effect, bounds).values).items()
             for p in [q for q in (*own[:4], own[-1]) if q.name in bounds]:
                 beyond = math.nextafter(bounds[p.name], outward)
-                with pytest.raises(InputError, match=f"{name}.{p.name} = "):
+                allowed = f"outside [{p.lower:g}, {p.upper:g}] {p.unit} ("
+                with pytest.raises(InputError, match=re.escape(allowed)) as told:
                     Fitted.at_start(effect, {p.name: beyond})
+                assert str(told.value).startswith(f"{name}.{p.name} = ")
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, "2", None, [2.0]])
@@ -130,19 +121,12 @@ def test_reading_is_the_inverse_of_writing_in_any_order():
     assert same == axis()
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "kept"), [(3.0, 5.0, 5.0), (5.0, 3.0, 5.0), (5.0, 5.0, 5.0)]
-)
-def test_a_value_may_not_fall_below_the_one_it_is_tied_to(low, high, kept):
+@pytest.mark.parametrize(("low", "high"), [(3.0, 5.0), (5.0, 3.0), (5.0, 5.0), (6.0, 4.0)])
+def test_a_value_may_not_fall_below_the_one_it_is_tied_to(low, high):
     """The one it is tied to stays as it is written."""
     where = [c for c in free_parameters(axis()) if c.effect == "pair"]
-    written = write(axis(), where, [low, high])
-    assert (written["pair"].values["low"], written["pair"].values["high"]) == (
-        low,
-        max(low, high),
-    )
-    raised = write(axis(), where[:1], [6.0])  # the start value of the higher is 4
-    assert (raised["pair"].values["low"], raised["pair"].values["high"]) == (6.0, 6.0)
+    written = write(axis(), where, [low, high])["pair"].values
+    assert (written["low"], written["high"]) == (low, max(low, high))
 
 
 def test_every_tie_of_the_catalogue_is_kept_by_writing():
