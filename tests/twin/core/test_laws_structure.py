@@ -85,6 +85,16 @@ def test_an_end_stop_of_any_stiffness_is_stable_whatever_is_attached(
     assert run.x.max() < 2e-3 + 1.5 * H + 60.0 / 1e5
 
 
+@pytest.mark.parametrize("load", [0.2, 0.8])
+def test_a_spring_beyond_the_sampling_rate_is_stable_and_the_same_in_both_simulations(
+    load: float,
+) -> None:
+    part = effect("flexible_mode", load=load, frequency=2000.0, damping=1e-3)
+    runs = [pushed(MASS, (part,), shoves(600, 20.0), stage) for stage in BOTH]
+    assert np.abs(runs[0].v).max() < 1.5
+    np.testing.assert_allclose(runs[1].x, runs[0].x, rtol=0, atol=1e-10 * np.ptp(runs[0].x))
+
+
 # --- Newton's second law --------------------------------------------------------------------------
 
 
