@@ -1,24 +1,29 @@
-"""HDF5, JSON, Parquet and TDMS, each as columns by name.
+"""MATLAB, HDF5, JSON, Parquet and TDMS, each as columns by name.
 
 HDF5: a dataset is named by its path; fields of a compound dataset as ``path/field``. JSON: arrays
 by name, a matrix (``name[1]``, ``name[2]``, ...; a list of as many names beside it names its
 columns), or one object a row. Parquet: an empty cell is NaN, which the importer refuses. TDMS of
-LabVIEW: a channel is named ``group/channel``; its waveform may state the rate.
+LabVIEW: a channel is named ``group/channel``; its waveform may state the rate. MATLAB: versions 4
+to 7.2 through SciPy, 7.3 as the HDF5 file it is; a field of a struct is named ``struct.field``.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import struct
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.io
 from numpy.typing import NDArray
 
 from twin.errors import InputError
 from twin.importers.mapping import ImportMap
 from twin.importers.table import (
+    SMALLEST_TABLE,
     Table,
     chosen,
     extra,
@@ -27,12 +32,13 @@ from twin.importers.table import (
     require_fits,
     split_columns,
 )
+from twin.isolated import isolated
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _MATLAB_HEADER = 512  # bytes before the signature in a MAT file of version 7.3
 
 
-def is_hdf5(path: Path) -> bool:
+def _is_hdf5(path: Path) -> bool:
     """Whether the file is HDF5, alone or behind the header of MATLAB."""
     with open(path, "rb") as stream:
         head = stream.read(_MATLAB_HEADER + len(_SIGNATURE))
@@ -147,3 +153,78 @@ def _rate(periods: dict[str, float]) -> float | None:
                 f"{period:.9g} s; export them at one rate"
             )
     return 1.0 / next(iter(periods.values())) if periods else None
+
+
+SHORTEST = 5.0  # s that a file may take, whatever its size
+SLOWEST = 2e7  # bytes of content a second
+COPIES = 4  # of its content, that SciPy and the way back to this process take
+_HEADER, _COMPRESSED = 128, 15
+_FED, _PIECE = 1 << 16, 1 << 20  # bytes that are decompressed, and that come of them, at once
+
+
+def read_mat(path: Path, mapping: ImportMap) -> Table:
+    """Columns of a MAT file; raises InputError."""
+    if _is_hdf5(path):
+        return read_hdf5(path, mapping, separator=".")
+    with parsing("MAT"):
+        content = content_bytes(path)
+    # In a process of its own: SciPy's reader of damaged files may crash, hang or fill the memory.
+    return Table(
+        isolated(
+            _load, path, mapping.column_names(),
+            seconds=SHORTEST + content / SLOWEST, memory=SMALLEST_TABLE + COPIES * content,
+        )
+    )  # fmt: skip
+
+
+def content_bytes(path: Path) -> int:
+    """Bytes that a file of version 4 to 7.2 holds, decompressed, found in little memory.
+
+    What is compressed proves itself by a checksum, so that only so much memory need be granted as
+    there are data. Raises zlib.error, and InputError for more than such a file may hold.
+    """
+    size = path.stat().st_size
+    with open(path, "rb") as stream:
+        marks = stream.read(_HEADER)[-4:]
+        if marks not in (b"\x00\x01IM", b"\x01\x00MI"):  # version 5 to 7.2, either byte order
+            return size
+        tag = struct.Struct("<II" if marks.endswith(b"IM") else ">II")
+        total = 0
+        while len(head := stream.read(tag.size)) == tag.size:
+            kind, length = tag.unpack(head)
+            if kind == _COMPRESSED:
+                for piece in _inflated(stream.read(min(length, size))):
+                    total += piece
+                    require_fits(total, path)
+            else:
+                total += min(length, size)
+                stream.seek(length, 1)
+    return total
+
+
+def _inflated(data: bytes) -> Iterator[int]:
+    """Sizes of the pieces of decompressed data; raises zlib.error."""
+    stream = zlib.decompressobj()
+    for start in range(0, len(data), _FED):
+        fed = data[start : start + _FED]
+        while fed and not stream.eof:
+            yield len(stream.decompress(fed, _PIECE))
+            fed = stream.unconsumed_tail
+
+
+def _load(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
+    with parsing("MAT"):
+        content = scipy.io.loadmat(path, simplify_cells=True)
+    columns = _fields("", {k: v for k, v in content.items() if not k.startswith("__")})
+    return {name: columns[name] for name in chosen(names, columns)}
+
+
+def _fields(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:
+    columns: dict[str, NDArray] = {}
+    for key, value in content.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            columns |= _fields(f"{name}.", value)
+        elif isinstance(value, np.ndarray | np.generic | int | float | str):
+            columns |= split_columns(name, np.asarray(value))
+    return columns

@@ -10,57 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from twin.errors import InputError, at
-from twin.importers import csv_text, mat, mcap_topics
+from twin.importers import csv_text, mcap_topics
 from twin.importers.clock import Clock, clock_of, rate_of
-from twin.importers.formats import read_hdf5, read_json, read_parquet, read_tdms
+from twin.importers.formats import read_hdf5, read_json, read_mat, read_parquet, read_tdms
 from twin.importers.mapping import ImportMap
 from twin.importers.table import Table, numbers
 from twin.logs.container import reading
 from twin.logs.log import Array, AxisLog, Log
 from twin.logs.series import instant, is_calendar
 from twin.numbers import first_not_finite
-
-Read = Callable[[Path, ImportMap], tuple[Mapping[str, Array], Array, str]]
-"""Columns by name, their times (n,) in s, and the sha256 of a file."""
-
-
-@dataclass(frozen=True)
-class Together:
-    """columns: by ColumnMap.key, on one clock; digests: sha256 by file; notes: what it cost."""
-
-    columns: Mapping[str, Array]
-    digests: tuple[str, ...]
-    notes: Mapping[str, str]
-    start: float
-
-
-def read_together(paths: Sequence[Path], mapping: ImportMap, read: Read) -> Together:
-    """The columns of all files where all have samples; raises InputError."""
-    files = mapping.files or []
-    if len(paths) != len(files):
-        raise InputError(
-            f"{len(paths)} files are given, the map has {len(files)} [[files]] tables; "
-            "give one for each, in the same order"
-        )
-    assert mapping.resample is not None
-    clocks: list[tuple[ImportMap, Mapping[str, Array], Clock]] = []
-    digests = []
-    for number, path in enumerate(paths, 1):
-        own = mapping.of_file(number)
-        with reading(path):
-            columns, times, digest = read(path, own)
-            times = times + files[number - 1].offset
-            clocks.append((own, columns, clock_of(times, mapping.resample)))
-            digests.append(digest)
-    grid = _common(paths, [clock for _, _, clock in clocks], mapping.resample)
-    out, notes = {}, {}
-    for number, (own, columns, clock) in enumerate(clocks, 1):
-        shared = replace(clock, grid=grid)
-        notes[f"resampled_{number}"] = shared.costs(own, columns)
-        for c in mapping.columns():
-            if c.file == number:
-                out[c.key] = shared.resampled(columns[c.name])
-    return Together(out, tuple(digests), notes, float(grid[0]))
 
 
 def _common(paths: Sequence[Path], clocks: Sequence[Clock], rate: float) -> Array:
@@ -87,7 +45,7 @@ class Format:
 
 FORMATS: Mapping[str, Format] = {
     "csv": Format((".csv", ".txt", ".tsv", ".dat", ".asc"), csv_text.read),
-    "mat": Format((".mat",), mat.read),
+    "mat": Format((".mat",), read_mat),
     "hdf5": Format((".h5", ".hdf5", ".hdf", ".he5"), read_hdf5),
     "parquet": Format((".parquet", ".pq"), read_parquet),
     "json": Format((".json",), read_json),
@@ -128,30 +86,43 @@ def _of_one(path: Path, mapping: ImportMap) -> Log:
 
 
 def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
-    formats, starts = [], []
+    files, rate = mapping.files or [], mapping.resample
+    if len(paths) != len(files):
+        raise InputError(
+            f"{len(paths)} files are given, the map has {len(files)} [[files]] tables; "
+            "give one for each, in the same order"
+        )
+    assert rate is not None
+    clocks: list[tuple[ImportMap, Mapping[str, Array], Clock]] = []
+    facts: dict[str, str] = {}
+    for number, path in enumerate(paths, 1):
+        own = mapping.of_file(number)
+        with reading(path):
+            table, columns, of_file = _read(path, own)
+            times = _times(table, own, columns) + files[number - 1].offset
+            clocks.append((own, columns, clock_of(times, rate)))
+        facts = {key: ",".join(filter(None, (facts.get(key), of_file[key]))) for key in of_file}
+    grid = _common(paths, [clock for _, _, clock in clocks], rate)
+    even: dict[str, Array] = {}
+    for number, (own, columns, clock) in enumerate(clocks, 1):
+        shared = replace(clock, grid=grid)
+        facts[f"resampled_{number}"] = shared.costs(own, columns)
+        even |= {c.key: shared.resampled(columns[c.name]) for c in own.columns()}
+    if is_calendar(float(grid[0])):
+        facts["start_time_unix_ns"] = str(round(float(grid[0]) * 1e9))
+    return _log(mapping, even, rate, facts)
 
-    def read(path: Path, own: ImportMap) -> tuple[Mapping[str, Array], Array, str]:
-        table, columns, facts = _read(path, own)
-        formats.append(facts["original_format"])
-        start = _start(table, own, columns).get("start_time_unix_ns")
-        starts.append(start)
-        if own.time is None:
-            rate, count = _sample_rate(table, own, columns), _common_length(columns)
-            return columns, np.arange(count) / rate, facts["original_sha256"]
-        times = own.time.to_si(columns[own.time.name])
-        if start is not None and not is_calendar(times[0]):  # dates: seconds since the first
-            times = times - times[0] + int(start) * 1e-9
-        return columns, times, facts["original_sha256"]
 
-    found = read_together(paths, mapping, read)
-    facts = {
-        "original_format": ",".join(formats), "original_sha256": ",".join(found.digests),
-        **found.notes,
-    }  # fmt: skip
-    if is_calendar(found.start):
-        facts["start_time_unix_ns"] = str(round(found.start * 1e9))
-    assert mapping.resample is not None
-    return _log(mapping, found.columns, mapping.resample, facts)
+def _times(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> Array:
+    """The times (n,) of the rows of one of several files, s."""
+    if mapping.time is None:
+        rate = _sample_rate(table, mapping, columns)
+        return np.arange(_common_length(columns)) / rate
+    times = mapping.time.to_si(columns[mapping.time.name])
+    start = _start(table, mapping, columns).get("start_time_unix_ns")
+    if start is not None and not is_calendar(times[0]):  # dates: seconds since the first
+        times = times - times[0] + int(start) * 1e-9
+    return times
 
 
 def table_of(path: Path, mapping: ImportMap) -> Table:

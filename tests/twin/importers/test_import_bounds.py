@@ -12,7 +12,8 @@ import scipy.io
 from import_cases import mapping
 
 from twin.errors import InputError
-from twin.importers import import_log, mat
+from twin.importers import import_log
+from twin.importers.formats import content_bytes
 
 MAP = """
 sample_rate = 1000.0
@@ -66,8 +67,8 @@ def test_memory_is_granted_for_what_a_mat_file_holds(tmp_path, compressed):
     """As many bytes as its arrays have, beside names and sizes, however they are packed."""
     path, arrays = tmp_path / "a.mat", {"q": np.zeros(300_000), "s": {"r": np.arange(70_000.0)}}
     scipy.io.savemat(path, arrays, do_compression=compressed)
-    assert mat.content_bytes(path) == pytest.approx(370_000 * 8, abs=1000)
+    assert content_bytes(path) == pytest.approx(370_000 * 8, abs=1000)
     scipy.io.savemat(path, {"q": np.zeros(1000)}, format="4")
-    assert mat.content_bytes(path) == path.stat().st_size
+    assert content_bytes(path) == path.stat().st_size
     path.write_bytes(path.read_bytes()[:50])
-    assert mat.content_bytes(path) == 50
+    assert content_bytes(path) == 50
