@@ -49,9 +49,9 @@ from twin.logs.topics import Topic, Topics
 from twin.logs.writer import write_parts
 
 METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
+_GAP = "a gap separates them from the longer run"
 INTACT_STEP = 1 << 17  # samples of an intact log that are held in memory at a time: some 20 MB
 STEP = 1 << 15  # the same of a damaged one, whose chunks are held beside them
-_KEPT_CHUNKS = 2  # decompressed at a time
 
 
 @dataclass(frozen=True)
@@ -145,8 +145,7 @@ _OPCODES = frozenset(Opcode)
 class _FoundChunk:
     """A chunk that lies in the file from ``offset`` to ``end``; size, crc: of what it holds.
 
-    length_holds: whether the length of its record says so too. proved: whether a checksum says that
-    its records are what was written.
+    length_holds: whether the length of its record says so too.
     """
 
     offset: int
@@ -157,6 +156,7 @@ class _FoundChunk:
 
     @property
     def proved(self) -> bool:
+        """Whether a checksum says that its records are what was written."""
         return self.crc != 0
 
     @property
@@ -214,6 +214,10 @@ def _opened(file: FileBytes, offset: int, head: bytes, budget: Inflation) -> _Fo
 # Samples, topic by topic
 
 
+def _instant(topic: Topic, sample: int) -> str:
+    return seconds(int(sample_times(sample, 1, topic.sample_rate)[0]))
+
+
 @dataclass(frozen=True)
 class _Piece:
     """Samples number ``first`` to before ``stop`` of a topic, which lie in a chunk."""
@@ -226,20 +230,14 @@ class _Piece:
 
 @dataclass(frozen=True)
 class _Stretch:
-    """Samples number ``first`` to before ``stop`` of topics, whose pieces hold at least these."""
+    """Samples of topics by their numbers; the pieces of each topic hold at least these."""
 
     pieces: Mapping[str, Sequence[_Piece]]
-    first: int
-    stop: int
-
-    @property
-    def count(self) -> int:
-        """How many samples."""
-        return self.stop - self.first
+    samples: range
 
     def __str__(self) -> str:
         topic = next(iter(self.pieces.values()))[0].topic
-        return f"{self.count} samples from {_instant(self.first, topic)}"
+        return f"{len(self.samples)} samples from {_instant(topic, self.samples.start)}"
 
     def empty(self, extras: Extras) -> Log:
         """The log without samples; raises InputError where an axis has too few signals, ..."""
@@ -252,17 +250,13 @@ class _Stretch:
     def logs(self, extras: Extras, read: Callable[[_Piece], Block]) -> Iterator[Log]:
         """Its samples as logs that follow each other; raises InputError as ``empty`` does."""
         rate = self.empty(extras).sample_rate
-        for first in range(self.first, self.stop, STEP):
-            stop = min(first + STEP, self.stop)
+        for first in self.samples[::STEP]:
+            stop = min(first + STEP, self.samples.stop)
             columns = (
                 (pieces[0].topic, _columns(pieces, first, stop, read))
                 for pieces in self.pieces.values()
             )
             yield assembled(columns, rate, extras)
-
-
-def _instant(sample: int, topic: Topic) -> str:
-    return seconds(int(sample_times(sample, 1, topic.sample_rate)[0]))
 
 
 def _columns(
@@ -293,7 +287,7 @@ class _Salvage:
         self._extras = Extras()
         self._topics = Topics()
         self._announced: dict[int, int] = {}  # ns, of the last sample by channel, by the summary
-        self._content = lru_cache(_KEPT_CHUNKS)(lambda chunk: chunk.content(file))
+        self._content = lru_cache(2)(lambda chunk: chunk.content(file))  # decompressed at a time
 
     def result(self, name: str) -> tuple[list[_Kept], Recovery]:
         """The longest stretch of the file called so and the others; raises InputError for none."""
@@ -304,7 +298,7 @@ class _Salvage:
             raise InputError(f"nothing can be recovered ({why}){hint}")
         # the rate is stated in every chunk too, and there a checksum protects it
         self._extras.metadata.pop("sample_rate_hz", None)
-        longest = max(stretches, key=lambda s: s.count * len(s.pieces))
+        longest = max(stretches, key=lambda s: len(s.samples) * len(s.pieces))
         longest.empty(self._extras)
         kept = [longest, *self._others(stretches, longest)]
         unproved = [METADATA] if self._extras.metadata and not self._extras.proved else []
@@ -336,13 +330,13 @@ class _Salvage:
             if stretch is longest:
                 continue
             absent = ", ".join(sorted(topics - stretch.pieces.keys()))
-            gap = "a gap separates them from the longer run"
+            why = f"{absent} has no samples there" if absent else _GAP
             with self._losing(), at(str(stretch)):
                 stretch.empty(self._extras)
                 yield stretch
                 self._lost.append(
                     f"{str(stretch).replace('samples', 'intact samples')} are in a log of their "
-                    f"own: {f'{absent} has no samples there' if absent else gap}"
+                    f"own: {why}"
                 )
 
     def _by_topic(self) -> dict[str, list[_Piece]]:
@@ -416,7 +410,7 @@ class _Salvage:
             if here and all(own[0].topic.is_truth for own in here.values()):
                 self._lost.append(f"{b - a} samples of {', '.join(here)} have no axis beside them")
             elif here:
-                out.append(_Stretch(here, a, b))
+                out.append(_Stretch(here, range(a, b)))
         return out
 
     def _runs(self, name: str, pieces: Sequence[_Piece]) -> list[range]:
@@ -426,8 +420,10 @@ class _Salvage:
         end = round(announced * 1e-9 * topic.sample_rate) + 1
         for first, last in [*((p.first, p.stop) for p in pieces), (max(end, 0), 0)]:
             if first > stop:
-                gone = " to ".join(_instant(k, topic) for k in (stop, first))
-                self._lost.append(f"{name}: {first - stop} samples are missing, from {gone}")
+                self._lost.append(
+                    f"{name}: {first - stop} samples are missing, from {_instant(topic, stop)} to "
+                    f"{_instant(topic, first)}"
+                )
                 runs.append(range(first, first))
             stop = max(stop, last)
             runs[-1] = range(runs[-1].start, max(stop, runs[-1].stop))
