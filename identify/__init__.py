@@ -8,53 +8,20 @@ MachineModel, the path of its file or a name of the package.
     >>> print(identify.fit("proton_xy", "run.mcap"))
 """
 
+# ruff: noqa: F403, F405
 from __future__ import annotations
 
 TYPE_CHECKING = False  # without the 10 ms of typing, in which `twin` does not heed Ctrl-C yet
 if TYPE_CHECKING:
     from typing import Any
 
-    from identify.results.addition import Addition
-    from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
-    from identify.validation.agreement import Agreement
-    from identify.workflow import (
-        add,
-        add_shape,
-        agree,
-        along_track,
-        cable_force,
-        compare,
-        diagnose,
-        dynamic_friction,
-        fit,
-        fit_simulation,
-        friction_map,
-        plan,
-        velocity_map,
-    )
+    from identify.workflow import *
 
-CLASSES = ("Addition", "Agreement", "Comparison", "Diagnosis", "FitResult", "SimulationFit")
 __all__ = [
-    "Addition",
-    "Agreement",
-    "Comparison",
-    "Diagnosis",
-    "FitResult",
-    "SimulationFit",
-    "add",
-    "add_shape",
-    "agree",
-    "along_track",
-    "cable_force",
-    "compare",
-    "diagnose",
-    "dynamic_friction",
-    "fit",
-    "fit_simulation",
-    "friction_map",
-    "plan",
-    "velocity_map",
-]
+    "Addition", "Agreement", "Comparison", "Diagnosis", "FitResult", "SimulationFit", "add",
+    "add_shape", "agree", "along_track", "cable_force", "compare", "diagnose", "dynamic_friction",
+    "fit", "fit_simulation", "friction_map", "plan", "velocity_map",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
@@ -68,7 +35,7 @@ def __getattr__(name: str) -> Any:
     from twin.threads import one_for_matrices
 
     found = getattr(workflow, name)
-    return found if name in CLASSES else one_for_matrices(found)
+    return found if isinstance(found, type) else one_for_matrices(found)
 
 
 def __dir__() -> list[str]:

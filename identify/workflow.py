@@ -7,9 +7,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from identify.analysis.cable_force import cable_force
-from identify.analysis.dynamic_friction import dynamic_friction
-from identify.analysis.velocity_map import along_track, friction_map, velocity_map
+from identify.analysis.cable_force import cable_force as cable_force
+from identify.analysis.dynamic_friction import dynamic_friction as dynamic_friction
+from identify.analysis.velocity_map import along_track as along_track
+from identify.analysis.velocity_map import friction_map as friction_map
+from identify.analysis.velocity_map import velocity_map as velocity_map
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import sticks
@@ -21,7 +23,8 @@ from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.estimation.open_loop import simulated_error
 from identify.estimation.residual_noise import noise_known, with_own_noise
 from identify.estimation.simulated_motion import fit_simulated_motion
-from identify.experiment_design.plan import next_experiments, plan
+from identify.experiment_design.plan import next_experiments
+from identify.experiment_design.plan import plan as plan
 from identify.output.text import diagnose_text as diagnose_text  # with it results print themselves
 from identify.output.words.addition import axis_in_words, notes_in_words
 from identify.results.addition import Addition, addition
@@ -338,27 +341,3 @@ def agree(
     models = (f.model if isinstance(f, FitResult) else f for f in (fit_a, fit_b))
     a, b = (as_model(model, known) for model in models)
     return agreement(a, b, known)
-
-
-__all__ = [
-    "Addition",
-    "Agreement",
-    "Comparison",
-    "Diagnosis",
-    "FitResult",
-    "SimulationFit",
-    "add",
-    "add_named",
-    "add_shape",
-    "agree",
-    "along_track",
-    "cable_force",
-    "compare",
-    "diagnose",
-    "dynamic_friction",
-    "fit",
-    "fit_simulation",
-    "friction_map",
-    "plan",
-    "velocity_map",
-]
