@@ -9,7 +9,8 @@ import numpy as np
 
 from identify.dataset.dataset import Role
 from identify.output.numbers import (
-    change,
+    Scale,
+    number,
     percent,
     quantity,
 )
@@ -123,14 +124,15 @@ def shape_in_words(effect: str, shape: FoundShape) -> str:
             "more than its 90 % band."
         )
     curve, at = shape.curves[direction], int(np.nanargmax(sure[direction]))
-    unit, band = shape.force_unit, quantity(float(curve.band[at]), shape.force_unit)
-    assumed, found = change(float(curve.assumed[at]), float(curve.found[at]), unit)
+    values = [float(v[at]) for v in (curve.assumed, curve.found, curve.band)]
+    scale = Scale.of(shape.force_unit, values)
+    assumed, found, band = (number(v / scale.size) for v in values)
     place = quantity(float(shape.coordinate[at]), shape.unit)
     within = "" if shape.period is None else " of its period"
     rest = " The force is gone at standstill." if shape.lets_go else ""
     return words(
         f"The law of {effect} is off most at {shape.over.value} {place}{within}, {direction}: it "
-        f"assumes {assumed}, the logs show {found} ± {band}.{rest}"
+        f"assumes {assumed}, the logs show {found} ± {band} {scale.unit}.{rest}"
     )
 
 

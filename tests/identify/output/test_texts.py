@@ -1,0 +1,260 @@
+"""The texts of results with made-up numbers, all different, are those of ``texts.txt``.
+
+`PYTHONPATH=tests python tests/identify/output/test_texts.py` writes them anew, to be read before
+they are committed: whatever has changed there has changed for a user.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import built_results as made
+import numpy as np
+import pytest
+from built_fits import CATALOGUE, NOISE, PLAIN, built, built_dataset, built_fit, fitted, step
+
+from identify.dataset.dataset import Role
+from identify.estimation.fit import Outcome
+from identify.estimation.intervals import refusal
+from identify.estimation.open_loop import Beginning
+from identify.estimation.simulated_motion import MotionFit
+from identify.experiment_design.candidate_experiments import NotRun
+from identify.output.machine import check_text, effect_text, effects_text, laws_text
+from identify.output.text import text_of
+from identify.results.results import SimulationFit
+from identify.selection.bends import Bend
+from identify.selection.confounded import Refit
+from identify.selection.diagnosis import Verdict
+from identify.selection.findings import FindingKind
+from identify.selection.found_shape import Drawn, FoundShape
+from identify.validation.agreement import Agreement, AxisAgreement, Cause, Difference
+from twin.checks import CheckReport, Fault, Finding, Severity
+from twin.curve import Coordinate
+from twin.laws import verdict
+from twin.model.parameters import free_parameters, read, write
+
+FILE = Path(__file__).parent / "texts.txt"
+
+# --- fits ------------------------------------------------------------------------------------
+
+
+def refused_fit():
+    """Without an interval for a reason that holds for all parameters, which is said once."""
+    result = made.fit_result()
+    own = replace(made.estimates(0.0)[1], reason=refusal(result.fits["x"]))
+    return replace(result, estimates={"x": (own,), "y": made.estimates(0.0)})
+
+
+def curve_fit():
+    """Of a curve without a law: its parameters are one sentence."""
+    effect = CATALOGUE["empirical_map"]
+    strength = replace(made.estimates(0.0)[0], label=f"{effect.name}.{effect.strengths[0].name}")
+    fit = built_fit(1.0, axis=made.axis_of(fitted(effect.name)))
+    return replace(made.fit_result(), fits={"x": fit}, estimates={"x": (strength,)})
+
+
+def simulation_fit(outcome=Outcome.CONVERGED, held=(6.1e-3, 4.3e-3)) -> SimulationFit:
+    where = free_parameters(PLAIN)
+    now = write(PLAIN, where, read(PLAIN, where) * 1.07)
+    beginnings = [Beginning(3, 0.011, -0.21, np.zeros(1)), Beginning(5, 0.013, 0.23, np.zeros(1))]
+    logs = built_dataset("one", "two").fit
+    fit = MotionFit(now, PLAIN, logs, beginnings, outcome, (7.1e-3, 5.3e-3, 9.7e-3))
+    fit.__dict__["errors"] = (np.array([3e-3, -4e-3]),)
+    fit.__dict__["error_begun"] = 8.5e-3
+    return SimulationFit(None, SimpleNamespace(not_fitted=["z"]), {"x": fit}, {"x": held})  # type: ignore[arg-type]
+
+
+def differences(*ratios: float) -> AxisAgreement:
+    """Parameters p0, p1, ... that differ by so many joint standard errors."""
+    shown = [
+        Difference(f"p{i}", 2.0 + i, 2.0 + i + ratio * (0.1 + 0.01 * i), 0.1 + 0.01 * i, unit, 3.1)
+        for i, (ratio, unit) in enumerate(zip(ratios, ("kg", "N", "N s/m"), strict=False))
+    ]
+    cause = Cause("payload_mass", 0.93)
+    return AxisAgreement(shown, (), (), (), (1.02, 1.07), "N", 0.0139, (cause,))
+
+
+SAME = differences(0.7, -1.9, 2.3)
+OTHER = replace(
+    differences(11.0, -1.3, -4.7), only_a=("wear",), only_b=("gms", "cogging"),
+    not_compared=("p7",), above_floor=(7.3, 1.9),
+    causes=(Cause("payload_mass", 0.61, ("constant_force",)), Cause("wear", 0.23)),
+)  # fmt: skip
+
+# --- diagnoses -------------------------------------------------------------------------------
+
+COGGING, LUGRE = made.FOUND
+ALONE = replace(COGGING, tied=())
+TRAINED = replace(made.DATASET, channel_delay=0.0, holdout=())
+SHAPE = FoundShape(
+    Coordinate.SPEED, np.array([0.1, 0.2]), "m/s", None, True, "N",
+    {"forwards": Drawn(np.array([1.0, 1.5]), np.array([1.2, 2.9]), np.array([0.31, 0.43]))},
+)  # fmt: skip
+
+
+def of(x, **changes: object):
+    """A diagnosis of axis x alone, without the next experiment; changes: other results of it."""
+    alone = replace(made.diagnosed(x), axes={"x": x}, next_experiments={})
+    return replace(alone, **changes)
+
+
+def pair():
+    """Two effects that the logs prove together alone."""
+    both = (replace(ALONE, together=("lugre",)), replace(LUGRE, together=("cogging",)))
+    ranking = (made.WEAK, replace(made.LATER, score=None))
+    return of(made.diagnosis_of(findings=both, ranking=ranking))
+
+
+def tested():
+    """With test logs, which contradict one finding."""
+    against = replace(ALONE, tested=made.errors(2.17, 2.29, Role.TEST)[0])
+    dataset = replace(made.DATASET, test=made.DATASET.holdout)
+    return of(made.diagnosis_of(on=Role.TEST, dataset=dataset, findings=(against, LUGRE)))
+
+
+def trained():
+    """Without selection logs, from a fit that did not converge, to one at a bound."""
+    found = replace(ALONE, chosen=replace(ALONE.chosen, on=Role.TRAINING), left=1.33)
+    x = made.diagnosis_of(
+        base=built_fit(2.0, outcome=Outcome.NOT_CONVERGED), repeat=made.REPEAT, on=Role.TRAINING,
+        final=replace(made.FINAL, outcome=Outcome.AT_BOUND), findings=(found,), dataset=TRAINED,
+    )  # fmt: skip
+    return of(x, refits={})
+
+
+def moved():
+    """Parameters that moved with what was found; no experiment, and effects that were not tried."""
+    result = of(made.diagnosis_of())
+    away = (made.MOVED, replace(made.MOVED, label="b", collapsed=True))
+    told = {**result.told, "x": replace(result.told["x"], moved=away)}
+    tried = {"not_tried": ("axis_coupling",), "not_planned": {"x": "no travel"}}
+    return replace(result, told=told, **tried)
+
+
+def shaped(kind: FindingKind, **more: object):
+    finding = replace(LUGRE, kind=kind, shape=SHAPE, **more)
+    verdict_ = Verdict.WRONG_SHAPE if kind is FindingKind.WRONG_SHAPE else Verdict.MISSING_EFFECTS
+    return of(made.diagnosis_of(verdict_, findings=(finding,)))
+
+
+def beyond():
+    """Nothing missing of the training logs, while the selection logs show something."""
+    result = made.diagnosed()
+    told = {"y": replace(result.told["y"], selection_ratio=3.0)}
+    quiet = {"axes": {"y": result.axes["y"]}, "refits": {"y": Refit(1.0, 1.0, ())}}
+    return replace(result, told=told, **quiet)
+
+
+# --- all of them -----------------------------------------------------------------------------
+
+DRAG, WITH_LUGRE = step(made.RIVAL), step(made.LATER)
+WEAR = replace(made.addition(), step=made.STEPS[2])
+STRANGE = replace(made.TRIALS[1], gain=91.0)
+IMPOSSIBLE = replace(made.TRIALS[1], gain=0.0, not_run=NotRun(made.TRIALS[1].experiment, "too far"))
+LAW = verdict.Outcome("law 0", True, "")
+LAWS = [
+    verdict.LawReport("a", (LAW,)),
+    verdict.LawReport(
+        "b", (replace(LAW, holds=False, fault="off by 3"), replace(LAW, holds=None, fault="later"))
+    ),
+]
+LATE = Finding(Severity.WARNING, Fault.LAG, "y", "the what", "the where", "the remedy")
+
+TEXTS: dict[str, Callable[[], object]] = {
+    "fit": made.fit_result,
+    "fit, intervals refused": refused_fit,
+    "fit of a curve": curve_fit,
+    "fit of simulated motion": simulation_fit,
+    "fit of simulated motion that made the others worse": lambda: simulation_fit(
+        Outcome.NOT_CONVERGED, (4.3e-3, 6.1e-3)
+    ),
+    "fit of simulated motion without other logs": lambda: simulation_fit(held=None),
+    "two fits": lambda: Agreement({"x": SAME, "y": OTHER}, ("z",)),
+    "two fits without a cause": lambda: Agreement(
+        {"y": replace(OTHER, causes=(), above_floor=(1.1, 1.0))}
+    ),
+    "comparison": made.compared,
+    "comparison without a region above noise": lambda: made.Comparison(
+        made.MODEL, {"x": replace(made.comparison_of(), worst=[])}
+    ),
+    "plan between two": lambda: made.plan_of("cogging", "wear", favoured="wear", supposed=True),
+    "plan between two models": lambda: made.plan_of(
+        "a.toml", "b.toml", supposed=True, excited_by={}
+    ),
+    "plan that decides nothing": lambda: made.plan_of(
+        "cogging", "wear", ranking=(replace(made.TRIALS[0], gain=10.0),)
+    ),
+    "plan in order of evidence": lambda: made.plan_of(
+        "cogging", "wear", ranking=(made.TRIALS[0], made.TRIALS[1], IMPOSSIBLE, STRANGE)
+    ),
+    "plan for one model": lambda: made.plan_of("the stage", supposed=True),
+    "addition": made.addition,
+    "addition that nothing proves": lambda: made.addition(False),
+    "addition with a test log": lambda: replace(made.addition(), step=made.STEPS[1]),
+    "addition without selection log": lambda: WEAR,
+    "a shape given": lambda: replace(WEAR, step=replace(WEAR.step, action="shape")),
+    "diagnosis": lambda: made.diagnosed(
+        made.diagnosis_of(unexplained=made.STRUCTURE, repeat=made.REPEAT, small=("wear", "gms"))
+    ),
+    "diagnosis: one effect": lambda: of(made.diagnosis_of(findings=(ALONE,))),
+    "diagnosis: two effects": lambda: of(made.diagnosis_of(findings=(ALONE, LUGRE))),
+    "diagnosis: a pair": pair,
+    "diagnosis: contradicted by test logs": tested,
+    "diagnosis: training logs alone": trained,
+    "diagnosis: what moved, what was not tried": moved,
+    "diagnosis: like a law of another shape": lambda: shaped(FindingKind.RESEMBLES),
+    "diagnosis: a law of another shape": lambda: shaped(FindingKind.WRONG_SHAPE),
+    "diagnosis: a law with another exponent": lambda: shaped(
+        FindingKind.WRONG_SHAPE, bend=Bend("n", 2.0, 0.66, "1")
+    ),
+    "diagnosis: unexplained": lambda: of(
+        made.diagnosis_of(Verdict.UNEXPLAINED, unexplained=made.STRUCTURE)
+    ),
+    "diagnosis: nothing missing but elsewhere": beyond,
+    "diagnosis: noise": lambda: of(made.diagnosis_of(steps=(step(built(NOISE)),))),
+    "diagnosis: steps that are not named": lambda: of(
+        made.diagnosis_of(
+            steps=(DRAG, replace(WITH_LUGRE, dropped=("quadratic_drag",))), findings=(LUGRE,)
+        )
+    ),
+    "diagnosis: a tie told once": lambda: of(
+        made.diagnosis_of(
+            findings=(replace(COGGING, tied=("lugre",)), replace(LUGRE, tied=("cogging",)))
+        )
+    ),
+    "catalogue": lambda: effects_text([CATALOGUE["wear"], CATALOGUE["gms"]]),
+    "effect": lambda: effect_text(CATALOGUE["coulomb_viscous"]),
+    "laws": lambda: laws_text(LAWS),
+    "check": lambda: check_text({"a": CheckReport((LATE,)), "b": CheckReport(())}),
+}  # fmt: skip
+
+
+def texts() -> dict[str, str]:
+    """The texts by name, in a line each of the file after their name."""
+    made_now = {name: result() for name, result in TEXTS.items()}
+    return {name: r if isinstance(r, str) else text_of(r) for name, r in made_now.items()}
+
+
+def kept() -> dict[str, str]:
+    """The texts of the file."""
+    parts = re.split(r"^== (.+)\n", FILE.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    return {n: text.rstrip("\n") for n, text in zip(parts[::2], parts[1::2], strict=True)}
+
+
+def test_there_is_a_text_of_every_result() -> None:
+    assert list(kept()) == list(TEXTS)
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_text_is_as_it_was_read(name: str) -> None:
+    result = TEXTS[name]()
+    text = result if isinstance(result, str) else text_of(result)
+    assert text.splitlines() == kept()[name].splitlines()
+
+
+if __name__ == "__main__":
+    FILE.write_text("".join(f"== {n}\n{text}\n\n" for n, text in texts().items()), encoding="utf-8")
