@@ -109,7 +109,7 @@ def pair():
     return of(made.diagnosis_of(findings=both, ranking=ranking))
 
 
-def tested():
+def with_test_logs():
     """With test logs, which contradict one finding."""
     against = replace(ALONE, tested=made.errors(2.17, 2.29, Role.TEST)[0])
     dataset = replace(made.DATASET, test=made.DATASET.holdout)
@@ -203,7 +203,7 @@ TEXTS: dict[str, Callable[[], object]] = {
     "diagnosis: one effect": lambda: of(made.diagnosis_of(findings=(ALONE,))),
     "diagnosis: two effects": lambda: of(made.diagnosis_of(findings=(ALONE, LUGRE))),
     "diagnosis: a pair": pair,
-    "diagnosis: contradicted by test logs": tested,
+    "diagnosis: contradicted by test logs": with_test_logs,
     "diagnosis: training logs alone": trained,
     "diagnosis: what moved, what was not tried": moved,
     "diagnosis: like a law of another shape": lambda: shaped(FindingKind.RESEMBLES),
