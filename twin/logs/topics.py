@@ -130,9 +130,9 @@ class Topics:
             raise Damaged(f"{name} {record.id} is defined twice, differently")
         self._seen.add(content)
 
-    def names(self, prefix: str = "") -> list[str]:
-        """The topics whose names begin so."""
-        return sorted(c.topic for c in self.channels.values() if c.topic.startswith(prefix))
+    def names(self) -> list[str]:
+        """All topics of the file, also those of no axis."""
+        return sorted(channel.topic for channel in self.channels.values())
 
     def topic(self, channel: int) -> Topic | None:
         """Topic of a channel; None where it holds no samples."""
