@@ -83,10 +83,17 @@ def write_results(results: Mapping[str, Sequence[Figure]], folder: Path) -> None
     _replace(folder / "RESULTS.json", json.dumps(content, indent=1) + "\n")
 
 
+def shown(value: float | None) -> str:
+    """A number of three digits; one that counts in full."""
+    if value is None:
+        return ""
+    return f"{value:.0f}" if float(value).is_integer() else f"{value:.3g}"
+
+
 def told(figures: Sequence[Figure]) -> int:
     """Print figures; 0 where every target is met."""
     for f in figures:
-        value = "" if f.value is None else f"{f.value:.3g}"
+        value = shown(f.value)
         print(f"{f.verdict:7} {value:>6}  {f.what}{'; ' if f.note else ''}{f.note}")
     return int(any(f.passed is False for f in figures))
 
@@ -98,7 +105,7 @@ def _kept(path: Path) -> dict[str, list[dict[str, Any]]]:
 def _table(figures: Sequence[Mapping[str, Any]]) -> str:
     lines = ["| figure | value | unit | target | | note |", "|---|---|---|---|---|---|"]
     for f in figures:
-        value = "" if f["value"] is None else f"{f['value']:.3g}"
+        value = shown(f["value"])
         verdict = {None: "", True: "pass", False: "FAIL"}[f["passed"]]
         lines.append(
             f"| {f['figure']} | {value} | {f['unit']} | {f['target'] or ''} | {verdict} "

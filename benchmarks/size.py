@@ -20,7 +20,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from benchmarks.figures import Figure, Target
+from benchmarks.figures import Figure, Target, shown
 from twin.errors import InputError
 
 TITLE = "Size of the code"
@@ -204,7 +204,7 @@ def compared(revision: str) -> list[Figure]:
     """Each figure now, with what it was at a revision in its note."""
     before, now = at(revision), here()
     return [
-        Figure(what, count(now), "1", target, f"{count(before):.4g} at {revision}")
+        Figure(what, count(now), "1", target, f"{shown(count(before))} at {revision}")
         for what, count, target in COUNTED
     ]
 
@@ -219,5 +219,5 @@ def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks size", description=__doc__)
     parser.add_argument("revision", nargs="?", default=BEFORE, help="of git, to compare with")
     for f in compared(parser.parse_args(arguments).revision):
-        print(f"{f.what:32} {f.note:>22}  {f.value:9.6g} now {f.verdict:5} {f.target or ''}")
+        print(f"{f.what:32} {f.note:>20}  {shown(f.value):>7} now  {f.verdict:4} {f.target or ''}")
     return 0

@@ -1,9 +1,9 @@
-"""How the result of a study is told: as plain numbers, tables of them, and pictures of lines."""
+"""How the result of a study is told: tables of its numbers, and pictures of lines."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,17 +16,6 @@ from identify.output.report.page import Column, Row, Table
 from studies.drawing import INK, Picture, new_figure, plain_tick
 
 HEIGHT = 2.2  # inches of a row of panels
-
-
-def numbers(value: Any) -> Any:
-    """Anything found as an object of JSON; a result by its fields."""
-    if is_dataclass(value):
-        return {field.name: numbers(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): numbers(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [numbers(one) for one in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
 def tables(found: Any, name: str) -> Iterator[Table]:

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from identify.output.answers.answer import plain
 from identify.output.numbers import capitalised
 from identify.output.report.page import Answer, Section, Tone, page
 from studies.drawing import drawing_style
-from studies.telling import numbers, tables
+from studies.telling import tables
 from studies.thesis import cable, dynamic, future, models, residuals, simulation, track, twin
 from studies.thesis.study import Chapter, Found
 from twin.errors import InputError
@@ -42,7 +43,7 @@ class Reproduction:
     def numbers(self) -> dict[str, Any]:
         """The documented object: every chapter that was run, and the seconds that it took."""
         return {
-            "chapters": {name: numbers(found.numbers) for name, found in self.chapters.items()},
+            "chapters": {name: plain(found.numbers) for name, found in self.chapters.items()},
             "small": self.small,
             "seconds": sum(self.seconds.values()),
             "seconds_by_chapter": dict(self.seconds),
@@ -72,7 +73,7 @@ class Reproduction:
 def _section(name: str, found: Found) -> Section:
     title, words = CHAPTERS[name].TITLE, [capitalised(said) for said in found.words]
     answer = Answer(title, words[0], [], words[1:], Tone.STRONG)
-    return Section(name, title, [answer, *found.pictures, *tables(numbers(found.numbers), name)])
+    return Section(name, title, [answer, *found.pictures, *tables(plain(found.numbers), name)])
 
 
 @one_for_matrices

@@ -1,4 +1,4 @@
-"""How a result is told: plain numbers, tables of alike entries, pictures whose lines are data."""
+"""How a result is told: plain tables of alike entries, pictures whose lines are data."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from identify.output.answers.answer import plain
 from studies.drawing import BLUE, drawing_style
-from studies.telling import Line, Panel, numbers, picture, tables
+from studies.telling import Line, Panel, picture, tables
 
 
 def readable(figure: Figure) -> None:
@@ -44,16 +45,8 @@ FOUND = {
 }  # fmt: skip
 
 
-def test_numbers_are_plain() -> None:
-    found = numbers(FOUND)
-    assert found["trials"] == 3
-    assert found["position"] == [0.1, 0.2]
-    assert found["spikes"][1] == {"centre": -0.022, "width": 0.0019}
-    assert numbers({1.0: np.float64(2.0)}) == {"1.0": 2.0}
-
-
 def test_alike_entries_are_a_table_each() -> None:
-    parameters, spikes, white = tables(numbers(FOUND), "cable")
+    parameters, spikes, white = tables(plain(FOUND), "cable")
     assert [c.title for c in parameters.columns] == ["", "true", "mean", "unit"]
     assert [tuple(row.cells) for row in parameters.rows] == [
         ("sigma0", "260", "260", "N/m"), ("sigma1", "0.600", "-0.0612", "N·s/m"),
