@@ -42,10 +42,18 @@ def main(given: Sequence[str]) -> int:
         return 2
     modules = (import_module(f"benchmarks.{places[name]}") for name in names)
     try:
-        return int(next(modules).main(options)) if is_run else measured(modules)
+        if is_run:
+            return _run(next(modules), options)
+        return measured(modules)
     except InputError as error:
         print(f"benchmarks: {error}", file=sys.stderr)
         return 2
+
+
+def _run(benchmark: ModuleType, options: Sequence[str]) -> int:
+    if not hasattr(benchmark, "main"):
+        raise InputError(f"{benchmark.__name__} has no options; give its name alone")
+    return int(benchmark.main(options))
 
 
 def measured(benchmarks: Iterable[ModuleType]) -> int:

@@ -114,6 +114,13 @@ def test_bad_input_is_one_line(given, said, capsys):
     assert said in err
 
 
-def test_an_unknown_benchmark_is_one_line_with_those_there_are(capsys):
-    assert main(["emps", "empss"]) == 2
-    assert "no benchmark empss; there are simulation, " in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["emps", "empss"], "no benchmark empss; there are simulation, "),
+        (["emps", "--seed", "3"], "benchmarks.emps has no options; give its name alone"),
+    ],
+)
+def test_a_benchmark_that_is_none_or_has_no_options_is_one_line(given, said, capsys):
+    assert main(given) == 2
+    assert said in capsys.readouterr().err
