@@ -124,7 +124,8 @@ def compare(
     with progress_on_stderr() as progress, left_out() as silent:
         result = workflow.compare(machine, recorded, test_function=test_function, progress=progress)
     title = f"{machine.name}: model against measurement"
-    _report(out, title, model, None, result, recorded.findings)
+    same = _options(test_function, effects)
+    _report(out, title, model, same, None, result, recorded.findings)
     if mcap:
         workflow.side_by_side_of(result).write(mcap)
     tell(result, as_json_, [*recorded.findings, *silent], left_out=silent)
@@ -153,20 +154,31 @@ def diagnose(
     job = partial(workflow.diagnose, catalogue=catalogue, test_function=test_function)
     result, findings, silent = with_roles(job, machine, logs, holdout, test)
     title = f"{machine.name}: what the model lacks"
-    _report(out, title, model, result, result.comparison, findings)
+    same = _options(test_function, effects)
+    _report(out, title, model, same, result, result.comparison, findings)
     told = {"data_faults": findings, "left_out": silent}
     tell(result, as_json_, [*findings, *silent], **told)
+
+
+def _options(test_function: float | None, effects: list[Path] | None) -> str:
+    """Options as they are typed."""
+    length = [] if test_function is None else ["--test-function", f"{test_function:g}"]
+    return shlex.join([*length, *(text for f in effects or () for text in ("--effects", str(f)))])
 
 
 def _report(
     out: Path | None,
     title: str,
     name: str,
+    options: str,
     diagnosis: Diagnosis | None,
     comparison: Comparison,
     findings: Sequence[str],
 ) -> None:
-    """Write the report that was asked for; name: of the given model; findings: on the logs."""
+    """Write the report that was asked for.
+
+    name: of the given model. options: that the next command needs as well. findings: on the logs.
+    """
     if out is None:
         return
     from identify.output.report import Source, write_report
@@ -175,7 +187,7 @@ def _report(
     write_report(
         out, title=title, diagnosis=diagnosis, comparison=comparison, history=model.history,
         assumed=[line for line in findings if "the import map assumes" in line],
-        source=Source(shlex.join(["twin", *sys.argv[1:]]), name),
+        source=Source(shlex.join(["twin", *sys.argv[1:]]), name, options=options),
     )  # fmt: skip
 
 

@@ -69,7 +69,6 @@ def _axis(view: AxisView, most: int) -> dict[str, Any]:
         "coordinates": coordinates,
         "residuals": residuals,
         "effects": [f"effect {name}" for name in signals.effects],
-        "named": [f"effect {name}" for name in (view.found.named if view.found else ())],
         "against": coordinate_of_answer(view, coordinates),
         "floor": float(left(view.axis.floor)),
         "texts": {
@@ -87,17 +86,17 @@ def _named(view: AxisView, left: Scale | None = None) -> dict[str, tuple[str, Ar
     signals, units, words = view.signals, view.units, view.words
     left = left or Scale.of(units.force, [])
     force = Scale.of(units.force, signals.to_explain)
-    without, with_it = (f", {w} {view.label}" if view.label else "" for w in ("without", "with"))
+    without = f"error without {view.label}" if view.label else words("unexplained force")
     named = {
         "to_explain": (
             words("measured force minus mass x acceleration"),
             signals.to_explain,
             force,
         ),
-        "before": (words(f"unexplained force{without}"), signals.before, left),
+        "before": (without, signals.before, left),
     }
     if signals.after is not None:
-        named["after"] = (words(f"unexplained force{with_it}"), signals.after, left)
+        named["after"] = (f"error with {view.label}", signals.after, left)
     for name, values in signals.effects.items():
         named[f"effect {name}"] = (spaced(name), values, force)
     for name, values in signals.coordinates.items():

@@ -23,11 +23,15 @@ from twin.model.units import AxisUnits
 
 @dataclass(frozen=True)
 class Source:
-    """What a report was made of: the command as typed, the model's name in it, the logs' folder."""
+    """What a report was made of: the command as typed, the model's name in it, the logs' folder.
+
+    options: those of the command that the next one needs as well.
+    """
 
     command: str = ""
     model: str = "MODEL"
     folder: Path = Path()
+    options: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +58,18 @@ class Subject:
         return named
 
     def command(self, text: str) -> str:
-        """A command with the model and the logs of this page in the place of MODEL and LOG..."""
-        first, *others = (
-            [shlex.join(pair) for name in names for pair in [[*option, name]]]
-            for names, option in zip(
-                self.logs.values(), ([], ["--holdout"], ["--test"]), strict=True
-            )
-        )
-        every = " ".join([*first, *(text for some in others for text in some)])
+        """A command with the model and the logs of this page in the place of MODEL and LOG...
+
+        A plan reads no test logs.
+        """
+        options = {Role.TRAINING: "", Role.SELECTION: "--holdout ", Role.TEST: "--test "}
+        given = [
+            f"{options[role]}{shlex.quote(name)}"
+            for role, names in self.logs.items()
+            for name in names
+            if role is not Role.TEST or not text.startswith("twin plan")
+        ]
+        every = " ".join([*given, *([self.source.options] if self.source.options else [])])
         return text.replace("LOG...", every).replace("MODEL", shlex.quote(self.source.model))
 
     @cached_property

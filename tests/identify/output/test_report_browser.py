@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,8 +11,13 @@ import pytest
 from browser import Browser, browser
 from report_cases import Case, cogging_case
 
+from identify import workflow
 from identify.output.as_json import compare_json, diagnose_json
 from identify.output.numbers import PREFIXES
+from twin.effects import Catalogue, load_catalogue
+from twin.experiments.named import simulate
+from twin.model.machine import Fitted
+from twin.simulator import ReducedSimulator
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +133,7 @@ def test_effects_can_be_shown_and_hidden(page: Browser) -> None:
       return {names, before, after: boxes.map((b, i) => [b.checked, u.series[i + 1].show])};
     """)
     assert seen["names"][3:] == ["coulomb viscous", "constant force", "cogging"]
-    assert [checked for checked, _ in seen["before"]] == [True, True, True, False, False, True]
+    assert [checked for checked, _ in seen["before"]] == [True, True, True, False, False, False]
     assert all(checked == drawn for checked, drawn in (*seen["before"], *seen["after"]))
     assert [a for a, _ in seen["after"]] == [not b for b, _ in seen["before"]]
 
@@ -222,3 +228,43 @@ def test_the_pages_numbers_are_those_of_the_json(page: Browser, case: Case) -> N
     floor = told["noise_floor"]
     ratios = [told["force_error"] / floor, told["force_error_with_found"] / floor]
     assert [number(before), number(after)] == pytest.approx(ratios, rel=0.006)
+
+
+# --- long logs ------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_five_logs_of_a_million_and_a_half_samples(case: Case, tmp_path: Path) -> None:
+    """At most 3 MB and, on a machine that does nothing else, a second to the first paint."""
+    catalogue = load_catalogue()
+    axis = case.model.axes["x"]
+    hidden = Fitted.at_start(catalogue["cogging"], {"p": 0.025, "a1": 0.1})
+    truth = case.model.with_axis("x", axis.with_effect(hidden))
+    logs = {
+        f"run {seed}": simulate(
+            truth, "tracking", seed=seed, duration=150.0, simulator=ReducedSimulator
+        )
+        for seed in range(5)
+    }
+    assert sum(len(log) for log in logs.values()) >= 1_500_000
+    test = {"run 4": logs.pop("run 4")}
+    held = {"run 3": logs.pop("run 3")}
+    few = Catalogue([catalogue["cogging"]])
+    found = workflow.diagnose(case.model, logs, held, test, catalogue=few)
+    path = tmp_path / "long.html"
+    begun = time.monotonic()
+    case.write(path, diagnosis=found, comparison=found.comparison, additions=())
+    took = time.monotonic() - begun
+    with browser(tmp_path) as running:
+        paints = []
+        for _ in range(5):
+            running.open(path)
+            paints.append(running.paint())
+        assert running.errors == []
+        zoomed = running.run("""const t = performance.now();
+          document.querySelector("[data-zoom=in]").click(); await frame();
+          return performance.now() - t;""")
+    size = path.stat().st_size
+    print(f"{size / 1e6:.2f} MB in {took:.1f} s, paint {min(paints):.2f} s, zoom {zoomed:.0f} ms")
+    assert size < 3_000_000
+    assert min(paints) < 1.0

@@ -131,7 +131,7 @@ if (data.length) {
   function toggles() {
     $("toggles").replaceChildren(...series().map(([name, color], i) => {
       const box = document.createElement("input"), mark = document.createElement("i"), text = document.createElement("label");
-      box.type = "checkbox", box.checked = i < series().length - axis.effects.length || axis.named.includes(name);
+      box.type = "checkbox", box.checked = i < series().length - axis.effects.length;
       mark.style.background = color;
       box.addEventListener("change", () => plots[0].setSeries(i + 1, {show: box.checked}));
       text.append(box, mark, title(name));
@@ -166,7 +166,8 @@ if (data.length) {
     motion(common, hooks);
   }
   function motion(common, hooks) {
-    const name = $("against").value === "time" ? "position" : $("against").value, s = axis.of(name);
+    const against = $("against").value;  // a phase turns too often to be read over time
+    const name = against === "time" || against.endsWith("_phase") ? "position" : against, s = axis.of(name);
     plots[2] = plot($("motion"), {...common, hooks, height: 180, labels: ["Time (s), logs in a row", label(s)],
       series: [line(s.label, INK, s.unit)]}, [axis.x, axis.values(name)]);
     plots[2].again = () => motion(common, hooks);
@@ -232,7 +233,7 @@ if (data.length) {
       let mean;
       [at, mean] = means(x, dots[g], a, b, low, high, accepts);
       values.push([null, ...mean, null]);
-      lines.push(line(`${title(name)}${side && ", " + side}, mean`, color, unit, {width: 2.25, dash, spanGaps: false}));
+      lines.push(line(`mean ${title(name)}${side && ", " + side}`, color, unit, {width: 2.25, dash, spanGaps: false}));
     }));
     const bounds = padded(Math.min(reach[0], -floor), Math.max(reach[1], floor));
     const u = plot($("coordinate"), {
