@@ -12,7 +12,7 @@ from browser import Browser, browser
 from report_cases import Case, cogging_case
 
 from identify import workflow
-from identify.output.as_json import compare_json, diagnose_json
+from identify.output.as_json import json_of
 from identify.output.numbers import PREFIXES
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
@@ -208,8 +208,8 @@ def test_the_pages_numbers_are_those_of_the_json(page: Browser, case: Case) -> N
       const tiles = Object.fromEntries([...document.querySelectorAll(".tiles div")].map(
         d => [d.children[0].textContent, d.children[1].textContent]));
       return {logs: of("logs"), ranking: of("ranking"), found: of("found"), tiles};""")
-    told = diagnose_json(case.diagnosis)
-    compared = compare_json(case.diagnosis.comparison)["axes"]["x"]
+    told = json_of(case.diagnosis)
+    compared = json_of(case.diagnosis.comparison)["axes"]["x"]
     for name, one in compared["logs"].items():
         cells = rows["logs"][name]
         expected = [one["force_error"], one["force_ratio"], one["position_error"]]
