@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted, step
@@ -11,22 +12,26 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fi
 from identify.dataset.dataset import Role
 from identify.estimation.fit import Errors, Outcome
 from identify.estimation.intervals import Estimate, NotExcited
+from identify.estimation.open_loop import Beginning
 from identify.estimation.residual_dependence import Dependence, Repeat
+from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.results.addition import Addition
-from identify.results.results import Comparison, Diagnosis, FitResult
+from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
 from identify.results.told import Told
 from identify.selection.acceptance import Score, Taken
 from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding
+from identify.validation.agreement import AxisAgreement, Cause, Difference
 from identify.validation.comparison import AxisComparison
 from identify.validation.misfit_maps import MisfitMap, Region
 from identify.validation.whiteness import Correlation, Loop, ResidualTests
 from twin.experiments.kinds import Passes, Tracking
 from twin.model.machine import HistoryStep, MachineModel
+from twin.model.parameters import free_parameters, read, write
 
 DATASET = replace(built_dataset("run 1", "run 2", held=("held 1",)), channel_delay=0.000217)
 RNG = np.random.default_rng(9)
@@ -217,6 +222,35 @@ def fit_result() -> FitResult:
         {"x": refit_of(0.0), "y": Refit(0.0319, 0.0317, ())},
     )  # fmt: skip
     return result
+
+
+def simulation_fit(outcome=Outcome.CONVERGED, held=(6.1e-3, 4.3e-3)) -> SimulationFit:
+    where = free_parameters(PLAIN)
+    now = write(PLAIN, where, read(PLAIN, where) * 1.07)
+    beginnings = [Beginning(3, 0.011, -0.21, np.zeros(1)), Beginning(5, 0.013, 0.23, np.zeros(1))]
+    logs = built_dataset("one", "two").fit
+    fit = MotionFit(now, PLAIN, logs, beginnings, outcome, (7.1e-3, 5.3e-3, 9.7e-3))
+    fit.__dict__["errors"] = (np.array([3e-3, -4e-3]),)
+    fit.__dict__["error_begun"] = 8.5e-3
+    return SimulationFit(None, SimpleNamespace(not_fitted=["z"]), {"x": fit}, {"x": held})  # type: ignore[arg-type]
+
+
+def differences(*ratios: float) -> AxisAgreement:
+    """Parameters p0, p1, ... that differ by so many joint standard errors."""
+    shown = [
+        Difference(f"p{i}", 2.0 + i, 2.0 + i + ratio * (0.1 + 0.01 * i), 0.1 + 0.01 * i, unit, 3.1)
+        for i, (ratio, unit) in enumerate(zip(ratios, ("kg", "N", "N s/m"), strict=False))
+    ]
+    cause = Cause("payload_mass", 0.93)
+    return AxisAgreement(shown, (), (), (), (1.02, 1.07), "N", 0.0139, (cause,))
+
+
+SAME = differences(0.7, -1.9, 2.3)
+OTHER = replace(
+    differences(11.0, -1.3, -4.7), only_a=("wear",), only_b=("gms", "cogging"),
+    not_compared=("p7",), above_floor=(7.3, 1.9),
+    causes=(Cause("payload_mass", 0.61, ("constant_force",)), Cause("wear", 0.23)),
+)  # fmt: skip
 
 
 STEPS = (

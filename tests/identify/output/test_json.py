@@ -15,21 +15,24 @@ from jsonschema import Draft202012Validator, ValidationError
 from report_cases import cogging_case
 from strict_json import shipped, strict, told, valid
 
+from identify.estimation.fit import Outcome
 from identify.output.answers.answer import plain
 from identify.output.answers.machine import check_answer, effect_answer, laws_answer
 from identify.output.as_json import FILE, json_of, schema_text
 from identify.output.report import sections
 from identify.output.words.diagnosis import SEVERAL, remarks_on
 from identify.output.words.findings import advice
-from identify.output.words.fit import OUTCOMES, no_interval_in_words
+from identify.output.words.fit import MOTION_OUTCOMES, OUTCOMES, no_interval_in_words
 from identify.output.words.plan import gap_in_words
 from identify.output.words.residual import loop_in_words, region_in_words
 from identify.selection.bends import Bend
 from identify.selection.diagnosis import Verdict
 from identify.selection.found_shape import Drawn, FoundShape
+from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.curve import Coordinate
 from twin.laws import verdict
+from twin.model.parameters import free_parameters, read
 
 # --- the schema ------------------------------------------------------------------------------
 
@@ -105,6 +108,59 @@ def test_a_fit() -> None:
             "parameters": estimates(result.estimates[axis]),
             "refit": refit(result.refits[axis]),
         }  # fmt: skip
+
+
+def test_a_fit_of_simulated_motion() -> None:
+    result = made.simulation_fit()
+    found = told(result)
+    assert (found["objective"], found["not_fitted"]) == ("simulation", ["z"])
+    assert found["objectives_disagree"] == []
+    x, fit = found["axes"]["x"], result.axes["x"]
+    where = free_parameters(fit.axis)
+    values = zip(where, read(fit.axis, where), read(fit.begun, where), strict=True)
+    begun = {"time_unit": "s", "position_unit": "m", "velocity_unit": "m/s"}
+    assert x == {
+        "outcome": MOTION_OUTCOMES[fit.outcome], "converged": True, "unit": "m",
+        "position_error": pytest.approx(12.5**0.5 * 1e-3), "position_error_of_force_fit": 8.5e-3,
+        "holdout_position_error": 4.3e-3, "holdout_position_error_of_force_fit": 6.1e-3,
+        "errors_of_starts": [7.1e-3, 5.3e-3, 9.7e-3],
+        "parameters": {
+            c.label: {"value": now, "force_fit": before, "unit": c.parameter.unit}
+            for c, now, before in values
+        },
+        "beginnings": {
+            "one": {"time": pytest.approx(3e-3), "position": 0.011, "velocity": -0.21, **begun},
+            "two": {"time": pytest.approx(5e-3), "position": 0.013, "velocity": 0.23, **begun},
+        },
+    }  # fmt: skip
+    bare = told(made.simulation_fit(Outcome.NOT_CONVERGED, None))["axes"]["x"]
+    assert not bare["converged"]
+    assert bare["holdout_position_error"] is bare["holdout_position_error_of_force_fit"] is None
+
+
+def test_two_fits() -> None:
+    result = Agreement({"x": made.SAME, "y": made.OTHER}, ("z",))
+    found = told(result, a="m.toml", b="n.toml")
+    assert (found["a"], found["b"]) == ("m.toml", "n.toml")
+    assert (found["agree"], found["not_compared"]) == (False, ["z"])
+    x, y = found["axes"]["x"], found["axes"]["y"]
+    assert (x["agree"], y["agree"]) == (True, False)
+    assert y["differing"] == ["p0", "p2"]  # the surest first
+    for axis, own in ((x, made.SAME), (y, made.OTHER)):
+        for d in own.differences:
+            assert axis["parameters"][d.label] == {
+                "a": d.a, "b": d.b, "difference": pytest.approx(d.ratio * d.standard_error),
+                "standard_error": d.standard_error, "unit": d.unit, "limit": d.limit,
+                "in_standard_errors": pytest.approx((d.b - d.a) / d.standard_error),
+                "differs": abs(d.ratio) > 3.1,
+            }  # fmt: skip
+    assert (y["only_in_a"], y["only_in_b"]) == (["wear"], ["gms", "cogging"])
+    assert (y["not_compared"], y["error_over_noise_floor"]) == (["p7"], [7.3, 1.9])
+    assert (y["force"], y["force_unit"]) == (0.0139, "N")
+    assert y["causes"] == [
+        {"effect": "payload_mass", "share": 0.61, "or": ["constant_force"]},
+        {"effect": "wear", "share": 0.23, "or": []},
+    ]
 
 
 def test_a_comparison() -> None:

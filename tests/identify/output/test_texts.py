@@ -10,32 +10,27 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import built_results as made
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, NOISE, PLAIN, built, built_dataset, built_fit, fitted, step
+from built_fits import CATALOGUE, NOISE, built, built_fit, fitted, step
 
 from identify.dataset.dataset import Role
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import refusal
-from identify.estimation.open_loop import Beginning
-from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.output.machine import check_text, effect_text, effects_text, laws_text
 from identify.output.text import text_of
-from identify.results.results import SimulationFit
 from identify.selection.bends import Bend
 from identify.selection.confounded import Refit
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 from identify.selection.found_shape import Drawn, FoundShape
-from identify.validation.agreement import Agreement, AxisAgreement, Cause, Difference
+from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.curve import Coordinate
 from twin.laws import verdict
-from twin.model.parameters import free_parameters, read, write
 
 FILE = Path(__file__).parent / "texts.txt"
 
@@ -56,34 +51,6 @@ def curve_fit():
     fit = built_fit(1.0, axis=made.axis_of(fitted(effect.name)))
     return replace(made.fit_result(), fits={"x": fit}, estimates={"x": (strength,)})
 
-
-def simulation_fit(outcome=Outcome.CONVERGED, held=(6.1e-3, 4.3e-3)) -> SimulationFit:
-    where = free_parameters(PLAIN)
-    now = write(PLAIN, where, read(PLAIN, where) * 1.07)
-    beginnings = [Beginning(3, 0.011, -0.21, np.zeros(1)), Beginning(5, 0.013, 0.23, np.zeros(1))]
-    logs = built_dataset("one", "two").fit
-    fit = MotionFit(now, PLAIN, logs, beginnings, outcome, (7.1e-3, 5.3e-3, 9.7e-3))
-    fit.__dict__["errors"] = (np.array([3e-3, -4e-3]),)
-    fit.__dict__["error_begun"] = 8.5e-3
-    return SimulationFit(None, SimpleNamespace(not_fitted=["z"]), {"x": fit}, {"x": held})  # type: ignore[arg-type]
-
-
-def differences(*ratios: float) -> AxisAgreement:
-    """Parameters p0, p1, ... that differ by so many joint standard errors."""
-    shown = [
-        Difference(f"p{i}", 2.0 + i, 2.0 + i + ratio * (0.1 + 0.01 * i), 0.1 + 0.01 * i, unit, 3.1)
-        for i, (ratio, unit) in enumerate(zip(ratios, ("kg", "N", "N s/m"), strict=False))
-    ]
-    cause = Cause("payload_mass", 0.93)
-    return AxisAgreement(shown, (), (), (), (1.02, 1.07), "N", 0.0139, (cause,))
-
-
-SAME = differences(0.7, -1.9, 2.3)
-OTHER = replace(
-    differences(11.0, -1.3, -4.7), only_a=("wear",), only_b=("gms", "cogging"),
-    not_compared=("p7",), above_floor=(7.3, 1.9),
-    causes=(Cause("payload_mass", 0.61, ("constant_force",)), Cause("wear", 0.23)),
-)  # fmt: skip
 
 # --- diagnoses -------------------------------------------------------------------------------
 
@@ -168,14 +135,14 @@ TEXTS: dict[str, Callable[[], object]] = {
     "fit": made.fit_result,
     "fit, intervals refused": refused_fit,
     "fit of a curve": curve_fit,
-    "fit of simulated motion": simulation_fit,
-    "fit of simulated motion that made the others worse": lambda: simulation_fit(
+    "fit of simulated motion": made.simulation_fit,
+    "fit of simulated motion that made the others worse": lambda: made.simulation_fit(
         Outcome.NOT_CONVERGED, (4.3e-3, 6.1e-3)
     ),
-    "fit of simulated motion without other logs": lambda: simulation_fit(held=None),
-    "two fits": lambda: Agreement({"x": SAME, "y": OTHER}, ("z",)),
+    "fit of simulated motion without other logs": lambda: made.simulation_fit(held=None),
+    "two fits": lambda: Agreement({"x": made.SAME, "y": made.OTHER}, ("z",)),
     "two fits without a cause": lambda: Agreement(
-        {"y": replace(OTHER, causes=(), above_floor=(1.1, 1.0))}
+        {"y": replace(made.OTHER, causes=(), above_floor=(1.1, 1.0))}
     ),
     "comparison": made.compared,
     "comparison without a region above noise": lambda: made.Comparison(
