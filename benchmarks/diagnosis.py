@@ -10,8 +10,8 @@ import numpy as np
 from benchmarks.figures import Figure, Target
 from benchmarks.timing import interleaved
 from identify import workflow
+from identify.estimation.variable_projection import absent_effects
 from identify.selection.acceptance import Judged
-from identify.selection.candidates import absent_effects
 from identify.selection.search import tried_beside
 from twin.core.native import law_address
 from twin.effects import load_catalogue

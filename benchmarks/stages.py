@@ -19,9 +19,9 @@ from benchmarks import workload
 from benchmarks.figures import Figure, Target
 from benchmarks.workload import AXIS, Workload, saved
 from identify import workflow
+from identify.estimation.variable_projection import absent_effects
 from identify.output.report import write_report
 from identify.selection import diagnosis
-from identify.selection.candidates import absent_effects
 from identify.selection.trying import try_effect
 from twin.core.compiled import law_address
 from twin.effects import load_catalogue

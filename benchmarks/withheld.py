@@ -29,7 +29,7 @@ from benchmarks.judgement import (
     stated_wrong,
 )
 from benchmarks.real_machines import EXAMPLES, Given
-from identify.selection.candidates import usable
+from identify.estimation.variable_projection import usable
 from identify.selection.diagnosis import diagnose_axis
 from twin.effect import Kind
 from twin.effects import load_catalogue

@@ -17,12 +17,14 @@ from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import sticks
 from identify.dataset.silent_logs import telling
 from identify.estimation.channel_delay import aligned, fit_aligned
+from identify.estimation.confounded import refit
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.force_balance import require_finite, require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.estimation.open_loop import simulated_error
 from identify.estimation.residual_noise import noise_known, with_own_noise
 from identify.estimation.simulated_motion import fit_simulated_motion
+from identify.estimation.variable_projection import usable
 from identify.experiment_design.plan import next_experiments
 from identify.experiment_design.plan import plan as plan
 from identify.output.text import diagnose_text as diagnose_text  # with it results print themselves
@@ -30,8 +32,6 @@ from identify.output.words.addition import axis_in_words, notes_in_words
 from identify.results.addition import Addition, addition
 from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
 from identify.results.told import Told, told_of
-from identify.selection.candidates import usable
-from identify.selection.confounded import refit
 from identify.selection.curves import having_shape
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone

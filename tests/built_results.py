@@ -10,6 +10,7 @@ import numpy as np
 from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted, step
 
 from identify.dataset.dataset import Role
+from identify.estimation.confounded import Change, MovedParameter, Refit
 from identify.estimation.fit import Errors, Outcome
 from identify.estimation.intervals import Estimate, NotExcited
 from identify.estimation.open_loop import Beginning
@@ -22,7 +23,6 @@ from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
 from identify.results.told import Told
 from identify.selection.acceptance import Score, Taken
-from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding
 from identify.validation.agreement import AxisAgreement, Cause, Difference

@@ -24,7 +24,8 @@ from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import minimise, orthonormal, unabsorbed
 from identify.rules import RULE
 from twin.effect import Effect, Excitation, Kind, Parameter
-from twin.model.machine import AxisModel, Fitted
+from twin.effects import Catalogue
+from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import ParameterReference, read
 from twin.signals import Array
 
@@ -307,3 +308,20 @@ def _is_nearest(shape: dict[str, float], present: Fitted, excitation: Excitation
 def fit_without(fit: Fit, dataset: Dataset, name: str) -> Fit:
     """The fit with one effect removed and the values of the others unchanged."""
     return finished(fit.axis.without(name), fit.begun, dataset.fit, fit.outcome)
+
+
+def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
+    """Effects that could be added to the axis; another friction replaces the present one."""
+    has_friction = any(f.effect.kind is Kind.FRICTION for f in axis.effects)
+    return [
+        e
+        for e in catalogue.after(axis.names)
+        if axis.can_have(e)
+        and (e.kind is not Kind.MODIFIER or has_friction)
+        and not e.is_nonparametric
+    ]
+
+
+def usable(catalogue: Catalogue, model: MachineModel) -> Catalogue:
+    """The effects of a catalogue that a machine with as many axes can have."""
+    return Catalogue([e for e in catalogue.values() if model.can_use(e)])

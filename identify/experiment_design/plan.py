@@ -10,6 +10,7 @@ from identify.dataset.dataset import Dataset, Role
 from identify.dataset.preparation import datasets
 from identify.dataset.test_function import require_test_function
 from identify.estimation.channel_delay import fit_aligned
+from identify.estimation.variable_projection import usable
 from identify.experiment_design.candidate_experiments import NotRun, proposals
 from identify.experiment_design.discrimination import (
     Arena,
@@ -28,7 +29,7 @@ from identify.experiment_design.rival_hypotheses import (
     simulated_dataset,
 )
 from identify.rules import RULE
-from identify.selection.candidates import Candidate, usable
+from identify.selection.candidates import Candidate
 from identify.selection.changes import Added
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.trying import try_effect

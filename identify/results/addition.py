@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from identify.dataset.dataset import Dataset, Role, by_log
+from identify.estimation.confounded import MovedParameter, moved_parameters
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.results.printed import Printed
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Reshaped
-from identify.selection.confounded import MovedParameter, moved_parameters
 from identify.validation.free_run import errors_of_both
 from twin.model.machine import HistoryStep, MachineModel
 from twin.model.units import AxisUnits

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from identify.dataset.dataset import Dataset
+from identify.estimation.confounded import Refit
 from identify.estimation.fit import Fit
 from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
 from identify.results.printed import Printed
 from identify.results.told import Told
-from identify.selection.confounded import Refit
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.comparison import AxisComparison
 from identify.validation.misfit_maps import Region

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from identify.dataset.dataset import Role
 from identify.dataset.floor import NoiseFloor
 from identify.dataset.noise_floor import floor_of
+from identify.estimation.confounded import MovedParameter, moved_parameters
 from identify.estimation.fit import Errors, error_in
 from identify.estimation.intervals import Estimate, estimates
 from identify.selection.acceptance import Judged
-from identify.selection.confounded import MovedParameter, moved_parameters
 from identify.selection.diagnosis import AxisDiagnosis
 
 

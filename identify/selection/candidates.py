@@ -28,9 +28,8 @@ from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.estimation.time_origin import depends_on_time_origin, phases_found
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, Taken, score
-from twin.effect import Effect, Kind
-from twin.effects import Catalogue
-from twin.model.machine import AxisModel, MachineModel
+from twin.effect import Effect
+from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]
 
@@ -39,23 +38,6 @@ MOST_INERTIA = 3.0  # times the moved mass of the base or its start, that an eff
 MOTION = ("position", "velocity", "acceleration", "direction")
 SAME_FORCE = 0.5  # of a force's square; where the motion leaves less of it, it is one of the motion
 NO_SCORE = "a linear step takes too little for a refit"
-
-
-def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
-    """Effects that could be added to the axis; another friction replaces the present one."""
-    has_friction = any(f.effect.kind is Kind.FRICTION for f in axis.effects)
-    return [
-        e
-        for e in catalogue.after(axis.names)
-        if axis.can_have(e)
-        and (e.kind is not Kind.MODIFIER or has_friction)
-        and not e.is_nonparametric
-    ]
-
-
-def usable(catalogue: Catalogue, model: MachineModel) -> Catalogue:
-    """The effects of a catalogue that a machine with as many axes can have."""
-    return Catalogue([e for e in catalogue.values() if model.can_use(e)])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -22,16 +22,10 @@ from identify.estimation.fit import Fit, error_on, finished, fit_axis
 from identify.estimation.least_squares import unabsorbed
 from identify.estimation.scaling import Scaling
 from identify.estimation.time_origin import synchronised, time_origins, with_given_origins
-from identify.estimation.variable_projection import fit_multistart, starts
+from identify.estimation.variable_projection import absent_effects, fit_multistart, starts
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, least_t, score
-from identify.selection.candidates import (
-    Candidate,
-    absent_effects,
-    candidate_of,
-    noise_candidate,
-    ordered,
-)
+from identify.selection.candidates import Candidate, candidate_of, noise_candidate, ordered
 from identify.selection.changes import (
     Added,
     Change,

@@ -15,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from identify.dataset.preparation import datasets
+from identify.estimation.confounded import linear_bases
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import BLOCKS, LARGEST_RATIO, QUANTILE
 from identify.estimation.least_squares import orthonormal, unabsorbed
-from identify.selection.candidates import usable
-from identify.selection.confounded import linear_bases
+from identify.estimation.variable_projection import usable
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.named import simulate

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.floor import NoiseFloor
+from identify.estimation.confounded import Change, MovedParameter, Refit
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import (
     AlwaysAtRest,
@@ -26,7 +27,6 @@ from identify.output.numbers import (
     quantity,
 )
 from identify.results.results import SimulationFit
-from identify.selection.confounded import Change, MovedParameter, Refit
 from identify.selection.nonparametric import followed
 from identify.validation.agreement import AxisAgreement, Difference
 from twin.model.machine import Fitted

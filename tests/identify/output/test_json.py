@@ -402,7 +402,7 @@ def test_a_residual_of_nothing_is_null_in_a_diagnosis() -> None:
 COMPUTES = (
     "identify.estimation.force_balance", "identify.estimation.fit_problem",
     "identify.estimation.intervals", "identify.dataset.noise_floor",
-    "identify.validation.free_run", "identify.selection.confounded", "twin.core",
+    "identify.validation.free_run", "identify.estimation.confounded", "twin.core",
 )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ import pytest
 from built_fits import CATALOGUE, axis_of, built, built_fit, fitted
 
 from identify.dataset.floor import NoiseFloor
+from identify.estimation.confounded import Change, MovedParameter, Refit
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.planting import FORCE, MASS, exemplary_motion, signature
 from identify.output.numbers import quantity, span
@@ -22,7 +23,6 @@ from identify.output.words.fit import (
 )
 from identify.output.words.plan import gap_in_words
 from identify.results.addition import Addition
-from identify.selection.confounded import Change, MovedParameter, Refit
 from twin.effect import Kind
 from twin.experiments.file import in_short
 from twin.experiments.kinds import Rests

@@ -5,7 +5,7 @@ from effect_runs import CATALOGUE
 
 from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
-from identify.selection.candidates import absent_effects
+from identify.estimation.variable_projection import absent_effects
 from identify.selection.trying import try_effect
 from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel

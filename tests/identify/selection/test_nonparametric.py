@@ -14,9 +14,9 @@ from unexplained_effects import foreign
 
 from identify.dataset.prepared_log import on_blocks, total_force
 from identify.estimation.fit import fit_axis
+from identify.estimation.variable_projection import absent_effects
 from identify.results.addition import Addition
 from identify.results.results import FitResult
-from identify.selection.candidates import absent_effects
 from identify.selection.nonparametric import fit_nonparametric
 from identify.workflow import add, fit
 from twin.effect import Effect

@@ -19,6 +19,7 @@ from built_fits import (
 )
 
 from identify import demo
+from identify.estimation import confounded as given
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
@@ -27,7 +28,6 @@ from identify.experiment_design.discrimination import Explanation
 from identify.experiment_design.planting import FORCE, exemplary_motion, signature
 from identify.experiment_design.rival_hypotheses import differing_axis, explained, require_different
 from identify.output.machine import draw
-from identify.selection import confounded as given
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.model.machine import MachineModel

@@ -8,9 +8,9 @@ from functools import cache
 import pytest
 
 from identify import workflow
+from identify.estimation.confounded import Refit
 from identify.output.words.fit import refit_in_words
 from identify.results.results import FitResult
-from identify.selection.confounded import Refit
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.logs import Log

@@ -19,8 +19,8 @@ from identify.estimation.fit_problem import is_linear
 from identify.estimation.force_balance import changes, jacobian, residual
 from identify.estimation.intervals import half_widths
 from identify.estimation.least_squares import orthonormal, unabsorbed
+from identify.estimation.variable_projection import absent_effects
 from identify.rules import RULE
-from identify.selection.candidates import absent_effects
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel, Fitted
