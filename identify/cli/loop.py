@@ -187,6 +187,7 @@ def _report(
     write_report(
         out, title=title, diagnosis=diagnosis, comparison=comparison, history=model.history,
         assumed=[line for line in findings if "the import map assumes" in line],
+        faults=[line for line in findings if ": error: " in line],
         source=Source(shlex.join(["twin", *sys.argv[1:]]), name, options=options),
     )  # fmt: skip
 

@@ -45,11 +45,12 @@ def write_report(
     additions: Sequence[Addition] = (),
     assumed: Sequence[str] = (),
     source: Source | None = None,
+    faults: Sequence[str] = (),
 ) -> None:
     """Write the report of a comparison, and of a diagnosis or additions where there are any.
 
-    assumed: findings of the log check on what import maps assume, said first. source: what the page
-    was made of.
+    assumed, faults: findings of the log check on what import maps assume, and its errors, said
+    first. source: what the page was made of.
 
     One HTML file without outside references: styles, scripts and signals are inside. It appears
     whole or not at all. Raises InputError where the folder does not exist.
@@ -57,7 +58,7 @@ def write_report(
     require_writable(path)
     subject = Subject(
         title, diagnosis, comparison, tuple(history), tuple(additions), tuple(assumed),
-        source or Source(),
+        source or Source(), tuple(faults),
     )  # fmt: skip
     text = whole_page(
         subject.title, facts(subject), sections(subject), explored(subject), origin(subject)
@@ -87,6 +88,7 @@ def facts(subject: Subject) -> list[tuple[str, str]]:
     axes = subject.comparison.axes.values()
     lengths = dict.fromkeys(quantity(a.logs[0].test_function.length, "s") for a in axes)
     shown = [("Not confirmed", line) for line in subject.assumed]
+    shown += [("Fault", line) for line in subject.faults]
     shown.append(("Model", subject.comparison.model.name))
     for role, logs in subject.logs.items():
         compared = role is Role.TRAINING and subject.diagnosis is None

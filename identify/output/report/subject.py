@@ -45,6 +45,7 @@ class Subject:
     additions: Sequence[Addition]
     assumed: Sequence[str] = ()
     source: Source = Source()
+    faults: Sequence[str] = ()
 
     @cached_property
     def logs(self) -> dict[Role, list[str]]:

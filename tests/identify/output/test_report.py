@@ -110,6 +110,11 @@ def test_the_footer_names_command_model_and_files(case: Case, tmp_path: Path) ->
     assert re.search(r"Date20\d\d-\d\d-\d\d", text)
 
 
+def test_what_is_wrong_with_the_logs_is_said_first(case: Case, tmp_path: Path) -> None:
+    text = Outline(case.write(tmp_path / "r.html", faults=["run 1: error: a gap"])).text
+    assert text.index("Fault") < text.index("run 1: error: a gap") < text.index("Axis x: cogging")
+
+
 # --- the signals of the plots ---------------------------------------------------------------
 
 
