@@ -442,18 +442,33 @@ def _is_held(change: Change, without: Judged, fit: Judged) -> bool:
     return bool(np.sum(unabsorbed(own, without.fit.basis) ** 2) < OUTSIDE * np.sum(own**2))
 
 
-def _is_of_another(change: Change, axis: AxisModel) -> bool:
-    """Whether a change is a curve of a friction in whose place the axis has another by now."""
-    if not isinstance(change, Reshaped) or change.law.effect.kind is not Kind.FRICTION:
-        return False
-    frictions = (f.effect for f in axis.effects if f.effect.kind is Kind.FRICTION)
-    return any(e.name != change.name for e in frictions)
+def _less_replaced(
+    judged: Judged, steps: tuple[Step, ...], first: Judged
+) -> tuple[Judged, tuple[Step, ...]]:
+    """The fit and the steps without those about a friction in whose place it has another by now."""
+    axis = judged.fit.axis
+    rubs = any(f.effect.kind is Kind.FRICTION for f in axis.effects)
+    gone = [s for s in steps if _rubs(s.change) and rubs and s.change.name not in axis.names]
+    for step in gone:
+        axis = step.change.undone(axis, first.fit.axis) or axis
+    if axis is not judged.fit.axis:
+        judged = _refitted_on(axis, judged, judged)
+    *kept, last = (s for s in steps if s not in gone)
+    dropped = (*last.dropped, *dict.fromkeys(s.change.name for s in gone))
+    return judged, (*kept, replace(last, dropped=dropped))
+
+
+def _rubs(change: Change) -> bool:
+    """Whether a change is about a friction."""
+    law = change.law.effect if isinstance(change, Reshaped) else change.effect
+    return law.kind is Kind.FRICTION
 
 
 def _needed(
     judged: Judged, steps: tuple[Step, ...], first: Judged
 ) -> tuple[Judged, tuple[Step, ...]]:
     """The fit and the steps without earlier ones that are not accepted beside the later ones."""
+    judged, steps = _less_replaced(judged, steps, first)
     for step in steps[:-1]:
         if step.held or any(s.change.name == step.change.name for s in steps if s is not step):
             continue  # another change of this law presupposes it
@@ -463,9 +478,7 @@ def _needed(
             if isinstance(steps[-1].change, Reshaped) and _is_held(step.change, without, judged):
                 steps = tuple(replace(s, held=True) if s is step else s for s in steps)
                 continue
-            if not _is_of_another(step.change, judged.fit.axis) and _is_needed(
-                step.change, without, judged
-            ):
+            if _is_needed(step.change, without, judged):
                 # The shapes of later effects were found beside this one; they may differ without.
                 again = fit_multistart(without.fit.axis, judged.dataset, judged.fit.begun)
                 without = Judged(again, judged.dataset)
