@@ -284,7 +284,7 @@ function drawPanel() {
   for (const axis of data.axes) {
     const k = frame(), far = (v) => (Number.isFinite(v) ? `${v < 0 ? "" : "+"}${quantity(v, axis.unit)}` : "–");
     const [step, prefix] = axis.large ? [1, ""] : [1e-3, "m"];
-    axis.cells[0].textContent = `${(axis.measured[k] / step).toFixed(3).replace("-", "−")} ${prefix}${axis.unit}`;
+    axis.cells[0].textContent = `${(axis.measured[k] / step).toFixed(3).replace(/^-(0\.0+)$/, "$1").replace("-", "−")} ${prefix}${axis.unit}`;
     axis.cells[1].textContent = far(axis.setpoint[k]);
     axis.cells[2].textContent = far(axis.modelled[k]);
     axis.forces.forEach((force, i) => {

@@ -33,7 +33,10 @@ class _Cache(FunctionCache):
     def load_overload(self, sig, target_context):
         # Of what numba prepares for its compiler (0.4 s), machine code needs only its runtime.
         rtsys.initialize(target_context)
-        return self._load_overload(sig, target_context)
+        try:
+            return self._load_overload(sig, target_context)
+        except ImportError:  # kept by a version whose modules had other names: compile anew
+            return None
 
     def _index_key(self, sig, codegen):
         return (*super()._index_key(sig, codegen), digest(self._py_func))
