@@ -90,12 +90,13 @@ def plantable(catalogue: Catalogue) -> list[str]:
 
 
 def _pairs(names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Two effects of which one at most is a friction."""
+    """Two effects of which one at most is a friction; two dead times are one in every log."""
     catalogue = load_catalogue()
+    kinds = {p: [catalogue[name] for name in p] for p in combinations(names, 2)}
     return [
-        pair
-        for pair in combinations(names, 2)
-        if any(catalogue[name].kind is not Kind.FRICTION for name in pair)
+        p
+        for p, both in kinds.items()
+        if any(e.kind is not Kind.FRICTION for e in both) and not all(e.dead_time for e in both)
     ]
 
 
