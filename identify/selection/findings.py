@@ -155,11 +155,18 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
         score=beside,
         kind=FindingKind.MISSING if added else FindingKind.WRONG_SHAPE,
         together=tuple(others) if any(s.with_others for s in steps) else (),
-        doubt=doubt(less, final.fit, steps[0].change.effect, parameters(steps[0].change)),
+        doubt=None if alone else _doubt(steps[0].change, less, final),
     )
     for step in steps:
         finding = _shaped(finding, step.change, less.fit, found)
     return finding
+
+
+def _doubt(change: Change, less: Judged, final: Judged) -> str | None:
+    """Why a change is not proved whatever it takes, in words; None where it may be."""
+    if less.at_floor:
+        return "what is left without it is noise"
+    return doubt(less, final.fit, change.effect, parameters(change))
 
 
 def _shaped(finding: Finding, change: Change, less: Fit, found: Found) -> Finding:

@@ -431,7 +431,9 @@ def _together(
 
 
 def _is_needed(change: Change, without: Judged, fit: Judged) -> bool:
-    """Whether a change is accepted beside a fit without it."""
+    """Whether a change is accepted beside a fit without it, which leaves more than noise."""
+    if without.at_floor:
+        return False
     plain = score(without, fit)
     return plain.accepted and replace(plain, control=control(change, without, fit)).accepted
 
