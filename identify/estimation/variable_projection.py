@@ -312,12 +312,11 @@ def fit_without(fit: Fit, dataset: Dataset, name: str) -> Fit:
 
 def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:
     """Effects that could be added to the axis; another friction replaces the present one."""
-    has_friction = any(f.effect.kind is Kind.FRICTION for f in axis.effects)
     return [
         e
         for e in catalogue.after(axis.names)
         if axis.can_have(e)
-        and (e.kind is not Kind.MODIFIER or has_friction)
+        and (e.kind is not Kind.MODIFIER or axis.friction is not None)
         and not e.is_nonparametric
     ]
 

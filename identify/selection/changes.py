@@ -192,9 +192,8 @@ class Reshaped:
         if curve not in axis.names:
             return None
         axis = axis.without(curve)
-        kinds = {f.effect.kind for f in axis.effects}
-        replaced = self.law.effect.kind is Kind.FRICTION and Kind.FRICTION in kinds
-        return axis if replaced or self.name in axis.names else axis.with_effect(self.law)
+        rubs = self.law.effect.kind is Kind.FRICTION and axis.friction is not None
+        return axis if rubs or self.name in axis.names else axis.with_effect(self.law)
 
     def columns(self, without: Judged, fit: Judged) -> tuple[Columns, bool]:
         axis, logs = without.fit.axis, without.dataset.fit
@@ -268,9 +267,8 @@ def _less_at_bounds(fit: Fit, judged: Judged, effect: Effect) -> Fit:
 
 def axis_less(effect: Effect, axis: AxisModel, base: AxisModel) -> AxisModel:
     """The axis without an effect; a friction is replaced by that of the base."""
-    own = next((f for f in base.effects if f.effect.kind is Kind.FRICTION), None)
-    if effect.kind is Kind.FRICTION and own:
-        return axis.with_effect(own)
+    if effect.kind is Kind.FRICTION and base.friction:
+        return axis.with_effect(base.friction)
     return axis.without(effect.name)
 
 

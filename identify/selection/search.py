@@ -379,13 +379,13 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
     level = [t for t in lowering if t is not best and is_level(t, best)]
     first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))
     level = [t for t in (best, *level) if t is not first]
-    frictions = [t for t in proved if t not in (first, *level) and _is_friction(t.change)]
-    rivals = frictions if _is_friction(first.change) else []
+    others = [t for t in proved if t not in (first, *level)]
+    rivals = [t for t in others if _adds_friction(t.change)] if _adds_friction(first.change) else []
     return [Step(first, tuple(level), tuple(rivals))]
 
 
-def _is_friction(change: Change) -> bool:
-    return isinstance(change, Added) and change.effect.kind is Kind.FRICTION
+def _adds_friction(change: Change) -> bool:
+    return isinstance(change, Added) and _rubs(change)
 
 
 def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Tried]:
@@ -449,8 +449,8 @@ def _less_replaced(
 ) -> tuple[Judged, tuple[Step, ...]]:
     """The fit and the steps without those about a friction in whose place it has another by now."""
     axis = judged.fit.axis
-    rubs = any(f.effect.kind is Kind.FRICTION for f in axis.effects)
-    gone = [s for s in steps if _rubs(s.change) and rubs and s.change.name not in axis.names]
+    rubs = axis.friction is not None
+    gone = [s for s in steps if rubs and _rubs(s.change) and s.change.name not in axis.names]
     for step in gone:
         axis = step.change.undone(axis, first.fit.axis) or axis
     if axis is not judged.fit.axis:

@@ -226,6 +226,11 @@ class AxisModel:
         """Names of the axis' effects."""
         return tuple(f.effect.name for f in self.effects)
 
+    @property
+    def friction(self) -> Fitted | None:
+        """The friction of the axis, of which there is one at most."""
+        return next((f for f in self.effects if f.effect.kind is Kind.FRICTION), None)
+
     def __getitem__(self, effect: str) -> Fitted:
         return next(f for f in self.effects if f.effect.name == effect)
 
