@@ -12,7 +12,7 @@ from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.dataset.floor import noise_beside
-from identify.dataset.noise_floor import floor_of, unrounded_floor_of
+from identify.dataset.noise_floor import unrounded_floor_of
 from identify.estimation.evidence import (
     Evidence,
     Gain,
@@ -167,12 +167,13 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
     dataset, fit = before.dataset, after.fit
     logs = (*dataset.fit, *dataset.holdout)
     left = error_on(fit.axis, logs)
-    error, less, floor = rms(left), unrounded_floor_of(fit.axis, logs), floor_of(fit.axis, logs)
+    error, less, noise = rms(left), unrounded_floor_of(fit.axis, logs), noise_beside(fit.axis, logs)
+    floor = noise.value
     part = min((floor**2 - less**2) / error**2, 1.0)
     plain = Candidate(
         effect, dataset.axis, fit, Evidence(0.0, 1, fit.samples), Gain(error, error, 0.0)
     )
-    highest = max(RULE.at_floor * floor, noise_beside(fit.axis, logs).high)
+    highest = max(RULE.at_floor * floor, noise.high)
     if not (RULE.least_part < part and SURE * floor < error < highest):
         return plain
     t = float(np.sqrt(max(effective_samples(left) * noise_gain(left, less, floor), 0.0)))

@@ -21,9 +21,9 @@ from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import Start, starts
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, part_of
-from identify.selection.bends import held_bends
 from identify.selection.controls import Columns, Trial, change_of, with_unit_penalty
 from identify.selection.curves import Shape, columns_of, shapes_of, sticking
+from identify.selection.free_exponent import held_exponents
 from identify.selection.nonparametric import fit_in_place
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, Fitted
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 SAME_ERROR = 1.01  # relative error that simpler values of an effect may have
 HEAD_EVALUATIONS = 4  # of a friction fitted on the heads; more do not change which start is best
 MORE_EVALUATIONS = 12  # of the best of them, where it helps; frictions with a memory need them
-OTHER_BENDS = (0.6, 1.5)  # times what a law holds by design, at which its exponent is tried
+OTHER_EXPONENTS = (0.6, 1.5)  # times what a law holds by design, at which its exponent is tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,7 @@ class Freed:
         """By the change of the residual at two other values: the law bends between them."""
         axis, free = judged.fit.axis, self.free(judged.fit.axis)
         law = free[self.name]
-        others = [{**law.values, self.parameter: r * self.held} for r in OTHER_BENDS]
+        others = [{**law.values, self.parameter: r * self.held} for r in OTHER_EXPONENTS]
         axes = [free, *(axis.with_effect(replace(law, values=v)) for v in others)]
 
         def columns(logs: Sequence[PreparedLog]) -> list[Array]:
@@ -207,7 +207,7 @@ def freed_of(axis: AxisModel) -> list[Freed]:
     return [
         Freed(law.effect, name, law.values[name])
         for law in axis.effects
-        for name in held_bends(law)
+        for name in held_exponents(law)
     ]
 
 

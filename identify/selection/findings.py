@@ -9,12 +9,11 @@ from enum import Enum
 from identify.dataset.dataset import Dataset, Role
 from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis
 from identify.selection.acceptance import Judged, Score, score
-from identify.selection.bends import Bend
-from identify.selection.bent_curve import bent_curve
 from identify.selection.candidates import doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.confidence import confidence
 from identify.selection.found_shape import FoundShape, found_shape
+from identify.selection.free_exponent import FreeExponent, exponent_curve
 from identify.selection.search import Found, Step, parameters
 from twin.model.machine import AxisModel
 
@@ -56,7 +55,7 @@ class Finding:
     kind: FindingKind = FindingKind.MISSING
     together: tuple[str, ...] = ()
     shape: FoundShape | None = None
-    bend: Bend | None = None
+    bend: FreeExponent | None = None
     left: float = 1.0
     left_fitted: float = 1.0
     doubt: str | None = None
@@ -177,18 +176,16 @@ def _shaped(finding: Finding, change: Change, less: Fit, found: Found) -> Findin
         return finding
     kind = FindingKind.RESEMBLES if finding.kind is FindingKind.MISSING else finding.kind
     if isinstance(change, Freed):
-        bend = Bend(
+        bend = FreeExponent(
             change.parameter, change.held, final.axis[name].values[change.parameter],
             change.effect.parameter(change.parameter).unit,
         )  # fmt: skip
         if finding.kind is FindingKind.MISSING and not bend.differs:
             return finding
-        drawn = bent_curve(without[name], final, dataset)
+        drawn = exponent_curve(without[name], final, dataset)
         return replace(finding, kind=kind, bend=bend, shape=drawn)
     assert isinstance(change, Reshaped)
     before = less if name in less.axis.names else fit_axis(without, dataset.fit)
-    if name not in before.axis.names:  # another friction has taken the place of its law
-        before = found.base.fit
     return replace(finding, kind=kind, shape=found_shape(change.shape, before, dataset))
 
 

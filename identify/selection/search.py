@@ -171,8 +171,8 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         step("all values refitted", 0, 1)
         judged, steps = _needed(new[-1].tried.judged, (*steps, *new), first)
         passed[-1] = steps[-1]  # which tells what it made needless
-        judged, bent = _bent(judged, steps)
-        passed, steps = [*passed, *bent], (*steps, *bent)
+        judged, freed = _with_free_exponents(judged, steps)
+        passed, steps = [*passed, *freed], (*steps, *freed)
         if judged.at_floor:
             break
         fit = fit_multistart(judged.fit.axis, judged.dataset, judged.fit.begun)
@@ -184,8 +184,10 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
     return Found(judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
 
 
-def _bent(judged: Judged, steps: tuple[Step, ...]) -> tuple[Judged, tuple[Step, ...]]:
-    """The fit with the exponents of added laws free that are others than these hold, and the steps.
+def _with_free_exponents(
+    judged: Judged, steps: tuple[Step, ...]
+) -> tuple[Judged, tuple[Step, ...]]:
+    """The fit with free exponents where added laws ask for others than they hold; those steps.
 
     A law of another exponent is another law, however little its exponent takes of what is left.
     """

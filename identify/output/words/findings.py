@@ -15,10 +15,10 @@ from identify.output.numbers import (
     quantity,
 )
 from identify.rules import RULE
-from identify.selection.bends import Bend
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding, FindingKind
 from identify.selection.found_shape import FoundShape
+from identify.selection.free_exponent import FreeExponent
 from twin.effects import load_catalogue
 from twin.model.units import units_of
 
@@ -48,13 +48,13 @@ def _explained(finding: Finding) -> str:
     if finding.kind is FindingKind.RESEMBLES:
         shape = "in another shape; that law"
         if finding.bend:
-            shape = "with {} in place of {}; that law".format(*_bends_in_words(finding.bend))
+            shape = "with {} in place of {}; that law".format(*_exponents_in_words(finding.bend))
         what = f"what is missing resembles {finding.effect}, {shape}"
     if finding.kind is FindingKind.WRONG_SHAPE:
         what = f"{finding.effect} has another shape: a free curve beside its law"
         without, with_it = "with the law", "with the curve"
         if finding.bend:
-            with_it, without = (f"with {value}" for value in _bends_in_words(finding.bend))
+            with_it, without = (f"with {value}" for value in _exponents_in_words(finding.bend))
             what = f"{finding.effect} has another shape, which its law {with_it} has: that"
     errors = f"{without} the {error} is {before}, {with_it} {after}"
     if finding.contradicted:
@@ -65,7 +65,7 @@ def _explained(finding: Finding) -> str:
     )
 
 
-def _bends_in_words(bend: Bend) -> list[str]:
+def _exponents_in_words(bend: FreeExponent) -> list[str]:
     """What bends a law as it was found, and as it was held, e.g. "n = 3"."""
     values = (f"{value:.3g} {bend.unit.removesuffix('1')}" for value in (bend.found, bend.held))
     return [f"{bend.parameter} = {value.strip()}" for value in values]

@@ -25,9 +25,9 @@ from identify.output.words.findings import advice
 from identify.output.words.fit import MOTION_OUTCOMES, OUTCOMES, no_interval_in_words
 from identify.output.words.plan import gap_in_words
 from identify.output.words.residual import loop_in_words, region_in_words
-from identify.selection.bends import Bend
 from identify.selection.diagnosis import Verdict
 from identify.selection.found_shape import Drawn, FoundShape
+from identify.selection.free_exponent import FreeExponent
 from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.curve import Coordinate
@@ -355,7 +355,7 @@ def test_a_law_of_another_shape_is_told_with_its_bend_and_its_curve_with_the_ban
     shape = FoundShape(
         Coordinate.SPEED, np.array([0.1, 0.2]), "m/s", None, True, "N", {"forwards": drawn}
     )
-    bent = replace(made.FOUND[1], bend=Bend("n", 2.0, 0.66, "1"), shape=shape)
+    bent = replace(made.FOUND[1], bend=FreeExponent("n", 2.0, 0.66, "1"), shape=shape)
     (found,) = told(made.diagnosed(made.diagnosis_of(findings=(bent,))))["findings"]
     assert found["bend"] == {"parameter": "n", "held": 2.0, "found": 0.66, "unit": "1"}
     assert found["shape"] == {

@@ -23,10 +23,10 @@ from identify.estimation.intervals import refusal
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.output.machine import check_text, effect_text, effects_text, laws_text
 from identify.output.text import text_of
-from identify.selection.bends import Bend
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 from identify.selection.found_shape import Drawn, FoundShape
+from identify.selection.free_exponent import FreeExponent
 from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.curve import Coordinate
@@ -176,7 +176,7 @@ TEXTS: dict[str, Callable[[], object]] = {
     "diagnosis: like a law of another shape": lambda: shaped(FindingKind.RESEMBLES),
     "diagnosis: a law of another shape": lambda: shaped(FindingKind.WRONG_SHAPE),
     "diagnosis: a law with another exponent": lambda: shaped(
-        FindingKind.WRONG_SHAPE, bend=Bend("n", 2.0, 0.66, "1")
+        FindingKind.WRONG_SHAPE, bend=FreeExponent("n", 2.0, 0.66, "1")
     ),
     "diagnosis: unexplained": lambda: of(
         made.diagnosis_of(Verdict.UNEXPLAINED, unexplained=made.STRUCTURE)

@@ -1,8 +1,11 @@
-"""The curve of a law over speed, with what bends it as it was held and as it was found."""
+"""What bends the curve of a law: a parameter that a model holds by design, such as an exponent.
+
+Set free, it is one number more where a free curve has ten, so that a far smaller difference shows.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -17,11 +20,36 @@ from twin.effect import RUBBING
 from twin.model.machine import AxisModel, Fitted
 from twin.signals import Array
 
+SAME = 0.1  # relative distance from its value by design at which a law is still itself
 SPEEDS = 24
 SLOWEST = 0.01  # of the highest speed, the least that is drawn
 
 
-def bent_curve(held: Fitted, final: Fit, dataset: Dataset) -> FoundShape:
+@dataclass(frozen=True)
+class FreeExponent:
+    """A parameter of a law, held by design, with which its curve comes nearest to the one found.
+
+    held, found: in ``unit``.
+    """
+
+    parameter: str
+    held: float
+    found: float
+    unit: str
+
+    @property
+    def differs(self) -> bool:
+        """Whether the law found is another than the one that is held."""
+        return abs(self.found - self.held) > SAME * abs(self.held)
+
+
+def held_exponents(law: Fitted) -> tuple[str, ...]:
+    """Names of the parameters that would bend the curves of a fitted law, and are held."""
+    names = dict.fromkeys(c.bent_by for c in law.effect.curves if c.bent_by)
+    return tuple(name for name in names if name in law.fixed)
+
+
+def exponent_curve(held: Fitted, final: Fit, dataset: Dataset) -> FoundShape:
     """The steady force of a law of a final fit with its 90 % band, and that of it as it was held.
 
     Of a friction with what modifies it. In the middle of the travel, positive or negative as the
