@@ -6,8 +6,8 @@ long where it rises and three quarters where it falls; d follows the direction w
 
 from math import copysign, cos, expm1, floor, pi
 
-from twin.curve import Coordinate, Curve
-from twin.effect import DT, OUT, WHEN, Effect, Kind, Parameter, V, X
+from benchmarks.selftest.laws.gaussian_bumps import EFFECT as GAUSSIAN
+from twin.effect import DT, OUT, WHEN, Effect, Kind, V, X
 
 TURN = 6e-5  # m
 
@@ -30,16 +30,10 @@ EFFECT = Effect(
     summary="roller bumps that rise steeply and fall gently",
     equation="F = -[(ahead + behind)/2 d + (ahead - behind)/2] b(x);  b a lopsided raised cosine",
     source="this project's choice",
-    parameters=(
-        Parameter("pitch", "m", 0.03, 1e-4, 10.0, "distance between bumps", fixed=True),
-        Parameter("width", "m", 0.004, 1e-4, 0.1, "full width of a bump"),
-        Parameter("phase", "m", 0.0, -1.0, 1.0, "position of one bump"),
-        Parameter("ahead", "N", 0.0, -1e3, 1e3, "height moving forwards", strength=True),
-        Parameter("behind", "N", 0.0, -1e3, 1e3, "height moving backwards", strength=True),
-    ),
+    parameters=GAUSSIAN.parameters,
     states=("direction",),
     law=law,
-    curves=(Curve(Coordinate.POSITION, period="pitch", by_direction=True),),
+    curves=GAUSSIAN.curves,
     fingerprint="none",
     excited_by="any motion",
 )
