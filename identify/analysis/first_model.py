@@ -8,10 +8,11 @@ believed by its t-value over blocks of the logs, as what so rough a model leaves
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identify.dataset.bodies import bodies_along
 from identify.dataset.excitation import excitation
 from identify.dataset.given_logs import require_samples
 from identify.dataset.motion import Motion
@@ -124,7 +125,7 @@ def _rows(
     for m in motions:
         w = TestFunction.at_least(length, m.period)
         along = [np.sign(m.velocity), m.velocity, np.ones_like(m.velocity)]
-        means = w.mean(np.stack([*along, *_of_place(m.position, place), m.command]))
+        means = w.mean(np.stack([*along, *_of_place(m.position, place), m.net]))
         columns.append(np.concatenate([w.acceleration(m.velocity)[None], means]))
         going.append(w.mean(at_rest(m.velocity).astype(float)) < AT_REST)
     rows, kept = np.hstack(columns), np.concatenate(going)
@@ -174,7 +175,7 @@ def _static(
     for m in motions:
         rest = at_rest(m.velocity)
         edges = np.flatnonzero(np.diff(rest, prepend=False, append=False))
-        driven = m.command - found.gains[0] * m.acceleration - found.gains[3]
+        driven = m.net - found.gains[0] * m.acceleration - found.gains[3]
         driven = driven - found.gains[4:] @ _of_place(m.position, place)
         driven = np.convolve(driven, np.ones(SMOOTHED) / SMOOTHED, "same")
         stood = max(round(STOOD / m.period), SMOOTHED)
@@ -190,14 +191,20 @@ TEST_FUNCTION = 0.02  # s, over which the acceleration that was reached is avera
 MARGIN = 0.05  # of the way that was covered, beyond its ends
 
 
-def first_model(logs: Mapping[str, Log], name: str, catalogue: Catalogue) -> MachineModel:
+def first_model(
+    logs: Mapping[str, Log],
+    name: str,
+    catalogue: Catalogue,
+    bodies: tuple[str, str] | None = None,
+) -> MachineModel:
     """A model to begin with: of each axis that moves its mass and the simplest friction.
 
     And a constant force where the logs ask for it. Static friction is that of Coulomb where the
     axis does not break away from rest (``not_determined``). Hardware is what the logs show: travel,
-    speed, acceleration and force that were reached, the step and the noise of the encoder. Raises
-    InputError where no axis moves, where the logs differ in sample rate, and where they do not tell
-    the mass.
+    speed, acceleration and force that were reached, the step and the noise of the encoder. bodies:
+    name and text of an MJCF or URDF file, whose joints are the axes of the same names; each log
+    then holds all of them. Raises InputError where no axis moves, where the logs differ in sample
+    rate, and where they do not tell the mass, or lack a joint.
     """
     require_samples(logs)
     rates = sorted({log.sample_rate for log in logs.values()})
@@ -206,17 +213,36 @@ def first_model(logs: Mapping[str, Log], name: str, catalogue: Catalogue) -> Mac
             f"the logs are sampled at {', '.join(f'{r:g}' for r in rates)} Hz; give one rate"
         )
     names = dict.fromkeys(axis for log in logs.values() for axis in log.axes)
+    begun = MachineModel(name, {}, rates[0])
+    if bodies is not None:
+        begun = _of_joints(begun, tuple(names), *bodies)
+    taken = {n: bodies_along(begun, log, n) for n, log in logs.items()}
     axes = {}
     for axis in names:
         going = {n: log for n, log in logs.items() if axis in log.axes and moves(log, axis)}
         if going:
             ripples = ripples_of_widest(going.values(), axis)
-            motions = [motion_of(log, axis, n, ripples=ripples) for n, log in going.items()]
+            motions = [
+                motion_of(log, axis, n, ripples=ripples, bodies=taken[n].get(axis))
+                for n, log in going.items()
+            ]
             constant = next(iter(going.values())).axes[axis].force_constant
-            axes[axis] = _first_axis(axis, motions, constant, catalogue)
+            axes[axis] = _first_axis(axis, motions, constant, catalogue, begun.axes.get(axis))
     if not axes:
         raise InputError(f"no axis moves in {', '.join(logs)}; give a log in which one does")
-    return MachineModel(name, axes, rates[0])
+    return replace(begun, axes={**begun.axes, **axes})
+
+
+def _of_joints(begun: MachineModel, names: Sequence[str], file: str, text: str) -> MachineModel:
+    """The machine whose axes are the joints of the same names, without effects."""
+    from twin.mujoco.mechanism import joints_of  # MuJoCo takes long to load
+
+    found = joints_of(text, file, {axis: axis for axis in names})
+    axes = {
+        axis: AxisModel(j.inertia, mass_fixed=True, rotary=j.rotary, joint=axis)
+        for axis, j in found.items()
+    }
+    return replace(begun, axes=axes, mjcf=text, mjcf_name=file)
 
 
 def not_determined(axis: AxisModel) -> list[str]:
@@ -230,10 +256,15 @@ def not_determined(axis: AxisModel) -> list[str]:
 
 
 def _first_axis(
-    axis: str, motions: Sequence[Motion], force_constant: float | None, catalogue: Catalogue
+    axis: str,
+    motions: Sequence[Motion],
+    force_constant: float | None,
+    catalogue: Catalogue,
+    joint: AxisModel | None,
 ) -> AxisModel:
+    """joint: the axis without effects where it is a joint, whose inertia is known."""
     found, covered, units = first_values(motions), excitation(motions, None), motions[0].units
-    if found.mass is None:
+    if found.mass is None and joint is None:
         names = ", ".join(m.name for m in motions)
         raise InputError(
             f"axis {axis}: {names} cannot tell the {units.mass_name}, as acceleration makes too "
@@ -257,7 +288,9 @@ def _first_axis(
         jerk=_shown(reached / TEST_FUNCTION),
     )
     effects = _first_effects(found, catalogue, covered, units)
-    return AxisModel(_shown(found.mass), hardware, effects, rotary=units.rotary)
+    if joint is not None:
+        return replace(joint, hardware=hardware, effects=effects)
+    return AxisModel(_shown(found.mass or 0.0), hardware, effects, rotary=units.rotary)
 
 
 def _first_effects(

@@ -143,6 +143,10 @@ def _guess(sources: list[Path], out: Path | None, as_json_: bool) -> None:
 def new(
     logs: Logs,
     out: Annotated[Path, typer.Option("--out", "-o", help="Machine model (.toml) to write.")],
+    mjcf: Annotated[
+        Path | None,
+        typer.Option("--mjcf", help="MJCF or URDF file whose joints are the axes of the logs."),
+    ] = None,
     as_json_: Json = False,
 ) -> None:
     """Propose a first model from logs: mass, friction, constant force, and their hardware.
@@ -152,11 +156,12 @@ def new(
     from identify.analysis.first_model import first_model, not_determined
     from identify.output.answers.machine import NewModelAnswer
     from twin.effects import load_catalogue
-    from twin.model.file import save_model
+    from twin.model.file import read_mjcf, save_model
 
     require_writable(out)
     recorded = CheckedRecordings(logs)
-    model = first_model(dict(recorded), out.stem, load_catalogue())
+    bodies = None if mjcf is None else (mjcf.name, read_mjcf(mjcf))
+    model = first_model(dict(recorded), out.stem, load_catalogue(), bodies)
     save_model(model, out)
     unknown = {axis: not_determined(found) for axis, found in model.axes.items()}
     notes = [

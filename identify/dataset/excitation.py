@@ -24,7 +24,7 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
         [m.position for m in motions] + ([np.array(travel)] if travel else [])
     )
     velocity = np.concatenate([m.velocity for m in motions])
-    command = np.concatenate([m.command for m in motions])
+    command = np.concatenate([m.net for m in motions])
     fast = 0.02 * np.abs(velocity).max()
     ahead, behind = command[velocity > fast], command[velocity < -fast]
     if len(ahead) and len(behind):
@@ -75,9 +75,9 @@ def ripples(motions: Sequence[Motion]) -> tuple[float, ...]:
 
 
 def _rest(motion: Motion) -> Array:
-    """Command that a rough model leaves, (n,) N."""
+    """Force that a rough model leaves, (n,) N."""
     x, v = motion.position, motion.velocity
     rows = np.stack([motion.acceleration, np.sign(v), v, np.ones_like(x), x, x**2, x**3], axis=1)
     rows /= np.maximum(np.abs(rows).max(axis=0), 1e-300)
-    solution = np.linalg.lstsq(rows, motion.command, rcond=None)[0]
-    return np.asarray(motion.command - rows @ solution)
+    solution = np.linalg.lstsq(rows, motion.net, rcond=None)[0]
+    return np.asarray(motion.net - rows @ solution)

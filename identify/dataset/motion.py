@@ -46,7 +46,9 @@ class Motion:
     more than two axes the others, by name. velocity_weight: 1, of a measured velocity beside the
     readings (identify.dataset.velocity); 0 where there is none. ripples: m, periods at which the
     readings err along the track (identify.dataset.reading_ripple). ahead: s, by which the command
-    was moved ahead of how it was logged.
+    was moved ahead of how it was logged. bodies (2, n * samples a block): of a joint of a mechanism
+    the momentum beyond mass x velocity and the force that its bodies take beyond the change of that
+    momentum (identify.dataset.bodies); None for a plain axis, which has neither.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Motion:
     velocity_weight: float = 0.0
     ripples: tuple[float, ...] = ()
     ahead: float = 0.0
+    bodies: Array | None = None
 
     def __repr__(self) -> str:
         return (
@@ -89,12 +92,13 @@ class Motion:
 
     def _of_blocks(self, blocks: slice) -> Motion:
         samples = self.raw.shape[1] // self.signals.shape[1]
-        ends = (None if end is None else end * samples for end in (blocks.start, blocks.stop))
+        ends = [None if end is None else end * samples for end in (blocks.start, blocks.stop)]
         return replace(
             self,
             signals=np.ascontiguousarray(self.signals[:, blocks]),
             others=np.ascontiguousarray(self.others[:, blocks]),
             raw=np.ascontiguousarray(self.raw[:, slice(*ends)]),
+            bodies=None if self.bodies is None else self.bodies[:, slice(*ends)],
             beside={a: replace(o, signals=o.signals[:, blocks]) for a, o in self.beside.items()},
         )
 
@@ -134,6 +138,24 @@ class Motion:
     def command(self) -> Array:
         """(n,) N."""
         return self.signals[2]
+
+    @property
+    def force(self) -> Array:
+        """Command less the bias force of a mechanism's bodies, N at the log's own rate."""
+        return self.raw[1] if self.bodies is None else self.raw[1] - self.bodies[1]
+
+    def momentum(self, mass: float, velocity: Array) -> Array:
+        """Of a mass (kg) at a velocity (n,) m/s, and of a mechanism's bodies beyond it, N s."""
+        own = mass * velocity
+        return own if self.bodies is None else own + self.bodies[0]
+
+    @cached_property
+    def net(self) -> Array:
+        """Command less what a mechanism's bodies take beyond mass x acceleration, (n,) N."""
+        if self.bodies is None:
+            return self.command
+        momentum, force = self.bodies.reshape(2, len(self.command), -1).mean(axis=2)
+        return np.asarray(self.command - force - rate(momentum, self.period))
 
     def at_samples(self, instant: float) -> Array:
         """Position m, velocity m/s and command N at the log's own rate, (3, n).

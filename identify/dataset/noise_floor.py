@@ -162,8 +162,8 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     velocity = motion.unrippled
     # Noise in the command moves the axis as well; without the actuator's delay the two would not
     # cancel and would look like measurement noise.
-    command = actual_force(axis, motion)
-    raw = 0.5 * (command[1:] + command[:-1]) - axis.mass * between(velocity, dt)
+    command = actual_force(axis, motion) + (motion.force - motion.raw[1])
+    raw = 0.5 * (command[1:] + command[:-1]) - between(motion.momentum(axis.mass, velocity), dt)
     # The forces that the model explains, such as a bump passed at speed, are not noise either.
     table = on_blocks(axis)
     if table.labels:

@@ -10,6 +10,7 @@ from itertools import islice
 import numpy as np
 
 from identify.dataset.beginning import beginnings
+from identify.dataset.bodies import bodies_along
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.excitation import excitation
 from identify.dataset.given_logs import (
@@ -30,6 +31,7 @@ from twin.logs import Log
 from twin.memory import give_back
 from twin.model.machine import MachineModel
 from twin.parallel import spread
+from twin.signals import Array
 
 MARGIN = 0.05  # of the range of the training logs, by which a log of another role may exceed it
 LEAST_SHARED = 0.2  # part of the logs of a role that must lie within it
@@ -62,6 +64,7 @@ def _prepared(model: MachineModel, given: Given, test_function: float | None) ->
     for logs in given.values():
         require_samples(logs)
     require_apart(given)
+    bodies = {n: bodies_along(model, log, n) for logs in given.values() for n, log in logs.items()}
     out: dict[str, Dataset] = {}
     for name, axis in model.axes.items():
         for logs in given.values():
@@ -71,19 +74,30 @@ def _prepared(model: MachineModel, given: Given, test_function: float | None) ->
         if going[Role.TRAINING]:
             why = f"axis {name} stands still in it; give one in which it moves"
             still = {log: why for _, names in found.values() for log in names}
-            out[name] = replace(_of_axis(model, name, going, test_function), left_out=still)
+            own = {log: along[name] for log, along in bodies.items() if name in along}
+            out[name] = replace(_of_axis(model, name, going, test_function, own), left_out=still)
     if not out:
         raise nothing_moves(model.axes, given[Role.TRAINING].values())
     return out
 
 
-def _of_axis(model: MachineModel, name: str, going: Given, test_function: float | None) -> Dataset:
-    """The dataset of one axis from the logs in which it moves; test logs decide nothing of it."""
+def _of_axis(
+    model: MachineModel,
+    name: str,
+    going: Given,
+    test_function: float | None,
+    bodies: Mapping[str, Array],
+) -> Dataset:
+    """The dataset of one axis from the logs in which it moves; test logs decide nothing of it.
+
+    bodies: of a joint what its bodies take in each log.
+    """
     axis, machine = model.axes[name], tuple(model.axes)
     ripples = ripples_of_widest(going[Role.TRAINING].values(), name)
 
     def motions_at(*roles: Role) -> Callable[[float | None], tuple[list[Motion], ...]]:
-        made = cache(partial(_motions, [going[r] for r in roles], name, machine, ripples))
+        logs = [going[r] for r in roles]
+        made = cache(partial(_motions, logs, name, machine, ripples, bodies))
         return partial(_long_enough, made)
 
     deciding = motions_at(Role.TRAINING, Role.SELECTION)
@@ -153,13 +167,14 @@ def _motions(
     axis: str,
     machine: tuple[str, ...],
     ripples: tuple[float, ...],
+    bodies: Mapping[str, Array],
     longest: float,
 ) -> tuple[list[Motion], ...]:
     """Motions of each part of the logs, in blocks of at most a length (s); ripples: m."""
 
     def motion(given: tuple[str, Log]) -> Motion:
         name, log = given
-        return motion_of(log, axis, name, machine, longest, ripples)
+        return motion_of(log, axis, name, machine, longest, ripples, bodies.get(name))
 
     made = iter(spread(motion, [given for some in parts for given in some.items()]))
     return tuple([*islice(made, len(some))] for some in parts)

@@ -31,7 +31,8 @@ class PreparedLog:
     """One log's motion of an axis with its weak form.
 
     test_function, fine: over the motion's blocks, and the same over the log's samples. command (n,)
-    N and acceleration (n,) m/s^2 are means by test functions. force_noise: N RMS by test functions,
+    N, of a joint less what its bodies take beyond mass x acceleration, and acceleration (n,) m/s^2
+    are means by test functions. force_noise: N RMS by test functions,
     which sensors do not make and nothing predicts; part of the noise floor. reach: positions (m)
     between which its test functions count; of a log that is not fitted those of the training logs.
     """
@@ -56,9 +57,11 @@ class PreparedLog:
         test_function = TestFunction.of_length(length, motion.period)
         samples = round(motion.period / motion.sample_period)
         fine, test_function = test_function.refined(samples), test_function.sharpened(samples)
-        velocity, command = motion.raw
-        acceleration = fine.acceleration(velocity)
-        return cls(motion, test_function, fine, fine.mean(command), acceleration, reach=reach)
+        acceleration = fine.acceleration(motion.raw[0])
+        command = fine.mean(motion.force)
+        if motion.bodies is not None:
+            command -= fine.acceleration(motion.bodies[0])
+        return cls(motion, test_function, fine, command, acceleration, reach=reach)
 
     @property
     def reached(self) -> NDArray[np.bool_]:

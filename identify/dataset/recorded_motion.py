@@ -31,11 +31,13 @@ def motion_of(
     machine: Sequence[str] = (),
     longest_block: float = LONGEST_BLOCK,
     ripples: tuple[float, ...] | None = None,
+    bodies: Array | None = None,
 ) -> Motion:
     """The motion of one axis of a log.
 
     machine: the axes of the machine; on one of two axes others that were logged do not matter.
-    longest_block: s; a noisy position asks for long blocks. ripples: m, sought where None.
+    longest_block: s; a noisy position asks for long blocks. ripples: m, sought where None. bodies
+    (2, n): of a joint, as ``bodies_along`` gives them.
     Raises InputError where the axis is not in the log, does not move, or is too short.
     """
     if axis not in log.axes:
@@ -75,6 +77,7 @@ def motion_of(
         follows=_follows(log.axes[axis]),
         velocity_weight=told.weight,
         ripples=ripples,
+        bodies=None if bodies is None else bodies[:, : block * signals.shape[1]],
     )
 
 

@@ -91,9 +91,7 @@ def choose_test_function(motions: Motions, others: Motions = (), *, imposed: boo
             continue
         test_functions = [TestFunction.of_length(length, m.period) for m in motions]
         pairs = list(zip(motions, test_functions, strict=True))
-        rest = np.concatenate(
-            [w.mean(m.command) - mass * w.acceleration(m.velocity) for m, w in pairs]
-        )
+        rest = np.concatenate([w.mean(m.net) - mass * w.acceleration(m.velocity) for m, w in pairs])
         if noise_floor(AxisModel(mass), pairs) < QUIET * np.sqrt(np.mean(rest**2)):
             return length
     return max(TEST_FUNCTIONS[-1], LEAST_BLOCKS * longest_block)
@@ -124,6 +122,6 @@ def regressors(motions: Motions, length: float) -> tuple[Array, Array, list[Test
                 [w.acceleration(m.velocity), direction, w.mean(m.velocity), np.ones_like(direction)]
             )
         )
-        forces.append(w.mean(m.command))
+        forces.append(w.mean(m.net))
         test_functions.append(w)
     return np.hstack(columns), np.concatenate(forces), test_functions

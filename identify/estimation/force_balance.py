@@ -73,7 +73,7 @@ def _driven(axis: AxisModel, log: PreparedLog) -> tuple[Motion, Array | float]:
     driven = motion
     if _is_stepped_finely(axis):
         driven = motion.with_force(actual_force(axis, motion))
-        added = log.fine.mean(driven.raw[1]) - log.command
+        added = log.fine.mean(driven.raw[1] - motion.raw[1])
     if motion is not log.motion:
         added = added + axis.mass * log.fine.acceleration(error_rate)
     return driven, added

@@ -224,7 +224,7 @@ def _left_on_blocks(fit: Fit, log: PreparedLog) -> Array:
     """Force (n,) N that the model leaves in each block."""
     m = log.motion
     force = total_force(on_blocks(fit.axis), m)
-    return np.asarray(m.command + force - fit.axis.mass * m.acceleration)
+    return np.asarray(m.net + force - fit.axis.mass * m.acceleration)
 
 
 def _repeat(records: Sequence[Record]) -> SpectralLine | None:

@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tomlkit
 
@@ -18,6 +18,9 @@ from twin.files import write_atomically
 from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, MachineModel
 from twin.model.schema import AxisEntry, EffectEntry, ModelFile
 from twin.model.units import LINEAR, ROTARY, AxisUnits
+
+if TYPE_CHECKING:
+    from twin.mujoco.mechanism import Joint
 
 # Of a linear axis; ``hardware_unit`` gives those of any.
 HARDWARE_UNITS = {
@@ -100,11 +103,16 @@ def as_model(given: MachineModel | str | Path, catalogue: Catalogue | None = Non
 def _read_beside(path: Path, name: str) -> str:
     for folder in (path.parent, models_folder()):
         if (folder / name).is_file():
-            try:
-                return (folder / name).read_text(encoding="utf-8")
-            except UnicodeDecodeError as error:
-                raise InputError(f"{folder / name}: is not an MJCF file: {error}") from error
+            return read_mjcf(folder / name)
     raise InputError(f"{path}: mujoco = '{name}' is not beside it; copy the MJCF file there")
+
+
+def read_mjcf(path: Path) -> str:
+    """The text of an MJCF or URDF file; raises InputError where there is none."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is not an MJCF file: {error}") from error
 
 
 def parse_model(
@@ -123,7 +131,8 @@ def _checked(document: Mapping[str, Any], where: str) -> ModelFile:
 
 def _model(entries: ModelFile, catalogue: Catalogue, mjcf: str | None, where: str) -> MachineModel:
     with at(where):
-        axes = {name: _axis(name, entry, catalogue) for name, entry in entries.axes.items()}
+        bodies = _bodies(entries, mjcf)
+        axes = {n: _axis(n, entry, catalogue, bodies) for n, entry in entries.axes.items()}
         return MachineModel(
             name=Path(where).stem if entries.name is None else entries.name,
             axes=axes,
@@ -135,19 +144,47 @@ def _model(entries: ModelFile, catalogue: Catalogue, mjcf: str | None, where: st
         )
 
 
-def _axis(name: str, entry: AxisEntry, catalogue: Catalogue) -> AxisModel:
+def _bodies(entries: ModelFile, mjcf: str | None) -> dict[str, Joint]:
+    """Of each axis that is a joint what the bodies of the MuJoCo file are to it."""
+    joints = {name: e.joint for name, e in entries.axes.items() if e.joint is not None}
+    if not joints:
+        return {}
+    plain = [name for name in entries.axes if name not in joints]
+    if plain:
+        raise InputError(
+            f"axes.{plain[0]}: has no joint, but {', '.join(joints)} has; give each axis its joint "
+            "of the MuJoCo file, or none"
+        )
+    if mjcf is None or entries.mujoco is None:
+        raise InputError('joint: is given without its file; give mujoco = "robot.xml" as well')
+    from twin.mujoco.mechanism import joints_of  # MuJoCo takes long to load
+
+    return joints_of(mjcf, entries.mujoco, joints)
+
+
+def _axis(
+    name: str, entry: AxisEntry, catalogue: Catalogue, bodies: Mapping[str, Joint]
+) -> AxisModel:
     with at(f"axes.{name}"):
-        units = _units(entry)
+        units = ROTARY if name in bodies and bodies[name].rotary else LINEAR
+        if name not in bodies:
+            units = _units(entry)
+        elif entry.mass is not None or entry.inertia is not None:
+            raise InputError(
+                f"{units.mass_name} and joint are both given; the bodies of the joint have their "
+                f"inertia in the MuJoCo file, so leave {units.mass_name} out"
+            )
         unknown = set(entry.fixed or ()) - {units.mass_name}
         if unknown:
             raise InputError(f"fixed = {entry.fixed}: give ['{units.mass_name}'], or leave it out")
         given = {f.name: getattr(entry, f.name) for f in fields(Hardware)}
         return AxisModel(
-            mass=float(getattr(entry, units.mass_name)),
+            mass=bodies[name].inertia if name in bodies else float(getattr(entry, units.mass_name)),
             hardware=Hardware(**{key: v for key, v in given.items() if v is not None}),
             effects=tuple(_fitted(catalogue[n], e, units) for n, e in entry.effects.items()),
-            mass_fixed=bool(entry.fixed),
+            mass_fixed=bool(entry.fixed) or name in bodies,
             rotary=units.rotary,
+            joint=entry.joint,
         )
 
 
@@ -206,9 +243,12 @@ def format_model(model: MachineModel) -> str:
 def _axis_table(axis: AxisModel) -> tomlkit.items.Table:
     table = tomlkit.table()
     units, mass = axis.units, axis.mass_parameter
-    table[mass.name] = tomlkit.item(axis.mass).comment(f"{units(mass.unit)}, {mass.meaning}")
-    if axis.mass_fixed:
-        table["fixed"] = [mass.name]
+    if axis.joint is not None:
+        table["joint"] = axis.joint
+    else:
+        table[mass.name] = tomlkit.item(axis.mass).comment(f"{units(mass.unit)}, {mass.meaning}")
+        if axis.mass_fixed:
+            table["fixed"] = [mass.name]
     for key in HARDWARE_UNITS:
         value = getattr(axis.hardware, key)
         if value is not None:

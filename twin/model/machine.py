@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, LEAST, MOST, Effect, Kind, Parameter
 from twin.errors import CannotRun, InputError
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 from twin.numbers import is_number
+
+if TYPE_CHECKING:
+    from twin.mujoco.mechanism import Mechanism
 
 
 @dataclass(frozen=True)
@@ -160,7 +164,9 @@ class AxisModel:
 
     mass: float
     """Moved mass, kg; of a rotary axis its moment of inertia, kg m^2. Zero: the motion is imposed,
-    and the force of a log is the one that it takes; such an axis cannot be simulated."""
+    and the force of a log is the one that it takes; such an axis cannot be simulated. Of a joint
+    that of the bodies that it moves, on average over their poses; what they take beyond this mass
+    times acceleration is known from the motion of all joints (twin.mujoco.mechanism)."""
     hardware: Hardware = Hardware()
     """Travel, drive, encoder and limits."""
     effects: tuple[Fitted, ...] = ()
@@ -169,6 +175,8 @@ class AxisModel:
     """Whether a fit holds the mass."""
     rotary: bool = False
     """Whether the axis turns: all lengths are then angles (rad), forces torques (N m)."""
+    joint: str | None = None
+    """Name of its joint in the machine's MuJoCo file, whose bodies it moves; None: a plain axis."""
 
     def __post_init__(self) -> None:
         name, unit = self.units.mass_name, self.units.mass
@@ -275,7 +283,7 @@ class MachineModel:
     sample_rate: float = 10_000.0
     """Rate of control and simulation, Hz."""
     mjcf: str | None = None
-    """MJCF text of its bodies; None: each axis is a plain slide or hinge."""
+    """MJCF (or URDF) text of its bodies; None: each axis is a plain slide or hinge."""
     mjcf_name: str | None = None
     """Name of the MJCF file beside the model file."""
     history: tuple[HistoryStep, ...] = field(default=())
@@ -306,12 +314,31 @@ class MachineModel:
             )
 
     @property
+    def joints(self) -> dict[str, str]:
+        """Name of the joint of each axis that is one of a mechanism."""
+        return {name: axis.joint for name, axis in self.axes.items() if axis.joint is not None}
+
+    @property
+    def mechanism(self) -> Mechanism | None:
+        """The bodies that the axes move as joints; None where they are plain axes."""
+        if self.mjcf is None or not self.joints:
+            return None
+        from twin.mujoco.mechanism import mechanism_of  # MuJoCo takes long to load
+
+        return mechanism_of(self.mjcf, self.mjcf_name or "", self.joints)
+
+    @property
     def is_imposed(self) -> bool:
         """Whether the motion of an axis is imposed, so that no motion can be simulated."""
-        return any(axis.is_imposed for axis in self.axes.values())
+        return bool(self.joints) or any(axis.is_imposed for axis in self.axes.values())
 
     def require_mass(self) -> None:
         """Raise CannotRun where the motion of an axis is imposed."""
+        if self.joints:
+            raise CannotRun(
+                f"{self.name}: its axes are joints of {self.mjcf_name}, whose motion is not "
+                "simulated yet; its forces are fitted and compared"
+            )
         for name, axis in self.axes.items():
             if axis.is_imposed:
                 mass, unit = axis.units.mass_name, axis.units.mass

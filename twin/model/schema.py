@@ -72,6 +72,11 @@ class AxisEntry(Entries):
         description=f"a number from {LEAST:g} to {MOST:g}, in kg m^2: the moment of "
         "inertia; or 0, where the motion is imposed and the torque that it takes was measured",
     )  # fmt: skip
+    joint: str | None = Field(
+        None, min_length=1, max_length=200,
+        description="the name of a hinge or slide joint of the MJCF or URDF file, whose bodies the "
+        "axis moves, in place of a mass or inertia",
+    )  # fmt: skip
     fixed: list[Name] | None = Field(
         None, description='["mass"] (["inertia"] on a rotary axis), where a fit holds it'
     )
@@ -127,7 +132,7 @@ class ModelFile(Entries):
     )  # fmt: skip
     mujoco: str | None = Field(
         None, pattern=r"^[^/\\\x00]+$",
-        description="the name of an MJCF file that is beside this one, without folders",
+        description="the name of an MJCF or URDF file that is beside this one, without folders",
     )  # fmt: skip
     sample_rate: float = Field(
         10_000.0, gt=0.0, le=1e7, description="a number above 0, at most 1e+07, in Hz"

@@ -163,7 +163,7 @@ def machine_spec(model: MachineModel) -> mujoco.MjSpec:
     moves both masses. Raises InputError where the file lacks a joint or motor of an axis, where a
     joint is of the other kind, and where a mass leaves nothing for a body.
     """
-    spec = _read_mjcf(model) if model.mjcf else _plain_joints(model)
+    spec = read_spec(model.mjcf, model.mjcf_name or "") if model.mjcf else _plain_joints(model)
     spec.option.timestep = model.period
     # Higher-order integrators evaluate the forces within a sample, where states do not advance.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
@@ -225,12 +225,14 @@ def _set_inertia(model: MachineModel, spec: mujoco.MjSpec, name: str) -> float:
     return mass
 
 
-def _read_mjcf(model: MachineModel) -> mujoco.MjSpec:
+def read_spec(text: str, name: str) -> mujoco.MjSpec:
+    """The spec of an MJCF or URDF text; InputError, that names the file, where it is none."""
     try:
-        return mujoco.MjSpec.from_string(model.mjcf)
+        return mujoco.MjSpec.from_string(text)
     except ValueError as error:
+        said = " ".join(str(error).split())
         raise InputError(
-            f"{model.mjcf_name}: is not an MJCF file that MuJoCo reads: {error}"
+            f"{name}: is not an MJCF or URDF file that MuJoCo reads: {said}"
         ) from error
 
 

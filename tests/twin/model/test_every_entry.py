@@ -193,7 +193,7 @@ def test_an_editor_finds_every_entry_effect_and_parameter_in_the_schema() -> Non
     schema = json.loads((FOLDER / "model.schema.json").read_text(encoding="utf-8"))
     entries = schema["$defs"]["AxisEntry"]["properties"]
     hardware = {f.name for f in fields(Hardware)}
-    assert set(entries) == hardware | {"mass", "inertia", "fixed", "effects"}
+    assert set(entries) == hardware | {"mass", "inertia", "joint", "fixed", "effects"}
     effects = entries["effects"]["properties"]
     assert set(effects) == set(CATALOGUE)
     for name, effect in CATALOGUE.items():

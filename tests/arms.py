@@ -1,0 +1,90 @@
+"""A three-joint arm in bare MuJoCo, with friction that the test plants, under a test's control.
+
+It shares no line with the package: friction, ripples and the like are forces that this file adds
+to ``qfrc_applied``, and a velocity loop follows sums of sines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.logs import ROTARY_UNITS, AxisLog, Log
+
+Array = NDArray[np.float64]
+Forces = Callable[[Array, Array], Array]  # of position and velocity (3,), N m
+
+JOINTS = ("base", "shoulder", "elbow")
+ARM = """<mujoco model="arm">
+  <option timestep="0.0005" integrator="implicitfast"/>
+  <worldbody>
+    <body name="column" pos="0 0 0.3">
+      <joint name="base" axis="0 0 1"/>
+      <inertial pos="0 0.01 0" mass="8" diaginertia="0.06 0.06 0.05"/>
+      <body name="upper" pos="0 0 0.1">
+        <joint name="shoulder" axis="0 1 0"/>
+        <inertial pos="0.2 0 0.02" mass="4" diaginertia="0.01 0.06 0.06"/>
+        <body name="fore" pos="0.4 0 0">
+          <joint name="elbow" axis="0 1 0"/>
+          <inertial pos="0.15 0.02 0" mass="2" diaginertia="0.004 0.02 0.02"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+SAMPLE, STEPS = 0.002, 4  # s, and steps of MuJoCo within it
+COULOMB, VISCOUS = np.array([0.8, 0.4, 0.1]), np.array([0.3, 0.2, 0.05])
+STEEP = 1e-3  # rad/s, over which the planted Coulomb friction changes its sign
+
+
+def friction(_: Array, velocity: Array) -> Array:
+    """The planted friction, N m."""
+    return -COULOMB * np.tanh(velocity / STEEP) - VISCOUS * velocity
+
+
+def arm_log(
+    seed: int,
+    forces: Forces = friction,
+    *,
+    duration: float = 12.0,
+    noise: float = 1e-6,
+    text: str = ARM,
+    change: Callable[[mujoco.MjModel], None] = lambda model: None,
+) -> Log:
+    """The arm under a velocity loop that follows sines; noise: rad RMS of the encoders."""
+    model = mujoco.MjModel.from_xml_string(text)
+    model.opt.timestep = SAMPLE / STEPS
+    change(model)
+    data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+    rate = 2.0 * np.pi * rng.uniform(0.1, 0.7, (3, 3))
+    size, phase = rng.uniform(0.2, 0.5, (3, 3)), rng.uniform(0.0, 2.0 * np.pi, (3, 3))
+    gain = np.array([25.0, 40.0, 8.0])
+    count = round(duration / SAMPLE)
+    position, command = np.empty((2, count, 3))
+    data.qpos[:] = (size * np.sin(phase)).sum(axis=1)
+    data.qvel[:] = (size * rate * np.cos(phase)).sum(axis=1)
+    for k in range(count):
+        at = rate * (k * SAMPLE) + phase
+        off = (size * np.sin(at)).sum(axis=1) - data.qpos
+        slow = (size * rate * np.cos(at)).sum(axis=1) - data.qvel
+        mujoco.mj_forward(model, data)
+        torque = data.qfrc_bias + gain * (slow + 8.0 * off)
+        # Its steps put the position half a step ahead of the velocity.
+        position[k], command[k] = data.qpos - 0.5 * model.opt.timestep * data.qvel, torque
+        for _ in range(STEPS):
+            data.qfrc_applied[:] = torque + forces(data.qpos, data.qvel)
+            mujoco.mj_step(model, data)
+    position += noise * rng.standard_normal(position.shape)
+    return arm_of(position, command)
+
+
+def arm_of(position: Array, command: Array) -> Log:
+    """A log of the arm's joints: position rad, torque N m (n, 3)."""
+    signals = {
+        a: {"position": position[:, i], "force": command[:, i]} for i, a in enumerate(JOINTS)
+    }
+    return Log(1.0 / SAMPLE, {a: AxisLog(columns, ROTARY_UNITS) for a, columns in signals.items()})

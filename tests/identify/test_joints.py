@@ -1,0 +1,63 @@
+"""The effects of joints are found beside the bodies of the user's own MuJoCo file."""
+
+from __future__ import annotations
+
+import pytest
+from arms import ARM, COULOMB, JOINTS, VISCOUS, arm_log
+from cli_runs import refusal, twin
+
+from identify.workflow import fit
+from twin.logs import write_log
+from twin.model.file import load_model
+
+NEW = ("new", "1.mcap", "--mjcf", "arm.xml", "-o", "arm.toml")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Two logs, the user's MJCF file, and the model that `twin new` made of them."""
+    folder = tmp_path_factory.mktemp("arm")
+    (folder / "arm.xml").write_text(ARM)
+    for seed in (1, 2):
+        write_log(arm_log(seed), folder / f"{seed}.mcap")
+    done = twin(*NEW, folder=folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_planted_friction_is_found(folder):
+    model = load_model(folder / "arm.toml")
+    assert model.joints == {name: name for name in JOINTS}
+    found = fit(model, folder / "1.mcap", folder / "2.mcap")
+    for joint, coulomb, viscous in zip(JOINTS, COULOMB, VISCOUS, strict=True):
+        values = found.fits[joint].axis["coulomb_viscous"].values
+        assert values["Fc"] == pytest.approx(coulomb, rel=0.02)
+        assert values["sigma2"] == pytest.approx(viscous, rel=0.02)
+        assert found.fits[joint].ratio < 1.5
+        assert found.datasets[joint].channel_delay == 0.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('joint = "elbow"', 'joint = "elbo"', "joint = 'elbo' is not in arm.xml"),
+        ('joint = "elbow"', "inertia = 1.0", "axes.elbow: has no joint, but base, shoulder has"),
+        ('joint = "elbow"', 'joint = "elbow"\ninertia = 1.0', "inertia and joint are both given"),
+        ('mujoco = "arm.xml"', "", 'give mujoco = "robot.xml" as well'),
+    ],
+)
+def test_a_model_file_that_is_wrong_is_one_line(folder, old, new, said):
+    text = (folder / "arm.toml").read_text()
+    assert old in text
+    (folder / "wrong.toml").write_text(text.replace(old, new))
+    assert said in refusal("fit", "wrong.toml", "1.mcap", "-o", "fitted.toml", folder=folder)
+
+
+def test_a_log_that_lacks_a_joint_is_one_line(folder):
+    log = arm_log(1)
+    del log.axes["elbow"]
+    write_log(log, folder / "less.mcap")
+    said = refusal("fit", "arm.toml", "less.mcap", "-o", "fitted.toml", folder=folder)
+    assert "has no axis 'elbow', which is a joint of arm.xml" in said
+    said = refusal("new", "less.mcap", "--mjcf", "arm.xml", "-o", "other.toml", folder=folder)
+    assert "the joints elbow are no axes" in said

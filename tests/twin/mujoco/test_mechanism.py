@@ -1,0 +1,81 @@
+"""Momentum and bias force of a mechanism's bodies are those of MuJoCo's own inverse dynamics."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from arms import ARM, JOINTS
+
+from twin.errors import InputError
+from twin.mujoco.mechanism import mechanism_of
+
+OWN = {joint: joint for joint in JOINTS}
+LOOSE = ARM.replace('name="elbow" axis="0 1 0"', 'name="elbow" type="ball"')
+MESHED = ARM.replace(
+    "<worldbody>",
+    '<asset><mesh name="cover" file="not_there.stl"/></asset>\n  <worldbody>',
+).replace(
+    '<body name="fore" pos="0.4 0 0">',
+    '<body name="fore" pos="0.4 0 0"><geom type="mesh" mesh="cover"/>',
+)
+
+
+def smooth_motion(step: float, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position, velocity and acceleration (3, n) of sines."""
+    rate, phase = np.array([[2.0], [3.1], [4.3]]), np.array([[0.3], [1.1], [2.0]])
+    at = rate * step * np.arange(count) + phase
+    return np.sin(at), rate * np.cos(at), -(rate**2) * np.sin(at)
+
+
+def test_momentum_form_is_the_inverse_dynamics():
+    step = 1e-3
+    q, v, a = smooth_motion(step, 400)
+    mechanism = mechanism_of(ARM, "arm.xml", OWN)
+    momentum, force = mechanism.along(q, v, v)
+    # Of fourth order: a difference of second order would be the larger error.
+    near, far = momentum[:, 3:-1] - momentum[:, 1:-3], momentum[:, 4:] - momentum[:, :-4]
+    ours = (8.0 * near - far) / (12.0 * step) + force[:, 2:-2]
+    model = mujoco.MjModel.from_xml_string(ARM)
+    data, wanted = mujoco.MjData(model), []
+    for k in range(2, q.shape[1] - 2):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q[:, k], v[:, k], a[:, k]
+        mujoco.mj_inverse(model, data)
+        wanted.append(data.qfrc_inverse.copy())
+    largest = np.abs(wanted).max(axis=0)
+    assert np.all(np.abs(ours - np.transpose(wanted)).max(axis=1) < 1e-6 * largest)
+
+
+def test_axes_may_be_in_another_order_than_joints():
+    q, v, _ = smooth_motion(1e-3, 20)
+    straight = mechanism_of(ARM, "arm.xml", OWN).along(q, v, v)
+    turned = dict(zip("abc", reversed(JOINTS), strict=True))
+    back = mechanism_of(ARM, "arm.xml", turned).along(q[::-1], v[::-1], v[::-1])
+    for one, other in zip(straight, back, strict=True):
+        np.testing.assert_array_equal(one, other[::-1])
+
+
+@pytest.mark.parametrize(
+    "given", [MESHED, ARM.replace("<joint", '<joint damping="3" armature="1"')]
+)
+def test_meshes_and_what_is_an_effect_are_no_bodies(given):
+    q, v, _ = smooth_motion(1e-3, 20)
+    plain = mechanism_of(ARM, "arm.xml", OWN).along(q, v, v)
+    for one, other in zip(plain, mechanism_of(given, "arm.xml", OWN).along(q, v, v), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "joints", "said"),
+    [
+        (ARM, {**OWN, "elbow": "elbo"}, r"'elbo' is not in arm.xml, which has base, shoulder"),
+        (ARM, {"base": "base", "elbow": "elbow"}, "joints shoulder are no axes"),
+        (ARM, {**OWN, "elbow": "base"}, "is that of axis base"),
+        (LOOSE, OWN, "neither a hinge nor a slide"),
+        ("<mujoco", OWN, "is not an MJCF or URDF file"),
+    ],
+)
+def test_what_cannot_be_an_axis_is_one_line(text, joints, said):
+    with pytest.raises(InputError, match=said) as raised:
+        mechanism_of(text, "arm.xml", joints)
+    assert "\n" not in str(raised.value)

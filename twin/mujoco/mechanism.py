@@ -1,0 +1,271 @@
+"""The bodies of a MuJoCo model: what they take of the forces at its joints along a measured motion.
+
+With the generalised momentum p = M(q) v and the bias force c(q, v) of gravity, centrifugal and
+Coriolis forces, the forces at the joints are
+
+    tau = dp/dt + c - dM/dt v
+
+so that a weak form integrates the momentum by parts, and nothing is differentiated twice
+(R. M. Murray, Z. Li, S. S. Sastry, A Mathematical Introduction to Robotic Manipulation, section
+4.3). dM/dt v is the change of M v as the joints move on with v. All of it is computed natively, by
+the same library as the callback.
+
+What a joint has of friction, damping, springs and rotor inertia is the matter of the machine
+model's effects, and is not among the bodies. Geometry is needed for none of this, so that the
+meshes of a file need not be there.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import mujoco
+import numpy as np
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from twin.core.compiled import compiled
+from twin.errors import InputError
+from twin.mujoco.callback import call_step, library, offsets, view, word_at
+from twin.mujoco.mjcf import read_spec
+from twin.signals import Array
+
+CALLS = ("mj_kinematics", "mj_comPos", "mj_makeM", "mj_comVel", "mj_rne", "mj_mulM")
+AHEAD = 1e-6  # rad or m, by which the joints move on, of the change of the mass matrix
+LEAST_INERTIA = 1e-9  # kg, kg m^2: of a body whose file rounds its inertia to 0
+POSES = 256  # over which the inertia about a joint is averaged
+PASSIVE = ("damping", "stiffness", "frictionloss", "armature")  # of a joint, which are effects here
+SLIDE, HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
+
+
+def read_bodies(text: str, name: str) -> mujoco.MjSpec:
+    """The spec of an MJCF or URDF text, less the geometry that the bodies' inertia does not need.
+
+    name: of the file, for messages. Raises InputError where MuJoCo cannot read it.
+    """
+    spec = read_spec(text, name)
+    spec.compiler.fusestatic = False  # a body keeps its name
+    spec.compiler.boundmass = spec.compiler.boundinertia = LEAST_INERTIA
+    spec.compiler.balanceinertia = True
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    for body in spec.bodies[1:]:
+        if not body.explicitinertial and any(_is_mesh(g) and g.mass != 0.0 for g in body.geoms):
+            raise InputError(
+                f"{name}: body '{body.name}' has its inertia from a mesh alone; give it an "
+                "inertial element with mass (kg), pos (m) and inertia (kg m^2)"
+            )
+    for geom in [g for g in spec.geoms if _is_mesh(g) or g.parent.explicitinertial]:
+        spec.delete(geom)
+    for part in (*spec.meshes, *spec.hfields, *spec.skins, *spec.materials, *spec.textures):
+        spec.delete(part)
+    return spec
+
+
+def _is_mesh(geom: mujoco.MjsGeom) -> bool:
+    return geom.type in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_HFIELD)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Mechanism:
+    """The bodies of a machine, whose axes are joints.
+
+    model: of the bodies alone. places (2, n_axes): of each axis in qpos and among the degrees of
+    freedom. inertia (n_axes,): kg or kg m^2, that of the bodies about each joint, the mean over
+    poses.
+    """
+
+    model: mujoco.MjModel
+    axes: tuple[str, ...]
+    places: NDArray[np.int64]
+    inertia: Array
+
+    def __repr__(self) -> str:
+        return f"<Mechanism of {', '.join(self.axes)}>"
+
+    def along(self, position: Array, velocity: Array, smooth: Array) -> tuple[Array, Array]:
+        """Momentum p and force c - dM/dt v (n_axes, n) of the bodies along a motion, SI units.
+
+        position, velocity, smooth (n_axes, n): of each axis; the momentum is linear in velocity,
+        everything else is made of the smooth one. dp/dt and the second sum to the forces at the
+        joints.
+        """
+        rows = (np.ascontiguousarray(a, dtype=float) for a in (position, velocity, smooth))
+        momentum, force = np.empty((2, *position.shape))
+        data = mujoco.MjData(self.model)
+        _along(
+            _addresses(), self.model._address, data._address, tuple(offsets()[2:]), self.places,
+            *rows, np.zeros((5, self.model.nv)), momentum, force,
+        )  # fmt: skip
+        return momentum, force
+
+
+def mechanism_of(text: str, name: str, joints: Mapping[str, str]) -> Mechanism:
+    """The mechanism of an MJCF or URDF text; joints: axis -> name of its joint.
+
+    Raises InputError where a joint is not in the file or cannot be an axis, where two axes have the
+    same, and where a joint of the file is no axis: its motion is not known.
+    """
+    return _mechanism(text, name, tuple(joints.items()))
+
+
+@lru_cache(maxsize=4)  # each command asks for that of its one model several times
+def _mechanism(text: str, name: str, joints: tuple[tuple[str, str], ...]) -> Mechanism:
+    spec = read_bodies(text, name)
+    for joint in spec.joints:
+        for key in PASSIVE:
+            setattr(joint, key, 0.0 * np.asarray(getattr(joint, key)))
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise InputError(f"{name}: MuJoCo cannot build it: {said}") from error
+    found = {model.joint(j).name: j for j in range(model.njnt)}
+    _require_measured(model, name, joints, list(found))
+    at = [found[joint] for _, joint in joints]
+    places = np.stack([model.jnt_qposadr[at], model.jnt_dofadr[at]]).astype(np.int64)
+    axes = tuple(axis for axis, _ in joints)
+    return Mechanism(model, axes, places, _mean_inertia(model)[places[1]])
+
+
+def _require_measured(
+    model: mujoco.MjModel,
+    name: str,
+    joints: Sequence[tuple[str, str]],
+    found: Collection[str],
+) -> None:
+    used: dict[str, str] = {}
+    for axis, joint in joints:
+        if joint not in found:
+            raise InputError(
+                f"axis {axis}: joint = '{joint}' is not in {name}, which has "
+                f"{', '.join(n or 'one without a name' for n in found)}; give one of these"
+            )
+        if joint in used:
+            raise InputError(
+                f"axis {axis}: joint = '{joint}' is that of axis {used[joint]}; give each its own"
+            )
+        if model.joint(joint).type not in (SLIDE, HINGE):
+            raise InputError(
+                f"axis {axis}: joint '{joint}' of {name} is neither a hinge nor a slide; a free or "
+                "a ball joint cannot be an axis"
+            )
+        used[joint] = axis
+    lacking = [n or "one without a name" for n in found if n not in used]
+    if lacking:
+        raise InputError(
+            f"{name}: the joints {', '.join(lacking)} are no axes, so that their motion is not "
+            "known; measure them as axes, or take these joints out of the file"
+        )
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What a joint is to its axis: whether it turns, and its bodies' inertia, kg or kg m^2."""
+
+    rotary: bool
+    inertia: float
+
+
+def joints_of(text: str, name: str, joints: Mapping[str, str]) -> dict[str, Joint]:
+    """The joints of an MJCF or URDF text by axis; raises InputError as ``mechanism_of`` does."""
+    found = mechanism_of(text, name, joints)
+    turns = found.model.jnt_type[found.model.dof_jntid[found.places[1]]] == HINGE
+    pairs = zip(joints, turns, found.inertia, strict=True)
+    return {axis: Joint(bool(turns), float(inertia)) for axis, turns, inertia in pairs}
+
+
+def _mean_inertia(model: mujoco.MjModel) -> Array:
+    """Inertia (nv,) about each joint, kg or kg m^2: the mean over poses within the joints' ranges.
+
+    In one pose it may vanish, such as that of a straight arm about its own line.
+    """
+    data, rng = mujoco.MjData(model), np.random.default_rng(0)
+    turns = model.jnt_type == HINGE
+    free = np.where(turns, np.pi, 0.0)[:, None] * [-1.0, 1.0]
+    low, high = np.where(model.jnt_limited[:, None] > 0, model.jnt_range, free).T
+    total, full = np.zeros(model.nv), np.zeros((model.nv, model.nv))
+    for _ in range(POSES):
+        data.qpos[model.jnt_qposadr] = rng.uniform(low, high)
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, full)
+        total += np.diag(full) / POSES
+    return total
+
+
+def _addresses() -> tuple[int, ...]:
+    """Of MuJoCo's functions in the order of CALLS."""
+    found = (ctypes.cast(getattr(library(), name), ctypes.c_void_p).value for name in CALLS)
+    return tuple(int(address or 0) for address in found)
+
+
+@intrinsic
+def _call_with(typingctx, function, model, data, out, given):
+    """Call function(model, data, out, given) by addresses."""
+
+    def codegen(context, builder, signature, args):
+        pointer = context.get_value_type(types.voidptr)
+        fnty = cgutils.ir.FunctionType(context.get_value_type(types.void), [pointer] * 4)
+        fn = builder.inttoptr(args[0], fnty.as_pointer())
+        builder.call(fn, [builder.inttoptr(a, pointer) for a in args[1:]])
+        return context.get_dummy_value()
+
+    return types.void(*[types.int64] * 5), codegen
+
+
+@intrinsic
+def _call_bias(typingctx, function, model, data, out):
+    """Call function(model, data, 0, out) by addresses: mj_rne without accelerations."""
+
+    def codegen(context, builder, signature, args):
+        pointer = context.get_value_type(types.voidptr)
+        number = context.get_value_type(types.int32)
+        void = context.get_value_type(types.void)
+        fnty = cgutils.ir.FunctionType(void, [pointer, pointer, number, pointer])
+        fn = builder.inttoptr(args[0], fnty.as_pointer())
+        given = [builder.inttoptr(a, pointer) for a in args[1:]]
+        builder.call(fn, [*given[:2], number(0), given[2]])
+        return context.get_dummy_value()
+
+    return types.void(*[types.int64] * 4), codegen
+
+
+@compiled(nogil=True)
+def _along(
+    calls, model, data, off, places, position, velocity, smooth, lent, momentum, force
+):  # fmt: skip
+    kinematics, com_pos, make_m, com_vel, rne, mul_m = calls
+    n_axes, n_dofs = places.shape[1], lent.shape[1]
+    moved, product, before, after, bias = lent
+    qpos = view(word_at(data + off[2]), n_dofs)  # hinges and slides: as many as degrees of freedom
+    qvel = view(word_at(data + off[3]), n_dofs)
+    speed = word_at(data + off[3])
+    for k in range(position.shape[1]):
+        fastest = 0.0
+        for a in range(n_axes):
+            qpos[places[0, a]] = position[a, k]
+            qvel[places[1, a]] = smooth[a, k]
+            moved[places[1, a]] = velocity[a, k]
+            fastest = max(fastest, abs(smooth[a, k]))
+        call_step(kinematics, model, data)
+        call_step(com_pos, model, data)
+        call_step(make_m, model, data)
+        _call_with(mul_m, model, data, product.ctypes.data, moved.ctypes.data)
+        _call_with(mul_m, model, data, before.ctypes.data, speed)
+        call_step(com_vel, model, data)
+        _call_bias(rne, model, data, bias.ctypes.data)
+        ahead = AHEAD / max(fastest, AHEAD)
+        for a in range(n_axes):
+            qpos[places[0, a]] += ahead * smooth[a, k]
+        call_step(kinematics, model, data)
+        call_step(com_pos, model, data)
+        call_step(make_m, model, data)
+        _call_with(mul_m, model, data, after.ctypes.data, speed)
+        for a in range(n_axes):
+            i = places[1, a]
+            momentum[a, k] = product[i]
+            force[a, k] = bias[i] - (after[i] - before[i]) / ahead
