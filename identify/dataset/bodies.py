@@ -26,9 +26,11 @@ def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Array]:
     velocity + momentum). Empty for a machine of plain axes. name: of the log. Raises InputError
     where the log lacks one of the joints.
     """
-    mechanism = model.mechanism
-    if mechanism is None:
+    if not model.joints:
         return {}
+    from twin.mujoco.mechanism import mechanism_of  # MuJoCo takes long to load
+
+    mechanism = mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
     for axis in mechanism.axes:
         if axis not in log.axes:
             raise InputError(

@@ -5,16 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
-
 from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, LEAST, MOST, Effect, Kind, Parameter
 from twin.errors import CannotRun, InputError
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 from twin.numbers import is_number
-
-if TYPE_CHECKING:
-    from twin.mujoco.mechanism import Mechanism
 
 
 @dataclass(frozen=True)
@@ -317,15 +312,6 @@ class MachineModel:
     def joints(self) -> dict[str, str]:
         """Name of the joint of each axis that is one of a mechanism."""
         return {name: axis.joint for name, axis in self.axes.items() if axis.joint is not None}
-
-    @property
-    def mechanism(self) -> Mechanism | None:
-        """The bodies that the axes move as joints; None where they are plain axes."""
-        if self.mjcf is None or not self.joints:
-            return None
-        from twin.mujoco.mechanism import mechanism_of  # MuJoCo takes long to load
-
-        return mechanism_of(self.mjcf, self.mjcf_name or "", self.joints)
 
     @property
     def is_imposed(self) -> bool:
