@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+
 from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, LEAST, MOST, Effect, Kind, Parameter
 from twin.errors import CannotRun, InputError
