@@ -1,4 +1,4 @@
-"""Commands on the machine's side: simulate, import, new, info, check, recover, effects, example."""
+"""Commands on the machine's side: from simulate and import to effects, export and example."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from identify.cli.shared import (
     Effects,
     Json,
     Logs,
+    Model,
     ModelOption,
     app,
     catalogue_with,
@@ -21,6 +22,7 @@ from identify.cli.shared import (
     say,
 )
 from twin.errors import InputError
+from twin.export import find_exporter, format_names
 from twin.files import require_writable
 
 
@@ -280,6 +282,40 @@ def effects(
     everything = list(catalogue.values())
     answer = EffectsAnswer(effects=[effect_answer(e) for e in everything])
     say(effects_text(everything), answer, as_json_)
+
+
+@app.command()
+def export(
+    model: Model,
+    to: Annotated[str, typer.Option("--to", help=f"{', '.join(format_names())}.")],
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[LOG...]", help="MCAP logs on which losses are told in N."),
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path(
+        "export"
+    ),
+    effects: Effects = None,
+    as_json_: Json = False,
+) -> None:
+    """Write the model for a controller or another tool, and tell what that cannot hold of it.
+
+    Example: twin export better.toml --to c -o controller
+    """
+    from identify.output.answers.machine import ExportAnswer
+    from identify.output.machine import export_text
+    from twin.files import make_folder, write_atomically
+
+    exporter = find_exporter(to)
+    recorded = CheckedRecordings(logs)
+    made = exporter.export(machine_model(model, catalogue_with(effects)), recorded)
+    make_folder(out)
+    files = [out / name for name in made.files]
+    for file, content in zip(files, made.files.values(), strict=True):
+        write_atomically(file, content.encode() if isinstance(content, str) else content)
+    names = [str(file) for file in files]
+    answer = ExportAnswer.of(made, format=to, files=names)
+    say("\n".join([*names, export_text(made)]), answer, as_json_, recorded.findings)
 
 
 @app.command()

@@ -23,7 +23,21 @@ if TYPE_CHECKING:
     from identify.dataset.motion import Motion
     from twin.checks import CheckReport
     from twin.checks.long import AxisInfo, LogInfo
+    from twin.export import Exported
     from twin.laws.verdict import LawReport
+
+
+# --- exports ---------------------------------------------------------------------------------
+
+
+def export_text(made: Exported) -> str:
+    """What an export holds of each axis, and what it lacks, a line for each part."""
+    lines = []
+    for axis, kept in made.kept.items():
+        lines.append(f"axis {axis}: keeps {', '.join(kept) or 'nothing'}")
+        for word, remarks in (("nearly", made.approximated), ("lost", made.lost)):
+            lines += [f"  {word}: {r.part}, {r.text}" for r in remarks if r.axis == axis]
+    return "\n".join(lines)
 
 
 # --- the catalogue ---------------------------------------------------------------------------

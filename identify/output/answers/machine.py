@@ -238,6 +238,24 @@ class NewModelAnswer(Answer):
     not_determined: dict[str, list[str]]
 
 
+class RemarkEntry(Entry):
+    """What a format makes of a part of an axis that it cannot hold as it is."""
+
+    axis: str
+    part: str
+    text: str
+
+
+class ExportAnswer(Answer):
+    """What `twin export` prints: the files, and by axis what they hold as the model does."""
+
+    format: str
+    files: list[str]
+    kept: dict[str, list[str]]
+    approximated: list[RemarkEntry]
+    lost: list[RemarkEntry]
+
+
 class ExamplesAnswer(Answer):
     """What `twin example` prints: what each example is."""
 

@@ -1,0 +1,183 @@
+"""The exported C gives the feedforward of the model, and that makes the model follow."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from c_compiler import UNDEFINED, given, library, needs_compiler
+from cli_runs import refusal, twin
+from effect_runs import CATALOGUE
+from numpy.polynomial import Polynomial
+
+from twin.effect import Effect, Kind
+from twin.export.c_source import CSource, c_source
+from twin.feedforward import feedforward, followed
+from twin.laws.trials import companion, moderate
+from twin.model.file import load_model
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.signals import Array
+
+PERIOD = 1e-4
+FRICTION = CATALOGUE["lugre"]
+
+
+def with_friction(effect: Effect, seed: int = 5) -> AxisModel:
+    """An axis with an effect of moderate size, and a friction beside it."""
+    own = Fitted.at_start(effect, moderate(effect, np.random.default_rng(seed)))
+    beside = () if effect.kind is Kind.FRICTION else (companion(FRICTION),)
+    return AxisModel(3.0, Hardware(force_constant=20.0), (*beside, own))
+
+
+AXES = {e.name: with_friction(e) for e in CATALOGUE.values()}
+OF_TWO = [n for n, a in AXES.items() if any(f.effect.reads_other_axis for f in a.effects)]
+ALONE = MachineModel("alone", {n: a for n, a in AXES.items() if n not in OF_TWO}, 1.0 / PERIOD)
+
+
+def moves(duration: float, seed: int = 1) -> Array:
+    """Position, velocity, acceleration (3, n) of smooth moves with rests in between."""
+    rng, rise = np.random.default_rng(seed), Polynomial([0, 0, 0, 0, 0, 126, -420, 540, -315, 70])
+    each, moving = 5000, 4000
+    t = np.arange(1, moving + 1) / moving
+    along, parts = 0.0, []
+    for _ in range(round(duration / PERIOD) // each):
+        to = rng.uniform(-0.1, 0.1)
+        one = np.zeros((3, each))
+        one[0] = to
+        for k in range(3):
+            scale = (to - along) / (moving * PERIOD) ** k
+            one[k, :moving] = scale * rise.deriv(k)(t) + (along if k == 0 else 0.0)
+        along = to
+        parts.append(one)
+    return np.concatenate(parts, axis=1)
+
+
+def driver(made: CSource) -> str:
+    """C that calls each axis along a whole motion of n samples."""
+    loops = [f'#include "{made.name}.h"']
+    for a in made.axes:
+        names = ", ".join(f"const double *{n}" for n in a.arguments)
+        each = ", ".join(f"{n}[k]" for n in a.arguments)
+        head = f"void run_{a.prefix}(int n, double *out, {names})"
+        loops.append(
+            f"{head};\n{head}\n{{\n    {a.prefix}_state state = {{0}};\n"
+            f"    for (int k = 0; k < n; k++) out[k] = {a.prefix}_force(&state, {each});\n}}"
+        )
+    return "\n\n".join(loops) + "\n"
+
+
+def made_from(model: MachineModel, folder, *options: str) -> tuple[CSource, ctypes.CDLL]:
+    made = c_source(model)
+    files = {f"{made.name}.h": made.header, f"{made.name}.c": made.source, "run.c": driver(made)}
+    return made, library(folder, files, *options)
+
+
+def run(made: CSource, code: ctypes.CDLL, axis: str, *motion: Array) -> Array:
+    own = next(a for a in made.axes if a.name == axis)
+    out = np.zeros(motion[0].shape[1])
+    columns = [c.copy() for m in motion for c in m][: len(own.arguments)]
+    getattr(code, f"run_{own.prefix}")(len(out), *given(out, *columns))
+    return out
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory) -> tuple[CSource, ctypes.CDLL]:
+    return made_from(ALONE, tmp_path_factory.mktemp("alone"), UNDEFINED)
+
+
+@pytest.fixture(scope="module")
+def motion() -> Array:
+    return moves(10.0)
+
+
+@needs_compiler
+@pytest.mark.parametrize("axis", ALONE.axes)
+def test_c_is_the_feedforward_of_the_model(alone, motion, axis, capfd) -> None:
+    found = run(*alone, axis, motion)
+    still = np.zeros_like(motion)
+    wanted = feedforward(ALONE.axes[axis], motion, still, PERIOD)
+    assert np.abs(found - wanted).max() <= 1e-9 * np.abs(wanted).max()
+    assert "runtime error" not in capfd.readouterr().err
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", OF_TWO)
+def test_c_of_an_axis_that_feels_the_other_one(tmp_path, name) -> None:
+    model = MachineModel("two", {"x": AXES[name], "y": AxisModel(2.0)}, 1.0 / PERIOD)
+    made, code = made_from(model, tmp_path, UNDEFINED)
+    own, other = moves(2.0), moves(2.0, seed=2)
+    wanted = feedforward(model.axes["x"], own, other, PERIOD)
+    found = run(made, code, "x", own, other)
+    assert np.abs(found - wanted).max() <= 1e-9 * np.abs(wanted).max()
+    assert np.ptp(found - run(made, code, "x", own, np.zeros_like(own))) > 0.0
+
+
+@needs_compiler
+def test_a_current_is_the_force_over_its_constant(alone) -> None:
+    _, code = alone
+    states = np.zeros((2, 200))
+    for function in ("force", "current"):
+        getattr(code, f"alone_cogging_{function}").restype = ctypes.c_double
+    numbers = [ctypes.c_double(v) for v in (0.02, 0.1, 3.0)]
+    force = code.alone_cogging_force(*given(states[0]), *numbers)
+    assert code.alone_cogging_current(*given(states[1]), *numbers) == force / 20.0
+
+
+@pytest.mark.parametrize("axis", [n for n in AXES if n not in OF_TWO])
+def test_under_its_feedforward_the_equation_of_motion_holds(axis) -> None:
+    """Along moves, and with all effects, the lost ones apart, mass x acceleration is the force."""
+    from twin.laws.trials import Motion, forces
+
+    motion = moves(1.0)
+    kept = followed(AXES[axis]).axis
+    command = feedforward(kept, motion, np.zeros_like(motion), PERIOD)
+    found = forces(kept.effects, Motion(PERIOD, motion[0], motion[1], command))
+    moving = motion[1] != 0.0
+    structure = [f for f in kept.effects if f.effect.kind is Kind.STRUCTURE]
+    assert set(found) == {f.effect.name for f in kept.effects}
+    scale = kept.mass if structure else 1.0  # ``forces`` moves 1 kg
+    added = {f.effect.name: scale for f in structure}
+    total = command + sum(added.get(name, 1.0) * force for name, force in found.items())
+    left = (total - kept.mass * motion[2])[moving]
+    assert np.abs(left).max() <= 1e-9 * np.abs(command).max()
+
+
+def test_what_cannot_be_fed_forward_is_told(tmp_path) -> None:
+    lost = {n for n, a in AXES.items() if followed(a).lost}
+    assert {e.name for e in CATALOGUE.values() if e.kind is Kind.SENSING} <= lost
+    assert {"actuator_delay", "actuator_lag", "actuator_deadband", "actuator_saturation"} <= lost
+    assert not {"force_constant_ripple", "flexible_mode", "base_vibration", "leuven"} & lost
+    assert "ahead of its time" in followed(AXES["actuator_delay"]).lost["actuator_delay"]
+    assert set(followed(AXES["periodic_disturbance"]).approximated) == {"periodic_disturbance"}
+    stage = load_model("proton_xy", CATALOGUE)
+    axis = stage.axes["x"].with_effect(AXES["encoder_ripple"]["encoder_ripple"])
+    made = c_source(stage.with_axis("x", axis))
+    assert [(r.axis, r.part) for r in made.lost] == [("x", "encoder_ripple")]
+    assert "Lost: encoder_ripple, it changes the reading" in made.header
+    assert "encoder_ripple" not in made.source
+
+
+def test_bands_of_the_last_fit_stand_beside_the_values() -> None:
+    from twin.model.machine import AxisIntervals
+
+    stage = load_model("proton_xy", CATALOGUE)
+    stage = stage.with_intervals("x", AxisIntervals({"lugre.Fc": (0.27, 0.2912)}, 1.0))
+    assert (
+        "0.285 /* lugre.Fc: N, Coulomb friction; 90 % 0.27 to 0.2912 */" in c_source(stage).source
+    )
+
+
+def test_the_command_writes_the_files_and_says_what_is_in_them(tmp_path) -> None:
+    done = twin("export", "proton_xy", "--to", "c", "-o", "into", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "axis x: keeps mass, lugre" in done.stdout
+    for suffix in (".c", ".h"):
+        assert (tmp_path / "into" / f"proton_motion_stage{suffix}").stat().st_size > 1000
+    assert "did you mean 'c'" in refusal("export", "proton_xy", "--to", "c9", folder=tmp_path)
+    imposed = replace(load_model("proton_xy", CATALOGUE).axes["x"], mass=0.0, effects=())
+    from twin.model.file import save_model
+
+    save_model(MachineModel("held", {"x": imposed}), tmp_path / "held.toml")
+    assert "imposed" in refusal("export", "held.toml", "--to", "c", folder=tmp_path)
