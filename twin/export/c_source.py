@@ -64,6 +64,11 @@ class CSource:
 
 def c_source(model: MachineModel) -> CSource:
     """The feedforward of a machine; raises InputError where the motion of an axis is imposed."""
+    if model.joints:
+        raise InputError(
+            f"{model.name}: its axes are joints of {model.mjcf_name}, whose forces depend on the "
+            "motion of all of them; give a model of one axis with a mass"
+        )
     model.require_mass()
     name, laws = identifier(model.name), CLaws()
     axes: list[AxisCode] = []
