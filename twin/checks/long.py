@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from twin.checks import check_log
 from twin.checks.report import WHOLE, CheckReport, Fault, Finding, Severity
-from twin.logs.decode import read_parts, samples_by_axis, verified_parts
-from twin.logs.log import Array, Log, joined, thinned
+from twin.logs.decode import read_parts, require_intact, samples_by_axis
+from twin.logs.log import Array, Log, in_multiples, joined, thinned
 
 OF_THE_WHOLE = (Fault.FLAT, Fault.WEAK_EXCITATION, Fault.COARSE_POSITION)  # not of each part
 # Samples, all axes together. A check takes 130 bytes a sample beside 0.1 GB for the program.
@@ -65,8 +66,9 @@ def _said(seen: Sequence[tuple[Part, Finding]], parts: int) -> Finding:
 def check_file(path: Path) -> CheckReport:
     """The findings on a whole log, which is read part by part and verified. Raises InputError."""
     reports: list[Part] = []
-    for _ in _checked(verified_parts(path, _part_samples(path)), reports):
+    for _ in _checked(_parts(path), reports):
         pass
+    require_intact(path)
     return together(reports)
 
 
@@ -116,13 +118,10 @@ def _checked(parts: Iterable[Log], reports: list[Part]) -> Iterator[Log]:
 
 def _thinned(parts: Iterable[Log], every: int) -> Iterator[Log]:
     """The parts at a lower rate; what does not fill a step at the end of one goes to the next."""
-    held: Log | None = None
-    for part in parts:
-        whole = part if held is None else joined([held, part])
-        step = max(1, min(every, int(LONGEST_STEP * whole.sample_rate * (1.0 + 1e-9))))
-        count = len(whole) // step * step
-        held = whole.part(count, len(whole)).copied() if count < len(whole) else None
-        yield thinned(whole.part(0, count), step)
+    coming = iter(parts)
+    first = next(coming)
+    step = max(1, min(every, int(LONGEST_STEP * first.sample_rate * (1.0 + 1e-9))))
+    return (thinned(part, step) for part in in_multiples(chain([first], coming), step))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 import os
 import struct
 import zlib
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -157,17 +157,10 @@ class McapFile:
                 break
             yield record
         for chunk in sorted(self._chunks, key=lambda c: c.message_start_time):
+            held = chunk.message_index_offsets  # which an index may leave out
             between = chunk.message_end_time >= start and chunk.message_start_time < stop
-            if between and _holds(chunk, channels):
+            if between and (not held or any(channel in channels for channel in held)):
                 yield self._record(chunk.chunk_start_offset, self._data_end)
-
-    def records_with(self, channels: Container[int]) -> Iterator[Record]:
-        """All records but the chunks that hold messages of other channels alone.
-
-        Those are read as well, so that the checksum of the data section covers them.
-        """
-        held = {c.chunk_start_offset: _holds(c, channels) for c in self._chunks}
-        return (record for record in self.records() if held.get(record.offset, True))
 
     def _record(self, offset: int, end: int) -> Record:
         start = offset + RECORD_HEAD.size
@@ -196,12 +189,6 @@ class McapFile:
                 f"data section (bytes 0 to {offset}): wrong checksum though every chunk is intact; "
                 "metadata, an attachment or an index is damaged"
             )
-
-
-def _holds(chunk: ChunkIndex, channels: Container[int]) -> bool:
-    """Whether a chunk may have messages of these channels; an index may leave out its channels."""
-    held = chunk.message_index_offsets
-    return not held or any(channel in channels for channel in held)
 
 
 def record_at(data: bytes, offset: int) -> tuple[int, bytes, int]:
@@ -290,26 +277,3 @@ def open_chunk(record: Record, budget: Inflation) -> tuple[bytes, bool]:
     with at(record.place):
         budget.take(chunk.uncompressed_size, len(chunk.data))
         return decompressed(chunk), chunk.uncompressed_crc != 0
-
-
-def payloads(
-    records: Iterator[Record], size: int, other: Callable[[Record], None]
-) -> Iterator[tuple[str, bytes]]:
-    """The chunks of a file of ``size`` bytes: where each is and the records in it, proved.
-
-    The other records go to ``other``. Raises Damaged, InputError.
-    """
-    budget = Inflation(size)
-    for record in records:
-        if record.opcode == Opcode.CHUNK:
-            data, proved = open_chunk(record, budget)
-            if data and not proved:
-                raise Damaged(f"{record.place}: states no checksum of its samples")
-            yield record.place, data
-        elif record.opcode == Opcode.MESSAGE:
-            raise InputError(
-                f"a message at byte {record.offset} is outside the chunks; convert the log with: "
-                "twin import"
-            )
-        else:
-            other(record)

@@ -13,7 +13,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
 from twin.errors import InputError, at
-from twin.logs.container import Damaged, McapFile, Record, open_mcap, payloads
+from twin.logs.container import Damaged, Inflation, McapFile, Record, open_chunk, open_mcap
 from twin.logs.log import Array, AxisLog, Log
 from twin.logs.messages import Block
 from twin.logs.series import Series, seconds
@@ -67,12 +67,19 @@ def read_log(
     Raises InputError otherwise, and where no axis has position and one of current and force.
     """
     wanted = Wanted(axes, fields, truth)
+    first, last = start or 0.0, math.inf if stop is None else stop
+    if not first < last:
+        raise InputError(f"{path}: start = {first:g} s is not before stop = {last:g} s")
     with _opened(path) as file:
-        if start is not None or stop is not None:
-            return _between(file, wanted, start or 0.0, math.inf if stop is None else stop)
-        everything = wanted == EVERYTHING
-        records = file.records() if everything else file.selected(wanted.channels(file))
-        return next(log_parts(file, records, wanted, None))
+        if start is None and stop is None:
+            everything = wanted == EVERYTHING
+            records = file.records() if everything else file.selected(wanted.channels(file))
+            return next(log_parts(file, records, wanted, None))
+        run = Run(file, wanted)
+        span = round(first * 1e9), min(last * 1e9, 2.0**63)
+        for _ in run.fed(file.selected(wanted.channels(file), *span)):
+            pass
+        return run.between(first, last)
 
 
 def read_parts(
@@ -89,11 +96,11 @@ def read_parts(
         yield from log_parts(file, file.selected(wanted.channels(file)), wanted, samples)
 
 
-def verified_parts(path: str | Path, samples: int) -> Iterator[Log]:
-    """The same, with all of the file verified when the last part was taken."""
-    wanted = Wanted(truth=False)
+def require_intact(path: str | Path) -> None:
+    """Raise InputError where any byte of a log is not what was written, whoever reads it."""
     with _opened(path) as file:
-        yield from log_parts(file, file.records_with(wanted.channels(file)), wanted, samples)
+        for _ in file.records():
+            pass
 
 
 def samples_by_axis(path: str | Path) -> dict[str, int]:
@@ -119,28 +126,14 @@ def log_parts(
     file: McapFile, records: Iterator[Record], wanted: Wanted, samples: int | None
 ) -> Iterator[Log]:
     """The log in parts of ``samples`` or a few more; whole where None."""
-    run = Run(file, wanted, samples)
-    for place, data in payloads(records, file.size, run.extras.add):
+    run, told = Run(file, wanted, samples), False
+    for _ in run.fed(records):
         if samples is not None and run.holds(samples):
             yield run.log()
-        with at(place):
-            run.append(data)
+            told = True
     run.require_counts()
-    if not run.is_told:
+    if not (told and run.is_empty):
         yield run.log()
-
-
-def _between(file: McapFile, wanted: Wanted, start: float, stop: float) -> Log:
-    """The samples from ``start`` to before ``stop``, s."""
-    if not start < stop:
-        raise InputError(f"start = {start:g} s is not before stop = {stop:g} s")
-    run = Run(file, wanted)
-    span = round(start * 1e9), min(stop * 1e9, 2.0**63)
-    records = file.selected(wanted.channels(file), *span)
-    for place, data in payloads(records, file.size, run.extras.add):
-        with at(place):
-            run.append(data)
-    return run.between(start, stop)
 
 
 @dataclass
@@ -193,8 +186,9 @@ class Run:
     """
 
     def __init__(self, file: McapFile, wanted: Wanted, samples: int | None = None) -> None:
-        self.extras = Extras()
+        self._extras = Extras()
         self._topics = Topics()
+        self._size = file.size
         for record in file.definitions:  # chunks that hold them as well may never be read
             self._topics.register(record.opcode, record.content)
         self._wanted = wanted
@@ -207,12 +201,27 @@ class Run:
         self._room = file.size if samples is None else min(file.size, samples + (samples >> 4))
         self._series: dict[int, Series] = {}
 
-    def append(self, data: bytes) -> None:
-        """Take the samples in a chunk; raises InputError."""
-        for block in self._topics.blocks(data):
-            series = self._series.get(block.channel) or self._open(block)
-            if series is not None:
-                series.append(block)
+    def fed(self, records: Iterable[Record]) -> Iterator[None]:
+        """Take what is in records, chunk by chunk; raises Damaged, InputError."""
+        budget = Inflation(self._size)
+        for record in records:
+            if record.opcode == Opcode.CHUNK:
+                data, proved = open_chunk(record, budget)
+                with at(record.place):
+                    if data and not proved:
+                        raise Damaged("states no checksum of its samples")
+                    for block in self._topics.blocks(data):
+                        series = self._series.get(block.channel) or self._open(block)
+                        if series is not None:
+                            series.append(block)
+                yield
+            elif record.opcode == Opcode.MESSAGE:
+                raise InputError(
+                    f"a message at byte {record.offset} is outside the chunks; convert the log "
+                    "with: twin import"
+                )
+            else:
+                self._extras.add(record)
 
     def _open(self, block: Block) -> Series | None:
         topic = self._topics.topic(block.channel)
@@ -230,9 +239,9 @@ class Run:
         return [series for _, series in sorted(self._series.items())]
 
     @property
-    def is_told(self) -> bool:
-        """Whether all samples are in the logs that were made of them."""
-        return bool(self._series) and not any(s.held for s in self._series.values())
+    def is_empty(self) -> bool:
+        """Whether no samples are held."""
+        return not any(s.held for s in self._series.values())
 
     def holds(self, samples: int) -> bool:
         """Whether all topics that the file announces hold so many or more, to the same time."""
@@ -264,7 +273,7 @@ class Run:
                     f"{seconds(end)}, other topics differ; "
                     "keep what they have in common with: twin recover"
                 )
-        return assembled(((s.topic, s.taken()) for s in self._opened()), rate, self.extras)
+        return assembled(((s.topic, s.taken()) for s in self._opened()), rate, self._extras)
 
     def between(self, start: float, stop: float) -> Log:
         """The log of the samples from ``start`` to before ``stop`` (s); raises InputError."""
@@ -285,7 +294,7 @@ class Run:
         for series in self._opened():
             span = slice(first - series.span.start, last - series.span.start)
             columns.append((series.topic, {f: c[span] for f, c in series.taken().items()}))
-        return assembled(columns, rate, self.extras)
+        return assembled(columns, rate, self._extras)
 
     @property
     def _common(self) -> range:
@@ -304,7 +313,7 @@ class Run:
             raise self._has_no(None)
         for one in series:
             one.topic.require_fields()
-        return common_rate([s.topic for s in series], self.extras)
+        return common_rate([s.topic for s in series], self._extras)
 
     def _has_no(self, axis: str | None) -> InputError:
         """The error for an axis without samples, None: for all of them."""

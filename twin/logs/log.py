@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -143,6 +143,19 @@ def joined(parts: Iterable[Log]) -> Log:
     }
     truth = {name: _one_after_the_other([log.truth[name] for log in logs]) for name in first.truth}
     return replace(first, axes=axes, truth=truth)
+
+
+def in_multiples(parts: Iterable[Log], count: int) -> Iterator[Log]:
+    """Parts that follow each other, as parts of a multiple of ``count``; the last has the rest."""
+    held: Log | None = None
+    for part in parts:
+        whole = part if held is None else joined([held, part])
+        stop = len(whole) // count * count
+        if stop:
+            yield whole.part(0, stop)
+        held = whole.part(stop, len(whole)).copied()
+    if held is not None and len(held):
+        yield held
 
 
 def _one_after_the_other(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:

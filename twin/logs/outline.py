@@ -39,10 +39,6 @@ class Signals:
     metadata: Mapping[str, str]
 
 
-Samples = tuple[Mapping[str, Array], ...]
-"""The columns (n,) of every topic, in the order of its channels."""
-
-
 @dataclass(frozen=True)
 class Planned:
     """One topic of a file: its schema, channel and the layout of its messages."""
@@ -88,18 +84,18 @@ class Outline:
 def outline_of(log: Log) -> Outline:
     """The file of a log; raises InputError for one that could not be read back."""
     _check_log(log)
-    return Outline.of(_signals(log), log.sample_rate, _metadata(log), log.attachments)
+    given = {key: value for key, value in log.metadata.items() if key != CHECKSUM}
+    metadata = {
+        **given,
+        "schema_version": SCHEMA_VERSION,
+        "sample_rate_hz": repr(float(log.sample_rate)),
+        "axes": ",".join(log.axes),
+    }
+    return Outline.of(signals_of(log), log.sample_rate, metadata, log.attachments)
 
 
-def samples_of(log: Log, first: int) -> Samples:
-    """The columns of a log, or of a part of one that begins with sample ``first``.
-
-    Raises InputError where a column is not one finite number a sample.
-    """
-    return checked(_signals(log), len(log), log.sample_rate, first)
-
-
-def _signals(log: Log) -> Iterator[Signals]:
+def signals_of(log: Log) -> Iterator[Signals]:
+    """The topics of a log, or of a part of one; raises InputError where an axis lacks anything."""
     for name, axis in log.axes.items():
         topic = AXIS_PREFIX + name
         with at(topic):
@@ -119,26 +115,6 @@ def _signals(log: Log) -> Iterator[Signals]:
 
 def _common(axis: str, log: Log) -> dict[str, str]:
     return {"axis": axis, "sample_rate_hz": repr(float(log.sample_rate))}
-
-
-def _metadata(log: Log) -> dict[str, str]:
-    given = {key: value for key, value in log.metadata.items() if key != CHECKSUM}
-    return {
-        **given,
-        "schema_version": SCHEMA_VERSION,
-        "sample_rate_hz": repr(float(log.sample_rate)),
-        "axes": ",".join(log.axes),
-    }
-
-
-def checked(topics: Iterable[Signals], count: int, sample_rate: float, first: int = 0) -> Samples:
-    """The columns of topics; raises InputError where one is not one finite number a sample."""
-    samples = []
-    for signals in topics:
-        with at(signals.topic):
-            _check_columns(signals, count, sample_rate, first)
-        samples.append(signals.columns)
-    return tuple(samples)
 
 
 def _check_log(log: Log) -> None:
@@ -167,7 +143,11 @@ def _check_axis(axis: AxisLog) -> None:
         raise InputError(f"force constant is {constant} {axis.kind('N/A')}; give a number above 0")
 
 
-def _check_columns(signals: Signals, count: int, sample_rate: float, first: int) -> None:
+def require_samples(signals: Signals, count: int, sample_rate: float, first: int) -> None:
+    """Raise InputError where a column is not one finite number for each of ``count`` samples.
+
+    first: number of the first of them in the log.
+    """
     for name, column in signals.columns.items():
         if not IDENTIFIER.fullmatch(name):
             raise InputError(f"column name {name!r}: use letters, digits and underscores")

@@ -175,28 +175,20 @@ def _found_chunks(file: FileBytes) -> Iterator[_FoundChunk]:
 
     Within one that is proved none is looked for.
     """
-    budget, start = Inflation(len(file)), 0
-    while (found := _first(file, start, budget)) is not None:
-        yield found
-        start = found.end if found.proved else found.offset + 1
-
-
-def _first(file: FileBytes, start: int, budget: Inflation) -> _FoundChunk | None:
-    for place in range(start, len(file), _WINDOW):
+    budget, behind = Inflation(len(file)), 0
+    for place in range(0, len(file), _WINDOW):
         data = file.part(place, place + _WINDOW + _HEAD.size)  # with all of a head that begins here
-        for name in re.finditer(re.escape(_ZSTD), data[_NAME_AT:]):
-            begin = name.start()
-            found = _opened(file, place + begin, data[begin : begin + _HEAD.size], budget)
-            if found is not None:
-                return found
-    return None
+        for name in re.finditer(re.escape(_ZSTD), data[_NAME_AT:-8]):
+            offset = place + name.start()
+            head = _HEAD.unpack_from(data, name.start())
+            if offset >= behind and (found := _opened(file, offset, head, budget)):
+                yield found
+                behind = found.end if found.proved else found.offset + 1
 
 
-def _opened(file: FileBytes, offset: int, head: bytes, budget: Inflation) -> _FoundChunk | None:
+def _opened(file: FileBytes, offset: int, head: tuple, budget: Inflation) -> _FoundChunk | None:
     """The chunk at a place, by either of the two sizes that it states of its data."""
-    if len(head) < _HEAD.size:
-        return None
-    _, length, _, _, size, crc, _, inner = _HEAD.unpack(head)
+    _, length, _, _, size, crc, _, inner = head
     start, outer = offset + _HEAD.size, length - (_HEAD.size - RECORD_HEAD.size)
     for stored in dict.fromkeys((inner, outer)):
         if not 0 < stored <= min(len(file) - start, 2 * size + _LEAST_ROOM):
@@ -470,16 +462,10 @@ class _Salvage:
         if opcode not in _OPCODES or end > len(self._file):
             return None
         if following is not None and following.offset < end:
-            crc = int.from_bytes(self._file.part(end - 4, end), "little")
-            if opcode != Opcode.ATTACHMENT or self._checksum(start, end - 4) != crc:
+            content = self._file.part(start, end) if opcode == Opcode.ATTACHMENT else b""
+            if zlib.crc32(content[:-4]) != int.from_bytes(content[-4:], "little") or not content:
                 return None
         return end
-
-    def _checksum(self, start: int, stop: int) -> int:
-        crc = 0
-        for place in range(start, stop, _WINDOW):
-            crc = zlib.crc32(self._file.part(place, min(place + _WINDOW, stop)), crc)
-        return crc
 
     def _take(self, offset: int, end: int, budget: Inflation) -> None:
         """Take metadata or an attachment; say what is wrong with a chunk that was not found."""

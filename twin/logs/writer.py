@@ -32,20 +32,13 @@ from mcap.records import (
     SummaryOffset,
 )
 
+from twin.errors import at
 from twin.files import atomic_writer, recording
 from twin.logs.container import MAGIC
 from twin.logs.decode import CHECKSUM, METADATA_NAME, checksum
-from twin.logs.log import Array, Log
+from twin.logs.log import Array, AxisLog, Log, in_multiples
 from twin.logs.messages import numbered, sample_times
-from twin.logs.outline import (
-    Outline,
-    Planned,
-    Samples,
-    Signals,
-    checked,
-    outline_of,
-    samples_of,
-)
+from twin.logs.outline import Outline, Planned, Signals, outline_of, require_samples, signals_of
 
 CHUNK_BYTES = 1 << 20  # of the samples in all chunks of a stretch, as the format recommends
 WORKERS = 2  # threads that compress; more would wait for the disk
@@ -94,16 +87,7 @@ def write_parts(parts: Iterable[Log], path: str | Path, *, chunk_bytes: int = CH
 def _recorded(stream: BinaryIO, parts: Iterable[Log], chunk_bytes: int) -> int:
     coming = iter(parts)
     first = next(coming)
-    samples = _numbered(chain([first], coming))
-    return _written(stream, outline_of(first), samples, chunk_bytes)
-
-
-def _numbered(parts: Iterable[Log]) -> Iterator[Samples]:
-    """The samples of parts that follow each other."""
-    first = 0
-    for part in parts:
-        yield samples_of(part, first)
-        first += len(part)
+    return _written(stream, outline_of(first), signals_of, chain([first], coming), chunk_bytes)
 
 
 def write_topics(
@@ -116,22 +100,26 @@ def write_topics(
 
     units: "/model/x/force" -> unit. Raises InputError as write_log does.
     """
-    signals = [
-        Signals(
-            topic, SERIES, columns, numbered(columns),
-            {"sample_rate_hz": repr(float(sample_rate)),
-             **{f"unit.{c}": u for c in columns if (u := units.get(f"{topic}/{c}"))}},
-        )
-        for topic, columns in topics.items()
-    ]  # fmt: skip
-    count = len(next(iter(signals[0].columns.values())))
-    samples = checked(signals, count, sample_rate)
-    outline = Outline.of(signals, sample_rate, {"source": "comparison"}, {})
+    rate = {"sample_rate_hz": repr(float(sample_rate))}
+
+    def series(log: Log) -> Iterator[Signals]:
+        for topic, columns in ((topic, axis.columns) for topic, axis in log.axes.items()):
+            known = {f"unit.{c}": u for c in columns if (u := units.get(f"{topic}/{c}"))}
+            yield Signals(topic, SERIES, columns, numbered(columns), {**rate, **known})
+
+    log = Log(sample_rate, {topic: AxisLog(columns) for topic, columns in topics.items()})
+    outline = Outline.of(series(log), sample_rate, {"source": "comparison"}, {})
     with atomic_writer(Path(path)) as stream:
-        _written(stream, outline, [samples], CHUNK_BYTES)
+        _written(stream, outline, series, [log], CHUNK_BYTES)
 
 
-def _written(stream: BinaryIO, outline: Outline, parts: Iterable[Samples], chunk_bytes: int) -> int:
+Topics = Callable[[Log], Iterable[Signals]]
+"""The topics of a part of a log, always the same ones in the same order."""
+
+
+def _written(
+    stream: BinaryIO, outline: Outline, topics_of: Topics, parts: Iterable[Log], chunk_bytes: int
+) -> int:
     """Write a whole file; returns the number of samples of each topic.
 
     Of a stretch every topic has a chunk of its own, so that one can be read without the others.
@@ -142,49 +130,41 @@ def _written(stream: BinaryIO, outline: Outline, parts: Iterable[Samples], chunk
     writer.add_metadata(METADATA_NAME, {**outline.metadata, **proof})
     for name, data in outline.attachments.items():
         writer.add_attachment(name, data)
-    stretches = _in_chunks(parts, max(1, chunk_bytes // outline.row_bytes))
-    # The axes come last, so that what a killed run leaves of a stretch is seldom some axes alone.
-    chunks = (
-        (topic, first, columns)
-        for first, samples in stretches
-        for topic, columns in reversed(list(zip(outline.topics, samples, strict=True)))
-    )
+    most = max(1, chunk_bytes // outline.row_bytes)
 
-    def chunk(item: tuple[Planned, int, Mapping[str, Array]]) -> PackedChunk:
-        return _packed(*item, outline.sample_rate)
+    def chunk(stretch: tuple[Planned, int, Mapping[str, Array]]) -> PackedChunk:
+        return _packed(*stretch, outline.sample_rate)
 
-    for packed in _ordered(chunk, chunks):
+    for packed in _ordered(chunk, _stretches(outline, topics_of, parts, most)):
         writer.add_chunk(packed)
     return writer.finish(outline.topics)
 
 
-def _in_chunks(parts: Iterable[Samples], most: int) -> Iterator[tuple[int, Samples]]:
-    """The samples in chunks of ``most``, each with the number of its first; the last is shorter."""
-    first, held = 0, None
+def _stretches(
+    outline: Outline, topics_of: Topics, parts: Iterable[Log], most: int
+) -> Iterator[tuple[Planned, int, Mapping[str, Array]]]:
+    """Every topic of each ``most`` samples, with the number of the first; raises InputError.
+
+    The axes come last, so that what a killed run leaves of a stretch is seldom some axes alone.
+    """
+    first = 0
+    for part in in_multiples(_sound(outline, topics_of, parts), most):
+        for start in range(0, len(part), most):
+            signals = topics_of(part.part(start, start + most))
+            for topic, own in reversed(list(zip(outline.topics, signals, strict=True))):
+                yield topic, first + start, own.columns
+        first += len(part)
+
+
+def _sound(outline: Outline, topics_of: Topics, parts: Iterable[Log]) -> Iterator[Log]:
+    """The parts, each with a finite number in every place; raises InputError."""
+    first = 0
     for part in parts:
-        samples = part if held is None else _behind(held, part)
-        whole = _count(samples) // most * most
-        for start in range(0, whole, most):
-            yield first + start, _cut(samples, start, start + most)
-        first += whole
-        held = _cut(samples, whole, _count(samples))
-    if held is not None and _count(held):
-        yield first, held
-
-
-def _count(samples: Samples) -> int:
-    return len(next(iter(samples[0].values())))
-
-
-def _cut(samples: Samples, start: int, stop: int) -> Samples:
-    return tuple({name: c[start:stop] for name, c in columns.items()} for columns in samples)
-
-
-def _behind(before: Samples, after: Samples) -> Samples:
-    return tuple(
-        {name: np.concatenate([column, new[name]]) for name, column in columns.items()}
-        for columns, new in zip(before, after, strict=True)
-    )
+        for signals in topics_of(part):
+            with at(signals.topic):
+                require_samples(signals, len(part), outline.sample_rate, first)
+        yield part
+        first += len(part)
 
 
 @dataclass(frozen=True)
