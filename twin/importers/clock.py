@@ -12,6 +12,7 @@ from twin.errors import InputError
 from twin.importers.mapping import ImportMap
 from twin.logs.log import Array
 from twin.logs.series import instant
+from twin.numbers import first_not_finite
 
 JITTER = 0.01  # of a period: how far a time may be off the even grid
 
@@ -22,38 +23,38 @@ def rate_of(time: Array) -> float:
     It is the nearest whole number where the times allow that. Raises InputError that names row and
     time where they do not increase, have a gap, or are off the even grid by more than 1 %.
     """
-    if not np.isfinite(time).all():
-        k = int(np.argmin(np.isfinite(time)))
-        raise InputError(f"the time in row {k + 1} is {time[k]}; give every row a time")
+    _require_finite(time)
     elapsed = time - time[0]
     steps = np.diff(elapsed)
     period = float(np.median(steps))
-    back = steps <= 0.0
-    if back.any():
-        k = int(np.argmax(back))
-        raise _uneven("does not increase", time, k + 1, period)
-    gap = steps > 1.5 * period
-    if gap.any():
-        raise _uneven("has a gap", time, int(np.argmax(gap)) + 1, period)
-    rate = len(steps) / float(elapsed[-1])
+    rate = len(steps) / max(float(elapsed[-1]), 1e-9)  # less than none is refused below
     if abs(round(rate) / rate - 1.0) * len(steps) < JITTER:
         rate = float(round(rate))
     off = np.abs(elapsed * rate - np.arange(len(time)))
-    if off.max() > JITTER:
-        raise _uneven(
-            f"is off the even grid by up to {100.0 * off.max():.3g} % of a sample",
-            time, int(np.argmax(off > JITTER)), period,
-        )  # fmt: skip
+    for fault, wrong in (
+        ("does not increase", np.append(False, steps <= 0.0)),
+        ("has a gap", np.append(False, steps > 1.5 * period)),
+        (f"is off the even grid by up to {100.0 * off.max():.3g} % of a sample", off > JITTER),
+    ):
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise InputError(
+                f"the time {fault}: {instant(time[row - 1])} is followed by {instant(time[row])} "
+                f"in row {row + 1}, usual are {period:.6g} s a sample; give resample = "
+                f"{1.0 / max(period, 1e-9):.6g} (Hz) in the map, or sample_rate in place of time "
+                "where only the printed times are inexact"
+            )
     return rate
 
 
-def _uneven(fault: str, time: Array, row: int, period: float) -> InputError:
-    rate = 1.0 / max(period, 1e-9)
-    return InputError(
-        f"the time {fault}: {instant(time[row - 1])} is followed by {instant(time[row])} in row "
-        f"{row + 1}, usual are {period:.6g} s a sample; give resample = {rate:.6g} "
-        "(Hz) in the map, or sample_rate in place of time where only the printed times are inexact"
-    )
+def _require_finite(time: Array) -> None:
+    if (k := first_not_finite(time)) is not None:
+        raise InputError(f"the time in row {k + 1} is {time[k]}; give every row a time")
+
+
+def even_times(begin: float, end: float, rate: float) -> Array:
+    """Times in s from ``begin`` to ``end``, of which there are ``rate`` a second."""
+    return begin + np.arange(int((end - begin) * rate * (1.0 + 1e-12)) + 1) / rate
 
 
 LONGEST_GAP = 20.0  # usual steps, over which a line is no measurement
@@ -100,9 +101,7 @@ class Clock:
 
 def clock_of(time: Array, rate: float) -> Clock:
     """The even clock of ``rate`` Hz over the times (n,) in s; raises InputError."""
-    if not np.isfinite(time).all():
-        k = int(np.argmin(np.isfinite(time)))
-        raise InputError(f"the time in row {k + 1} is {time[k]}; give every row a time")
+    _require_finite(time)
     increasing = time > np.maximum.accumulate(np.concatenate([[-np.inf], time[:-1]]))
     rows = np.flatnonzero(increasing)
     kept = time[rows]
@@ -120,5 +119,4 @@ def clock_of(time: Array, rate: float) -> Clock:
             f"there is nothing between {instant(kept[gap])} and {instant(kept[gap + 1])}; import "
             "the parts before and behind it as logs of their own"
         )
-    grid = kept[0] + np.arange(int((kept[-1] - kept[0]) * rate * (1.0 + 1e-12)) + 1) / rate
-    return Clock(rows, kept, grid, len(time) - len(kept))
+    return Clock(rows, kept, even_times(kept[0], kept[-1], rate), len(time) - len(kept))

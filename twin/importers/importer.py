@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from twin.errors import InputError, at
 from twin.importers import csv_text, mcap_topics
-from twin.importers.clock import Clock, clock_of, rate_of
+from twin.importers.clock import Clock, clock_of, even_times, rate_of
 from twin.importers.formats import read_hdf5, read_json, read_mat, read_parquet, read_tdms
 from twin.importers.mapping import ImportMap
 from twin.importers.table import Table, numbers
@@ -21,37 +21,16 @@ from twin.logs.series import instant, is_calendar
 from twin.numbers import first_not_finite
 
 
-def _common(paths: Sequence[Path], clocks: Sequence[Clock], rate: float) -> Array:
-    """The even times that lie in all files."""
-    begin = max(clock.times[0] for clock in clocks)
-    end = min(clock.times[-1] for clock in clocks)
-    if not (end - begin) * rate >= 2.0:
-        spans = "; ".join(
-            f"{path} {instant(clock.times[0])} to {instant(clock.times[-1])}"
-            for path, clock in zip(paths, clocks, strict=True)
-        )
-        raise InputError(f"the files have no time in common ({spans}); correct their offset (s)")
-    count = int((end - begin) * rate * (1.0 + 1e-12)) + 1
-    return np.asarray(begin + np.arange(count) / rate)
-
-
-@dataclass(frozen=True)
-class Format:
-    """A format: how its files end, and what reads them."""
-
-    endings: tuple[str, ...]
-    read: Callable[[Path, ImportMap], Table]
-
-
-FORMATS: Mapping[str, Format] = {
-    "csv": Format((".csv", ".txt", ".tsv", ".dat", ".asc"), csv_text.read),
-    "mat": Format((".mat",), read_mat),
-    "hdf5": Format((".h5", ".hdf5", ".hdf", ".he5"), read_hdf5),
-    "parquet": Format((".parquet", ".pq"), read_parquet),
-    "json": Format((".json",), read_json),
-    "tdms": Format((".tdms",), read_tdms),
-    "mcap": Format((".mcap",), mcap_topics.read),
+FORMATS: Mapping[str, tuple[tuple[str, ...], Callable[[Path, ImportMap], Table]]] = {
+    "csv": ((".csv", ".txt", ".tsv", ".dat", ".asc"), csv_text.read),
+    "mat": ((".mat",), read_mat),
+    "hdf5": ((".h5", ".hdf5", ".hdf", ".he5"), read_hdf5),
+    "parquet": ((".parquet", ".pq"), read_parquet),
+    "json": ((".json",), read_json),
+    "tdms": ((".tdms",), read_tdms),
+    "mcap": ((".mcap",), mcap_topics.read),
 }
+"""Each format by name: how its files end, and what reads them."""
 
 
 def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> Log:
@@ -75,14 +54,14 @@ def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> L
 
 def _of_one(path: Path, mapping: ImportMap) -> Log:
     table, columns, facts = _read(path, mapping)
-    start = _start(table, mapping, columns)
-    notes: dict[str, str] = {}
-    if mapping.resample is None:
-        rate = _sample_rate(table, mapping, columns)
-    else:
-        rate = mapping.resample
-        columns, notes = _on_one_clock(mapping, columns)
-    return _log(mapping, columns, rate, {**facts, **start, **notes})
+    facts |= _start(table, mapping, columns)
+    if mapping.resample is None or mapping.time is None:
+        return _log(mapping, columns, _sample_rate(table, mapping, columns), facts)
+    with at(f"column '{mapping.time.name}'"):
+        clock = clock_of(mapping.time.to_si(columns[mapping.time.name]), mapping.resample)
+    even = {n: clock.resampled(c) for n, c in columns.items() if n != mapping.time.name}
+    facts["resampled"] = clock.costs(mapping, columns)
+    return _log(mapping, even, mapping.resample, facts)
 
 
 def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
@@ -102,7 +81,15 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
             times = _times(table, own, columns) + files[number - 1].offset
             clocks.append((own, columns, clock_of(times, rate)))
         facts = {key: ",".join(filter(None, (facts.get(key), of_file[key]))) for key in of_file}
-    grid = _common(paths, [clock for _, _, clock in clocks], rate)
+    begin = max(clock.times[0] for _, _, clock in clocks)
+    end = min(clock.times[-1] for _, _, clock in clocks)
+    if not (end - begin) * rate >= 2.0:
+        spans = "; ".join(
+            f"{path} {instant(clock.times[0])} to {instant(clock.times[-1])}"
+            for path, (_, _, clock) in zip(paths, clocks, strict=True)
+        )
+        raise InputError(f"the files have no time in common ({spans}); correct their offset (s)")
+    grid = even_times(begin, end, rate)
     even: dict[str, Array] = {}
     for number, (own, columns, clock) in enumerate(clocks, 1):
         shared = replace(clock, grid=grid)
@@ -127,7 +114,7 @@ def _times(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> Ar
 
 def table_of(path: Path, mapping: ImportMap) -> Table:
     """The columns that a map names, all where it has no axes; raises InputError."""
-    return FORMATS[_format_name(path, mapping)].read(path, mapping)
+    return FORMATS[_format_name(path, mapping)][1](path, mapping)
 
 
 def _read(path: Path, mapping: ImportMap) -> tuple[Table, Mapping[str, Array], dict[str, str]]:
@@ -144,23 +131,25 @@ def _read(path: Path, mapping: ImportMap) -> tuple[Table, Mapping[str, Array], d
 def _log(
     mapping: ImportMap, columns: Mapping[str, Array], rate: float, facts: Mapping[str, str]
 ) -> Log:
-    for column, values in columns.items():
-        _require_finite(column, values, rate)
-    span = _undelayed(mapping, _common_length(columns))
+    """The log of columns that are sampled at ``rate`` (Hz); raises InputError."""
+    for name, values in columns.items():
+        if (k := first_not_finite(values)) is not None:
+            raise InputError(
+                f"column '{name}' is {values[k]} in row {k + 1} of {len(values)} "
+                f"({k / rate:.6g} s), {np.count_nonzero(~np.isfinite(values))} such rows in all; "
+                "cut them out or leave the signal out of the map"
+            )
+    count = _common_length(columns)
+    delays = [c.delay_samples for c in mapping.columns()]
+    # samples for which every column, moved back by its delay, has a value
+    span = range(max(0, -min(delays)), count - max(0, *delays))
+    if len(span) < 2:
+        raise InputError(
+            f"delay_samples of {min(delays)} to {max(delays)} leave nothing of {count} rows; "
+            "correct them in the map"
+        )
     metadata = {"source": "import", "import_map": mapping.text, **facts}
     return Log(rate, _axes(mapping, columns, span), metadata)
-
-
-def _on_one_clock(
-    mapping: ImportMap, columns: Mapping[str, Array]
-) -> tuple[dict[str, Array], dict[str, str]]:
-    """The columns resampled, and for the metadata what that cost."""
-    assert mapping.time is not None
-    assert mapping.resample is not None
-    with at(f"column '{mapping.time.name}'"):
-        clock = clock_of(mapping.time.to_si(columns[mapping.time.name]), mapping.resample)
-    even = {n: clock.resampled(c) for n, c in columns.items() if n != mapping.time.name}
-    return even, {"resampled": clock.costs(mapping, columns)}
 
 
 def _start(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> dict[str, str]:
@@ -185,12 +174,11 @@ def _format_name(path: Path, mapping: ImportMap) -> str:
                 f"the map gives format = '{mapping.format}'; allowed: {', '.join(FORMATS)}"
             )
         return mapping.format
-    for name, known in FORMATS.items():
-        if path.suffix.lower() in known.endings:
-            return name
-    endings = ", ".join(e for f in FORMATS.values() for e in f.endings)
+    by_ending = {ending: name for name, (endings, _) in FORMATS.items() for ending in endings}
+    if (found := by_ending.get(path.suffix.lower())) is not None:
+        return found
     raise InputError(
-        f"ends in '{path.suffix}', known are {endings}; state format in the map: "
+        f"ends in '{path.suffix}', known are {', '.join(by_ending)}; state format in the map: "
         f"{', '.join(FORMATS)}"
     )
 
@@ -215,8 +203,7 @@ def _sample_rate(table: Table, mapping: ImportMap, columns: Mapping[str, Array])
             raise InputError(f"column '{mapping.time.name}' holds dates; state its unit as s")
         with at(f"column '{mapping.time.name}'"):
             return rate_of(mapping.time.to_si(columns[mapping.time.name]))
-    rate = mapping.sample_rate or table.sample_rate
-    if rate is None:
+    if (rate := mapping.sample_rate or table.sample_rate) is None:
         raise InputError(
             "does not state its sample rate; give sample_rate (Hz) or time "
             '({column = "t", unit = "s"}) in the map'
@@ -229,38 +216,14 @@ def _sample_rate(table: Table, mapping: ImportMap, columns: Mapping[str, Array])
     return rate
 
 
-def _require_finite(name: str, values: Array, rate: float) -> None:
-    if (k := first_not_finite(values)) is not None:
-        raise InputError(
-            f"column '{name}' is {values[k]} in row {k + 1} of {len(values)} ({k / rate:.6g} s), "
-            f"{np.count_nonzero(~np.isfinite(values))} such rows in all; cut them out or leave "
-            "the signal out of the map"
-        )
-
-
-def _undelayed(mapping: ImportMap, count: int) -> range:
-    """Samples for which every column, moved back by its delay, has a value."""
-    delays = [c.delay_samples for axis in mapping.axes.values() for c in axis.columns.values()]
-    span = range(max(0, -min(delays)), count - max(0, *delays))
-    if len(span) < 2:
-        raise InputError(
-            f"delay_samples of {min(delays)} to {max(delays)} leave nothing of {count} rows; "
-            "correct them in the map"
-        )
-    return span
-
-
 def _axes(mapping: ImportMap, columns: Mapping[str, Array], span: range) -> dict[str, AxisLog]:
     axes = {}
     for name, axis in mapping.axes.items():
-        signals = {
-            field: c.to_si(
-                columns[c.key][span.start + c.delay_samples : span.stop + c.delay_samples]
-            )
-            for field, c in axis.columns.items()
-        }
-        for field, values in signals.items():
-            if not np.isfinite(values).all():
+        signals = {}
+        for field, c in axis.columns.items():
+            rows = slice(span.start + c.delay_samples, span.stop + c.delay_samples)
+            signals[field] = c.to_si(columns[c.key][rows])
+            if not np.isfinite(signals[field]).all():
                 raise InputError(
                     f"axes.{name}.{field} is too large for a number after unit, scale and offset; "
                     "correct them in the map"

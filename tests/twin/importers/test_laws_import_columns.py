@@ -178,7 +178,7 @@ def test_dates_are_seconds_since_the_first_and_text_names_its_row():
 
 
 def test_every_ending_belongs_to_one_format():
-    endings = [e for f in FORMATS.values() for e in f.endings]
+    endings = [e for endings, _ in FORMATS.values() for e in endings]
     assert len(set(endings)) == len(endings)
 
 
