@@ -12,7 +12,7 @@ from __future__ import annotations
 import codecs
 import csv
 import itertools
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,82 +22,12 @@ import numpy as np
 from twin.errors import InputError
 from twin.importers.mapping import ImportMap
 from twin.importers.table import Table, chosen, parsing
-from twin.logs.log import Array
 
 TIME = "time"
 END = "EOF"  # the last line of an export, where it was asked for
 _NAME, _SYMBOL, _STEP = "Name", "SymbolName", "SampleTime[ms]"
 _STARTS = ("StartRecord", "Starttime of export", "StartTime")
 _UNIX_EPOCH = 116_444_736_000_000_000  # in 100 ns since 1601
-
-
-@dataclass(frozen=True)
-class ScopeHeader:
-    """names: of the columns; first: row of the first numbers; start_ns: since 1970, or None."""
-
-    names: tuple[str, ...]
-    first: int
-    sample_rate: float | None
-    start_ns: int | None
-
-
-def find_header(
-    rows: Sequence[Sequence[str]], is_number: Callable[[str], bool], value: Callable[[str], float]
-) -> ScopeHeader | None:
-    """The header of an export, None where the rows are none; raises InputError."""
-    keys = [row[0] if row else "" for row in rows]
-    if _STEP not in keys or _NAME not in keys:
-        return None
-    step = keys.index(_STEP)
-    first = next((k for k in range(step, len(rows)) if is_number(keys[k])), None)
-    if first is None:
-        raise InputError("has no numbers below the header of TwinCAT Scope; export it again")
-    named = keys.index(_SYMBOL) if _SYMBOL in keys[:first] else _last(keys[:step], _NAME)
-    names = [TIME if cell in (keys[named], "") else cell for cell in rows[named]]
-    width = len(rows[first])
-    if width < len(names):  # exported without times
-        names = [name for name in names if name != TIME]
-    if width > len(names) or not names:
-        raise InputError(
-            f"has {len(names)} names of channels, but rows of {width} cells; export it from "
-            "TwinCAT Scope with the whole header and one time column"
-        )
-    return ScopeHeader(
-        _distinct(names[:width]), first, _rate(rows[step], is_number, value), _start(rows[:first])
-    )
-
-
-def _last(keys: Sequence[str], key: str) -> int:
-    return len(keys) - 1 - keys[::-1].index(key)
-
-
-def _distinct(names: Sequence[str]) -> tuple[str, ...]:
-    """The time of the first channel is that of all; others are called time[2], time[3], ..."""
-    times, out = 0, []
-    for name in names:
-        times += name == TIME
-        out.append(f"{TIME}[{times}]" if name == TIME and times > 1 else name)
-    return tuple(out)
-
-
-def _rate(
-    row: Sequence[str], is_number: Callable[[str], bool], value: Callable[[str], float]
-) -> float | None:
-    steps = {value(cell) for cell in row if is_number(cell)}
-    if len(steps) > 1:
-        shown = ", ".join(f"{step:g}" for step in sorted(steps))
-        raise InputError(
-            f"has channels with sample times of {shown} ms; export those of one sample time at once"
-        )
-    step = steps.pop() if steps else 0.0
-    return 1e3 / step if step > 0.0 else None
-
-
-def _start(rows: Sequence[Sequence[str]]) -> int | None:
-    for row in rows:
-        if len(row) > 1 and row[0] in _STARTS and row[1].isdigit() and int(row[1]) > _UNIX_EPOCH:
-            return 100 * (int(row[1]) - _UNIX_EPOCH)
-    return None
 
 
 _HEAD_BYTES = 1 << 16
@@ -160,20 +90,15 @@ def read(path: Path, mapping: ImportMap) -> Table:
         wanted = chosen(mapping.column_names(), layout.names)
         where = [layout.names.index(name) for name in wanted]
         try:
-            values = _numbers(path, layout, where)
+            with closing(_lines(path, layout)) as lines:
+                values = np.loadtxt(
+                    lines, delimiter=layout.style.delimiter, usecols=where, comments=None,
+                    quotechar='"', ndmin=2, unpack=True,
+                )  # fmt: skip
         except ValueError as error:
             raise _first_fault(path, layout, where) or InputError(str(error)) from error
     columns = dict(zip(wanted, values, strict=True))
     return Table(columns, layout.sample_rate, layout.start_ns)
-
-
-def _numbers(path: Path, layout: _Layout, where: Sequence[int]) -> Array:
-    """Columns ``where`` as rows (k, n)."""
-    with closing(_lines(path, layout)) as lines:
-        return np.loadtxt(
-            lines, delimiter=layout.style.delimiter, usecols=where, comments=None, quotechar='"',
-            ndmin=2, unpack=True,
-        )  # fmt: skip
 
 
 def _lines(path: Path, layout: _Layout) -> Generator[str]:
@@ -198,11 +123,49 @@ def _find_layout(path: Path, stated: ImportMap) -> _Layout:
         raise InputError("has no line of text; give a table of numbers")
     style = _find_style(lines[-_SAMPLE_LINES:], stated)
     rows = [style.cells(line) for line in lines]
-    scope = find_header(rows, style.is_number, style.value)
-    if scope is not None:
-        return _Layout(encoding, style, scope.names, scope.first, scope.sample_rate, scope.start_ns)
+    if (scope := _scope_layout(rows, encoding, style)) is not None:
+        return scope
     skip = _first_row(rows, style, stated.header_line)
     return _Layout(encoding, style, _names(rows, skip, stated.header_line), skip)
+
+
+def _scope_layout(rows: Sequence[Sequence[str]], encoding: str, style: _Style) -> _Layout | None:
+    """The layout of an export of TwinCAT Scope, None where it is none; raises InputError."""
+    keys = [row[0] if row else "" for row in rows]
+    if _STEP not in keys or _NAME not in keys:
+        return None
+    step = keys.index(_STEP)
+    first = next((k for k in range(step, len(rows)) if style.is_number(keys[k])), None)
+    if first is None:
+        raise InputError("has no numbers below the header of TwinCAT Scope; export it again")
+    symbols = _SYMBOL in keys[:first]  # above the steps each channel has its name
+    named = keys.index(_SYMBOL) if symbols else max(k for k in range(step) if keys[k] == _NAME)
+    names = [TIME if cell in (keys[named], "") else cell for cell in rows[named]]
+    width = len(rows[first])
+    if width < len(names):  # exported without times
+        names = [name for name in names if name != TIME]
+    if width > len(names) or not names:
+        raise InputError(
+            f"has {len(names)} names of channels, but rows of {width} cells; export it from "
+            "TwinCAT Scope with the whole header and one time column"
+        )
+    # the time of the first channel is that of all; others are called time[2], time[3], ...
+    places = [k for k, name in enumerate(names) if name == TIME]
+    for number, k in enumerate(places[1:], 2):
+        names[k] = f"{TIME}[{number}]"
+    starts = [
+        100 * (int(row[1]) - _UNIX_EPOCH)
+        for row in rows[:first]
+        if len(row) > 1 and row[0] in _STARTS and row[1].isdigit() and int(row[1]) > _UNIX_EPOCH
+    ]
+    steps = sorted({style.value(cell) for cell in rows[step] if style.is_number(cell)})
+    if len(steps) > 1:
+        raise InputError(
+            f"has channels with sample times of {', '.join(f'{s:g}' for s in steps)} ms; export "
+            "those of one sample time at once"
+        )
+    rate = 1e3 / steps[0] if steps and steps[0] > 0.0 else None
+    return _Layout(encoding, style, tuple(names[:width]), first, rate, next(iter(starts), None))
 
 
 def _encoding(head: bytes) -> str:

@@ -20,7 +20,6 @@ from twin.logs.log import Array, AxisLog, Log
 from twin.logs.series import instant, is_calendar
 from twin.numbers import first_not_finite
 
-
 FORMATS: Mapping[str, tuple[tuple[str, ...], Callable[[Path, ImportMap], Table]]] = {
     "csv": ((".csv", ".txt", ".tsv", ".dat", ".asc"), csv_text.read),
     "mat": ((".mat",), read_mat),

@@ -33,21 +33,21 @@ from twin.logs.topics import IDENTIFIER
 
 NUMBER = "a finite number"
 AXIS_NAME = rf"^{IDENTIFIER.pattern}$"
-_FORMAT = 'a format in quotes, such as "csv"'
-_TIME = 'a table such as {column = "t", unit = "s"}'
-_RATE = NUMBER + " above 0, in Hz"
 
 
-class TimeMap(Entries):
-    """The column of the time stamps."""
-
+class _Column(Entries):
     column: str | int = Field(description="a name, or a number where there are no names")
-    unit: str = Field(description='a unit of time in quotes, such as "s", "ms" or "us"')
 
     @property
     def name(self) -> str:
         """Of the column in its file."""
         return str(self.column)
+
+
+class TimeMap(_Column):
+    """The column of the time stamps."""
+
+    unit: str = Field(description='a unit of time in quotes, such as "s", "ms" or "us"')
 
     @property
     def seconds(self) -> float:
@@ -59,10 +59,9 @@ class TimeMap(Entries):
         return np.asarray(self.seconds * raw)
 
 
-class ColumnMap(Entries):
+class ColumnMap(_Column):
     """The column of a signal: SI value = sign x (scale x raw + offset) x unit."""
 
-    column: str | int = Field(description="a name, or a number where there are no names")
     unit: str = Field(description='a unit in quotes, such as "mm", "A", "V" or "counts"')
     scale: float = Field(1.0, description=NUMBER + " other than 0: SI units a raw one")
     offset: float = Field(0.0, description=NUMBER + ", in the unit; in SI where a scale brings it")
@@ -75,11 +74,6 @@ class ColumnMap(Entries):
         1, ge=1, le=1000, description="a whole number: which of several files, the first is 1"
     )
     _si: Unit = PrivateAttr(Unit(1.0, None))
-
-    @property
-    def name(self) -> str:
-        """Of the column in its file."""
-        return str(self.column)
 
     @property
     def key(self) -> str:
@@ -156,21 +150,21 @@ class AxisMap(Entries):
         return [f for f, c in self.columns.items() if c.si.si == units[f] != "A"]
 
 
-class FileMap(Entries):
+class _File(Entries):
+    format: str | None = Field(None, description='a format in quotes, such as "csv"')
+    sample_rate: float | None = Field(None, gt=0.0, description=NUMBER + " above 0, in Hz")
+    time: TimeMap | None = Field(None, description='a table such as {column = "t", unit = "s"}')
+
+
+class FileMap(_File):
     """One of several files that are given together, in their order."""
 
-    format: str | None = Field(None, description=_FORMAT)
-    sample_rate: float | None = Field(None, gt=0.0, description=_RATE)
-    time: TimeMap | None = Field(None, description=_TIME)
     offset: float = Field(0.0, description=NUMBER + ", in s, which is added to its times")
 
 
-class ImportMap(Entries):
+class ImportMap(_File):
     """A whole map; at most one of sample_rate and time."""
 
-    format: str | None = Field(None, description=_FORMAT)
-    sample_rate: float | None = Field(None, gt=0.0, description=_RATE)
-    time: TimeMap | None = Field(None, description=_TIME)
     resample: float | None = Field(
         None,
         gt=0.0,

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.entries import near
 from twin.errors import InputError
 from twin.logs.container import LARGEST_RATIO
 from twin.logs.log import Array
 
+_REAL = int | float | np.integer | np.floating
 _MOST_NAMES = 40  # columns listed in a message
 SMALLEST_TABLE = 1 << 27  # bytes, whatever the size of the file
 
@@ -42,12 +42,10 @@ def require_columns(wanted: Iterable[str], there: Collection[str]) -> None:
             raise InputError(f"{names.count(name)} columns are called '{name}'; rename them")
         if name in names:
             continue
-        near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-        hint = f"did you mean '{near[0]}'? " if near else ""
         more = len(names) - _MOST_NAMES
         tail = f" and {more} more" if more > 0 else ""
         raise InputError(
-            f"there is no column '{name}'; {hint}columns: "
+            f"there is no column '{name}'; {near(name, names, cutoff=0.5)}columns: "
             f"{', '.join(names[:_MOST_NAMES]) or 'none'}{tail}"
         )
 
@@ -79,14 +77,10 @@ def numbers(name: str, raw: NDArray) -> Array:
     if array.dtype.kind == "M":
         return np.asarray((array - array[:1]) / np.timedelta64(1, "s"), dtype=np.float64)
     if array.ndim != 1 or array.dtype.kind not in "fiub":
-        row = next((k for k, v in enumerate(array.flat, 1) if not _is_number(v)), None)
+        row = next((k for k, v in enumerate(array.flat, 1) if not isinstance(v, _REAL)), None)
         place = f": {array.flat[row - 1]!r} in row {row}" if row else ""
         raise InputError(f"column '{name}' does not hold one real number a row{place}")
     return array.astype(np.float64)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float | np.number) and not isinstance(value, np.complexfloating)
 
 
 def extra(module: str) -> ModuleType:
