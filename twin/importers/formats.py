@@ -64,15 +64,13 @@ def read_hdf5(path: Path, mapping: ImportMap, separator: str = "/") -> Table:
             if not wanted or any(w.startswith(name) for w in wanted):
                 size += float(dataset.size or 0) * dataset.dtype.itemsize
                 require_fits(size, path)
-                columns |= _datasets(name, dataset, separator)
+                if dataset.ndim in (0, 1, 2):
+                    columns |= _split(name, np.asarray(dataset[()]), separator)
         require_columns(wanted, {**datasets, **columns})  # lists all there are
         return Table({name: columns[name] for name in chosen(wanted, columns)})
 
 
-def _datasets(name: str, dataset: Any, separator: str) -> dict[str, NDArray]:
-    if dataset.ndim not in (0, 1, 2):
-        return {}
-    values = np.asarray(dataset[()])
+def _split(name: str, values: NDArray, separator: str) -> dict[str, NDArray]:
     if values.dtype.names is None:
         return split_columns(name, values)
     parts = [split_columns(f"{name}{separator}{f}", values[f]) for f in values.dtype.names]
@@ -86,26 +84,34 @@ def read_json(path: Path, mapping: ImportMap) -> Table:
     """Columns of a JSON file; raises InputError."""
     with parsing("JSON"):
         content = json.loads(path.read_text(encoding="utf-8-sig"))
-        columns = _arrays("", content if isinstance(content, dict) else {ROWS: content})
+        columns = _flat("", content if isinstance(content, dict) else {ROWS: content})
     return Table({name: columns[name] for name in chosen(mapping.column_names(), columns)})
 
 
-def _arrays(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:
+def _flat(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:
+    """The columns in arrays, lists and tables within tables: ``prefix`` and a name for each.
+
+    A list of as many texts as a matrix beside it has columns names them.
+    """
     columns: dict[str, NDArray] = {}
-    names: list[str] = next((v for v in content.values() if _are_names(v)), [])
+    names: list[str] = next((v for v in content.values() if _are_all(str, v)), [])
     for key, value in content.items():
         name = f"{prefix}{key}"
-        if isinstance(value, dict):
-            columns |= _arrays(f"{name}.", value)
-        elif isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
+        if isinstance(value, Mapping):
+            columns |= _flat(f"{name}.", value)
+        elif _are_all(dict, value):
             columns |= {k: np.array([row.get(k, np.nan) for row in value]) for k in value[0]}
-        elif isinstance(value, list) and not _are_names(value):
+        elif isinstance(value, list) and not _are_all(str, value):
             split = split_columns(name, _numeric(value))
             named = len(names) == len(split) > 1
             columns |= dict(zip(names, split.values(), strict=True)) if named else split
-        elif isinstance(value, int | float | str):
-            columns[name] = np.array([value])
+        elif isinstance(value, np.ndarray | np.generic | int | float | str):
+            columns |= split_columns(name, np.asarray(value))
     return columns
+
+
+def _are_all(kind: type, value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(v, kind) for v in value)
 
 
 def _numeric(value: list[Any]) -> NDArray:
@@ -114,10 +120,6 @@ def _numeric(value: list[Any]) -> NDArray:
         return np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         return np.array([str(v) for v in value], dtype=object)
-
-
-def _are_names(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(v, str) for v in value)
 
 
 def read_parquet(path: Path, mapping: ImportMap) -> Table:
@@ -141,18 +143,15 @@ def read_tdms(path: Path, mapping: ImportMap) -> Table:
         read = {name: channels[name] for name in chosen(mapping.column_names(), channels)}
         require_fits(sum(8.0 * len(channel) for channel in read.values()), path)
         periods = {n: c.properties[_PERIOD] for n, c in read.items() if _PERIOD in c.properties}
-        return Table({name: c[:] for name, c in read.items()}, _rate(periods))
-
-
-def _rate(periods: dict[str, float]) -> float | None:
-    for name, period in periods.items():
-        first, expected = next(iter(periods.items()))
-        if period != expected or not period > 0.0:
-            raise InputError(
-                f"channel '{first}' has a sample every {expected:.9g} s, '{name}' every "
-                f"{period:.9g} s; export them at one rate"
-            )
-    return 1.0 / next(iter(periods.values())) if periods else None
+        for name, period in periods.items():
+            first, expected = next(iter(periods.items()))
+            if period != expected or not period > 0.0:
+                raise InputError(
+                    f"channel '{first}' has a sample every {expected:.9g} s, '{name}' every "
+                    f"{period:.9g} s; export them at one rate"
+                )
+        rate = 1.0 / next(iter(periods.values())) if periods else None
+        return Table({name: c[:] for name, c in read.items()}, rate)
 
 
 SHORTEST = 5.0  # s that a file may take, whatever its size
@@ -215,16 +214,5 @@ def _inflated(data: bytes) -> Iterator[int]:
 def _load(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
     with parsing("MAT"):
         content = scipy.io.loadmat(path, simplify_cells=True)
-    columns = _fields("", {k: v for k, v in content.items() if not k.startswith("__")})
+    columns = _flat("", {k: v for k, v in content.items() if not k.startswith("__")})
     return {name: columns[name] for name in chosen(names, columns)}
-
-
-def _fields(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:
-    columns: dict[str, NDArray] = {}
-    for key, value in content.items():
-        name = f"{prefix}{key}"
-        if isinstance(value, Mapping):
-            columns |= _fields(f"{name}.", value)
-        elif isinstance(value, np.ndarray | np.generic | int | float | str):
-            columns |= split_columns(name, np.asarray(value))
-    return columns

@@ -11,23 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from twin.errors import InputError
+from twin.importers import signals
 from twin.importers.importer import table_of
 from twin.importers.mapping import EVERY_COLUMN
-from twin.importers.signals import (
-    ASKED,
-    OTHER,
-    WORDS,
-    Signal,
-    assumed,
-    bare,
-    is_unit,
-    named,
-    ratio_of_rates,
-    signals_of,
-    turns,
-    unit_in,
-    words_of,
-)
 from twin.importers.table import numbers
 from twin.importers.units import find_unit
 from twin.logs.container import reading
@@ -59,19 +45,15 @@ def guess_map(path: Path) -> Guess:
     time = _time(columns)
     clock, step = _clock(columns, time, table.sample_rate)
     moving = {n: c for n, c in columns.items() if n != time and np.ptp(c) > 0.0}
-    lines = [
-        f"# Proposed from {path.name}; correct what is wrong, above all what is ASSUMED",
-        *clock,
-    ]
-    missing: list[str] = []
-    used = {time} if time else set()
+    head = f"# Proposed from {path.name}; correct what is wrong, above all what is ASSUMED"
+    lines, missing, used = [head, *clock], list[str](), {time}
     for axis, names in _axes(moving).items():
-        found = signals_of(names, moving, step)
-        rotary = turns(found)
+        found = signals.signals_of(names, moving, step)
+        rotary = signals.turns(found)
         lines += ["", f"[axes.{axis}]"]
-        position = found.get("position")
-        for field, signal in found.items():
-            lines.append(_entry(field, signal, moving, rotary, position, step))
+        lines += [
+            _entry(f, s, moving, rotary, found.get("position"), step) for f, s in found.items()
+        ]
         for field in ("position", "force"):
             if field not in found and not (field == "force" and "current" in found):
                 missing.append(f"axis {axis}: no column of {', '.join(names)} looks like a {field}")
@@ -79,10 +61,9 @@ def guess_map(path: Path) -> Guess:
         if "current" in found and "force" not in found:
             unit = "N m/A" if rotary else "N/A"
             lines.append(f"# force_constant = 1.0 # {unit}: NOT KNOWN, see the motor's data sheet")
-        used |= {signal.name for signal in found.values()}
-        unused = [n for n in names if n not in used]
+        used |= {*names, *(signal.name for signal in found.values())}
+        unused = [n for n in names if n not in {signal.name for signal in found.values()}]
         lines += [f"# not used: {', '.join(unused)}"] if unused else []
-        used |= set(unused)
     others = [_about(n, c) for n, c in table.columns.items() if n not in used]
     lines += ["", *(f"# not used: {other}" for other in others)] if others else []
     return Guess("\n".join(lines) + "\n", tuple(missing))
@@ -120,7 +101,7 @@ def _distinct(raw: Mapping[str, np.ndarray]) -> dict[str, Array]:
 def _time(columns: Mapping[str, Array]) -> str | None:
     """The column of time stamps: it rises, and is called so or rises evenly."""
     rising = {n: c for n, c in columns.items() if np.mean(np.diff(c) > 0.0) > 0.9}
-    called = [n for n in rising if set(words_of(n)) & set(_TIME_WORDS)]
+    called = [n for n in rising if set(signals.words_of(n)) & set(_TIME_WORDS)]
     even = [n for n, c in rising.items() if np.ptp(np.diff(c)) < 0.5 * np.median(np.diff(c))]
     return next(iter([*called, *even]), None)
 
@@ -135,8 +116,8 @@ def _clock(
         return ["sample_rate = 1000.0 # Hz, ASSUMED: no column rises as times do"], 1e-3
     steps = np.diff(columns[time])
     step = float(np.median(steps[steps > 0.0]))
-    unit, reason = unit_in(time), "its name states the unit"
-    if unit is None or not is_unit(unit, "s"):
+    unit, reason = signals.unit_in(time), "its name states the unit"
+    if unit is None or not signals.is_unit(unit, "s"):
         fits = [u for u, size in _TIME_SIZES.items() if _SLOWEST <= size / step <= _FASTEST]
         unit = fits[0] if fits else "s"
         reason = f"that is {_TIME_SIZES[unit] / step:.6g} Hz"
@@ -151,10 +132,11 @@ def _clock(
 
 def _axes(columns: Mapping[str, Array]) -> dict[str, list[str]]:
     """Columns by axis: what a name has beside the words of signals and units tells the axis."""
-    every = {w for words in (*WORDS.values(), ASKED, OTHER) for w in words if len(w) > 1}
+    told = (*signals.WORDS.values(), signals.ASKED, signals.OTHER)
+    every = {w for words in told for w in words if len(w) > 1}
     out: dict[str, list[str]] = {}
     for name in columns:
-        rest = [w for w in words_of(bare(name)) if w not in every]
+        rest = [w for w in signals.words_of(signals.bare(name)) if w not in every]
         letters = [w for w in rest if w in ("x", "y", "z")]
         digits = re.findall(r"\d+", name.rpartition("/")[2])
         axis = letters[0] if letters else f"axis{digits[-1]}" if digits else (rest or ["x"])[-1]
@@ -162,27 +144,28 @@ def _axes(columns: Mapping[str, Array]) -> dict[str, list[str]]:
     whole = {
         axis: names
         for axis, names in out.items()
-        if IDENTIFIER.fullmatch(axis) and {"force", "current"} & named(names).keys()
-        and "position" in named(names)
-    }  # fmt: skip
+        if IDENTIFIER.fullmatch(axis)
+        and "position" in (found := signals.named(names))
+        and {"force", "current"} & found.keys()
+    }
     return whole or {"x": list(columns)}
 
 
 def _entry(
-    field: str, signal: Signal, columns: Mapping[str, Array], rotary: bool,
-    position: Signal | None, step: float,
+    field: str, signal: signals.Signal, columns: Mapping[str, Array], rotary: bool,
+    position: signals.Signal | None, step: float,
 ) -> str:  # fmt: skip
     """One line of the map, with the reason behind it."""
     column = columns[signal.name]
     span = f"{signal.reason}; {column.min():.4g} to {column.max():.4g}"
     units = ROTARY_UNITS if rotary else LINEAR_UNITS
-    if is_unit(signal.unit, units[field]):
+    if signals.is_unit(signal.unit, units[field]):
         return f"{field} = {_table(signal.name, signal.unit)} # {span}"
-    unit, why = assumed(units[field], column), ""
+    unit, why = signals.assumed(units[field], column), ""
     if field.endswith("velocity") and position is not None:
-        base = position.unit or assumed(units["position"], columns[position.name])
+        base = position.unit or signals.assumed(units["position"], columns[position.name])
         unit = f"{base}/s"
-        ratio = ratio_of_rates(columns[position.name], column, step)
+        ratio = signals.ratio_of_rates(columns[position.name], column, step)
         if field == "velocity" and abs(ratio - 1.0) > _ALIKE:
             why = f", but one of it is {ratio:.3g} {unit} by the position: correct one of the units"
     return f"{field} = {_table(signal.name, unit)} # {span}; unit ASSUMED{why}"

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Schema
 from numpy.typing import NDArray
 
 from twin.errors import InputError
@@ -38,7 +37,7 @@ from twin.logs.topics import Topics
 LOG_TIME = "log_time"
 _STAMPS = (("sec", "nanosec"), ("seconds", "nanos"))  # ROS 2, protobuf
 
-Decode = Callable[[bytes], Any]
+_MODULES = {"cdr": "mcap_ros2.decoder", "protobuf": "mcap_protobuf.decoder"}
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
@@ -55,7 +54,7 @@ def _columns(path: Path, wanted: Sequence[str]) -> dict[str, NDArray]:
     stamps: set[str] = set()
     seen: dict[str, None] = {}
     for topic, time, decoded in _messages(path, wanted):
-        values = _flat(f"{topic}.", decoded) if decoded is not None else {}
+        values = _flat(topic, decoded)
         values[f"{topic}.{LOG_TIME}"] = np.datetime64(time, "ns")
         seen.update(dict.fromkeys(values))
         for name in wanted or values:
@@ -80,7 +79,7 @@ def _messages(path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any
     Raises Damaged where there are not as many as the file announces.
     """
     topics, shown = Topics(), Counter[int]()
-    decoders: dict[int, Decode | None] = {}
+    decoders: dict[int, Callable[[bytes], Any] | None] = {}
     with open(path, "rb") as stream:
         file = McapFile(FileBytes(stream))
         for opcode, content in _records(file):
@@ -95,8 +94,11 @@ def _messages(path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any
             ):
                 continue
             if number not in decoders:
-                schema = topics.schemas.get(channel.schema_id)
-                decoders[number] = _decoder_for(channel.message_encoding, schema)
+                encoding, schema = channel.message_encoding, topics.schemas.get(channel.schema_id)
+                decoders[number] = json.loads if encoding == "json" else None
+                if encoding in _MODULES:
+                    factory = extra(_MODULES[encoding]).DecoderFactory()
+                    decoders[number] = factory.decoder_for(encoding, schema)
             decode = decoders[number]
             yield channel.topic, time, decode(content[_MESSAGE_HEAD.size :]) if decode else None
     # a chunk whose kind is damaged is passed over
@@ -121,78 +123,46 @@ def _records(file: McapFile) -> Iterator[tuple[int, bytes]]:
             yield record.opcode, record.content
 
 
-def _decoder_for(encoding: str, schema: Schema | None) -> Decode | None:
-    if encoding == "json":
-        return json.loads
-    modules = {"cdr": "mcap_ros2.decoder", "protobuf": "mcap_protobuf.decoder"}
-    if encoding not in modules:
-        return None
-    return extra(modules[encoding]).DecoderFactory().decoder_for(encoding, schema)
-
-
-def _flat(prefix: str, message: Any) -> dict[str, Any]:
-    """The numbers and time stamps of a message by name."""
-    fields = _fields(message)
-    names = _names_of_entries(fields)
-    out: dict[str, Any] = {}
-    for name, value in fields.items():
-        out |= _values(f"{prefix}{name}", value, names)
-    return out
-
-
-def _values(name: str, value: Any, names: Sequence[str]) -> dict[str, Any]:
-    """The numbers and time stamps in a field; names: of its entries, where it has as many."""
+def _flat(name: str, value: Any, names: Sequence[str] = ()) -> dict[str, Any]:
+    """The numbers and time stamps in a value, by name; names: of its entries, if it has as many."""
     if isinstance(value, bool | int | float | np.number):
         return {name: float(value)}
-    if _is_message(value):
-        stamp = _stamp(_fields(value))
-        return _flat(f"{name}.", value) if stamp is None else {name: stamp}
-    if isinstance(value, str | bytes) or not hasattr(value, "__len__"):
-        return {}
     out: dict[str, Any] = {}
-    for k, entry in enumerate(value):
-        called = names[k] if len(names) == len(value) else _name_of(entry)
-        for key in (f"{name}[{k + 1}]", *((f"{name}.{called}",) if called else ())):
-            out |= _values(key, entry, ())
+    if (fields := _fields(value)) is not None:
+        for seconds, rest in _STAMPS:
+            if fields.keys() == {seconds, rest}:
+                time = int(fields[seconds]) * 10**9 + int(fields[rest])
+                return {name: np.datetime64(time, "ns")}
+        lists = [v for v in fields.values() if _are_entries(v) and all(map(_is_text, v)) and len(v)]
+        for key, inner in fields.items():
+            out |= _flat(f"{name}.{key}", inner, lists[0] if lists else ())
+    elif _are_entries(value):
+        for k, entry in enumerate(value):
+            texts = [v for v in (_fields(entry) or {}).values() if _is_text(v)]
+            called = texts[0] if len(texts) == 1 else None  # such as the name of a joint
+            if len(names) == len(value):
+                called = names[k]
+            for key in (f"{name}[{k + 1}]", *((f"{name}.{called}",) if called else ())):
+                out |= _flat(key, entry)
     return out
 
 
-def _is_message(value: Any) -> bool:
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _are_entries(value: Any) -> bool:
+    """Whether it is a list, of whatever kind a library makes them."""
+    return hasattr(value, "__len__") and not isinstance(value, str | bytes | Mapping)
+
+
+def _fields(value: Any) -> Mapping[str, Any] | None:
+    """The fields of a message; None where it is none."""
     if isinstance(value, Mapping):
-        return True
-    return not hasattr(value, "__len__") and (
-        hasattr(value, "__slots__") or hasattr(value, "DESCRIPTOR")
-    )
-
-
-def _name_of(entry: Any) -> str | None:
-    """The one text in a message of a list, such as the name of a joint."""
-    if not _is_message(entry):
+        return value
+    if hasattr(value, "__len__"):
         return None
-    texts = [value for value in _fields(entry).values() if isinstance(value, str)]
-    return texts[0] if len(texts) == 1 and texts[0] else None
-
-
-def _fields(message: Any) -> Mapping[str, Any]:
-    if isinstance(message, Mapping):
-        return message
-    if hasattr(message, "DESCRIPTOR"):
-        return {f.name: getattr(message, f.name) for f in message.DESCRIPTOR.fields}
-    return {name: getattr(message, name) for name in getattr(message, "__slots__", ())}
-
-
-def _names_of_entries(fields: Mapping[str, Any]) -> list[str]:
-    """The one list of texts in a message; nothing where there is none."""
-    for value in fields.values():
-        if isinstance(value, str | bytes) or not hasattr(value, "__len__") or not len(value):
-            continue
-        if not isinstance(value, Mapping) and all(isinstance(v, str) for v in value):
-            return list(value)
-    return []
-
-
-def _stamp(fields: Mapping[str, Any]) -> np.datetime64 | None:
-    for seconds, rest in _STAMPS:
-        if set(fields) == {seconds, rest}:
-            return np.datetime64(int(fields[seconds]) * 10**9 + int(fields[rest]), "ns")
-    return None
+    if hasattr(value, "DESCRIPTOR"):
+        return {f.name: getattr(value, f.name) for f in value.DESCRIPTOR.fields}
+    slots = getattr(value, "__slots__", None)
+    return None if slots is None else {name: getattr(value, name) for name in slots}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
@@ -26,12 +27,10 @@ def rate_of_another(
     """A column, the one that is its rate, and their correlation; None where no two are so."""
     found = [
         (abs(_correlation(rates(columns[x], step), means(columns[v], step))), x, v)
-        for x in names
-        for v in names
-        if x != v
+        for x, v in permutations(names, 2)
     ]
-    best = max(found, default=(0.0, "", ""))
-    return (best[1], best[2], best[0]) if best[0] > _RATE else None
+    how, position, velocity = max(found, default=(0.0, "", ""))
+    return (position, velocity, how) if how > _RATE else None
 
 
 @dataclass(frozen=True)
@@ -82,23 +81,17 @@ def moved_by(
     columns: Mapping[str, Array], names: Sequence[str], position: Array, step: float
 ) -> tuple[str, float] | None:
     """The column that the motion explains best as a force, and the share of its variance."""
-    width = _width(step)
-    velocity = rates(position, step)
-    middle = means(position, step)
-    rows = np.column_stack(
-        [
-            rate(velocity, width * step), velocity, np.sign(velocity), middle,
-            np.ones_like(middle),
-        ]
-    )  # fmt: skip
+    velocity, middle = rates(position, step), means(position, step)
+    acceleration, one = rate(velocity, _width(step) * step), np.ones_like(middle)
+    rows = np.column_stack([acceleration, velocity, np.sign(velocity), middle, one])
     rows /= np.abs(rows).max(axis=0) + np.finfo(float).tiny
     found = []
     for name in names:
         force = means(columns[name], step)
         left = force - rows @ np.linalg.lstsq(rows, force, rcond=1e-10)[0]
         found.append((1.0 - float(np.var(left) / np.var(force)), name))
-    best = max(found, default=(0.0, ""))
-    return (best[1], best[0]) if best[0] > _FORCE else None
+    share, best = max(found, default=(0.0, ""))
+    return (best, share) if share > _FORCE else None
 
 
 def _width(step: float) -> int:
@@ -134,18 +127,8 @@ WORDS: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 ASKED = ("setpoint", "reference", "target", "desired", "demand", "command", "ref", "set", "cmd",
           "goal", "qg", "sp", "soll")  # fmt: skip
-OTHER = (
-    "act",
-    "actual",
-    "measured",
-    "main",
-    "axis",
-    "data",
-    "joint",
-    "states",
-    "state",
-    "present",
-)
+OTHER = ("act", "actual", "measured", "main", "axis", "data", "joint", "states", "state",
+         "present")  # fmt: skip
 _TURNING = ("torque", "effort", "tau", "moment", "angle", "theta")
 _UNIT_IN_NAME = re.compile(r"[\[(]\s*([^\])]*[^\])\s\d][^\])]*?)\s*[\])]\s*$|[_ ]([A-Za-z/0-9^]+)$")
 _FAR = {"m": (5.0, "mm"), "rad": (40.0, "deg")}  # what goes farther is taken for the other unit
@@ -173,21 +156,19 @@ def words_of(name: str) -> list[str]:
 def named(names: Sequence[str]) -> dict[str, Signal]:
     """The signals that names tell, the surest name first."""
     found: dict[str, Signal] = {}
+    left = {name: words_of(bare(name)) for name in names}
     for field, words in WORDS.items():
-        for asked in (False, True):
-            if asked and field not in ("position", "velocity"):
-                continue
-            taken = {signal.name for signal in found.values()}
+        for asked in (False, True) if field in ("position", "velocity") else (False,):
             fitting = []
-            for name in names:
-                own = words_of(bare(name))
+            for name, own in left.items():
                 places = [words.index(w) for w in own if w in words]
                 if asked and field == "position" and set(own) <= set(ASKED):
                     places.append(0)  # qg, goal: of what, is not said
-                if name not in taken and places and bool(set(own) & set(ASKED)) is asked:
+                if places and bool(set(own) & set(ASKED)) is asked:
                     fitting.append((min(places), name))
             if fitting:
                 name = min(fitting)[1]
+                del left[name]
                 key = f"setpoint_{field}" if asked else field
                 found[key] = Signal(name, unit_in(name), "so called")
     return found
@@ -201,14 +182,14 @@ def signals_of(
     left = [n for n in names if n not in {signal.name for signal in found.values()}]
     if "position" not in found and (pair := _moved(columns, left, step)):
         position, velocity, how = pair
-        found["position"] = Signal(
-            position, unit_in(position), f"{velocity} is its rate ({how:.2f})"
-        )
+        why = f"{velocity} is its rate ({how:.2f})"
+        found["position"] = Signal(position, unit_in(position), why)
         found.setdefault("velocity", Signal(velocity, unit_in(velocity), f"the rate of {position}"))
         left = [n for n in left if n not in pair]
-    if "position" in found:
-        left = _with_setpoints(found, left, columns, step)
-    if "position" in found and not {"force", "current"} & found.keys():
+    if "position" not in found:
+        return found
+    left = _with_setpoints(found, left, columns, step)
+    if not {"force", "current"} & found.keys():
         moved = moved_by(columns, left, columns[found["position"].name], step)
         if moved is not None:
             why = f"the motion explains {100.0 * moved[1]:.0f} % of it"
@@ -255,10 +236,10 @@ def _with_setpoints(
 
 def _unit_of(leader: Leader, unit: str) -> str | None:
     """The unit in which a column is as large as the one that it goes with; None where in none."""
-    kinds = ("m", "rad") if "/" not in unit else ("m/s", "rad/s")
+    rate = "".join(unit.partition("/")[1:])
+    kinds = ("m/s", "rad/s") if rate else ("m", "rad")
     size = find_unit(unit, *kinds).size if is_unit(unit, *kinds) else 1.0
     stated = unit_in(leader.name)
-    rate = unit[unit.index("/") :] if "/" in unit else ""
     for other in [stated] if stated else [unit, *(u + rate for u in _COMMON)]:
         if other == unit:
             off, most = leader.slope, _AS_LARGE
