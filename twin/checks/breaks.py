@@ -9,7 +9,7 @@ in everything.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,8 +40,15 @@ def check_breaks(axis: Axis) -> Iterator[Finding]:
     if count := axis.position_held:
         yield held(axis, "the position", count)
         return
-    if is_uneven(axis):
-        yield _uneven(axis)
+    if len(bends := uneven_bends(axis)):
+        size = f"{axis.jumps[bends - 1].max():.3g} {axis.log.units['position']}"
+        yield axis.warning(
+            Fault.UNEVEN,
+            f"the position bends by up to {size} at {len(bends)} samples all over the log: the "
+            "clock jitters, or samples are missing",
+            "record with the drive's own clock, or import with the time stamps",
+            f"from {(bends[0] - 1) / axis.sample_rate:.6g} s",
+        )
         return
     breaks = find_breaks(axis)
     for fault in dict.fromkeys(b.fault for b in breaks):
@@ -54,13 +61,19 @@ def find_breaks(axis: Axis) -> list[Break]:
     if not len(bends) or axis.position_held:
         return []
     stuck = list(_stuck(axis))
-    for b in stuck:
-        bends = bends[(bends < b.first - 2) | (bends > b.last + 2)]
+    bends = _outside(stuck, bends)
     if not len(bends):
         return stuck
     clusters = np.split(bends, np.flatnonzero(np.diff(bends) > limits.CLUSTER) + 1)
     single = [_classified(axis, int(c[0]), int(c[-1])) for c in clusters]
     return _undone(sorted([*stuck, *(b for b in single if b)], key=lambda b: b.first), axis)
+
+
+def _outside(breaks: Iterable[Break], bends: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The bends that none of these breaks is about."""
+    for b in breaks:
+        bends = bends[(bends < b.first - 2) | (bends > b.last + 2)]
+    return bends
 
 
 def _undone(breaks: list[Break], axis: Axis) -> list[Break]:
@@ -85,11 +98,9 @@ def _stuck(axis: Axis) -> Iterator[Break]:
     least = max(limits.STUCK * axis.sample_rate, limits.STUCK_SAMPLES)
     bends = axis.jumps > 0.0
     for first, last in zip(same[::2], same[1::2], strict=False):
-        if last - first < least:
-            continue
-        ends = (bends[max(first - 3, 0) : first + 1], bends[max(last - 3, 0) : last + 1])
-        caught_up = abs(x[min(last + 1, len(x) - 1)] - x[last])
-        if all(part.any() for part in ends):
+        at_ends = all(bends[max(end - 3, 0) : end + 1].any() for end in (first, last))
+        if last - first >= least and at_ends:
+            caught_up = abs(x[min(last + 1, len(x) - 1)] - x[last])
             yield Break(Fault.STUCK, int(first), int(last), float(caught_up))
 
 
@@ -101,15 +112,12 @@ def _classified(axis: Axis, first: int, last: int) -> Break | None:
         return None
     step, before, after = course
     speed = 0.5 * (before + after) / dt
-    alike = (
-        abs(before - after)
-        <= limits.ALIKE_SPEEDS * max(abs(before), abs(after)) + axis.possible_jump
-    )
-    sure = limits.SURE_BREAK * axis.possible_jump
-    if abs(step) <= sure:
-        off = float(axis.jumps[first - 1 : last].max())
+    larger = max(abs(before), abs(after))
+    alike = abs(before - after) <= limits.ALIKE_SPEEDS * larger + axis.possible_jump
+    if abs(step) <= limits.SURE_BREAK * axis.possible_jump:
         if last - first > limits.CLUSTER:
             return None
+        off = float(axis.jumps[first - 1 : last].max())
         fault = Fault.UNEVEN if off < limits.A_SAMPLE * abs(speed) * dt else Fault.OUTLIERS
         return Break(fault, first, last, off)
     setpoint = axis.log.columns.get("setpoint_position")
@@ -181,33 +189,18 @@ def and_more(count: int) -> str:
     return f" and {count - 1} more times" if count > 1 else ""
 
 
-def is_uneven(axis: Axis) -> bool:
-    """Whether the position bends everywhere: then it is the clock, and not this and that."""
-    bends = _bends_of_a_clock(axis)
+def uneven_bends(axis: Axis) -> NDArray[np.intp]:
+    """Samples where the position bends, if it does everywhere: then it is the clock.
+
+    But not by most of the travel, as a counter that wraps.
+    """
+    bends = axis.bends
     if not len(bends) or axis.position_held:
-        return False
+        return bends[:0]
+    bends = bends[axis.jumps[bends - 1] < 0.5 * float(np.ptp(axis.log.position))]
     places = 1 + np.count_nonzero(np.diff(bends) > limits.SHORT_GAP * axis.sample_rate)
-    return bool(places >= max(limits.MANY_BENDS, limits.EVERYWHERE * axis.duration))
-
-
-def _bends_of_a_clock(axis: Axis) -> NDArray[np.intp]:
-    """Where the position bends, but not by most of the travel, as a counter that wraps."""
-    if not len(axis.bends):
-        return axis.bends
-    most = 0.5 * float(np.ptp(axis.log.position))
-    return np.flatnonzero((axis.jumps > 0.0) & (axis.jumps < most))
-
-
-def _uneven(axis: Axis) -> Finding:
-    bends = _bends_of_a_clock(axis)
-    size = f"{axis.jumps[bends].max():.3g} {axis.log.units['position']}"
-    return axis.warning(
-        Fault.UNEVEN,
-        f"the position bends by up to {size} at {len(bends)} samples all over the log: the clock "
-        "jitters, or samples are missing",
-        "record with the drive's own clock, or import with the time stamps",
-        f"from {bends[0] / axis.sample_rate:.6g} s",
-    )
+    everywhere = places >= max(limits.MANY_BENDS, limits.EVERYWHERE * axis.duration)
+    return bends if everywhere else bends[:0]
 
 
 def held(axis: Axis, name: str, count: int) -> Finding:
@@ -222,8 +215,9 @@ def held(axis: Axis, name: str, count: int) -> Finding:
 
 def check_outliers(axis: Axis) -> Iterator[Finding]:
     """Outliers in position and command."""
-    jumps = _unexplained_jumps(axis)
-    if len(jumps):
+    unexplained = not axis.position_held and not len(uneven_bends(axis))
+    jumps = _outside(find_breaks(axis), axis.bends)
+    if unexplained and len(jumps):
         unit = axis.log.units["position"]
         yield _outliers(
             axis,
@@ -239,16 +233,6 @@ def check_outliers(axis: Axis) -> Iterator[Finding]:
         yield _outliers(axis, rough, "the force jumps to and fro from sample to sample")
     else:
         yield from _contradictions(axis)
-
-
-def _unexplained_jumps(axis: Axis) -> NDArray[np.intp]:
-    """Samples (k,) where the position bends, but for those that another check names."""
-    if axis.position_held or is_uneven(axis):
-        return np.empty(0, dtype=np.intp)
-    jumps = axis.bends
-    for found in find_breaks(axis):
-        jumps = jumps[(jumps < found.first - 2) | (jumps > found.last + 2)]
-    return jumps
 
 
 def _rough_command(axis: Axis) -> Array:

@@ -14,6 +14,7 @@ from twin.checks.explain import Trend, find_lag, fit_dynamics
 from twin.checks.report import Fault, Finding
 from twin.signals import Array
 
+CAUSED = "the motion that it causes"
 DEAD_TIME = ", unless the drive has that dead time"
 READINGS = ("position", "velocity", "current", "force")
 
@@ -24,40 +25,29 @@ def check_timing(axis: Axis) -> Iterator[Finding]:
         return
     allowed = max(limits.ALLOWED, limits.ALLOWED_SAMPLES / axis.sample_rate)
     columns = axis.log.columns
-    lag = axis.lag.seconds if axis.lag.clear else 0.0
-    if abs(lag) > allowed:
-        dead_time = -limits.PHYSICAL <= lag < 0.0
-        late = "force" if lag > 0.0 else "position"
-        yield (axis.warning if dead_time else axis.error)(
-            Fault.LAG,
-            f"the force is {_text(axis, lag)} the motion that it causes",
-            f"{_remedy(axis, late, lag)}{DEAD_TIME * dead_time}",
-        )
+    force = axis.lag.seconds if axis.lag.clear else 0.0
+    if abs(force) > allowed:
+        dead_time = -limits.PHYSICAL <= force < 0.0
+        what, remedy = _lagging(axis, "the force", force, CAUSED, "force", "position")
+        told = axis.warning if dead_time else axis.error
+        yield told(Fault.LAG, what, remedy + DEAD_TIME * dead_time)
     else:
         yield from _steady(axis)
     if "velocity" in columns:
         lag = _lag(axis, axis.smoother.rate(columns["velocity"]), axis.velocity)
         if abs(lag) > allowed:
-            late = "velocity" if lag > 0.0 else "position"
-            yield _disagree(axis, "velocity", "the rate of position", late, lag)
+            yield axis.warning(Fault.LAG, *_lagging(axis, "velocity", lag, "the rate of position",
+                                                    "velocity", "position"))  # fmt: skip
     if "setpoint_position" in columns:
-        setpoint = axis.smoother.velocity(columns["setpoint_position"])
-        lag = _lag(axis, axis.velocity, setpoint)
+        lag = _lag(axis, axis.velocity, axis.smoother.velocity(columns["setpoint_position"]))
+        # Where the force is not late, all readings are: the position alone would then be wrong to
+        # correct, above all where a slow position loop is the cause.
+        apart = abs(force) > allowed
+        late = "position" if apart else " and ".join(n for n in READINGS if n in columns)
         slow = lag > max(allowed, limits.FOLLOWING) and not axis.soft_loop
         if lag < -allowed or slow:
-            yield _disagree(axis, "position", "its setpoint", _late(axis, lag, allowed), lag)
-
-
-def _late(axis: Axis, lag: float, allowed: float) -> str:
-    """The columns that are late where the position is so many s behind its setpoint.
-
-    Where the force is not, all readings are: the position alone would then be wrong to correct,
-    above all where a slow position loop is the cause.
-    """
-    if lag < 0.0:
-        return "setpoint_position"
-    apart = axis.lag.clear and abs(axis.lag.seconds) > allowed
-    return "position" if apart else " and ".join(n for n in READINGS if n in axis.log.columns)
+            yield axis.warning(Fault.LAG, *_lagging(axis, "position", lag, "its setpoint", late,
+                                                    "setpoint_position"))  # fmt: skip
 
 
 def _steady(axis: Axis) -> Iterator[Finding]:
@@ -75,13 +65,9 @@ def _steady(axis: Axis) -> Iterator[Finding]:
         )
         return
     if _is_steady(axis, trend) and _is_steady(axis, axis.trend_beside_memory):
-        late = "force" if trend.seconds > 0.0 else "position"
-        yield axis.warning(
-            Fault.LAG,
-            f"the force is {_text(axis, trend.seconds)} the motion that it causes, "
-            f"+- {trend.error * 1e3:.2g} ms",
-            f"{_remedy(axis, late, trend.seconds)}{DEAD_TIME}",
-        )
+        what, remedy = _lagging(axis, "the force", trend.seconds, CAUSED, "force", "position")
+        told = f"{what}, +- {trend.error * 1e3:.2g} ms"
+        yield axis.warning(Fault.LAG, told, remedy + DEAD_TIME)
 
 
 def _is_steady(axis: Axis, trend: Trend | None) -> bool:
@@ -101,19 +87,19 @@ def _lag(axis: Axis, signal: Array, other: Array) -> float:
     return lag.seconds if lag.clear else 0.0
 
 
-def _disagree(axis: Axis, name: str, other: str, late: str, lag: float) -> Finding:
-    what = f"{name} is {_text(axis, lag)} {other}"
-    return axis.warning(Fault.LAG, what, _remedy(axis, late, lag))
+def _lagging(
+    axis: Axis, name: str, lag: float, other: str, late: str, early: str
+) -> tuple[str, str]:
+    """That a signal is so many s behind the other, and the remedy: the column which is late.
 
-
-def _text(axis: Axis, lag: float) -> str:
-    side = "behind" if lag > 0.0 else "ahead of"
-    return f"{abs(lag) * 1e3:.3g} ms ({abs(lag) * axis.sample_rate:.3g} samples) {side}"
-
-
-def _remedy(axis: Axis, late: str, lag: float) -> str:
-    samples = round(abs(lag) * axis.sample_rate)
-    return f"give {late} delay_samples = {samples} in the import map"
+    early: which one is late where it is ahead.
+    """
+    side, column = ("behind", late) if lag > 0.0 else ("ahead of", early)
+    samples = abs(lag) * axis.sample_rate
+    return (
+        f"{name} is {abs(lag) * 1e3:.3g} ms ({samples:.3g} samples) {side} {other}",
+        f"give {column} delay_samples = {round(samples)} in the import map",
+    )
 
 
 _SLIPS: Mapping[float, str] = {
@@ -121,7 +107,6 @@ _SLIPS: Mapping[float, str] = {
     1e6: "a unit a million times smaller, as um for m",
     180.0 / np.pi: "degrees for radians",
 }
-UNKNOWN_SLIP = "a scale or the sample rate is wrong"
 
 
 @dataclass(frozen=True)
@@ -143,13 +128,6 @@ class _Pair:
 
 def check_units(axis: Axis) -> Iterator[Finding]:
     """Unit slips and reversed signs."""
-    yield from _travel(axis)
-    for pair in _pairs(axis):
-        yield from _compare(axis, pair)
-    yield from _reversed_force(axis)
-
-
-def _travel(axis: Axis) -> Iterator[Finding]:
     for name in ("position", "setpoint_position"):
         travel = np.ptp(axis.log.columns[name]) if name in axis.log.columns else 0.0
         if travel > limits.LONGEST_TRAVEL and not axis.log.kind.rotary:
@@ -159,6 +137,18 @@ def _travel(axis: Axis) -> Iterator[Finding]:
                 f"in mm it would be {travel / 1e3:.4g} m",
                 "correct its unit in the import map",
             )
+    if not axis.moves:
+        return
+    for pair in _pairs(axis):
+        yield from _compare(axis, pair)
+    fit, units = axis.dynamics, axis.log.kind
+    if fit.explains and fit.mass_matters and fit.mass < 0.0:
+        yield axis.error(
+            Fault.SIGN,
+            f"the force acts against the acceleration, as if the "
+            f"{units.mass_name} were {fit.mass:.3g} {units.mass}",
+            "give the force or the position the sign -1 in the import map",
+        )
 
 
 def _pairs(axis: Axis) -> Iterator[_Pair]:
@@ -189,7 +179,7 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
     if not pair.zero:
         one, other = one - one.mean(), other - other.mean()
     power = float(other @ other)
-    if power == 0.0 or not axis.moves:
+    if power == 0.0:
         return
     product = float(one @ other)
     if abs(product) < limits.RELATED * np.sqrt(power * float(one @ one)):
@@ -200,35 +190,19 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
     if ratio < 0.0:
         fault, looks = Fault.SIGN, "one of them is reversed"
     else:
-        fault, looks = Fault.UNIT, _looks_like(ratio)
-        if looks == UNKNOWN_SLIP and pair.follows and axis.soft_loop:
+        off = abs(np.log(ratio))
+        near = [s for s in _SLIPS if abs(off - np.log(s)) < limits.LOOKS_LIKE]
+        if not near and pair.follows and axis.soft_loop:
             return
+        looks = (
+            f"it looks like {_SLIPS[near[0]]}" if near else "a scale or the sample rate is wrong"
+        )
+        fault = Fault.UNIT
     yield axis.error(
         fault,
         f"{pair.name} is {ratio:.4g} times {pair.other_name}: {looks}",
         "correct unit, scale, sign or sample rate in the import map",
     )
-
-
-def _looks_like(ratio: float) -> str:
-    for size, text in _SLIPS.items():
-        if min(abs(np.log(ratio * size)), abs(np.log(ratio / size))) < limits.LOOKS_LIKE:
-            return f"it looks like {text}"
-    return UNKNOWN_SLIP
-
-
-def _reversed_force(axis: Axis) -> Iterator[Finding]:
-    if not axis.moves:
-        return
-    fit = axis.dynamics
-    if fit.explains and fit.mass_matters and fit.mass < 0.0:
-        units = axis.log.kind
-        yield axis.error(
-            Fault.SIGN,
-            f"the force acts against the acceleration, as if the "
-            f"{units.mass_name} were {fit.mass:.3g} {units.mass}",
-            "give the force or the position the sign -1 in the import map",
-        )
 
 
 def check_crossed(axes: Sequence[Axis]) -> Iterator[Finding]:

@@ -32,7 +32,18 @@ def check_command(axis: Axis) -> Iterator[Finding]:
             "repair these samples, or cut the log there",
             f"{first:.6g} s{and_more(len(single))}",
         )
-    yield from _noise(axis)
+    # noise that hides what the motion does not explain, even when it is averaged
+    noise, averaged = axis.force_noise, axis.smoother.held_noise(axis.force_noise)
+    left = float(np.median(np.abs(axis.dynamics.residual)))
+    hides = axis.dynamics.explains and averaged >= limits.HIDES * left
+    if hides and noise > limits.NOISY * float(np.std(force)):
+        yield axis.warning(
+            Fault.NOISE,
+            f"the force has noise of {noise:.3g} {unit} rms from sample to sample, {averaged:.2g} "
+            f"{unit} over {axis.smoother.length * 1e3:.2g} ms: about all that is left of it beside "
+            "the motion",
+            "record the command that the controller computed, or shield the cable",
+        )
 
 
 def _single(off: Array, least: float) -> NDArray[np.intp]:
@@ -44,23 +55,6 @@ def _single(off: Array, least: float) -> NDArray[np.intp]:
     bad &= off > limits.SINGLE_SAMPLE * float(np.quantile(off, 0.99))
     together = np.convolve(bad, np.ones(limits.NOISE_BURST), "same")
     return np.flatnonzero(bad & (together <= limits.MOST_TOGETHER))  # noise is no single sample
-
-
-def _noise(axis: Axis) -> Iterator[Finding]:
-    """Noise that hides what the motion does not explain, even when it is averaged."""
-    noise, unit = axis.force_noise, axis.log.units["force"]
-    left = float(np.median(np.abs(axis.dynamics.residual)))
-    averaged = axis.smoother.held_noise(noise)
-    if not axis.dynamics.explains or averaged < limits.HIDES * left:
-        return
-    if noise > limits.NOISY * float(np.std(axis.log.force)):
-        yield axis.warning(
-            Fault.NOISE,
-            f"the force has noise of {noise:.3g} {unit} rms from sample to sample, {averaged:.2g} "
-            f"{unit} over {axis.smoother.length * 1e3:.2g} ms: about all that is left of it beside "
-            "the motion",
-            "record the command that the controller computed, or shield the cable",
-        )
 
 
 def off_course(signal: Array) -> Array:
