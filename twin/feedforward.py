@@ -97,6 +97,8 @@ def feedforward(axis: AxisModel, motion: Array, others: Array, period: float) ->
         drag = needed - inertia + force(moving, command)
         command = needed - np.concatenate([[0.0], drag[:-1]])
     wanted = inertia - force(moving, command)
+    if not acting.effects:
+        return wanted
     at_zero, at_one = (u + force(acting, u) for u in (np.zeros_like(wanted), np.ones_like(wanted)))
     return np.asarray((wanted - at_zero) / (at_one - at_zero))
 

@@ -1,0 +1,147 @@
+"""Tables hold what they say they hold, and what they lose is told in N."""
+
+from __future__ import annotations
+
+import json
+from itertools import combinations
+
+import numpy as np
+import pytest
+from cli_runs import refusal, twin
+from effect_runs import CATALOGUE
+
+from twin.export import find_exporter
+from twin.export.tables import fewest_points, motions, tables
+from twin.feedforward import feedforward
+from twin.logs import AxisLog, Log, write_log
+from twin.model.file import save_model
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+
+HARDWARE = Hardware(
+    travel=(-0.1, 0.1), force_constant=20.0, velocity=0.2, acceleration=2.0, jerk=50.0
+)
+
+
+def fitted(effect: str, **values: float) -> Fitted:
+    return Fitted.at_start(CATALOGUE[effect], values)
+
+
+PLAIN = (
+    fitted("coulomb_viscous", Fc=0.5, Fs=0.5, sigma2=2.0),
+    fitted("constant_force", F0=0.2),
+    fitted("cable_slab", k1=1.5, k2=-4.0),
+    fitted("cogging", p=0.024, a1=0.3, b2=0.1),
+    fitted("payload_mass", ratio=0.1),
+)
+UNEVEN = (
+    fitted("asymmetric_friction", coulomb=0.2),
+    fitted("position_dependent_friction", start=-0.1, length=0.2, c2=0.2),
+)
+
+
+def slide(*effects: Fitted) -> MachineModel:
+    return MachineModel("slide", {"x": AxisModel(3.0, HARDWARE, effects)}, 1000.0)
+
+
+def table(text: str | bytes) -> dict[str, np.ndarray]:
+    """Columns of a CSV file by name."""
+    assert isinstance(text, str)
+    head, *rows = text.splitlines()
+    columns = np.array([[float(v) for v in row.split(",")] for row in rows]).T
+    return dict(zip(head.split(","), columns, strict=True))
+
+
+def test_the_sum_of_the_tables_is_the_force_of_the_model() -> None:
+    model = slide(*PLAIN)
+    made = find_exporter("csv").export(model, {})
+    assert set(made.kept["x"]) == {"mass", *model.axes["x"].names}
+    assert not made.approximated
+    assert not made.lost
+    (motion,) = motions(model, {})
+    x, v, a = own = motion.setpoints["x"]
+    files = {name: table(text) for name, text in made.files.items()}
+    (mass,) = files["x_mass.csv"]["mass (kg)"]
+    assert mass == pytest.approx(3.3)
+    place, along = files["x_position.csv"].values()
+    speed, forwards, backwards = files["x_speed.csv"].values()
+    phase, force = files["x_cogging.csv"].values()
+    assert len(force) == 256
+    found = mass * a + np.interp(x, place, along) + np.interp(x, phase, force, period=0.024)
+    found += np.where(v > 0, np.interp(v, speed, forwards), 0.0)
+    found += np.where(v < 0, np.interp(-v, speed, backwards), 0.0)
+    wanted = feedforward(model.axes["x"], own, np.zeros_like(own), motion.period)
+    assert np.abs(found - wanted)[v != 0.0].max() < 2e-3 * np.abs(wanted).max()
+    terms = table(made.files["x_cogging_harmonics.csv"])
+    waves = 2.0 * np.pi * np.outer(phase, 1.0 / terms["period (m)"])
+    again = np.sin(waves) @ terms["sine (N)"] + np.cos(waves) @ terms["cosine (N)"]
+    np.testing.assert_allclose(again, force, atol=1e-8)
+
+
+def test_twincat_has_twenty_points_and_says_in_newtons_what_it_has_no_place_for() -> None:
+    made = find_exporter("twincat").export(slide(*PLAIN, *UNEVEN), {})
+    text = made.files["x_friction.lis"]
+    assert isinstance(text, str)
+    entries = dict(line.split() for line in text.splitlines() if line[0] != "#")
+    count = int(entries["frict_comp.table_entries"])
+    speeds = [int(entries[f"frict_comp.table[{i}].in"]) for i in range(count)]
+    assert count <= 20
+    assert speeds[0] == 0
+    assert speeds == sorted(set(speeds))
+    # 0.5 N + 2 N s/m 0.1 m/s over 20 N/A, mean over the travel
+    out = [float(entries[f"frict_comp.table[{i}].out"]) for i in range(count)]
+    assert np.interp(0.1e6, speeds, out) == pytest.approx(35.0, rel=0.02)
+    lost = {r.part: r.text for r in made.lost}
+    assert {"cable_slab", "constant_force", *(f.effect.name for f in UNEVEN)} == set(lost)
+    assert lost["constant_force"] == "0.2 of its 0.2 N RMS are lost on simulated moves"
+    uneven = lost["asymmetric_friction"].split(" of its ")
+    assert float(uneven[0]) == pytest.approx(0.2 * 0.5, rel=0.1)
+    assert uneven[1].startswith(f"{uneven[0]} N RMS")
+    assert {"mass", "cogging", "payload_mass"} == set(made.kept["x"])
+    # what the other two make of the friction is lost of it, too
+    assert "coulomb_viscous" in {r.part for r in made.approximated}
+    assert len(table(made.files["x_cogging.csv"])["current (A)"]) == 256
+    assert table(made.files["x_cogging.csv"])["current (A)"][0] == pytest.approx(-0.1 / 20.0)
+
+
+def test_the_points_that_lose_least_are_found() -> None:
+    rng = np.random.default_rng(3)
+    speeds, force = np.sort(rng.random(11)), rng.random(11)
+    found, left = fewest_points(speeds, force, 5)
+
+    def loss(inner: tuple[int, ...]) -> float:
+        at = [0, *inner, 10]
+        return float(np.abs(np.interp(speeds, speeds[at], force[at]) - force).max())
+
+    losses = {inner: loss(inner) for inner in combinations(range(1, 10), 3)}
+    assert left == pytest.approx(min(losses.values()))
+    assert losses[tuple(found[1:-1])] == pytest.approx(left)
+
+
+def test_losses_are_told_on_the_logs_that_are_given(tmp_path) -> None:
+    save_model(slide(*PLAIN, *UNEVEN), tmp_path / "m.toml")
+    t = 1e-3 * np.arange(4000)
+    columns = {"position": t, "force": t, "setpoint_position": 0.05 * np.sin(6.0 * t)}
+    write_log(Log(1000.0, {"x": AxisLog(columns)}), tmp_path / "run.mcap")
+    arguments = ("export", "m.toml", "run.mcap", "--to", "twincat", "-o", "plc")
+    done = twin(*arguments, "--json", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert {r["part"] for r in told["lost"]} >= {"asymmetric_friction", "cable_slab"}
+    assert all(r["text"].endswith("on run.mcap") for r in told["lost"])
+    assert (tmp_path / "plc" / "x_friction.lis").exists()
+    columns.pop("setpoint_position")
+    write_log(Log(1000.0, {"x": AxisLog(columns)}), tmp_path / "bare.mcap")
+    line = refusal("export", "m.toml", "bare.mcap", "--to", "csv", folder=tmp_path)
+    assert "setpoint_position" in line
+
+
+def test_a_rotary_axis_has_its_own_units() -> None:
+    axis = AxisModel(0.01, HARDWARE, (fitted("coulomb_viscous", Fc=0.5, Fs=0.5),), rotary=True)
+    model = MachineModel("table", {"c": axis}, 1000.0)
+    files = find_exporter("csv").export(model, {}).files
+    assert "speed (rad/s),torque (N m) forwards" in str(files["c_speed.csv"])
+    text = str(find_exporter("twincat").export(model, {}).files["c_friction.lis"])
+    assert "0.001 degrees/s" in text
+    assert "torque over 20 N m/A" in text
+    highest = tables(axis, (-0.1, 0.1), 0.2).speeds[-1]
+    assert f"].in            {round(1e3 * np.degrees(highest))}" in text

@@ -1,0 +1,68 @@
+"""CSV: tables over position, speed and phase of a pitch, whose sum is the force of an axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from twin.export import Exported, Exporter, identifier
+from twin.export.tables import AxisTables, judged, motions
+from twin.logs import Log
+from twin.model.machine import AxisModel, MachineModel
+from twin.signals import Array
+
+
+def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
+    """A file for each table of each axis."""
+    given = motions(model, logs)
+    found = {name: judged(model, name, given, lambda t: t) for name in model.axes}
+    files: dict[str, str | bytes] = {}
+    for name, axis in model.axes.items():
+        files |= _files(identifier(name), axis, found[name].tables)
+    return Exported(
+        files,
+        {name: own.kept for name, own in found.items()},
+        tuple(r for own in found.values() for r in own.approximated),
+        tuple(r for own in found.values() for r in own.lost),
+    )
+
+
+def _files(name: str, axis: AxisModel, of: AxisTables) -> dict[str, str]:
+    units = axis.units
+    force, position = f"{units.words('force')} ({units.force})", f"({units.position})"
+    place = f"{units.words('position')} {position}"
+    mass = f"{units.mass_name} ({units.mass})"
+    files = {
+        f"{name}_{units.mass_name}.csv": csv_text({mass: np.array([of.mass])}),
+        f"{name}_position.csv": csv_text({place: of.positions, force: of.along}),
+        f"{name}_speed.csv": csv_text(
+            {
+                f"speed ({units.velocity})": of.speeds,
+                f"{force} forwards": of.forwards,
+                f"{force} backwards": of.backwards,
+            }
+        ),
+    }
+    for p in of.periodic:
+        at = p.period * np.arange(len(p.force)) / len(p.force)
+        files[f"{name}_{p.name}.csv"] = csv_text({place: at, force: p.force})
+        terms = p.harmonics()
+        files[f"{name}_{p.name}_harmonics.csv"] = csv_text(
+            {
+                "harmonic (1)": np.array([*terms]),
+                f"period {position}": np.array([p.period / k if k else np.inf for k in terms]),
+                f"sine ({units.force})": np.array([-c.imag for c in terms.values()]),
+                f"cosine ({units.force})": np.array([c.real for c in terms.values()]),
+            }
+        )
+    return files
+
+
+def csv_text(columns: Mapping[str, Array]) -> str:
+    """Columns of equal length with their names, which hold no comma."""
+    rows = zip(*columns.values(), strict=True)
+    return "\n".join([",".join(columns), *(",".join(f"{v:.9g}" for v in r) for r in rows)]) + "\n"
+
+
+EXPORTER = Exporter("tables over position, speed and phase of a pitch", export)

@@ -1,0 +1,95 @@
+"""TwinCAT CNC: the friction compensation of a compensation value list, and cogging as tables.
+
+frict_comp.table adds a current by the size of the commanded speed, with its sign: at most 20 points
+from speed 0 upwards (Beckhoff, TF5200, P-COMP-00041 to 00062).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import degrees
+
+import numpy as np
+
+from twin.export import Exported, Exporter, Remark, identifier
+from twin.export.formats.csv import csv_text
+from twin.export.tables import ENTRIES, AxisTables, Judged, fewest_points, judged, motions
+from twin.logs import Log
+from twin.model.machine import AxisModel, MachineModel
+
+POINTS = 20  # P-COMP-00062, as it is delivered
+MODE = 3  # P-COMP-00041: current by commanded speed, the only mode
+WHOLE = 1000  # P-COMP-00045: 100.0 %
+
+
+def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
+    """For each axis a compensation value list, and a file for each effect that repeats."""
+    given = motions(model, logs)
+    found = {name: judged(model, name, given, _held) for name in model.axes}
+    files: dict[str, str | bytes] = {}
+    nearly: list[Remark] = []
+    for name, axis in model.axes.items():
+        files |= _files(identifier(name), axis, found[name])
+        nearly += [Remark(name, "friction table", _points(axis, found[name].tables))]
+    return Exported(
+        files,
+        {name: own.kept for name, own in found.items()},
+        (*nearly, *(r for own in found.values() for r in own.approximated)),
+        tuple(r for own in found.values() for r in own.lost),
+    )
+
+
+def _held(of: AxisTables) -> AxisTables:
+    """What TwinCAT has a place for: a speed table that turns with the direction, and cogging."""
+    chosen, _ = fewest_points(of.speeds, of.odd, POINTS)
+    odd = of.odd[chosen]
+    return replace(
+        of, along=np.zeros_like(of.along), speeds=of.speeds[chosen], forwards=odd, backwards=-odd
+    )
+
+
+def _points(axis: AxisModel, of: AxisTables) -> str:
+    return f"{len(of.speeds)} points from 0 to {of.speeds[-1]:.3g} {axis.units.velocity}"
+
+
+def _files(name: str, axis: AxisModel, found: Judged) -> dict[str, str]:
+    units, of = axis.units, found.tables
+    constant = axis.hardware.force_constant
+    known = constant != 1.0
+    current = f"mA, {units.words('force')} over {constant:g} {units('N/A')}"
+    force = f"0.001 {units.force}: the model has no force constant"
+    speeds = np.degrees(of.speeds) * 1e3 if axis.rotary else of.speeds * 1e6
+    lines = [
+        f"# Friction compensation of axis {name}: {_points(axis, of)}",
+        f"# .in in {'0.001 degrees/s' if axis.rotary else 'um/s'}, .out in "
+        f"{current if known else force}",
+        "# .out has to be in the unit of dig_drv.act_torque of the drive: adapt scaling_factor",
+        f"# {units.mass_name} for the acceleration feedforward: {of.mass:.6g} {units.mass}",
+        *(f"# nearly: {r.part}, {r.text}" for r in found.approximated),
+        *(f"# lost: {r.part}, {r.text}" for r in found.lost),
+    ]
+    entries: dict[str, float] = {
+        "mode": MODE, "table_entries": len(speeds), "position_delay": 0, "reversal_lookahead": 0,
+        "scaling_factor": WHOLE, "delay_cycles": 0,
+    }  # fmt: skip
+    for i, (speed, needed) in enumerate(zip(speeds, 1e3 * of.forwards / constant, strict=True)):
+        entries |= {f"table[{i}].in": round(float(speed)), f"table[{i}].out": round(needed, 3)}
+    lines += [f"frict_comp.{key:24s}{value}" for key, value in entries.items()]
+    files = {f"{name}_friction.lis": "\n".join(lines) + "\n"}
+    for p in of.periodic:
+        phase = np.arange(ENTRIES) * 360.0 / ENTRIES
+        unit = f"force ({units.force})" if not known else "current (A)"
+        files[f"{name}_{p.name}.csv"] = csv_text(
+            {"phase (deg)": phase, unit: p.force / (constant if known else 1.0)}
+        )
+        rows = [
+            f"{k},{abs(c) / (constant if known else 1.0):.9g},{degrees(np.angle(c)):.9g}"
+            for k, c in p.harmonics().items()
+        ]
+        head = f"harmonic (1),amplitude of the {unit},phase of the cosine (deg)"
+        files[f"{name}_{p.name}_harmonics.csv"] = "\n".join([head, *rows]) + "\n"
+    return files
+
+
+EXPORTER = Exporter("friction compensation table of TwinCAT CNC, cogging as tables", export)

@@ -1,0 +1,267 @@
+"""A feedforward as tables over position, speed and phase of a pitch, and what these lose of it.
+
+The tables are measured on the model as one would on a machine: passes at steady speeds in both
+directions. What they lose of an effect is measured, too: along a motion, the force that the effect
+makes in the model less the one that it makes in the tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.effect import Kind
+from twin.errors import InputError
+from twin.experiments.follow import recorded_setpoint
+from twin.experiments.named import find_experiment
+from twin.experiments.trajectory import AnySetpoint
+from twin.export import Remark
+from twin.feedforward import feedforward, followed
+from twin.logs import Log
+from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.signals import Array
+
+PLACES = 1025  # along the travel: a bump a hundredth of it wide has ten
+SPEEDS = 61  # from zero on, denser at low speed, where friction bends
+ENTRIES = 256  # of one period
+FEW = 33  # places that tell the mean over the travel at each speed
+RUN_IN = 0.25  # of the travel, run on the spot for friction to forget how it began
+KEPT = 0.01  # least part of an effect's force that is told to be lost: a tenth of usual intervals
+HALF = 0.5  # where more is lost than held, the effect is called lost
+EXPERIMENT, DURATION, SEED = "moves", 10.0, 1  # the motion that tells losses where no log is given
+
+
+@dataclass(frozen=True, eq=False)
+class Periodic:
+    """The force that balances an effect which repeats along the track."""
+
+    name: str
+    """Of the effect."""
+    period: float
+    """m."""
+    force: Array
+    """(ENTRIES,) N, from position 0 on."""
+
+    def harmonics(self, least: float = 0.01) -> dict[int, complex]:
+        """Harmonics of at least that part of the largest: cosine term - i sine term, N."""
+        found = np.fft.rfft(self.force)[: ENTRIES // 2] * 2.0 / ENTRIES
+        found[0] /= 2.0
+        sizes = np.abs(found)
+        return {int(k): complex(found[k]) for k in np.flatnonzero(sizes > least * sizes.max())}
+
+
+@dataclass(frozen=True, eq=False)
+class AxisTables:
+    """The force that an axis needs, as a sum of tables."""
+
+    mass: float
+    """kg, times the acceleration."""
+    positions: Array
+    """(n,) m."""
+    along: Array
+    """(n,) N, the same in both directions."""
+    speeds: Array
+    """(k,) m/s, from 0 on."""
+    forwards: Array
+    """(k,) N, added while the axis moves forwards."""
+    backwards: Array
+    """(k,) N, added while it moves backwards: negative for a friction."""
+    periodic: tuple[Periodic, ...]
+    """What repeats along the track."""
+
+    def force(self, motion: Array) -> Array:
+        """Force (n,) N along a motion (3, n): position m, velocity m/s, acceleration m/s^2."""
+        x, v, a = motion
+        total = self.mass * a + np.interp(x, self.positions, self.along)
+        total += np.where(v > 0.0, np.interp(v, self.speeds, self.forwards), 0.0)
+        total += np.where(v < 0.0, np.interp(-v, self.speeds, self.backwards), 0.0)
+        for p in self.periodic:
+            places = p.period * np.arange(ENTRIES) / ENTRIES
+            total += np.interp(x, places, p.force, period=p.period)
+        return np.asarray(total)
+
+    @property
+    def odd(self) -> Array:
+        """(k,) N, the part of the speed table that turns with the direction."""
+        return 0.5 * (self.forwards - self.backwards)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A motion on which losses are told."""
+
+    name: str
+    period: float
+    """s."""
+    setpoints: Mapping[str, Array]
+    """By axis (3, n): position m, velocity m/s, acceleration m/s^2."""
+
+
+def motions(model: MachineModel, logs: Mapping[str, Log]) -> list[Motion]:
+    """The setpoints of logs, or of moves over the travel where none is given."""
+    if model.joints:
+        raise InputError(f"{model.name}: its axes are joints; give a model of axes with a mass")
+    model.require_mass()
+    given: dict[str, tuple[AnySetpoint, float]] = {
+        name: (recorded_setpoint(model, log), log.period) for name, log in logs.items()
+    }
+    if not given:
+        planned = find_experiment(EXPERIMENT, model, duration=DURATION)
+        setpoint = planned.setpoint(model, np.random.default_rng(SEED))
+        given[f"simulated {EXPERIMENT}"] = setpoint, model.period
+    return [
+        Motion(
+            name,
+            period,
+            {
+                axis: np.stack([s.position[:, i], s.velocity[:, i], s.acceleration[:, i]])
+                for i, axis in enumerate(model.axes)
+            },
+        )
+        for name, (s, period) in given.items()
+    ]
+
+
+def tables(axis: AxisModel, reach: tuple[float, float], speed: float) -> AxisTables:
+    """The tables of an axis over ``reach``, m,, up to a speed in m/s."""
+    steady = _steady(axis)
+    repeated = tuple(f for f in steady.effects if _repeats(f))
+    passed = replace(steady, effects=tuple(f for f in steady.effects if f not in repeated))
+    positions = np.linspace(*reach, PLACES)
+    speeds = speed * np.linspace(0.0, 1.0, SPEEDS) ** 2
+    runs = np.maximum(speeds, 1e-6 * speed)
+    usual = speed / 9.0
+    along = 0.5 * (_pass(passed, positions, usual) + _pass(passed, positions, -usual))
+    few = np.linspace(*reach, FEW)
+    own = np.interp(few, positions, along)
+    forwards, backwards = (
+        np.array([np.mean(_pass(passed, few, way * v) - own) for v in runs]) for way in (1.0, -1.0)
+    )
+    added = sum(
+        f.effect.added_mass(f.values) for f in axis.effects if f.effect.added_mass is not None
+    )
+    return AxisTables(
+        axis.mass * (1.0 + added), positions, along, speeds, forwards, backwards,
+        tuple(_of_one_period(steady, f) for f in repeated),
+    )  # fmt: skip
+
+
+def _steady(axis: AxisModel) -> AxisModel:
+    """The axis with the effects that a pass at a steady speed shows."""
+    shown = (Kind.FORCE, Kind.MODIFIER, Kind.FRICTION)
+    return replace(
+        axis,
+        effects=tuple(
+            f for f in followed(axis).axis.effects
+            if f.effect.kind in shown and not f.effect.reads("TIME")
+        ),
+    )  # fmt: skip
+
+
+def _repeats(fitted: Fitted) -> bool:
+    """Whether its force is one of the phase of a pitch alone."""
+    effect = fitted.effect
+    alone = effect.kind is Kind.FORCE and not effect.states and not effect.reads("V")
+    return alone and any(p.period for p in effect.parameters)
+
+
+def _pass(axis: AxisModel, positions: Array, velocity: float) -> Array:
+    """Force (n,) N at these positions of a pass at a velocity, m/s."""
+    along = positions if velocity > 0.0 else positions[::-1]
+    run_in = round(RUN_IN * len(along))
+    x = np.concatenate([np.full(run_in, along[0]), along])
+    motion = np.stack([x, np.full_like(x, velocity), np.zeros_like(x)])
+    period = (positions[1] - positions[0]) / abs(velocity)
+    force = feedforward(axis, motion, np.zeros_like(motion), period)[run_in:]
+    return force if velocity > 0.0 else force[::-1]
+
+
+def _of_one_period(axis: AxisModel, fitted: Fitted) -> Periodic:
+    period = next(fitted.values[p.name] for p in fitted.effect.parameters if p.period)
+    motion = np.zeros((3, ENTRIES))
+    motion[0] = period * np.arange(ENTRIES) / ENTRIES
+    alone = replace(axis, effects=(fitted,))
+    return Periodic(
+        fitted.effect.name, period, feedforward(alone, motion, np.zeros_like(motion), 1.0)
+    )
+
+
+def fewest_points(speeds: Array, force: Array, count: int) -> tuple[Array, float]:
+    """Which of the speeds (k,) a table of so many points keeps, and the largest error left, N.
+
+    Straight lines between them leave less at no other choice (dynamic programming); the first and
+    the last speed are kept.
+    """
+    n = len(speeds)
+    left = np.full((n, n), np.inf)
+    for i in range(n):
+        for j in range(i + 1, n):
+            line = np.interp(speeds[i : j + 1], speeds[[i, j]], force[[i, j]])
+            left[i, j] = np.abs(line - force[i : j + 1]).max()
+    best, came = np.where(np.arange(n) == 0, 0.0, np.inf), []
+    for _ in range(count - 1):
+        reached = np.maximum(best[:, None], left)
+        came.append(reached.argmin(axis=0))
+        best = reached.min(axis=0)
+    kept, at = [n - 1], n - 1
+    for before in reversed(came):
+        at = int(before[at])
+        kept.append(at)
+    return np.unique(kept), float(best[n - 1])
+
+
+@dataclass(frozen=True)
+class Judged:
+    """The tables of one axis, and what becomes of its effects in them."""
+
+    tables: AxisTables
+    kept: tuple[str, ...]
+    approximated: tuple[Remark, ...]
+    lost: tuple[Remark, ...]
+
+
+def judged(
+    model: MachineModel, name: str, given: list[Motion], made: Callable[[AxisTables], AxisTables]
+) -> Judged:
+    """The tables that a format makes of an axis, and by effect what they lose on given motions."""
+    axis, others = model.axes[name], [a for a in model.axes if a != name]
+    ends = np.concatenate([m.setpoints[name][0] for m in given])
+    reach = axis.hardware.travel or (float(ends.min()), float(ends.max()))
+    speed = max(*(np.abs(m.setpoints[name][1]).max() for m in given), axis.hardware.velocity)
+
+    def tabled(of: AxisModel) -> AxisTables:
+        return made(tables(of, reach, speed))
+
+    def both(of: AxisModel, its: AxisTables) -> Array:
+        """Force of the model and of the tables while the axis moves in all motions, (2, n) N."""
+        forces = []
+        for m in given:
+            own = m.setpoints[name]
+            beside = m.setpoints[others[0]] if len(others) == 1 else np.zeros_like(own)
+            whole = feedforward(of, own, beside, m.period)
+            forces.append(np.stack([whole, its.force(own)])[:, own[1] != 0.0])
+        return np.concatenate(forces, axis=1)
+
+    whole = tabled(axis)
+    total, unit = both(axis, whole), axis.units.force
+    found, where = followed(axis), ", ".join(m.name for m in given)
+    kept = [axis.units.mass_name]
+    remarks: dict[bool, list[Remark]] = {False: [], True: []}  # lost: whether more than half
+    for effect in axis.names:
+        if effect in found.lost:
+            remarks[True].append(Remark(name, effect, found.lost[effect]))
+            continue
+        less = axis.without(effect)
+        own, in_tables = total - both(less, tabled(less))
+        size, left = (float(np.sqrt(np.mean(f**2))) for f in (own, own - in_tables))
+        if size == 0.0:
+            text = f"it makes no {axis.units.words('force')} on {where}, so its loss is not known"
+            remarks[False].append(Remark(name, effect, text))
+        elif left <= KEPT * size:
+            kept.append(effect)
+        else:
+            text = f"{left:.2g} of its {size:.2g} {unit} RMS are lost on {where}"
+            remarks[left > HALF * size].append(Remark(name, effect, text))
+    return Judged(whole, tuple(kept), tuple(remarks[False]), tuple(remarks[True]))
