@@ -9,12 +9,12 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from identify.cli import doctor, loop, machine, view
+from identify.cli import doctor, loop, machine
 from identify.cli.shared import app
 from twin.errors import InputError
 from twin.threads import VARIABLES
 
-__all__ = ["doctor", "loop", "machine", "main", "view"]
+__all__ = ["app", "doctor", "loop", "machine", "main"]
 
 OBJECTS = 100_000  # that may be made before cycles among them are sought
 INTERRUPTED = 130  # exit code that typer makes of Ctrl-C, without a word

@@ -8,9 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import typer
-
-from identify.cli.shared import Json, app, say
+from identify.cli.command import Said
+from identify.cli.shared import app
 
 NEEDED = (
     "numpy", "pydantic", "pint", "scipy", "numba", "mujoco", "matplotlib", "mcap", "protobuf",
@@ -40,7 +39,7 @@ class Line:
 
 
 @app.command()
-def doctor(as_json_: Json = False) -> None:
+def doctor() -> Said:
     """Tell what this installation has, what is missing, and how to get it.
 
     Example: twin doctor
@@ -49,9 +48,7 @@ def doctor(as_json_: Json = False) -> None:
 
     lines = [look() for look in LOOKS]
     ok = not any(line.needed and line.remedy for line in lines)
-    say("\n".join(map(str, lines)), DoctorAnswer.of(ok=ok, lines=lines), as_json_)
-    if not ok:
-        raise typer.Exit(1)
+    return Said("\n".join(map(str, lines)), DoctorAnswer.of(ok=ok, lines=lines), fine=ok)
 
 
 def _twin() -> Line:

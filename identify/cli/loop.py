@@ -9,37 +9,29 @@ from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from identify.cli.apart import require_apart
+from identify.cli.command import Said, require_apart
 from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
     MEANINGLESS,
-    CheckedRecordings,
     Effects,
     FitLogs,
     Holdout,
-    Json,
     Logs,
     Model,
     ModelOption,
-    Recordings,
     Report,
     Test,
     TestFunction,
     app,
-    catalogue_with,
-    left_out,
-    machine_model,
-    require_report,
-    say,
-    tell,
-    with_roles,
+    loaded,
+    said_of,
+    with_logs,
 )
 from twin.errors import InputError
-from twin.files import require_writable
 
 if TYPE_CHECKING:
     from identify.experiment_design.rival_hypotheses import Rival
@@ -70,8 +62,7 @@ def fit(
     ] = Objective.FORCE,
     test_function: TestFunction = None,
     effects: Effects = None,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Identify the parameters of the model's effects.
 
     Example: twin fit proton_xy fit.mcap --holdout held.mcap -o fitted.toml
@@ -80,13 +71,9 @@ def fit(
     from identify.output.words.fit import objectives_in_words
     from twin.model.file import save_model
 
-    if out:
-        require_writable(out)
-    catalogue = catalogue_with(effects)
-    fitted, findings, silent = with_roles(
-        partial(workflow.fit, catalogue=catalogue, test_function=test_function),
-        machine_model(model, catalogue), logs, holdout, test, MEANINGLESS,
-    )  # fmt: skip
+    machine, catalogue = loaded(model, effects)
+    job = partial(workflow.fit, catalogue=catalogue, test_function=test_function)
+    fitted, findings, silent = with_logs(job, machine, logs, holdout, test, refused=MEANINGLESS)
     warnings = [*findings, *silent]
     result: FitResult | SimulationFit = fitted
     if objective is Objective.SIMULATION:
@@ -95,40 +82,36 @@ def fit(
         warnings += objectives_in_words(moved)
     if out:
         save_model(result.model, out)
-    tell(result, as_json_, warnings, left_out=silent)
+    return said_of(result, warnings, left_out=silent)
 
 
 @app.command()
 def compare(
     model: Model,
     logs: Logs,
-    out: Report = None,
+    html: Report = None,
     mcap: Annotated[
         Path | None,
         typer.Option(help="The first log measured, modelled and their difference, as MCAP."),
     ] = None,
     test_function: TestFunction = None,
     effects: Effects = None,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Print the errors of the model, and where it fails.
 
     Example: twin compare fitted.toml test.mcap -o report.html
     """
     from identify import workflow
 
-    require_report(out)
-    if mcap:
-        require_writable(mcap)
-    machine, recorded = machine_model(model, catalogue_with(effects)), CheckedRecordings(logs)
-    with progress_on_stderr() as progress, left_out() as silent:
-        result = workflow.compare(machine, recorded, test_function=test_function, progress=progress)
-    title = f"{machine.name}: model against measurement"
-    same = _options(test_function, effects)
-    _report(out, title, model, same, None, result, recorded.findings)
+    machine, _ = loaded(model, effects)
+    job = partial(workflow.compare, test_function=test_function)
+    result, findings, silent = with_logs(job, machine, logs)
+    if html:
+        again = _typed(model, test_function, effects)
+        _report(html, f"{machine.name}: model against measurement", again, None, result, findings)
     if mcap:
         workflow.side_by_side_of(result).write(mcap)
-    tell(result, as_json_, [*recorded.findings, *silent], left_out=silent)
+    return said_of(result, [*findings, *silent], left_out=silent)
 
 
 @app.command()
@@ -137,58 +120,52 @@ def diagnose(
     logs: FitLogs,
     holdout: Holdout = None,
     test: Test = None,
-    out: Report = None,
+    html: Report = None,
     test_function: TestFunction = None,
     effects: Effects = None,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Find which physical effect is missing, with the evidence for it.
 
     Example: twin diagnose fitted.toml fit.mcap --holdout held.mcap -o diagnosis.html
     """
     from identify import workflow
 
-    require_report(out)
-    catalogue = catalogue_with(effects)
-    machine = machine_model(model, catalogue)
+    machine, catalogue = loaded(model, effects)
     job = partial(workflow.diagnose, catalogue=catalogue, test_function=test_function)
-    result, findings, silent = with_roles(job, machine, logs, holdout, test)
-    title = f"{machine.name}: what the model lacks"
-    same = _options(test_function, effects)
-    _report(out, title, model, same, result, result.comparison, findings)
-    told = {"data_faults": findings, "left_out": silent}
-    tell(result, as_json_, [*findings, *silent], **told)
+    result, findings, silent = with_logs(job, machine, logs, holdout, test)
+    if html:
+        again, title = (
+            _typed(model, test_function, effects),
+            f"{machine.name}: what the model lacks",
+        )
+        _report(html, title, again, result, result.comparison, findings)
+    return said_of(result, [*findings, *silent], data_faults=findings, left_out=silent)
 
 
-def _options(test_function: float | None, effects: list[Path] | None) -> str:
-    """Options as they are typed."""
+def _typed(model: str, test_function: float | None, effects: list[Path] | None) -> dict[str, str]:
+    """The model, and the options as they are typed, that the next command needs as well."""
     length = [] if test_function is None else ["--test-function", f"{test_function:g}"]
-    return shlex.join([*length, *(text for f in effects or () for text in ("--effects", str(f)))])
+    own = [text for file in effects or () for text in ("--effects", str(file))]
+    return {"model": model, "options": shlex.join([*length, *own])}
 
 
 def _report(
-    out: Path | None,
+    out: Path,
     title: str,
-    name: str,
-    options: str,
+    again: dict[str, Any],
     diagnosis: Diagnosis | None,
     comparison: Comparison,
     findings: Sequence[str],
 ) -> None:
-    """Write the report that was asked for.
-
-    name: of the given model. options: that the next command needs as well. findings: on the logs.
-    """
-    if out is None:
-        return
+    """Write a report. again: what the next command needs as well. findings: on the logs."""
     from identify.output.report import Source, write_report
 
-    model = comparison.model if diagnosis is None else diagnosis.model
     write_report(
-        out, title=title, diagnosis=diagnosis, comparison=comparison, history=model.history,
+        out, title=title, diagnosis=diagnosis, comparison=comparison,
+        history=(diagnosis or comparison).model.history,
         assumed=[line for line in findings if "the import map assumes" in line],
         faults=[line for line in findings if ": error: " in line],
-        source=Source(shlex.join(["twin", *sys.argv[1:]]), name, options=options),
+        source=Source(shlex.join(["twin", *sys.argv[1:]]), **again),
     )  # fmt: skip
 
 
@@ -209,8 +186,7 @@ def add(
         typer.Option("--shape", help="The model has the effect: give its law the shape found."),
     ] = False,
     effects: Effects = None,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Add an effect, or the shape of one, refit, and record the error before and after.
 
     Example: twin add cogging fitted.toml fit.mcap --holdout held.mcap -o better.toml
@@ -218,17 +194,12 @@ def add(
     from identify import workflow
     from twin.model.file import save_model
 
-    require_writable(out)
-    catalogue = catalogue_with(effects)
-    chosen, made = catalogue[effect], workflow.add_shape if shape else workflow.add
-    result, findings, silent = with_roles(
-        partial(made, chosen, axis=axis, test_function=test_function),
-        machine_model(model, catalogue), logs, holdout, test, MEANINGLESS,
-    )  # fmt: skip
+    machine, catalogue = loaded(model, effects)
+    made = workflow.add_shape if shape else workflow.add
+    job = partial(made, catalogue[effect], axis=axis, test_function=test_function)
+    result, findings, silent = with_logs(job, machine, logs, holdout, test, refused=MEANINGLESS)
     save_model(result.model, out)
-    tell(result, as_json_, [*findings, *silent], left_out=silent)
-    if not result.kept:
-        raise typer.Exit(1)
+    return said_of(result, [*findings, *silent], result.kept, left_out=silent)
 
 
 @app.command()
@@ -236,22 +207,20 @@ def agree(
     a: Annotated[str, typer.Argument(metavar="A", help="Fitted model (.toml).")],
     b: Annotated[str, typer.Argument(metavar="B", help="Fitted model (.toml).")],
     effects: Effects = None,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Say whether two fits agree within their uncertainties; exit code 1 where they do not.
 
     Example: twin agree monday.toml friday.toml
     """
     from identify import workflow
+    from twin.model.file import load_model
 
-    catalogue = catalogue_with(effects)
-    fits = [machine_model(name, catalogue) for name in (a, b)]
+    first, catalogue = loaded(a, effects)
+    second = load_model(b, catalogue)
     with progress_on_stderr() as progress:
         progress("comparing the fits", 0, 1)
-        result = workflow.agree(*fits, catalogue=catalogue)
-    tell(result, as_json_, a=a, b=b)
-    if not result.agrees:
-        raise typer.Exit(1)
+        result = workflow.agree(first, second, catalogue=catalogue)
+    return said_of(result, fine=result.agrees, a=a, b=b)
 
 
 @app.command()
@@ -272,61 +241,54 @@ def plan(
     holdout: Holdout = None,
     test_function: TestFunction = None,
     effects: Effects = None,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Choose the experiment that decides between explanations; `twin simulate` runs it.
 
     Example: twin plan fitted.toml --between cogging wear --duration 8 -o next.toml
     """
     from identify import workflow
-    from identify.output.answers.diagnoses import answer_of
-    from identify.output.text import plan_text
     from twin.experiments.file import ENDING, SUFFIX, save_experiment, write_setpoints
 
     if out.suffix != SUFFIX:
         raise InputError(f"{out}: an experiment is a {SUFFIX} file; give such a name")
-    require_writable(out)
-    catalogue = catalogue_with(effects)
-    machine = machine_model(model, catalogue)
-    rivals = [_rival(name, catalogue) for name in between or ()]
-    recorded = CheckedRecordings(logs, beside=holdout)
-    with progress_on_stderr() as progress:
-        result = workflow.plan(
-            machine, recorded, Recordings(holdout, beside=logs), between=rivals,
-            catalogue=catalogue, axis=axis, duration=duration, test_function=test_function,
-            progress=progress,
-        )  # fmt: skip
-    text, table = plan_text(result), out.with_suffix(ENDING)
-    made: dict[str, str] = {}
-    if result.decides:
-        chosen = result.chosen
-        save_experiment(chosen.experiment, out, *text.splitlines()[:3], units=chosen.units)
-        write_setpoints(chosen.experiment, machine, 0, table)
-        text += (
-            f"\n{table}: the setpoints, to be run on the machine"
-            f"\n{out}: the experiment; `twin simulate {out} --model MODEL -o LOG` simulates it"
-        )
-        made = {"file": str(out), "setpoints": str(table)}
-    say(text, answer_of(result, **made), as_json_, recorded.findings)
+    machine, catalogue = loaded(model, effects)
+    job = partial(
+        workflow.plan, between=[_rival(name, catalogue) for name in between or ()],
+        catalogue=catalogue, axis=axis, duration=duration, test_function=test_function,
+    )  # fmt: skip
+    result, findings, silent = with_logs(job, machine, logs, holdout)
     if not result.decides:
-        raise typer.Exit(1)
+        return said_of(result, [*findings, *silent], fine=False)
+    chosen, table = result.chosen, out.with_suffix(ENDING)
+    said = said_of(result, [*findings, *silent], file=out, setpoints=table)
+    save_experiment(chosen.experiment, out, *said.text.splitlines()[:3], units=chosen.units)
+    write_setpoints(chosen.experiment, machine, 0, table)
+    text = (
+        f"{said.text}\n{table}: the setpoints, to be run on the machine"
+        f"\n{out}: the experiment; `twin simulate {out} --model MODEL -o LOG` simulates it"
+    )
+    return replace(said, text=text)
 
 
 def _rival(name: str, catalogue: Catalogue) -> Rival:
     """The model of that file, or the effect of that name."""
     if name.endswith(".toml"):
-        return replace(machine_model(name, catalogue), name=name)
+        from twin.model.file import load_model
+
+        return replace(load_model(name, catalogue), name=name)
     return catalogue[name]
 
 
 @app.command()
 def demo(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path("demo"),
+    ctx: typer.Context,
+    folder: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path(
+        "demo"
+    ),
     seed: Annotated[int, typer.Option(help="Draws the machine and its hidden effect.")] = 2,
     model: ModelOption = "proton_xy",
     effects: Effects = None,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Run the whole loop on a machine with a hidden effect.
 
     Example: twin demo -o demo
@@ -335,24 +297,18 @@ def demo(
     from identify.demo import demo as run
     from identify.output.answers.diagnoses import DemoAnswer, answer_of
 
-    require_apart({"-o": out / BETTER}, {"--model": model})
-    catalogue = catalogue_with(effects)
-    machine = machine_model(model, catalogue)
-
-    def line(text: str) -> None:
-        print(text, file=sys.stderr if as_json_ else sys.stdout, flush=True)
-
+    require_apart({"-o": folder / BETTER}, {"--model": model})
+    machine, catalogue = loaded(model, effects)
+    line = partial(print, file=sys.stderr if ctx.params["as_json"] else sys.stdout, flush=True)
     with progress_on_stderr() as progress:
-        result = run(machine, catalogue, out, seed, line, progress)
+        result = run(machine, catalogue, folder, seed, line, progress)
     hidden = result.hidden.effect.name
     answer = DemoAnswer.of(
         result,
         hidden=hidden,
-        report=str(result.report),
         diagnosis=answer_of(result.diagnosis),
         addition=result.addition and answer_of(result.addition),
     )
     verdict = "the diagnosis is right" if result.named else "the diagnosis did not name it"
-    say(f"5. the hidden effect was {hidden}: {verdict}\nreport: {result.report}", answer, as_json_)
-    if not result.named:
-        raise typer.Exit(1)
+    text = f"5. the hidden effect was {hidden}: {verdict}\nreport: {result.report}"
+    return Said(text, answer, fine=result.named)

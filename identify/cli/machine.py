@@ -1,4 +1,4 @@
-"""Commands on the machine's side: from simulate and import to effects, export and example."""
+"""Commands about machines and logs: from simulate and import to export, example and view."""
 
 from __future__ import annotations
 
@@ -8,22 +8,21 @@ from typing import Annotated
 
 import typer
 
+from identify.cli.command import Said
 from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
     CheckedRecordings,
     Effects,
-    Json,
     Logs,
     Model,
     ModelOption,
+    Recordings,
     app,
-    catalogue_with,
-    machine_model,
-    say,
+    left_out,
+    loaded,
 )
 from twin.errors import InputError
 from twin.export import find_exporter, format_names
-from twin.files import require_writable
 
 
 @app.command()
@@ -42,8 +41,7 @@ def simulate(
         Path | None, typer.Option(help="Setpoints to write as CSV, to be run on a machine.")
     ] = None,
     effects: Effects = None,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Run an experiment on the twin in MuJoCo and log it as MCAP.
 
     Example: twin simulate moves --model example_machine --duration 10 -o fit.mcap
@@ -54,10 +52,7 @@ def simulate(
     from twin.experiments.named import DURATION, Reach, find_experiment, simulate_parts
     from twin.logs import record_log
 
-    for file in (out, setpoints):
-        if file is not None:
-            require_writable(file)
-    stage = machine_model(model, catalogue_with(effects))
+    stage, _ = loaded(model, effects)
     chosen = load_experiment(experiment) if experiment.endswith(SUFFIX) else experiment
     reach = Reach(stage)
     with progress_on_stderr() as progress:
@@ -71,15 +66,10 @@ def simulate(
             chosen = find_experiment(chosen, stage, axis, duration or DURATION)
         write_setpoints(chosen, stage, seed, setpoints)
     rate = stage.sample_rate
-    answer = LogAnswer(
-        log=str(out),
-        samples=samples,
-        sample_rate=rate,
-        setpoints=str(setpoints) if setpoints else None,
-    )
+    answer = LogAnswer.of(log=out, samples=samples, sample_rate=rate, setpoints=setpoints)
     asked = None if duration is None else missed(duration, samples / rate)
     warnings = [*reach.warnings(), *([asked] if asked else [])]
-    say(f"{out}: {samples} samples at {rate:g} Hz", answer, as_json_, warnings)
+    return Said(f"{out}: {samples} samples at {rate:g} Hz", answer, warnings)
 
 
 @app.command("import")
@@ -97,8 +87,7 @@ def import_(
     guess: Annotated[
         bool, typer.Option("--guess", help="Propose a map for FILE, with reasons.")
     ] = False,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Turn a machine's recording into an MCAP log.
 
     Example: twin import recording.csv --map map.toml -o run.mcap
@@ -108,24 +97,21 @@ def import_(
     from twin.importers import import_log, load_mapping
     from twin.logs import write_log
 
-    if out is not None:
-        require_writable(out)
     if guess:
-        _guess(sources, out, as_json_)
-        return
+        return _guess(sources, out)
     if mapping is None or out is None:
         raise InputError("give --map MAP and -o LOG; --guess proposes a map")
     log = import_log(sources, load_mapping(mapping))
     write_log(log, out)
-    answer = LogAnswer(log=str(out), samples=len(log), sample_rate=log.sample_rate)
+    answer = LogAnswer.of(log=out, samples=len(log), sample_rate=log.sample_rate)
     resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
     unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
-    said = [*resampled, *(f"{out}: warning: {finding}" for finding in unsure)]
-    say(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", answer, as_json_, said)
+    warnings = [*resampled, *(f"{out}: warning: {finding}" for finding in unsure)]
+    return Said(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", answer, warnings)
 
 
-def _guess(sources: list[Path], out: Path | None, as_json_: bool) -> None:
-    """Print or write a proposed map; exit code 1 where something is missing in it."""
+def _guess(sources: list[Path], out: Path | None) -> Said:
+    """A proposed map, printed or written; exit code 1 where something is missing in it."""
     from identify.output.answers.machine import MapAnswer
     from twin.files import write_atomically
     from twin.importers.guess import guess_map
@@ -136,9 +122,7 @@ def _guess(sources: list[Path], out: Path | None, as_json_: bool) -> None:
     if out is not None:
         write_atomically(out, found.text.encode())
     text = found.text if out is None else f"{out}: a map to be read and corrected"
-    say(text, MapAnswer.of(found, map=found.text), as_json_, found.missing)
-    if found.missing:
-        raise typer.Exit(1)
+    return Said(text, MapAnswer.of(found, map=found.text), found.missing, not found.missing)
 
 
 @app.command()
@@ -149,8 +133,7 @@ def new(
         Path | None,
         typer.Option("--mjcf", help="MJCF or URDF file whose joints are the axes of the logs."),
     ] = None,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Propose a first model from logs: mass, friction, constant force, and their hardware.
 
     Example: twin new run.mcap -o model.toml
@@ -160,7 +143,6 @@ def new(
     from twin.effects import load_catalogue
     from twin.model.file import read_mjcf, save_model
 
-    require_writable(out)
     recorded = CheckedRecordings(logs)
     bodies = None if mjcf is None else (mjcf.name, read_mjcf(mjcf))
     model = first_model(dict(recorded), out.stem, load_catalogue(), bodies)
@@ -173,12 +155,12 @@ def new(
         for label in labels
     ]
     text = f"{out}: axes {', '.join(model.axes)}; now `twin fit {out} {logs[0]} -o fitted.toml`"
-    answer = NewModelAnswer(model=str(out), axes=list(model.axes), not_determined=unknown)
-    say("\n".join([text, *notes]), answer, as_json_, recorded.findings)
+    answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
+    return Said("\n".join([text, *notes]), answer, recorded.findings)
 
 
 @app.command()
-def info(logs: Logs, as_json_: Json = False) -> None:
+def info(logs: Logs) -> Said:
     """Tell what is in logs: length, rate, axes, signals with units and ranges, and faults.
 
     Example: twin info fit.mcap
@@ -188,11 +170,11 @@ def info(logs: Logs, as_json_: Json = False) -> None:
     from twin.checks.long import log_info
 
     found = {str(path): log_info(path) for path in logs}
-    say(info_text(found), info_answer(found), as_json_)
+    return Said(info_text(found), info_answer(found))
 
 
 @app.command()
-def check(logs: Logs, as_json_: Json = False) -> None:
+def check(logs: Logs) -> Said:
     """Say whether logs are fit for identification, and what is wrong with them.
 
     Example: twin check run.mcap
@@ -202,9 +184,8 @@ def check(logs: Logs, as_json_: Json = False) -> None:
     from twin.checks.long import check_file
 
     reports = {str(path): check_file(path) for path in logs}
-    say(check_text(reports), check_answer(reports), as_json_)
-    if not all(report.ok for report in reports.values()):
-        raise typer.Exit(1)
+    answer = check_answer(reports)
+    return Said(check_text(reports), answer, fine=answer.ok)
 
 
 @app.command()
@@ -214,8 +195,7 @@ def recover(
     unproved: Annotated[
         bool, typer.Option("--unproved", help="Keep samples that no checksum proves as well.")
     ] = False,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Keep the intact parts of a damaged log: the longest at OUT, the others beside it.
 
     Example: twin recover bad.mcap -o good.mcap
@@ -223,14 +203,11 @@ def recover(
     from identify.output.answers.machine import RecoveryAnswer
     from twin.logs import recover_file
 
-    require_writable(out)
     recovery, files = recover_file(log, out, unproved=unproved)
-    others = {str(path): text for path, text in files.items() if path != out}
-    answer = RecoveryAnswer.of(
-        recovery, log=str(out), not_proved=recovery.unproved, others=list(others)
-    )
+    others = {path: text for path, text in files.items() if path != out}
+    answer = RecoveryAnswer.of(recovery, log=out, others=list(others))
     written = [f"{path}: {text}" for path, text in others.items()]
-    say("\n".join([str(recovery), *written]), answer, as_json_)
+    return Said("\n".join([str(recovery), *written]), answer)
 
 
 @app.command()
@@ -243,16 +220,16 @@ def effects(
     check_: Annotated[
         bool, typer.Option("--check", help="Run the laws that every effect obeys.")
     ] = False,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Print the catalogue, or one effect with its equation, units and source; or check it.
 
     Example: twin effects cogging --plot cogging.png
     """
     from identify.output.answers.machine import EffectsAnswer, effect_answer, laws_answer
     from identify.output.machine import draw, effect_text, effects_text, laws_text
+    from twin.effects import load_catalogue
 
-    catalogue = catalogue_with(files)
+    catalogue = load_catalogue(files or ())
     if check_:
         from twin.laws.verdict import check_effect
 
@@ -264,24 +241,20 @@ def effects(
                 "--check was given no effect; give the NAME of one, or your own file with --effects"
             )
         reports = [check_effect(effect) for effect in [catalogue[name] for name in names]]
-        say(laws_text(reports), laws_answer(reports), as_json_)
-        if not all(report.ok for report in reports):
-            raise typer.Exit(1)
-        return
+        answer = laws_answer(reports)
+        return Said(laws_text(reports), answer, fine=answer.ok)
     if name is not None:
         chosen = catalogue[name]
         if plot is not None:
             from identify.experiment_design.planting import signature
 
-            require_writable(plot)
             draw(chosen, *signature(chosen, catalogue), plot)
-        say(effect_text(chosen), effect_answer(chosen), as_json_)
-        return
+        return Said(effect_text(chosen), effect_answer(chosen))
     if plot is not None:
         raise InputError(f"--plot {plot}: draws one effect; give its NAME")
     everything = list(catalogue.values())
-    answer = EffectsAnswer(effects=[effect_answer(e) for e in everything])
-    say(effects_text(everything), answer, as_json_)
+    answers = EffectsAnswer(effects=[effect_answer(e) for e in everything])
+    return Said(effects_text(everything), answers)
 
 
 @app.command()
@@ -292,12 +265,11 @@ def export(
         list[Path] | None,
         typer.Argument(metavar="[LOG...]", help="MCAP logs on which losses are told in N."),
     ] = None,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path(
+    folder: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path(
         "export"
     ),
     effects: Effects = None,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Write the model for a controller or another tool, and tell what that cannot hold of it.
 
     Example: twin export better.toml --to c -o controller
@@ -307,15 +279,14 @@ def export(
     from twin.files import make_folder, write_atomically
 
     exporter = find_exporter(to)
-    recorded = CheckedRecordings(logs)
-    made = exporter.export(machine_model(model, catalogue_with(effects)), recorded)
-    make_folder(out)
-    files = [out / name for name in made.files]
+    recorded = CheckedRecordings(logs or ())
+    made = exporter.export(loaded(model, effects)[0], recorded)
+    make_folder(folder)
+    files = [folder / name for name in made.files]
     for file, content in zip(files, made.files.values(), strict=True):
         write_atomically(file, content.encode() if isinstance(content, str) else content)
-    names = [str(file) for file in files]
-    answer = ExportAnswer.of(made, format=to, files=names)
-    say("\n".join([*names, export_text(made)]), answer, as_json_, recorded.findings)
+    answer = ExportAnswer.of(made, format=to, files=files)
+    return Said("\n".join([*map(str, files), export_text(made)]), answer, recorded.findings)
 
 
 @app.command()
@@ -323,11 +294,10 @@ def example(
     name: Annotated[
         str | None, typer.Argument(help="Which example; all are listed if left out.")
     ] = None,
-    out: Annotated[
+    folder: Annotated[
         Path | None, typer.Option("--out", "-o", help="New folder; NAME if left out.")
     ] = None,
-    as_json_: Json = False,
-) -> None:
+) -> Said:
     """Write an example with its data and the commands to type, or list the examples.
 
     Example: twin example hidden_effect
@@ -336,14 +306,76 @@ def example(
     from twin.examples import EXAMPLES, write_example
 
     if name is None:
-        width, told = max(map(len, EXAMPLES)), {key: e.summary for key, e in EXAMPLES.items()}
-        lines = [f"{key:{width}s}  {summary}" for key, summary in told.items()]
-        say("\n".join(lines), ExamplesAnswer(examples=told), as_json_)
-        return
-    into = out or Path(name)
+        width, summaries = max(map(len, EXAMPLES)), {n: e.summary for n, e in EXAMPLES.items()}
+        lines = [f"{key:{width}s}  {summary}" for key, summary in summaries.items()]
+        return Said("\n".join(lines), ExamplesAnswer(examples=summaries))
+    into = folder or Path(name)
     chosen, files = write_example(name, into)
     lines = [f"{into}: {', '.join(file.name for file in files)}"]
     lines += [f"data: {chosen.data}"] if chosen.data else []
     lines += ["now:", f"  cd {into}", *(f"  {command}" for command in chosen.commands)]
-    answer = ExampleAnswer.of(chosen, folder=str(into), files=[str(file) for file in files])
-    say("\n".join(lines), answer, as_json_)
+    answer = ExampleAnswer.of(chosen, folder=into, files=files)
+    return Said("\n".join(lines), answer)
+
+
+@app.command()
+def view(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="MCAP log.")],
+    model: Annotated[
+        str | None,
+        typer.Argument(metavar="MODEL", help="Machine model (.toml); the log alone if left out."),
+    ] = None,
+    html: Annotated[
+        Path | None, typer.Option(help="Page to write, which replays it in any browser.")
+    ] = None,
+    video: Annotated[Path | None, typer.Option(help="MP4 to write, without a display.")] = None,
+    speed: Annotated[float, typer.Option(help="Speed of the replay; 1 is real time.")] = 1.0,
+    gain: Annotated[
+        float | None,
+        typer.Option(
+            metavar="TIMES",
+            help="How many times larger than they are the differences to the measured motion are "
+            "drawn; chosen so that they are seen if left out.",
+        ),
+    ] = None,
+    effects: Effects = None,
+) -> Said:
+    """Show the machine as measured, as modelled and as commanded, with forces and what is left.
+
+    In MuJoCo's viewer, unless a page or a video is asked for.
+
+    Example: twin view test.mcap fitted.toml --html replay.html
+    """
+    from identify.output.answers.machine import ViewAnswer
+
+    for option, value in (("--speed", speed), ("--gain", gain)):
+        if value is not None and not 0.0 < value < float("inf"):
+            raise InputError(f"{option} {value:g}: must be above 0, without unit; 1 is as it was")
+    machine = None if model is None else loaded(model, effects)[0]
+    with progress_on_stderr() as progress, left_out() as silent:
+        progress("reading and replaying the log", 0, 1)
+        from identify.view.replay import replay
+
+        shown = replay(machine, Recordings([log])[str(log)], log.name)
+        times = shown.gain if gain is None else gain
+        if video:
+            from identify.view.video import write_video
+
+            write_video(video, shown, times, speed, progress)
+    if html:
+        from identify.view.page import write_page
+
+        write_page(html, shown, times, speed)
+    if not (html or video):
+        from identify.view.live import show
+
+        show(shown, times, speed)
+    seconds = len(shown) / shown.rate
+    answer = ViewAnswer.of(
+        shown, log=log, html=html, video=video, axes=list(shown.axes), duration=seconds, gain=times,
+        left_out=silent,
+    )  # fmt: skip
+    drawn = "at their true size" if times == 1.0 else f"{times:g} times as large"
+    said = f"{seconds:.3g} s of {log}, differences drawn {drawn}"
+    text = "\n".join(f"{path}: {said}" for path in (html, video) if path)
+    return Said(text, answer, [*silent, *shown.notes])

@@ -1,8 +1,7 @@
-"""Options, input and output that the commands share."""
+"""Options that the commands share, and the logs and models that they read."""
 
 from __future__ import annotations
 
-import json
 import logging
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -12,13 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from identify.cli.apart import Command
+from identify.cli.command import Commands, Said
 from identify.cli.progress import progress_on_stderr
 from twin.errors import InputError
-from twin.files import require_writable
 
 if TYPE_CHECKING:
-    from identify.output.answers.answer import Answer
     from twin.effects import Catalogue
     from twin.logs import Log
     from twin.model.machine import MachineModel
@@ -26,22 +23,6 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 MEANINGLESS = ("SIGN", "UNIT", "SWAPPED")  # faults with which a fit gives numbers without a meaning
 MEASURED = ("position", "velocity", "setpoint_position", "current", "force")
-
-
-class Commands(typer.Typer):
-    """The commands, none of which overwrites what it reads.
-
-    In the list of commands each has the first sentence of its help, whole.
-    """
-
-    def command(self, name: str | None = None, **options: Any) -> Any:
-        def register(job: Callable[..., None]) -> Callable[..., None]:
-            first = (job.__doc__ or "").split("\n\n")[0]
-            given = {"short_help": " ".join(first.split()), **options}
-            return super(Commands, self).command(name, cls=Command, **given)(job)
-
-        return register
-
 
 app = Commands(
     help="Find out why the model and the machine disagree.",
@@ -56,7 +37,6 @@ ModelOption = Annotated[str, typer.Option("--model", help="Machine model (.toml)
 Holdout = Annotated[
     list[Path] | None,
     typer.Option(
-        "--holdout",
         help="Selection log (MCAP): no parameter is fitted on it, but it takes part in the choice "
         "of effects; may be repeated.",
     ),
@@ -64,7 +44,6 @@ Holdout = Annotated[
 Test = Annotated[
     list[Path] | None,
     typer.Option(
-        "--test",
         help="Test log (MCAP), on which nothing is decided: it gives the error that is reported; "
         "may be repeated.",
     ),
@@ -72,19 +51,16 @@ Test = Annotated[
 TestFunction = Annotated[
     float | None,
     typer.Option(
-        "--test-function",
         metavar="SECONDS",
         help="Length of the test functions, the time scale of the residual; from the noise if "
         "left out.",
     ),
 ]
 Report = Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Effects = Annotated[
     list[Path] | None,
     typer.Option(
-        "--effects",
-        help="Your own effect file; loading it runs its code. May be repeated.",
+        "--effects", help="Your own effect file; loading it runs its code. May be repeated."
     ),
 ]
 
@@ -106,34 +82,28 @@ def front_door(
     """Find out why the model and the machine disagree."""
 
 
-# --- what is read ----------------------------------------------------------------------------
-
-
-def catalogue_with(files: list[Path] | None) -> Catalogue:
+def loaded(model: str, effects: list[Path] | None) -> tuple[MachineModel, Catalogue]:
+    """A model, and the catalogue with a user's own effects."""
     from twin.effects import load_catalogue
-
-    return load_catalogue(files or ())
-
-
-def machine_model(name: str, catalogue: Catalogue) -> MachineModel:
     from twin.model.file import load_model
 
-    return load_model(name, catalogue)
+    catalogue = load_catalogue(effects or ())
+    return load_model(model, catalogue), catalogue
 
 
 class Recordings(Mapping[str, "Log"]):
     """Logs by name, read each time that one is asked for, less what identification does not read.
 
-    So nobody holds a log for a command that is done with it: datasets() takes each once. beside:
-    other logs that are held in memory as well; where all are too long, they are read at a lower
-    rate, which is said on standard error.
+    So nobody holds a log for a command that is done with it: datasets() takes each once. among: all
+    logs that are held in memory at once; where these are too long, they are read at a lower rate,
+    which is said on standard error.
     """
 
-    def __init__(self, paths: Sequence[Path] | None, beside: Sequence[Path] | None = None) -> None:
+    def __init__(self, paths: Sequence[Path], among: Sequence[Path] = ()) -> None:
         from twin.checks.long import step_of
 
-        self.paths = {str(path): path for path in paths or ()}
-        self.every = step_of([*self.paths.values(), *(beside or ())]) if paths else 1
+        self.paths = {str(path): path for path in paths}
+        self.every = step_of(among or paths) if paths else 1
 
     def __getitem__(self, name: str) -> Log:
         path = self.paths[name]
@@ -167,12 +137,9 @@ class CheckedRecordings(Recordings):
     """
 
     def __init__(
-        self,
-        paths: Sequence[Path] | None,
-        beside: Sequence[Path] | None = None,
-        refused: Collection[str] = (),
+        self, paths: Sequence[Path], among: Sequence[Path] = (), refused: Collection[str] = ()
     ) -> None:
-        super().__init__(paths, beside)
+        super().__init__(paths, among)
         self.refused, self.findings = refused, list[str]()
 
     def read(self, path: Path) -> Log:
@@ -186,27 +153,26 @@ class CheckedRecordings(Recordings):
         return log
 
 
-def with_roles(
+def with_logs(
     job: Callable[..., Result],
     model: MachineModel,
-    logs: list[Path],
-    holdout: list[Path] | None,
-    test: list[Path] | None,
+    logs: list[Path] | None,
+    *others: list[Path] | None,
     refused: Collection[str] = (),
 ) -> tuple[Result, list[str], list[str]]:
-    """The result of a job on a model and the logs of each role; the findings on the first.
+    """The result of a job on a model and logs, those of each other role in turn.
 
-    And which logs of any role were left out, and why. refused: names of the faults with which a
-    training log is refused.
+    Also the findings on the first logs, and which of any role were left out, and why. refused:
+    names of the faults with which one of the first is refused.
     """
     from twin.memory import share
 
     share()
-    held, tests = holdout or [], test or []
-    recorded = CheckedRecordings(logs, [*held, *tests], refused)
-    others = Recordings(held, [*logs, *tests]), Recordings(tests, [*logs, *held])
+    every = [path for paths in (logs, *others) for path in paths or ()]
+    recorded = CheckedRecordings(logs or (), every, refused)
+    rest = (Recordings(paths or (), every) for paths in others)
     with progress_on_stderr() as progress, left_out() as silent:
-        result = job(model, recorded, *others, progress=progress)
+        result = job(model, recorded, *rest, progress=progress)
     return result, recorded.findings, silent
 
 
@@ -224,27 +190,9 @@ def left_out() -> Iterator[list[str]]:
         logger.removeHandler(handler)
 
 
-# --- what is written -------------------------------------------------------------------------
-
-
-def say(text: str, answer: Answer, as_json: bool, warnings: Sequence[str] = ()) -> None:
-    """Print the warnings on standard error, and the answer as text or as one JSON object."""
-    for warning in warnings:
-        print(f"twin: {warning}", file=sys.stderr)
-    print(json.dumps(answer.entries()) if as_json else text)
-
-
-def tell(result: Any, as_json: bool, warnings: Sequence[str] = (), **more: Any) -> None:
-    """Print a result of the workflow; more: entries of its JSON object that the command knows."""
+def said_of(result: Any, warnings: Sequence[str] = (), fine: bool = True, **more: Any) -> Said:
+    """What a command says of a result; more: entries of its JSON object that the command knows."""
     from identify.output.as_json import answer_of
     from identify.output.text import text_of
 
-    say(text_of(result), answer_of(result, **more), as_json, warnings)
-
-
-def require_report(path: Path | None) -> None:
-    """Raise InputError where a report could not be written, or its name is that of another kind."""
-    if path is not None:
-        if path.suffix.lower() not in (".html", ".htm"):
-            raise InputError(f"{path}: a report is an .html file; give such a name")
-        require_writable(path)
+    return Said(text_of(result), answer_of(result, **more), warnings, fine)

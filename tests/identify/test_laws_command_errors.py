@@ -11,8 +11,8 @@ import pytest
 from cli_runs import twin
 from strict_json import valid
 
-from identify.cli import machine, main
-from identify.cli.apart import OUTPUTS, Command
+from identify.cli import main
+from identify.cli.command import OUTPUTS, Command
 from identify.cli.shared import CheckedRecordings, Recordings, app
 from twin.checks import check_log
 from twin.errors import InputError
@@ -47,7 +47,7 @@ def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, sai
         raise error
 
     monkeypatch.delenv("TWIN_TRACEBACK", raising=False)
-    monkeypatch.setattr(machine, "catalogue_with", fails)
+    monkeypatch.setattr("twin.effects.load_catalogue", fails)
     code, out, err = cli("effects", "--json")
     interrupted = isinstance(error, KeyboardInterrupt)
     assert code == (130 if interrupted else 2)
@@ -73,7 +73,7 @@ def test_an_empty_argument_is_no_name(cli, arguments, said):
 def test_a_traceback_is_shown_where_it_is_asked_for(monkeypatch):
     monkeypatch.setenv("TWIN_TRACEBACK", "1")
     monkeypatch.setattr(sys, "argv", ["twin", "effects"])
-    monkeypatch.setattr(machine, "catalogue_with", lambda files: 1 / 0)
+    monkeypatch.setattr("twin.effects.load_catalogue", lambda files: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         main()
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import Enum
 from functools import singledispatch
-from typing import Any, Self
+from pathlib import Path
+from typing import Annotated, Any, Self
 
 from pydantic import (
     AliasPath,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
@@ -20,6 +22,7 @@ from pydantic_core import to_jsonable_python
 
 SCHEMA = "answers-1"  # the number grows when an entry goes, or gets another meaning
 Number = float | None  # null: not a number, infinite, or none
+File = Annotated[str, BeforeValidator(lambda v: str(v) if isinstance(v, Path) else v)]  # as typed
 
 
 def read(path: str) -> Any:

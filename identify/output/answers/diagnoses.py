@@ -9,7 +9,7 @@ from pydantic import Field
 from identify.dataset.dataset import Role
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
-from identify.output.answers.answer import Answer, Entry, Number, answer_of, read
+from identify.output.answers.answer import Answer, Entry, File, Number, answer_of, read
 from identify.output.answers.fits import EstimateEntry, RefitEntry, estimate_entries
 from identify.output.words.diagnosis import (
     model_change_in_words,
@@ -60,8 +60,8 @@ class PlanAnswer(Answer, ExperimentEntry):
     missing_motion: str
     ranking: list[ExperimentEntry]
     not_run: list[str]
-    file: str | None = None
-    setpoints: str | None = None
+    file: File | None = None
+    setpoints: File | None = None
 
 
 @answer_of.register
@@ -393,6 +393,6 @@ class DemoAnswer(Answer):
 
     hidden: str
     named: bool
-    report: str
+    report: File
     diagnosis: DiagnosisAnswer
     addition: AdditionAnswer | None

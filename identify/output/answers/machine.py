@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from identify.output.answers.answer import Answer, Entry, Number, read
+from identify.output.answers.answer import Answer, Entry, File, Number, read
 
 if TYPE_CHECKING:  # a command that only shows the catalogue loads no NumPy
     from twin.checks.long import AxisInfo, LogInfo
@@ -188,19 +188,19 @@ def _axis_info(axis: AxisInfo) -> AxisInfoEntry:
 class LogAnswer(Answer):
     """What `twin simulate` and `twin import` print of the log that they wrote."""
 
-    log: str
+    log: File
     samples: int
     sample_rate: Number
     unit: str = "Hz"
-    setpoints: str | None = None
+    setpoints: File | None = None
 
 
 class ViewAnswer(Answer):
     """What `twin view` prints; gain: by how much differences are drawn larger than they are."""
 
-    log: str
-    html: str | None
-    video: str | None
+    log: File
+    html: File | None
+    video: File | None
     axes: list[str]
     duration: float
     duration_unit: Literal["s"] = "s"
@@ -212,11 +212,11 @@ class ViewAnswer(Answer):
 class RecoveryAnswer(Answer):
     """What `twin recover` prints."""
 
-    log: str
+    log: File
     kept: str
     lost: list[str]
-    not_proved: list[str]
-    others: list[str]
+    not_proved: list[str] = read("unproved")
+    others: list[File]
     """The other intact parts, as files beside the log."""
 
 
@@ -233,7 +233,7 @@ class MapAnswer(Answer):
 class NewModelAnswer(Answer):
     """What `twin new` prints; not_determined: by axis, the values that the logs do not tell."""
 
-    model: str
+    model: File
     axes: list[str]
     not_determined: dict[str, list[str]]
 
@@ -250,7 +250,7 @@ class ExportAnswer(Answer):
     """What `twin export` prints: the files, and by axis what they hold as the model does."""
 
     format: str
-    files: list[str]
+    files: list[File]
     kept: dict[str, list[str]]
     approximated: list[RemarkEntry]
     lost: list[RemarkEntry]
@@ -265,8 +265,8 @@ class ExamplesAnswer(Answer):
 class ExampleAnswer(Answer):
     """What `twin example NAME` prints; data: where the data are to be had, if not in the folder."""
 
-    folder: str
-    files: list[str]
+    folder: File
+    files: list[File]
     commands: list[str]
     data: str | None
 
