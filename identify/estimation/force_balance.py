@@ -55,6 +55,12 @@ def averaged_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
     return np.concatenate(spread(averaged, logs))
 
 
+def effect_forces(axis: AxisModel, logs: Sequence[PreparedLog]) -> dict[str, Array]:
+    """By name, the force (n,) N that each effect adds to the command: all less all but it."""
+    whole = averaged_force(axis, logs)
+    return {name: whole - averaged_force(axis.without(name), logs) for name in axis.names}
+
+
 def _is_stepped_finely(axis: AxisModel) -> bool:
     """Whether an actuation with memory asks for the log's own rate."""
     return any(f.effect.kind is Kind.ACTUATION and f.effect.states for f in axis.effects)

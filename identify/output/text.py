@@ -39,8 +39,8 @@ from identify.output.words.plan import (
     supposed_in_words,
 )
 from identify.output.words.residual import correlation_in_words, loop_in_words, region_in_words
+from identify.results import text_of
 from identify.results.addition import Addition
-from identify.results.printed import text_of
 from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
 from identify.results.told import Told
 from identify.selection.candidates import Candidate

@@ -9,7 +9,7 @@ from identify.dataset.dataset import Dataset, Role, by_log
 from identify.estimation.confounded import MovedParameter, moved_parameters
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.intervals import estimates, intervals_to_keep
-from identify.results.printed import Printed
+from identify.results import Printed
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Reshaped
 from identify.validation.free_run import errors_of_both
@@ -63,9 +63,6 @@ class Addition(Printed):
     def units(self) -> AxisUnits:
         """Of the axis that the effect was added to."""
         return self.candidate.fit.axis.units
-
-    def __repr__(self) -> str:
-        return f"<Addition of {self.model.name}; print it to read it>"
 
 
 def addition(

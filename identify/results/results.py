@@ -11,7 +11,7 @@ from identify.estimation.fit import Fit
 from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
-from identify.results.printed import Printed
+from identify.results import Printed
 from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.comparison import AxisComparison
@@ -48,9 +48,6 @@ class FitResult(Printed):
         """Axes of the model that move in no log."""
         return tuple(axis for axis in self.model.axes if axis not in self.fits)
 
-    def __repr__(self) -> str:
-        return f"<FitResult of {self.model.name}; print it to read it>"
-
 
 DISAGREE = 2.0  # times, by which the values of two objectives differ where one of them is wrong
 
@@ -86,9 +83,6 @@ class SimulationFit(Printed):
             if c.parameter.lower >= 0.0 and not before <= DISAGREE * after <= DISAGREE**2 * before
         )
 
-    def __repr__(self) -> str:
-        return f"<SimulationFit of {self.model.name}; print it to read it>"
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Printed):
@@ -96,9 +90,6 @@ class Comparison(Printed):
 
     model: MachineModel
     axes: Mapping[str, AxisComparison]
-
-    def __repr__(self) -> str:
-        return f"<Comparison of {self.model.name}; print it to read it>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,6 +131,3 @@ class Diagnosis(Printed):
         """The effect that is named, if any."""
         best = self.leading.best
         return best.effect if best else None
-
-    def __repr__(self) -> str:
-        return f"<Diagnosis of {self.model.name}; print it to read it>"

@@ -6,18 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Role
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
-from identify.estimation.force_balance import averaged_force, residual
-from identify.estimation.residual_dependence import UNITS, unit_of
-from identify.validation.misfit_maps import periods
+from identify.estimation.force_balance import effect_forces, residual
+from identify.estimation.residual_dependence import unit_of
+from identify.validation.misfit_maps import KNOWN_UNITS, coordinates
 from twin.model.machine import AxisModel
-from twin.model.units import LINEAR
-
-Array = NDArray[np.float64]
+from twin.signals import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,25 +43,21 @@ def signals_of(
     logs: Mapping[PreparedLog, Role | None], before: AxisModel, after: AxisModel | None
 ) -> Signals:
     """The signals of some logs, with the model before anything was found, and the final one."""
-    every = tuple(logs)
-    final = after or before
-    command = np.concatenate([log.command for log in every])
-    where = gathered(every)
-    for phase, period in periods(final).items():
-        where[phase] = np.mod(where["position"], period)
-    known = {**UNITS, "command": LINEAR.force}
-    whole = averaged_force(final, every)
+    every, final = tuple(logs), after or before
+    where = coordinates(final, every)
+    time, command = where.pop("time"), where.pop("command")
+    del where["standstill"]
     return Signals(
         logs=every,
         roles=tuple(logs.values()),
-        time=where.pop("time"),
+        time=time,
         coordinates=where,
-        units={name: unit_of(name, every[0].motion, known) for name in where},
+        units={name: unit_of(name, every[0].motion, KNOWN_UNITS) for name in where},
         command=command,
         to_explain=command - final.mass * np.concatenate([log.acceleration for log in every]),
         before=_left(before, every),
         after=None if after is None else _left(after, every),
-        effects={n: averaged_force(final.without(n), every) - whole for n in final.names},
+        effects={name: -force for name, force in effect_forces(final, every).items()},
     )
 
 

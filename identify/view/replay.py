@@ -8,18 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.drive import actual_force, parts_of, true_motion
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.dataset.silent_logs import telling
 from identify.estimation.channel_delay import aligned
-from identify.estimation.force_balance import residual
+from identify.estimation.force_balance import effect_forces, residual
 from identify.validation.free_run import free_run
-from twin.core.walks import walk
-from twin.effect import Kind
 from twin.errors import InputError
 from twin.logs import AxisLog, Log
-from twin.model.machine import AxisModel, MachineModel, axis_table
+from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import AxisUnits
 from twin.parallel import parallel
 from twin.signals import Array
@@ -43,7 +40,8 @@ class Strip:
 class AxisReplay:
     """One axis at the beginning of each frame: (n,) m; NaN where there is none.
 
-    modelled: of the free run. forces: mean (n,) N over each frame, by effect.
+    modelled: of the free run. forces: mean (n,) N over each frame, by effect, as it adds to the
+    command.
     """
 
     units: AxisUnits
@@ -151,34 +149,16 @@ def _axis(
     position = part.motion.position_at_samples(0.0)[cut.begun - part.motion.left_out :][: cut.count]
     off = nothing if error is None else error[part.motion.axis]
     left = cut.interpolated(part.time, residual(own, [part]))
-    force = Strip(f"{units.words('force')} left over", units.force, cut.range(left))
+    unexplained = Strip(f"{units.words('force')} left over", units.force, cut.range(left))
     drift = Strip("model - measured", units.position, cut.range(off))
     added = {
-        name: cut.mean(cut.interpolated(part.motion.time, f))
-        for name, f in forces(own, part).items()
+        name: cut.mean(cut.interpolated(part.time, force))
+        for name, force in effect_forces(own, [part]).items()
     }
     return AxisReplay(
         units, cut.at(position), cut.at(wanted), cut.at(position + off), added,
-        (force,) if error is None else (force, drift),
+        (unexplained,) if error is None else (unexplained, drift),
     )  # fmt: skip
-
-
-def forces(axis: AxisModel, log: PreparedLog) -> dict[str, Array]:
-    """The force of each effect along the measured motion, (n,) N over the blocks of the motion."""
-    motion = true_motion(axis, log.motion)[0]
-    motion = motion.with_force(actual_force(axis, motion))
-    table = axis_table({"": parts_of(axis, *(set(Kind) - {Kind.SENSING, Kind.ACTUATION}))})
-    rows = np.zeros((len(table.entries), motion.signals.shape[1]))
-    first, last, at, *_ = table.axes[0]
-    walk(
-        table.entries, first, last, table.parameters, np.zeros(table.n_states), at, motion.signals,
-        motion.others, motion.period, 0, rows, axis.mass, motion.time_origin,
-    )  # fmt: skip
-    found = {effect: row for (_, effect), row in zip(table.labels, rows, strict=True)}
-    driven = [f.effect.name for f in axis.effects if f.effect.kind is Kind.ACTUATION]
-    if driven:
-        found[" + ".join(driven)] = motion.command - log.motion.command
-    return found
 
 
 @dataclass(frozen=True, eq=False)
