@@ -11,15 +11,7 @@ import numpy as np
 
 from twin.errors import CannotRun
 from twin.experiments.experiment import Experiment, OneAxis, gentle, machine_limits
-from twin.experiments.kinds import (
-    Moves,
-    Passes,
-    Rests,
-    Staircase,
-    Steps,
-    Sweep,
-    Tracking,
-)
+from twin.experiments.kinds import Moves, Passes, Rests, Staircase, Steps, Sweep, Tracking
 from twin.experiments.lasting import ALLOWED, lasting
 from twin.experiments.trajectory import Limits
 from twin.model.machine import AxisModel, MachineModel
@@ -67,16 +59,19 @@ def proposals(
     travel is not known, and where none fits.
     """
     model.axis(axis)
-    limits = dict(zip(model.axes, machine_limits(model), strict=True))
-    effort, scale = _affordable(model, axis), _scale(model.axes[axis])
-    limits[axis] = gentle(limits[axis], effort)
+    own, limits = model.axes[axis], dict(zip(model.axes, machine_limits(model), strict=True))
+    others = [v.travel for name, v in limits.items() if name != axis]
+    other = neat(USED * (others[0][1] - others[0][0])) if len(others) == 1 else 0.0
+    effort = min(
+        1.0, FORCE_USED * own.hardware.force_limit / (own.mass * own.hardware.acceleration)
+    )
+    room = _Room(own, axis, gentle(limits[axis], effort), other, duration, _scale(own))
     drafts = (
-        Tracking(duration),
-        *(Moves(max(int(duration / d), 2), dwell=d, duration=duration) for d in (0.1, 1.0)),
-        *_passes(limits, axis, duration, scale),
-        *_reversing(limits, axis, duration, scale),
-        *_accelerating(limits, axis, duration),
-        *_swept(model, limits, axis, duration),
+        *room.general(),
+        *room.passing(),
+        *room.reversing(),
+        *room.accelerating(),
+        *room.swept(),
     )
     found, not_run = [], []
     for draft in drafts:
@@ -96,12 +91,6 @@ def proposals(
     return found, tuple(not_run)
 
 
-def _affordable(model: MachineModel, axis: str) -> float:
-    """Part of the acceleration limit that the motor's force allows, 0..1."""
-    h, mass = model.axes[axis].hardware, model.axes[axis].mass
-    return min(1.0, FORCE_USED * h.force_limit / (mass * h.acceleration))
-
-
 def _require_fit(experiment: Experiment, model: MachineModel, duration: float) -> None:
     """Raise CannotRun unless the machine can run it, in not more than that time (s)."""
     setpoint = experiment.setpoint(model, np.random.default_rng(0))
@@ -110,12 +99,6 @@ def _require_fit(experiment: Experiment, model: MachineModel, duration: float) -
             f"takes {setpoint.duration:.3g} s, more than the {duration:g} s planned; give a longer "
             "--duration (s)"
         )
-
-
-def _other_span(limits: dict[str, Limits], axis: str) -> float:
-    """Span (m) for the other axis, or 0 where there is none."""
-    spans = [neat(USED * (v.travel[1] - v.travel[0])) for name, v in limits.items() if name != axis]
-    return spans[0] if len(spans) == 1 else 0.0
 
 
 def _scale(axis: AxisModel) -> float:
@@ -131,68 +114,85 @@ def _scale(axis: AxisModel) -> float:
     return min(max(travel / STAGE, seen / SHORT[0][0]), USED * travel / SHORT[-1][0])
 
 
-def _pass(axis: str, limit: Limits, span: float, speed: float, seconds: float) -> Passes:
-    """As many passes as fit in that time, at the speed or as fast as the span allows."""
-    speed = neat(min(speed, limit.fastest_plateau(span)))
-    once = span / speed + limit.ramp_time(speed) + 0.1
-    return Passes(axis, span, speed, repeats=min(max(int(seconds / once / 2), 1), MOST_REPEATS))
+@dataclass(frozen=True)
+class _Room:
+    """What the experiments of one axis may use.
 
+    limit: as far as the motor's force allows. other: m, span of the other axis, 0 where there is
+    none, or are several. duration: s. scale: of the lengths and speeds of a stage.
+    """
 
-def _passes(
-    limits: dict[str, Limits], axis: str, duration: float, scale: float = 1.0
-) -> Iterator[Experiment]:
-    """Passes over the whole travel, and a velocity map; the other axis at rest, then moving."""
-    limit = limits[axis]
-    span = neat(USED * (limit.travel[1] - limit.travel[0]))
-    slow = 2.0 * span / duration
-    fast = limit.fastest_plateau(span)
-    other = _other_span(limits, axis)
-    for speed in (1.1 * slow, (slow * fast) ** 0.5, fast):
-        passes = _pass(axis, limit, span, speed, duration)
-        yield passes
-        if other:
-            yield Passes(axis, span, passes.speed, passes.repeats, other=other)
-    map_span = neat(0.3 * span)
-    fastest = limit.fastest_plateau(map_span)
-    speeds = np.geomspace(min(SLOWEST * scale, SLOW * fastest), fastest, 10)
-    yield Staircase(axis, tuple(map(neat, speeds)), map_span, neat(duration / 40.0))
+    model: AxisModel
+    axis: str
+    limit: Limits
+    other: float
+    duration: float
+    scale: float
 
+    def general(self) -> Iterator[Experiment]:
+        """Motion of all axes."""
+        yield Tracking(self.duration)
+        for dwell in (0.1, 1.0):
+            yield Moves(max(int(self.duration / dwell), 2), dwell=dwell, duration=self.duration)
 
-def _reversing(
-    limits: dict[str, Limits], axis: str, duration: float, scale: float = 1.0
-) -> Iterator[Experiment]:
-    """Short passes, slow and fast, and starts after rests of several lengths."""
-    limit = limits[axis]
+    def span(self, part: float = 1.0) -> float:
+        """A part of the travel that passes cover, m."""
+        return neat(part * USED * (self.limit.travel[1] - self.limit.travel[0]))
 
-    def passes(span: float, speed: float) -> Passes:
-        return _pass(axis, limit, neat(scale * span), scale * speed, duration)
+    def passes(self, span: float, speed: float) -> Passes:
+        """As many passes as fit in the time, at the speed or as fast as the span allows."""
+        speed = neat(min(speed, self.limit.fastest_plateau(span)))
+        once = span / speed + self.limit.ramp_time(speed) + 0.1
+        repeats = min(max(int(self.duration / once / 2), 1), MOST_REPEATS)
+        return Passes(self.axis, span, speed, repeats=repeats)
 
-    for short in SHORT:
-        yield passes(*short)
-    if other := _other_span(limits, axis):
-        yield replace(passes(*STILL), other=other)
-    rests = np.geomspace(0.1, duration / 3.0, 5)
-    move = passes(*RESTED)
-    yield Rests(
-        axis, move.span, move.speed, tuple(map(neat, rests * 0.55 * duration / rests.sum()))
-    )
+    def passing(self) -> Iterator[Experiment]:
+        """Passes over the whole travel, the other axis at rest and moving; and a velocity map."""
+        span = self.span()
+        slow, fast = 2.0 * span / self.duration, self.limit.fastest_plateau(span)
+        for speed in (1.1 * slow, (slow * fast) ** 0.5, fast):
+            passes = self.passes(span, speed)
+            yield passes
+            if self.other:
+                yield replace(passes, other=self.other)
+        map_span = neat(0.3 * span)
+        fastest = self.limit.fastest_plateau(map_span)
+        speeds = np.geomspace(min(SLOWEST * self.scale, SLOW * fastest), fastest, 10)
+        yield Staircase(self.axis, tuple(map(neat, speeds)), map_span, neat(self.duration / 40.0))
 
+    def reversing(self) -> Iterator[Experiment]:
+        """Short passes, slow and fast, and starts after rests of several lengths."""
+        *short, still, move = (
+            self.passes(neat(self.scale * span), self.scale * speed)
+            for span, speed in (*SHORT, STILL, RESTED)
+        )
+        yield from short
+        if self.other:
+            yield replace(still, other=self.other)
+        rests = np.geomspace(0.1, self.duration / 3.0, 5)
+        rests *= 0.55 * self.duration / rests.sum()
+        yield Rests(self.axis, move.span, move.speed, tuple(map(neat, rests)))
 
-def _accelerating(limits: dict[str, Limits], axis: str, duration: float) -> Iterator[Experiment]:
-    """Steps through the travel at high and low acceleration: many forces at each place."""
-    limit = limits[axis]
-    for part in (1.0, 0.3):
-        span = neat(part * USED * (limit.travel[1] - limit.travel[0]))
-        for count in (60, 15, 3):
-            left, efforts = duration, []
+    def accelerating(self) -> Iterator[Experiment]:
+        """Steps through the travel at high and low acceleration: many forces at each place."""
+        for part, count in itertools.product((1.0, 0.3), (60, 15, 3)):
+            span, left, efforts = self.span(part), self.duration, []
             for effort in itertools.cycle(EFFORTS):
-                moving = _move_time(gentle(limit, effort), span / count) + STEP_DWELL
+                moving = _move_time(gentle(self.limit, effort), span / count) + STEP_DWELL
                 left -= 2 * count * moving
                 if left < 0.0:
                     break
                 efforts.append(effort)
             if efforts:
-                yield Steps(axis, span, neat(span / count), tuple(efforts), STEP_DWELL)
+                yield Steps(self.axis, span, neat(span / count), tuple(efforts), STEP_DWELL)
+
+    def swept(self) -> Iterator[Experiment]:
+        """A force sweep on slow passes, over the whole travel and at one place."""
+        for part, highest in itertools.product((1.0, 0.1), SWEPT):
+            span = self.span(part)
+            speed = neat(min(2.4 * span / self.duration, self.limit.fastest_plateau(span)))
+            weak = Sweep(self.axis, span, speed, 1, 1.0, LOWEST, highest, effort=GENTLE)
+            yield replace(weak, amplitude=neat(MARGIN * weak.most_force(self.model)))
 
 
 def _move_time(limit: Limits, distance: float) -> float:
@@ -200,15 +200,3 @@ def _move_time(limit: Limits, distance: float) -> float:
     speed = min(limit.velocity, math.sqrt(distance * limit.acceleration))
     steep = limit.acceleration / limit.jerk
     return distance / speed + speed / limit.acceleration + steep
-
-
-def _swept(
-    model: MachineModel, limits: dict[str, Limits], axis: str, duration: float
-) -> Iterator[Experiment]:
-    """A force sweep on slow passes, over the whole travel and at one place."""
-    limit = limits[axis]
-    for part, highest in itertools.product((1.0, 0.1), SWEPT):
-        span = neat(part * USED * (limit.travel[1] - limit.travel[0]))
-        speed = neat(min(2.4 * span / duration, limit.fastest_plateau(span)))
-        weak = Sweep(axis, span, speed, 1, 1.0, LOWEST, highest, effort=GENTLE)
-        yield replace(weak, amplitude=neat(MARGIN * weak.most_force(model.axes[axis])))

@@ -137,12 +137,8 @@ class Arena:
         length = self.test_function or choose_test_function(
             [*(log.motion for log in self.logs), new]
         )
-        old = (
-            log
-            if np.isclose(log.test_function.length, length)
-            else PreparedLog.of(log.motion, length)
-            for log in self.logs
-        )
+        alike = all(np.isclose(log.test_function.length, length) for log in self.logs)
+        old = self.logs if alike else (PreparedLog.of(log.motion, length) for log in self.logs)
         return (*old, PreparedLog.of(new, length))
 
 
@@ -205,8 +201,7 @@ def _discriminating(arena: Arena, experiment: Experiment, motion: Motion) -> Sim
         added = len(free_parameters(axes[truth])) - len(free_parameters(axes[rival]))
         found.append((evidence(np.hypot(noise, left), noise, added).delta_bic, left))
     gain, left = min(found, key=lambda pair: pair[0])
-    where = _spread(left**2, kept)[-len(new) :]
-    quiet = _spread(noise**2, kept)[-len(new) :]
+    where, quiet = (_on_last(values**2, kept, logs) for values in (left, noise))
     return _simulated(experiment, new, gain, where, float(np.sqrt(where.mean())), quiet)
 
 
@@ -228,30 +223,24 @@ def _informative(arena: Arena, experiment: Experiment, motion: Motion) -> Simula
     information = np.eye(len(where)) + columns.T @ columns
     leverage = np.sum(columns * np.linalg.solve(information, columns.T).T, axis=1)
     gain = 0.5 * float(np.linalg.slogdet(information)[1])
-    seen = _spread(leverage, kept)[-len(new) :]
-    return _simulated(
-        experiment, new, gain, seen, float("nan"), _spread(noise**2, kept)[-len(new) :]
-    )
+    seen, quiet = (_on_last(values, kept, logs) for values in (leverage, noise**2))
+    return _simulated(experiment, new, gain, seen, np.nan, quiet)
 
 
 def _simulated(
-    experiment: Experiment,
-    new: PreparedLog,
-    gain: float,
-    where: Array,
-    difference: float,
+    experiment: Experiment, new: PreparedLog, gain: float, where: Array, difference: float,
     quiet: Array,
-) -> SimulatedExperiment:
+) -> SimulatedExperiment:  # fmt: skip
     duration = len(new.motion.time) * new.motion.period
     floor = float(np.sqrt(quiet.mean()))
     return SimulatedExperiment(experiment, duration, difference, floor, gain, new, where)
 
 
-def _spread(values: Array, kept: NDArray[np.bool_]) -> Array:
-    """Values of the test functions that were kept, zero in the others."""
+def _on_last(values: Array, kept: NDArray[np.bool_], logs: Sequence[PreparedLog]) -> Array:
+    """Values of the test functions that were kept, zero in the others: those of the last log."""
     out = np.zeros(len(kept))
     out[kept] = values
-    return out
+    return out[-len(logs[-1]) :]
 
 
 def _answer(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
@@ -291,7 +280,7 @@ def _beside_rivals(
         fit = fit_axis(rival.axis, logs)
         kept = own.kept & fit.kept
         after, before = (residual(f.axis, logs)[kept] for f in (own, fit))
-        excess = _spread(before**2 - after**2, kept)[-len(logs[-1]) :].mean()
+        excess = _on_last(before**2 - after**2, kept, logs).mean()
         added = len(own.scaling.where) - len(fit.scaling.where)
         difference = float(np.sqrt(max(excess, 0.0)))
         found.append((evidence(before, after, added).delta_bic, difference))

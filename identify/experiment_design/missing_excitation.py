@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,34 +17,7 @@ HEART = (0.25, 0.75)  # quantiles of the squared difference that bound the range
 SELDOM = 0.01  # share of the data below which all motions count as equally rare
 DUST = 1e-5  # of the axis' own motion, below which the other axis is at rest
 RARE = 0.05  # share of the data below which a motion counts as missing
-
-
-@dataclass(frozen=True)
-class Feature:
-    """A property of motion: its name, its unit, and its values (n_test_functions,) on a log.
-
-    unit: on a linear axis. own: of the other axis: the same property of this axis, beside which
-    little of it is rest.
-    """
-
-    name: str
-    unit: str
-    of: Callable[[PreparedLog], Array]
-    own: Callable[[PreparedLog], Array] | None = None
-
-    @property
-    def other(self) -> bool:
-        """Whether it is a property of the other axis."""
-        return self.own is not None
-
-    def at_rest(self, log: PreparedLog, high: float) -> bool:
-        """Whether values up to ``high`` are what a closed loop makes of an axis at rest."""
-        return self.own is not None and high < DUST * float(np.max(self.own(log), initial=0.0))
-
-    def on(self, motion: Motion) -> tuple[str, str]:
-        """Its name and its unit on that motion."""
-        units = motion.other_units if self.other else motion.units
-        return units.words(self.name), units(self.unit)
+OTHER = " of the other axis"
 
 
 @dataclass(frozen=True)
@@ -67,72 +40,75 @@ class Gap:
         return self.share is not None and self.share < RARE
 
 
-def _speed(log: PreparedLog) -> Array:
-    return np.abs(log.test_function.mean(log.motion.velocity))
+UNITS = {  # of a linear axis, of the properties of a motion that tell explanations apart
+    "speed": LINEAR.velocity,
+    "acceleration": LINEAR.acceleration,
+    "motor force": LINEAR.force,
+    "rate of change of the motor force": "N/s",
+    "distance since the last reversal": LINEAR.position,
+    "rest before the motion": "s",
+    "speed of the other axis": LINEAR.velocity,
+    "acceleration of the other axis": LINEAR.acceleration,
+}
 
 
-def _acceleration(log: PreparedLog) -> Array:
-    return np.abs(log.acceleration)
+def properties(log: PreparedLog) -> dict[str, Array]:
+    """Properties (n,) of the motion of a log, by test functions, by name."""
+    motion, mean = log.motion, log.test_function.mean
+    found = (
+        np.abs(mean(motion.velocity)),
+        np.abs(log.acceleration),
+        np.abs(log.command),
+        np.abs(log.test_function.acceleration(motion.command)),
+        mean(since_reversal(motion.velocity, motion.period)),
+        np.round(mean(_rest(motion)), 1),  # as settling is gradual
+        np.abs(mean(motion.others[1])),
+        np.abs(mean(motion.others[2])),
+    )
+    return dict(zip(UNITS, found, strict=True))
 
 
-def _rest(log: PreparedLog) -> Array:
-    """Rest (s) before the last start of motion, rounded to 0.1 s because settling is gradual."""
-    m = log.motion
-    still = at_rest(m.velocity)
+def _rest(motion: Motion) -> Array:
+    """Rest (n,) s before the last start of motion; while it lasts, how long so far."""
+    still = at_rest(motion.velocity)
     index = np.arange(len(still))
     begun = np.maximum.accumulate(np.where(still, 0, index + 1))
     stood = np.where(still, index + 1 - begun, 0.0)
     ended = np.maximum.accumulate(np.where(still, index, 0))
-    return np.round(log.test_function.mean(stood[ended] * m.period), 1)
+    return np.asarray(stood[ended] * motion.period)
 
 
-FEATURES = (
-    Feature("speed", LINEAR.velocity, _speed),
-    Feature("acceleration", LINEAR.acceleration, _acceleration),
-    Feature("motor force", LINEAR.force, lambda w: np.abs(w.command)),
-    Feature(
-        "rate of change of the motor force", "N/s",
-        lambda w: np.abs(w.test_function.acceleration(w.motion.command)),
-    ),
-    Feature(
-        "distance since the last reversal", LINEAR.position,
-        lambda w: w.test_function.mean(since_reversal(w.motion.velocity, w.motion.period)),
-    ),
-    Feature("rest before the motion", "s", _rest),
-    Feature(
-        "speed of the other axis", LINEAR.velocity,
-        lambda w: np.abs(w.test_function.mean(w.motion.others[1])), own=_speed,
-    ),
-    Feature(
-        "acceleration of the other axis", LINEAR.acceleration,
-        lambda w: np.abs(w.test_function.mean(w.motion.others[2])), own=_acceleration,
-    ),
-)  # fmt: skip
-
-
-def gap(
-    motion: PreparedLog,
-    where: Array,
-    logs: Sequence[PreparedLog],
-    features: Sequence[Feature] = FEATURES,
-) -> Gap:
+def gap(planned: PreparedLog, where: Array, logs: Sequence[PreparedLog]) -> Gap:
     """The property of motion for which the logs have least data where the explanations differ.
 
-    where: squared difference (n_test_functions,) on the planned motion. Among properties with
-    equally few data, the one whose range singles out the difference best.
+    where: squared difference (n_test_functions,) on the planned motion.
+    """
+    found, known = properties(planned), [properties(log) for log in logs]
+    data = {name: np.concatenate([one[name] for one in known]) for name in found} if logs else {}
+    name, low, high, share = most_missed(found, where, data)
+    motion = planned.motion
+    units = motion.other_units if name.endswith(OTHER) else motion.units
+    return Gap(units.words(name), units(UNITS[name]), low, high, share)
+
+
+def most_missed(
+    planned: Mapping[str, Array], where: Array, data: Mapping[str, Array]
+) -> tuple[str, float, float, float | None]:
+    """The property by name that data lack most where a difference is, its range, and their share.
+
+    planned, data: by name (n,) and (m,); no data where there are none. where (n,): the squared
+    difference. Among properties with equally few data, the one whose range singles it out best.
     """
     found = []
-    for feature in features:
-        values = feature.of(motion)
+    for name, values in planned.items():
         low, high = _weighted_quantiles(values, where)
-        if not high > 0.0 or feature.at_rest(motion, high):
+        # Of another axis, values up to what a closed loop makes of one at rest are none.
+        own = planned[name.removesuffix(OTHER)].max() if name.endswith(OTHER) else 0.0
+        if not high > 0.0 or high < DUST * own:
             continue
-        share = None
-        if logs:
-            share = _inside(np.concatenate([feature.of(log) for log in logs]), low, high)
+        share = _inside(data[name], low, high) if data else None
         missed = 1.0 if share is None else share + SELDOM
-        merit = missed * _inside(values, low, high)
-        found.append((merit, Gap(*feature.on(motion.motion), low, high, share)))
+        found.append((missed * _inside(values, low, high), (name, low, high, share)))
     return min(found, key=lambda pair: pair[0])[1]
 
 

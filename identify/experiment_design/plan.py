@@ -8,6 +8,7 @@ from pathlib import Path
 
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.preparation import datasets
+from identify.dataset.prepared_log import PreparedLog
 from identify.dataset.test_function import require_test_function
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.variable_projection import usable
@@ -118,51 +119,31 @@ def plan(
     catalogue = usable(catalogue, model)
     progress("preparing the logs and the rivals", 0, 1)
     dataset = _dataset(model, logs or {}, holdout or {}, between, axis, test_function)
-    arena = replace(
-        _arena(model, dataset, bool(logs), between, catalogue, progress),
-        test_function=test_function,
-    )
+    arena = _arena(model, dataset, bool(logs), between, catalogue, test_function, progress)
     effects = {**catalogue, **{r.name: r for r in between if isinstance(r, Effect)}}
     return _planned(arena, duration, VERIFIED, not logs, effects, progress)
 
 
-def next_experiment(
-    found: AxisDiagnosis, model: MachineModel, test_function: float | None = None
-) -> Plan | None:
-    """The experiment that separates the explanations that an ambiguous diagnosis left.
-
-    test_function: length that the diagnosis used, s; None where it was chosen from the noise.
-    Returns None where it left less than two. Raises CannotRun where the machine can run none, and
-    where the model does not say how far its axes may travel.
-    """
-    if found.best is None:
-        return None
-    rivals = _rivals(found)
-    if len(rivals) < 2:
-        return None
-    some = found.dataset.part  # as in a search: all of long logs would tell little more
-    arena = replace(_between_candidates(model, some, rivals), test_function=test_function)
-    return _planned(
-        arena, NEXT_DURATION, NEXT_VERIFIED, False, {c.effect.name: c.effect for c in rivals}
-    )
-
-
 def next_experiments(
-    axes: Mapping[str, AxisDiagnosis], model: MachineModel, test_function: float | None
+    axes: Mapping[str, AxisDiagnosis], model: MachineModel, test_function: float | None = None
 ) -> tuple[dict[str, Plan], dict[str, str]]:
-    """By axis, the experiment that decides an ambiguous diagnosis, and why there is none.
+    """By axis, the experiment that decides an ambiguous diagnosis, or why the machine can run none.
 
-    Both are empty for an axis with nothing to decide. test_function: as in `next_experiment`.
+    Both are empty for an axis where less than two explanations are left. test_function: length that
+    the diagnosis used, s; None where it was chosen from the noise.
     """
     plans, not_planned = {}, {}
     for axis, found in axes.items():
+        rivals = _rivals(found)
+        if len(rivals) < 2:
+            continue
+        some = found.dataset.part  # as in a search: all of long logs would tell little more
+        arena = _between_candidates(model, some, rivals, test_function)
+        effects = {c.effect.name: c.effect for c in rivals}
         try:
-            following = next_experiment(found, model, test_function)
+            plans[axis] = _planned(arena, NEXT_DURATION, NEXT_VERIFIED, False, effects)
         except CannotRun as why:
             not_planned[axis] = str(why)
-        else:
-            if following is not None:
-                plans[axis] = following
     return plans, not_planned
 
 
@@ -245,37 +226,34 @@ def _dataset(
 
 
 def _arena(
-    model: MachineModel,
-    dataset: Dataset,
-    recorded: bool,
-    between: Sequence[Rival],
-    catalogue: Catalogue,
-    progress: Progress,
-) -> Arena:
-    own = model.axes[dataset.axis]
+    model: MachineModel, dataset: Dataset, recorded: bool, between: Sequence[Rival],
+    catalogue: Catalogue, test_function: float | None, progress: Progress,
+) -> Arena:  # fmt: skip
+    own, logs = model.axes[dataset.axis], tuple[PreparedLog, ...]()
     if recorded:
         dataset, base = fit_aligned(own, dataset)
-    logs = dataset.fit if recorded else ()
+        own, logs = base.axis, dataset.fit
+    known: tuple[Explanation, ...] = (Explanation(model.name, own),)
     if between:
         known = explained(between, model, dataset, recorded)
-        return Arena(model, dataset.axis, known, logs)
-    if recorded:
+    elif recorded:
         found = diagnose_axis(base, dataset, catalogue, within(progress, "diagnosis"))
-        own = base.axis
-        if found.best is not None and len(found.ranking) > 1:
-            rivals = _rivals(found)
-            if len(rivals) < 2:
-                # Of one that promised little only a linear step was taken: it is fitted now.
-                rivals = [
-                    c if c.score is not None else try_effect(found.base, found.dataset, c.effect)
-                    for c in found.ranking[:2]
-                ]
-            return _between_candidates(model, dataset, rivals)
-    return Arena(model, dataset.axis, (Explanation(model.name, own),), logs)
+        rivals = _rivals(found)
+        if found.best is not None and len(rivals) < 2 <= len(found.ranking):
+            # Of one that promised little only a linear step was taken: it is fitted now.
+            rivals = [
+                c if c.score is not None else try_effect(found.base, found.dataset, c.effect)
+                for c in found.ranking[:2]
+            ]
+        if len(rivals) > 1:
+            return _between_candidates(model, dataset, rivals, test_function)
+    return Arena(model, dataset.axis, known, logs, test_function)
 
 
 def _rivals(found: AxisDiagnosis) -> list[Candidate]:
     """The effect that is named first and those that are level with it, as they were tried."""
+    if found.best is None:
+        return []
     step = next(
         s for s in reversed(found.steps)
         if isinstance(s.change, Added) and s.change.name == found.named[0]
@@ -286,7 +264,7 @@ def _rivals(found: AxisDiagnosis) -> list[Candidate]:
 
 
 def _between_candidates(
-    model: MachineModel, dataset: Dataset, rivals: Sequence[Candidate]
+    model: MachineModel, dataset: Dataset, rivals: Sequence[Candidate], test_function: float | None
 ) -> Arena:
     known = tuple(Explanation(c.effect.name, c.fit.axis) for c in rivals)
-    return Arena(model, dataset.axis, known, dataset.fit)
+    return Arena(model, dataset.axis, known, dataset.fit, test_function)

@@ -1,7 +1,6 @@
 """Laws of coverage: what the logs lack is where a difference lives and the data do not."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,21 +8,22 @@ from constructed import SHORT, moved, windowed
 
 from identify.dataset.prepared_log import REST_SPEED
 from identify.experiment_design.missing_excitation import (
-    FEATURES,
     RARE,
-    Feature,
+    UNITS,
     Gap,
     gap,
+    most_missed,
+    properties,
 )
 from identify.output.words.plan import gap_in_words
-from twin.model.units import LINEAR
 
 LOG = windowed(SHORT)
-FEATURE = {f.name: f for f in FEATURES}
 
 
-def test_features_are_windowed_properties_of_the_motion():
+def test_properties_are_windowed_means_of_the_motion():
     m, w = SHORT, LOG.test_function
+    found = properties(LOG)
+    assert list(found) == list(UNITS)
     for name, wanted in {
         "speed": np.abs(w.mean(m.velocity)),
         "acceleration": np.abs(LOG.acceleration),
@@ -32,8 +32,7 @@ def test_features_are_windowed_properties_of_the_motion():
         "speed of the other axis": np.abs(w.mean(m.others[1])),
         "acceleration of the other axis": np.abs(w.mean(m.others[2])),
     }.items():
-        found = FEATURE[name].of(LOG)
-        np.testing.assert_allclose(found, wanted, atol=0.01 * np.ptp(wanted))
+        np.testing.assert_allclose(found[name], wanted, atol=0.01 * np.ptp(wanted))
 
 
 def test_a_rest_is_the_time_stood_before_the_motion():
@@ -51,50 +50,35 @@ def test_a_rest_is_the_time_stood_before_the_motion():
             last = stood * motion.period if stood else last
             rest.append(last)
         wanted = np.round(log.test_function.mean(np.array(rest)), 1)
-        np.testing.assert_allclose(FEATURE["rest before the motion"].of(log), wanted)
+        np.testing.assert_allclose(properties(log)["rest before the motion"], wanted)
         assert wanted.max() == pytest.approx(rounded)
-    assert FEATURE["distance since the last reversal"].unit == "m"
 
 
 def test_the_gap_is_where_the_difference_is_and_the_data_are_not():
     planned = windowed(moved(np.random.default_rng(2), 2.0, 1000.0))
-    speed = FEATURE["speed"].of(planned)
+    speed = properties(planned)["speed"]
     where = (speed > np.quantile(speed, 0.8)).astype(float)
     slow = windowed(replace(SHORT, signals=SHORT.signals * [[1.0], [1e-3], [1.0]]))
     found = gap(planned, where, [slow])
-    assert found.feature == "speed"
-    assert found.share == 0.0
+    assert (found.feature, found.share, found.unit) == ("speed", 0.0, "m/s")
     ordered = np.sort(speed[where > 0])
     assert found.low == pytest.approx(np.quantile(ordered, 0.25), rel=0.05)
     assert found.high == pytest.approx(np.quantile(ordered, 0.75), rel=0.05)
     alone = gap(planned, where, [])
-    assert alone.share is None
-    assert alone.feature == "speed"
-    held = gap(planned, np.ones(len(speed)), [planned])
-    assert held.share > 0.4
+    assert (alone.feature, alone.share) == ("speed", None)
+    assert gap(planned, np.ones(len(speed)), [planned]).share > 0.4
 
 
-def test_dust_of_an_axis_at_rest_is_no_motion():
+@pytest.mark.parametrize(("speed", "counts"), [(5e-8, False), (5e-2, True)])
+def test_dust_of_an_axis_at_rest_is_no_motion(speed, counts):
     """Its speed alone tells where the difference is; a loop that settles makes one as small."""
     planned = windowed(moved(np.random.default_rng(2), 2.0, 1000.0))
-    where = np.zeros(len(planned))
-    where[: len(where) // 2] = 1.0
+    where = (np.arange(len(planned)) < len(planned) // 2).astype(float)
+    rests = replace(planned.motion, others=np.zeros_like(planned.motion.others))
     early = planned.time < np.median(planned.time)
-
-    def found_at(speed):
-        rests = replace(planned.motion, others=np.zeros_like(planned.motion.others))
-        log = replace(planned, motion=rests)
-        rests.others[1] = speed * np.interp(rests.time, planned.time, early)
-        return gap(log, where, [windowed(SHORT)])
-
-    assert found_at(5e-8).feature != "speed of the other axis"
-    assert found_at(5e-2).feature == "speed of the other axis"
-
-
-class Windows(dict):
-    """Features by name, of a motion in linear units."""
-
-    motion = SimpleNamespace(units=LINEAR)
+    rests.others[1] = speed * np.interp(rests.time, planned.time, early)
+    found = gap(replace(planned, motion=rests), where, [windowed(SHORT)])
+    assert (found.feature == "speed of the other axis") is counts
 
 
 @pytest.mark.parametrize(
@@ -108,21 +92,17 @@ class Windows(dict):
     ],
 )
 def test_a_gap_weighs_how_much_is_missed_by_how_well_it_tells(inside, shares, wanted):
-    """Windows of the difference have 1 to 2 of a feature, so have some others, and some data."""
-    names = ("a", "b")
+    """Windows of the difference have 1 to 2 of a property, so have some others, and some data."""
+
+    def values(count, first):
+        return np.concatenate([first, np.full(count, 1.5), np.full(100 - count, 9.0)])
+
     ones = np.tile([1.0, 1.5, 1.5, 1.5, 2.0], 2)
-
-    def log(counts, first):
-        parts = [np.concatenate([first, np.full(n, 1.5), np.full(100 - n, 9.0)]) for n in counts]
-        return Windows(zip(names, parts, strict=True), still=np.zeros(len(parts[0])))
-
-    features = [Feature(n, "m", lambda log, n=n: log[n]) for n in ("still", *names)]
-    planned = log([n - 10 for n in inside], ones)
+    planned = {"still": np.zeros(110), **{n: values(i - 10, ones) for n, i in zip("ab", inside)}}  # noqa: B905
+    data = {n: values(count, np.zeros(0)) for n, count in zip("ab", shares, strict=True)}
     where = np.concatenate([np.ones(10), np.zeros(100)])
-    found = gap(planned, where, [log(shares, np.zeros(0))], features)
-    assert found.feature == wanted
-    assert found.share == pytest.approx(shares[names.index(wanted)] / 100.0)
-    assert (found.low, found.high) == (1.5, 1.5)
+    share = shares["ab".index(wanted)] / 100.0
+    assert most_missed(planned, where, data) == (wanted, 1.5, 1.5, pytest.approx(share))
 
 
 def test_a_gap_says_whether_motion_is_missing():
