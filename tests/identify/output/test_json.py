@@ -1,6 +1,6 @@
 """The JSON objects: of every result as they were read, as the schema says.
 
-`PYTHONPATH=tests python tests/identify/output/test_json.py` writes the file anew, to be read before it is kept.
+`PYTHONPATH=tests python tests/identify/output/test_json.py` writes them anew, to be read first.
 """
 
 from __future__ import annotations
