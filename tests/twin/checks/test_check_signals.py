@@ -1,97 +1,54 @@
 """Laws of the low-pass, the lag and the rough dynamics that the checks of a log rest on.
 
 Polynomials pass a symmetric low-pass in closed form; the noise of a linear map is the norm of one
-of its rows, measured with unit impulses; a lag that is put in is the lag that is found.
+of its rows; a lag that is put in is the lag that is found.
 """
 
 import numpy as np
 import pytest
 
 from twin.checks.explain import Smoother, find_lag, fit_dynamics
-from twin.checks.limits import BLOCK, WINDOW
-from twin.signals import white_noise
 
-RATES = (200.0, 1000.0, 1500.0, 4000.0)
+KEPT = np.ones(6000)
 
 
-def middle(smoother: Smoother, count: int) -> np.ndarray:
-    return smoother.time(np.arange(count))
-
-
-@pytest.mark.parametrize("rate", RATES)
-def test_the_window_is_even_of_unit_sum_and_as_long_as_stated(rate):
-    smoother = Smoother(1.0 / rate)
-    assert smoother.samples == max(1, round(BLOCK * rate))
-    assert smoother.block == pytest.approx(smoother.samples / rate)
-    weights = smoother.weights
-    assert weights.sum() == pytest.approx(1.0, rel=1e-14)
-    np.testing.assert_allclose(weights, weights[::-1], rtol=1e-13)
-    assert len(weights) % 2 == 1
-    assert np.all(np.diff(weights)[: len(weights) // 2] > 0.0)
-    assert len(weights) >= 8
-    assert smoother.length == pytest.approx(len(weights) * smoother.block)
-    if rate >= 1000.0:
-        assert abs(smoother.length - WINDOW) <= 1.01 * smoother.block
-
-
-@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("rate", [200.0, 1000.0, 1500.0, 4000.0])
 def test_lines_and_parabolas_pass_in_closed_form(rate):
     """x = a + b t + c t^2: position a + b t, velocity b + 2 c t, acceleration 2 c, at time()."""
     smoother = Smoother(1.0 / rate)
     t = np.arange(round(0.5 * rate) + 3) / rate
     a, b, c = 0.3, -1.7, 2.9
     line, parabola = a + b * t, a + b * t + c * t**2
-    at = middle(smoother, len(smoother.position(line)))
-    np.testing.assert_allclose(smoother.position(line), a + b * at, rtol=1e-11)
-    np.testing.assert_allclose(smoother.velocity(line), b, rtol=1e-9)
-    velocity = smoother.velocity(parabola)
-    np.testing.assert_allclose(velocity, b + 2.0 * c * middle(smoother, len(velocity)), rtol=1e-9)
-    acceleration = smoother.acceleration(parabola)
-    assert len(acceleration) == len(velocity) == len(at)
-    np.testing.assert_allclose(acceleration[1:-1], 2.0 * c, rtol=1e-6)
-    np.testing.assert_allclose(smoother.held(np.full(len(t), 4.5)), 4.5, rtol=1e-12)
-    # a held signal acts from its sample on: over a block its mean is half a sample early
-    np.testing.assert_allclose(smoother.held(line), a + b * (at - 0.5 / rate), rtol=1e-10)
-    np.testing.assert_allclose(smoother.rate(line), a + b * at, rtol=1e-10)
-    assert len(smoother.held(line)) == len(smoother.rate(line)) == len(at)
+    at = smoother.time(np.arange(len(smoother.position(line))))
+    for found, wanted in (
+        (smoother.position(line), a + b * at),
+        (smoother.velocity(parabola), b + 2.0 * c * at),
+        (smoother.acceleration(parabola)[1:-1], np.full(len(at) - 2, 2.0 * c)),
+        # a held signal acts from its sample on: over a block its mean is half a sample early
+        (smoother.held(line), a + b * (at - 0.5 / rate)),
+        (smoother.rate(line), a + b * at),
+        (smoother.direction(b * t, 0.1), np.full(len(at), np.tanh(b / 0.1))),
+    ):
+        assert len(found) == len(wanted)
+        np.testing.assert_allclose(found, wanted, rtol=1e-6)
 
 
-def test_the_direction_is_odd_and_full_at_speed():
-    smoother = Smoother(1e-3)
-    t = np.arange(200) * 1e-3
-    for speed in (0.05, 2.0):
-        forward = smoother.direction(speed * t, 0.1)
-        np.testing.assert_allclose(forward, np.tanh(speed / 0.1), rtol=1e-9)
-        np.testing.assert_allclose(smoother.direction(-speed * t, 0.1), -forward, rtol=1e-9)
-
-
-@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("rate", [200.0, 1500.0])
 def test_noise_is_the_norm_of_what_unit_impulses_give(rate):
     smoother = Smoother(1.0 / rate)
-    count = 6 * len(smoother.weights) * smoother.samples + 1
-    unit = np.eye(count)
+    unit = np.eye(6 * len(smoother.weights) * smoother.samples + 1)
     for transform, noise in (
         (smoother.velocity, smoother.velocity_noise),
         (smoother.acceleration, smoother.acceleration_noise),
         (smoother.held, smoother.held_noise),
     ):
-        response = np.array([transform(row) for row in unit[:, :]])
+        response = np.array([transform(row) for row in unit])
         row = response[:, response.shape[1] // 2]
         assert noise(3.0) == pytest.approx(3.0 * np.linalg.norm(row), rel=1e-9)
 
 
-def test_white_noise_is_measured_and_smooth_motion_is_not_noise():
-    rng = np.random.default_rng(5)
-    noise = rng.standard_normal(40_000)
-    assert white_noise(0.7 * noise) == pytest.approx(0.7, rel=0.02)
-    t = np.arange(40_000) / 1000.0
-    assert white_noise(0.7 * noise + 3.0 + 2.0 * t - t**3) == pytest.approx(0.7, rel=0.02)
-    assert white_noise(t**3) < 1e-9
-
-
 def signals(lag_blocks: float, noise: float = 0.0):
     """A signal that follows two regressors so many blocks late."""
-    rng = np.random.default_rng(6)
     k = np.arange(6000.0)
 
     def motion(at: np.ndarray) -> np.ndarray:
@@ -101,37 +58,33 @@ def signals(lag_blocks: float, noise: float = 0.0):
         ])  # fmt: skip
 
     signal = motion(k - lag_blocks) @ np.array([2.0, -3.0]) + 5.0
-    return signal + noise * rng.standard_normal(len(k)), motion(k)
+    return signal + noise * np.random.default_rng(6).standard_normal(len(k)), motion(k)
 
 
 @pytest.mark.parametrize("lag", [-200.0, -30.5, -1.0, -0.3, 0.0, 2.25, 17.0, 150.0])
 @pytest.mark.parametrize("block", [1e-3, 5e-4])
 def test_the_lag_put_in_is_the_lag_found_to_a_tenth_of_a_block(lag, block):
     signal, regressors = signals(lag)
-    found = find_lag(signal, regressors, np.ones(len(signal)), block)
+    found = find_lag(signal, regressors, KEPT, block)
     assert found.seconds == pytest.approx(lag * block, abs=0.1 * block)
     assert found.clear == (abs(lag) >= 1.0)  # a lag of 0.3 leaves less than 3 % of the signal
     # neither scale nor offset of the signals matter
-    scaled = find_lag(-3.0 * signal + 100.0, 7.0 * regressors, np.ones(len(signal)), block)
+    scaled = find_lag(-3.0 * signal + 100.0, 7.0 * regressors, KEPT, block)
     assert scaled.seconds == pytest.approx(found.seconds, abs=1e-6 * block)
     assert scaled.clear == found.clear
 
 
-def test_a_lag_longer_than_is_searched_or_drowned_in_noise_is_not_clear():
-    signal, regressors = signals(40.0)
-    kept = np.ones(len(signal))
-    assert find_lag(signal, regressors, kept, 1e-3).clear
-    assert not find_lag(signal, regressors, kept, 0.02).clear  # 0.25 s are 12 blocks of these
-    noisy, _ = signals(40.0, noise=3.0)
-    assert not find_lag(noisy, regressors, kept, 1e-3).clear
-
-
-def wave(angle: float, noise: float):
-    """A sine that is late by an angle, with white noise that is a part of the whole."""
-    k = np.arange(6000.0)
-    rms = noise / np.sqrt(1.0 - noise**2) * 0.5**0.5
-    signal = np.sin(0.05 * k - angle) + rms * np.random.default_rng(1).standard_normal(6000)
-    return find_lag(signal, np.sin(0.05 * k)[:, None], np.ones(6000), 1e-3)
+@pytest.mark.parametrize(
+    ("lag", "noise", "block", "clear"),
+    [
+        (40.0, 0.0, 1e-3, True),
+        (40.0, 0.0, 0.02, False),  # 0.25 s are 12 blocks of these
+        (250.0, 0.0, 1e-3, False),  # at the end of what is searched
+        (40.0, 3.0, 1e-3, False),
+    ],
+)
+def test_a_lag_longer_than_is_searched_or_drowned_in_noise_is_not_clear(lag, noise, block, clear):
+    assert find_lag(*signals(lag, noise), KEPT, block).clear is clear
 
 
 @pytest.mark.parametrize(
@@ -149,14 +102,18 @@ def wave(angle: float, noise: float):
     ],
 )
 def test_a_lag_is_clear_where_it_explains_much_and_much_more_than_none(angle, noise, clear):
-    found = wave(angle, noise)
+    """A sine that is late by an angle, with white noise that is a part of the whole."""
+    k = np.arange(6000.0)
+    rms = noise / np.sqrt(1.0 - noise**2) * 0.5**0.5
+    signal = np.sin(0.05 * k - angle) + rms * np.random.default_rng(1).standard_normal(6000)
+    found = find_lag(signal, np.sin(0.05 * k)[:, None], KEPT, 1e-3)
     assert found.clear is clear
     if noise < 0.01:
         assert found.seconds == pytest.approx(angle / 0.05 * 1e-3, abs=2e-5)
 
 
-@pytest.mark.parametrize("late", [-1.5, -0.5, 0.4, 0.5, 1.5, 2.5])
-@pytest.mark.parametrize("speed", [0.031, 0.05, 0.083])
+@pytest.mark.parametrize("late", [-1.5, -0.5, 0.4, 1.5, 2.5])
+@pytest.mark.parametrize("speed", [0.031, 0.083])
 def test_a_sine_is_late_by_the_least_that_explains_it_though_half_a_period_does_too(late, speed):
     """Between two samples neither of them is exact, where half a period later one may be."""
     k = np.arange(4000.0)
@@ -165,29 +122,23 @@ def test_a_sine_is_late_by_the_least_that_explains_it_though_half_a_period_does_
     assert found.seconds == pytest.approx(late * 1e-3, abs=2e-5)
 
 
-def test_a_signal_that_fits_best_at_the_longest_lag_has_none():
-    signal, regressors = signals(250.0)
-    found = find_lag(signal, regressors, np.ones(len(signal)), 1e-3)
-    assert (found.seconds, found.clear) == (0.0, False)
-
-
 def test_samples_that_are_not_kept_do_not_tell():
     signal, regressors = signals(25.0)
-    spoilt, kept = regressors.copy(), np.ones(len(signal))
-    spoilt[2000:2300] += 50.0
+    kept = KEPT.copy()
+    regressors[2000:2300] += 50.0
     kept[2000:2300] = 0.0
-    found = find_lag(signal, spoilt, kept, 1e-3)
+    found = find_lag(signal, regressors, kept, 1e-3)
     assert (found.seconds, found.clear) == (pytest.approx(0.025, abs=1e-4), True)
 
 
 def motion_and_force(noise: float, mass: float = 3.5):
-    rng = np.random.default_rng(7)
     k = np.arange(2000.0)
     regressors = np.column_stack([
         4.0 * np.sin(0.05 * k), 0.8 * np.cos(0.05 * k), np.sign(np.cos(0.05 * k)), np.ones(2000)
     ])  # fmt: skip
     clean = regressors @ np.array([mass, 1.2, 2.0, -0.7])
-    return regressors, clean + noise * np.std(clean) * rng.standard_normal(2000)
+    white = np.random.default_rng(7).standard_normal(2000)
+    return regressors, clean + noise * np.std(clean) * white
 
 
 def test_gains_are_those_put_in_whatever_a_few_samples_say():
@@ -197,22 +148,24 @@ def test_gains_are_those_put_in_whatever_a_few_samples_say():
     kept = np.ones(2000)
     kept[100:130] = 0.0
     fit = fit_dynamics(force, regressors, kept, 11)
-    assert fit.mass == pytest.approx(3.5, rel=1e-9)
-    assert fit.first == 11
+    assert (fit.mass, fit.first) == (pytest.approx(3.5, rel=1e-9), 11)
     np.testing.assert_allclose(fit.residual[700:720], 500.0, rtol=1e-6)
-    reversed_fit = fit_dynamics(-force, regressors, kept, 0)
-    assert reversed_fit.mass == pytest.approx(-3.5, rel=1e-9)
+    assert fit_dynamics(-force, regressors, kept, 0).mass == pytest.approx(-3.5, rel=1e-9)
     assert fit_dynamics(force[:90], 0.0 * regressors[:90], kept[:90], 0).mass == 0.0
 
 
-@pytest.mark.parametrize(("noise", "explains"), [(0.2, True), (0.6, False)])
-def test_a_model_explains_where_little_is_left(noise, explains):
-    regressors, force = motion_and_force(noise)
-    assert fit_dynamics(force, regressors, np.ones(2000), 0).explains is explains
-
-
-@pytest.mark.parametrize("mass", [0.05, 0.15, 0.6, 3.5])
-def test_mass_matters_where_its_part_of_the_command_is_three_tenths(mass):
-    regressors, force = motion_and_force(0.0, mass)
-    share = np.std(mass * regressors[:, 0]) / np.std(force)
-    assert fit_dynamics(force, regressors, np.ones(2000), 0).mass_matters == (share > 0.3)
+@pytest.mark.parametrize(
+    ("noise", "mass", "explains", "matters"),
+    [(0.2, 3.5, True, True), (0.6, 3.5, False, True), (0.0, 0.05, True, False),
+     (0.0, 0.15, True, False), (0.0, 0.6, True, True)],
+)  # fmt: skip
+def test_a_model_explains_where_little_is_left_and_mass_matters_from_three_tenths_on(
+    noise, mass, explains, matters
+):
+    regressors, force = motion_and_force(noise, mass)
+    fit = fit_dynamics(force, regressors, np.ones(2000), 0)
+    assert fit.explains is explains
+    if not noise:
+        assert (
+            fit.mass_matters == (np.std(mass * regressors[:, 0]) / np.std(force) > 0.3) == matters
+        )
