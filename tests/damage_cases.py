@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -126,6 +126,20 @@ def spoilt(case: Case, *chunks: int) -> bytes:
     for number in chunks:
         data[case.chunks[number].end - 20] ^= 0x40
     return bytes(data)
+
+
+def without(case: Case, data: bytes, gone: set[int]) -> Case:
+    """Changed bytes of the log less some chunks, and where in them the others are."""
+    cuts = [case.chunks[number] for number in sorted(gone)]
+    left = bytearray(data)
+    for chunk in reversed(cuts):
+        del left[chunk.start : chunk.end]
+    moved = []
+    for number, chunk in enumerate(case.chunks):
+        shift = sum(c.end - c.start for c in cuts if c.start < chunk.start)
+        place = (-1, -1) if number in gone else (chunk.start - shift, chunk.end - shift)
+        moved.append(replace(chunk, start=place[0], end=place[1]))
+    return Case(bytes(left), moved)
 
 
 def flipped(data: bytes, *places: int, mask: int = 1) -> bytes:

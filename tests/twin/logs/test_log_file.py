@@ -1,7 +1,7 @@
 """The written file: every number in it is what a recount of the bytes gives.
 
-The file is taken apart with ``struct`` and the stock record classes; checksums, offsets, counts and
-times are computed anew, times with exact fractions. What is read of it is what was written.
+The stock reader takes it apart; checksums, offsets, counts and times are computed anew, times with
+exact fractions. What is read of it is what was written.
 """
 
 import tracemalloc
@@ -12,21 +12,16 @@ from io import BytesIO
 import numpy as np
 import pytest
 import zstandard
-from google.protobuf.descriptor_pb2 import FileDescriptorSet
-from google.protobuf.message_factory import GetMessages
 from log_cases import assert_same_log, two_axes, write_together
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import (
-    Attachment,
     AttachmentIndex,
     Channel,
     Chunk,
     ChunkIndex,
     DataEnd,
     Footer,
-    Header,
     MessageIndex,
-    Metadata,
     MetadataIndex,
     Schema,
     Statistics,
@@ -41,7 +36,6 @@ from mcap_bytes import (
     DATA_END,
     FOOTER,
     HEADER,
-    MESSAGE,
     MESSAGE_INDEX,
     METADATA,
     METADATA_INDEX,
@@ -53,6 +47,7 @@ from mcap_bytes import (
     pieces,
     records,
 )
+from mcap_protobuf.decoder import DecoderFactory
 
 from twin.logs import FIELDS, ROTARY_UNITS, AxisLog, Log, read_log, write_log
 
@@ -106,31 +101,21 @@ def exact(k: int, rate: float) -> int:
     return round(Fraction(k * 10**9) / Fraction(rate))
 
 
-def test_the_checksums_are_those_of_the_bytes(data):
-    end = of(data, DATA_END)[0]
-    assert parsed(DataEnd, end).data_section_crc == zlib.crc32(data[: end.start]) != 0
-    footer_piece = of(data, FOOTER)[0]
-    footer = parsed(Footer, footer_piece)
-    assert footer.summary_start == end.end
-    assert footer.summary_crc == zlib.crc32(data[end.end : footer_piece.end - 4]) != 0
-    for piece in of(data, CHUNK):
-        chunk = parsed(Chunk, piece)
-        assert chunk.uncompressed_crc == zlib.crc32(payload(chunk)) != 0
-        assert chunk.uncompressed_size == len(payload(chunk))
-    for body in (p.body for p in of(data, ATTACHMENT)):
-        assert int.from_bytes(body[-4:], "little") == zlib.crc32(body[:-4])
-
-
-def test_the_sections_follow_each_other_as_the_format_orders(data):
+def test_the_sections_follow_each_other_with_the_checksums_of_their_bytes(data):
     count = -(-COUNT // PER_CHUNK)
     assert [p.opcode for p in records(data)] == [
         HEADER, METADATA, *[ATTACHMENT] * 3, *[CHUNK, MESSAGE_INDEX] * count * 4, DATA_END,
         *[SCHEMA] * 3, *[CHANNEL] * 4, STATISTICS, *[CHUNK_INDEX] * count * 4,
         *[ATTACHMENT_INDEX] * 3, METADATA_INDEX, *[SUMMARY_OFFSET] * 6, FOOTER,
     ]  # fmt: skip
-    assert parsed(Header, of(data, HEADER)[0]).library.startswith("proton-twin ")
-    footer = parsed(Footer, of(data, FOOTER)[0])
+    end, behind = of(data, DATA_END)[0], of(data, FOOTER)[0]
+    footer = parsed(Footer, behind)
+    assert parsed(DataEnd, end).data_section_crc == zlib.crc32(data[: end.start]) != 0
+    assert footer.summary_crc == zlib.crc32(data[end.end : behind.end - 4]) != 0
+    for body in (p.body for p in of(data, ATTACHMENT)):
+        assert int.from_bytes(body[-4:], "little") == zlib.crc32(body[:-4])
     place = footer.summary_start
+    assert place == end.end
     for offset in (parsed(SummaryOffset, p) for p in of(data, SUMMARY_OFFSET)):
         assert offset.group_start == place
         place += offset.group_length
@@ -146,24 +131,22 @@ def test_every_chunk_holds_one_topic_can_be_read_alone_and_is_indexed(data):
     indexes = [parsed(ChunkIndex, p) for p in of(data, CHUNK_INDEX)]
     for index, piece, content in zip(indexes, of(data, CHUNK), in_chunks(data), strict=True):
         chunk, (schema, channel, *sent) = parsed(Chunk, piece), content
+        assert chunk.uncompressed_crc == zlib.crc32(payload(chunk)) != 0
         messages = [parsed_message(p) for p in sent]
         (number,) = {m.channel_id for m in messages}
         assert channel.body == channels[number]
         assert schema.body == schemas[parsed(Channel, channel).schema_id]
         behind = everything[everything.index(piece) + 1]
+        times = chunk.message_start_time, chunk.message_end_time
+        assert times == (messages[0].log_time, messages[-1].log_time)
         assert index == ChunkIndex(
-            chunk_length=piece.end - piece.start,
-            chunk_start_offset=piece.start,
-            compression=chunk.compression,
-            compressed_size=len(chunk.data),
-            message_end_time=max(m.log_time for m in messages),
+            chunk_length=piece.end - piece.start, chunk_start_offset=piece.start,
+            compression=chunk.compression, compressed_size=len(chunk.data),
+            message_start_time=times[0], message_end_time=times[1],
             message_index_length=behind.end - piece.end,
             message_index_offsets={number: behind.start},
-            message_start_time=min(m.log_time for m in messages),
             uncompressed_size=len(payload(chunk)),
-        )
-        times = chunk.message_start_time, chunk.message_end_time
-        assert times == (index.message_start_time, index.message_end_time)
+        )  # fmt: skip
         entries = [(m.log_time, p.start) for m, p in zip(messages, sent, strict=True)]
         assert parsed(MessageIndex, behind) == MessageIndex(number, entries)
         order.append((number, len(messages)))
@@ -172,50 +155,48 @@ def test_every_chunk_holds_one_topic_can_be_read_alone_and_is_indexed(data):
 
 
 def test_every_message_has_its_number_exact_time_and_each_value_in_its_own_field(data):
-    """Field numbers are those the file format promises, not those of one program."""
-    schemas = {s.id: s for s in (parsed(Schema, p) for p in of(data, SCHEMA))}
-    channels = {c.id: c for c in (parsed(Channel, p) for p in of(data, CHANNEL))}
+    """Field numbers are those the file format promises; equal axes share one schema."""
     wanted = {f"/axis/{n}": a.columns for n, a in LOG.axes.items()} | {"/truth/x": LOG.truth["x"]}
-    assert [c.topic for c in channels.values()] == list(wanted)
-    sent: dict[int, list] = {}
-    for piece in (p for content in in_chunks(data) for p in content if p.opcode == MESSAGE):
-        sent.setdefault(parsed_message(piece).channel_id, []).append(parsed_message(piece))
-    counts = {number: len(own) for number, own in sent.items()}
+    found: dict[str, list] = {topic: [] for topic in wanted}
+    reader = make_reader(BytesIO(data), validate_crcs=True, decoder_factories=[DecoderFactory()])
+    for schema, channel, message, sample in reader.iter_decoded_messages():
+        k, columns = len(found[channel.topic]), wanted[channel.topic]
+        names = TRUTH if channel.topic == "/truth/x" else FIELDS
+        assert schema.name == ("twin.AxisTruth" if names is TRUTH else "twin.AxisSample")
+        numbers = {f.name: f.number for f in sample.DESCRIPTOR.fields}
+        assert numbers == {n: names.index(n) + FIRST_NUMBER for n in columns}
+        assert {n: getattr(sample, n) for n in columns} == {n: c[k] for n, c in columns.items()}
+        found[channel.topic].append((message.sequence, message.log_time, message.publish_time))
+    rows = [(k, exact(k, RATE), exact(k, RATE)) for k in range(COUNT)]
+    assert found == dict.fromkeys(wanted, rows)
+    channels = [parsed(Channel, p) for p in of(data, CHANNEL)]
+    assert [(c.id, c.schema_id, c.topic) for c in channels] == [
+        (k, of, topic) for k, of, topic in zip((1, 2, 3, 4), (1, 2, 2, 3), wanted, strict=True)
+    ]
     assert parsed(Statistics, of(data, STATISTICS)[0]) == Statistics(
-        attachment_count=3, channel_count=4, channel_message_counts=counts,
+        attachment_count=3, channel_count=4,
+        channel_message_counts=dict.fromkeys(range(1, 5), COUNT),
         chunk_count=len(of(data, CHUNK)), message_count=4 * COUNT, metadata_count=1,
         message_end_time=exact(COUNT - 1, RATE), message_start_time=0, schema_count=3,
     )  # fmt: skip
-    for number, messages in sent.items():
-        assert [m.sequence for m in messages] == list(range(COUNT))
-        times = [exact(k, RATE) for k in range(COUNT)]
-        assert [m.log_time for m in messages] == [m.publish_time for m in messages] == times
-        schema, columns = schemas[channels[number].schema_id], wanted[channels[number].topic]
-        names = TRUTH if channels[number].topic == "/truth/x" else FIELDS
-        assert schema.name == ("twin.AxisTruth" if names is TRUTH else "twin.AxisSample")
-        kind = GetMessages(FileDescriptorSet.FromString(schema.data).file)[schema.name]
-        numbers = {f.name: f.number for f in kind.DESCRIPTOR.fields}
-        assert numbers == {n: names.index(n) + FIRST_NUMBER for n in columns}
-        for k, message in enumerate(messages):
-            sample = kind.FromString(message.data)
-            assert {n: getattr(sample, n) for n in columns} == {n: c[k] for n, c in columns.items()}
 
 
 def test_metadata_attachments_and_channels_say_what_the_log_holds(data):
-    attachments = [(p, parsed(Attachment, p)) for p in of(data, ATTACHMENT)]
-    assert {a.name: a.data for _, a in attachments} == LOG.attachments
-    assert {(a.log_time, a.create_time) for _, a in attachments} == {(0, 0)}
-    types = [a.media_type for _, a in attachments]
+    reader = make_reader(BytesIO(data), validate_crcs=True)
+    attachments = list(reader.iter_attachments())
+    assert {a.name: a.data for a in attachments} == LOG.attachments
+    assert {(a.log_time, a.create_time) for a in attachments} == {(0, 0)}
+    types = [a.media_type for a in attachments]
     assert types == ["application/toml", "application/xml", "application/octet-stream"]
     assert [parsed(AttachmentIndex, p) for p in of(data, ATTACHMENT_INDEX)] == [
         AttachmentIndex(p.start, p.end - p.start, 0, 0, len(a.data), a.name, a.media_type)
-        for p, a in attachments
+        for p, a in zip(of(data, ATTACHMENT), attachments, strict=True)
     ]
-    metadata = of(data, METADATA)[0]
+    place = of(data, METADATA)[0]
     assert [parsed(MetadataIndex, p) for p in of(data, METADATA_INDEX)] == [
-        MetadataIndex(metadata.start, metadata.end - metadata.start, "twin")
+        MetadataIndex(place.start, place.end - place.start, "twin")
     ]
-    entries = parsed(Metadata, metadata).metadata
+    (entries,) = [m.metadata for m in reader.iter_metadata()]
     proof = entries.pop("checksum")
     assert entries == {
         "source": "a test", "schema_version": "1", "sample_rate_hz": "3000.0", "axes": "x,y,z",
@@ -231,16 +212,9 @@ def test_metadata_attachments_and_channels_say_what_the_log_holds(data):
     assert channels[3] == {"axis": "x", "sample_rate_hz": "3000.0", "unit.position": "m"}
 
 
-def test_equal_axes_share_one_schema(data):
-    assert [parsed(Schema, p).id for p in of(data, SCHEMA)] == [1, 2, 3]
-    found = [(parsed(Channel, p).id, parsed(Channel, p).schema_id) for p in of(data, CHANNEL)]
-    assert found == [(1, 1), (2, 2), (3, 2), (4, 3)]
-
-
 def test_stock_readers_accept_every_checksum_and_find_samples_by_time(data):
-    for reader in (make_reader(BytesIO(data), validate_crcs=True),
-                   NonSeekingReader(BytesIO(data), validate_crcs=True)):  # fmt: skip
-        assert sum(1 for _ in reader.iter_messages()) == 4 * COUNT
+    reader = NonSeekingReader(BytesIO(data), validate_crcs=True)
+    assert sum(1 for _ in reader.iter_messages()) == 4 * COUNT
     last = make_reader(BytesIO(data)).iter_messages("/axis/y", starting_at=exact(COUNT - 1, RATE))
     assert [m.sequence for _, _, m in last] == [COUNT - 1]
 

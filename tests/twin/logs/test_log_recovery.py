@@ -25,6 +25,7 @@ from damage_cases import (
     runs_without,
     samples_of,
     spoilt,
+    without,
     written,
 )
 from log_cases import assert_same_log, assert_same_samples, two_axes, write_together
@@ -43,48 +44,31 @@ def intact(tmp_path_factory) -> Case:
     return case
 
 
-PAIRS = [(i, j) for i in range(CHUNKS) for j in range(i, CHUNKS)]
+PAIRS = [{i, j} for i in range(CHUNKS) for j in range(i, CHUNKS)]
+DAMAGE = [
+    *((pair, set()) for pair in PAIRS),
+    *((set(), pair) for pair in PAIRS),
+    *(({a}, {b}) for a in range(CHUNKS) for b in range(CHUNKS) if a != b),
+]
 
 
-@pytest.mark.parametrize("chunks", PAIRS, ids=str)
-def test_kept_left_out_and_damaged_are_all_samples(tmp_path, intact, chunks):
-    _, recovery = recovered(tmp_path / "a.mcap", spoilt(intact, *set(chunks)))
-    got = account(intact, recovery)
-    runs = runs_without(*chunks)
-    assert got.damaged == samples_of(*chunks)
+@pytest.mark.parametrize(("bad", "gone"), DAMAGE, ids=str)
+def test_kept_left_out_and_damaged_are_all_samples(tmp_path, intact, bad, gone):
+    """Of chunks that are gone message indexes and summary still speak."""
+    changed = without(intact, spoilt(intact, *bad), gone)
+    _, recovery = recovered(tmp_path / "a.mcap", changed.data)
+    got = account(changed, recovery)
+    runs = runs_without(*bad, *gone)
+    assert samples_of(*bad) <= got.damaged
+    assert got.all == set(range(COUNT)), recovery.lost
     assert len(got.kept) == max(len(r) for r in runs)
     runs.remove(got.kept)
     assert sorted(got.left_out, key=min) == runs
     assert len(recovery.others) == len(runs)
-    gaps = len(set(chunks)) - (chunks[1] == chunks[0] + 1)
-    assert len(recovery.lost) == len(set(chunks)) + len(runs) + gaps
-
-
-@pytest.mark.parametrize("chunks", PAIRS, ids=str)
-def test_chunks_that_are_gone_are_told(tmp_path, intact, chunks):
-    """Message indexes and summary still speak of them."""
-    data = bytearray(intact.data)
-    for number in sorted(set(chunks), reverse=True):
-        del data[intact.chunks[number].start : intact.chunks[number].end]
-    _, recovery = recovered(tmp_path / "a.mcap", bytes(data))
-    got = account(intact, recovery)
-    runs = runs_without(*chunks)
-    assert len(got.kept) == max(len(r) for r in runs)
-    runs.remove(got.kept)
-    assert sorted(got.left_out, key=min) == runs
-    assert got.all == set(range(COUNT)), recovery.lost
-
-
-@pytest.mark.parametrize(("gone", "bad"), [(a, b) for a in range(5) for b in range(5) if a != b])
-def test_one_chunk_gone_and_one_damaged_are_both_told(tmp_path, intact, gone, bad):
-    data = bytearray(spoilt(intact, bad))
-    del data[intact.chunks[gone].start : intact.chunks[gone].end]
-    _, recovery = recovered(tmp_path / "a.mcap", bytes(data))
-    shift = intact.chunks[gone].end - intact.chunks[gone].start if bad > gone else 0
-    place = intact.chunks[bad].start - shift
-    assert any(f"chunk at byte {place}:" in loss for loss in recovery.lost)
-    told = account(Case(intact.data, []), recovery).all
-    assert told | samples_of(bad) == set(range(COUNT)), recovery.lost
+    if not gone:
+        assert got.damaged == samples_of(*bad)
+        gaps = len(bad) - (max(bad) == min(bad) + 1)
+        assert len(recovery.lost) == len(bad) + len(runs) + gaps
 
 
 @pytest.mark.parametrize("number", range(CHUNKS - 1))
@@ -132,15 +116,6 @@ def test_a_bit_flipped_in_any_kind_of_record_is_told_and_costs_its_chunk_at_most
         data = flipped(intact.data, place % len(intact.data), mask=4)
         _, recovery = recovered(tmp_path / "a.mcap", data)
         assert account(intact, recovery).kept == set(range(COUNT))
-
-
-@pytest.mark.parametrize("chunks", [(0, 1), (0, 3), (1, 3), (2, 4)], ids=str)
-def test_two_lengths_that_are_damaged_are_two_places(tmp_path, intact, chunks):
-    places = [intact.chunks[c].start + 4 for c in chunks]
-    _, recovery = recovered(tmp_path / "a.mcap", flipped(intact.data, *places, mask=0x10))
-    ranges = re.findall(r"bytes (\d+) to (\d+): ", " ".join(recovery.lost))
-    for place in places:
-        assert any(int(a) <= place <= int(b) for a, b in ranges), recovery.lost
 
 
 def test_each_extra_that_is_damaged_is_named_and_the_others_are_kept(tmp_path, intact):
