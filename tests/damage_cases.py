@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap_bytes import CHUNK, MESSAGE_INDEX, Piece, records
+from mcap.opcode import Opcode
+from mcap_bytes import Piece, records
 
 from twin.errors import InputError
 from twin.logs import AxisLog, Log, Recovery, read_log, recover_log, write_log
@@ -35,12 +36,12 @@ class Case:
     @property
     def chunks(self) -> list[Piece]:
         """Its chunk records."""
-        return [r for r in self.records if r.opcode == CHUNK]
+        return [r for r in self.records if r.opcode == Opcode.CHUNK]
 
     def behind(self, number: int) -> int:
         """End of the message indexes behind a chunk."""
         following = [r for r in self.records if r.start >= self.chunks[number].end]
-        return next(r.start for r in following if r.opcode != MESSAGE_INDEX)
+        return next(r.start for r in following if r.opcode != Opcode.MESSAGE_INDEX)
 
 
 def written(path: Path) -> Case:

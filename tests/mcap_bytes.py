@@ -24,9 +24,6 @@ from mcap.records import (
 )
 
 MAGIC = b"\x89MCAP0\r\n"
-HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
-ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA = range(9, 13)
-METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(13, 16)
 
 
 @dataclass(frozen=True)
@@ -55,6 +52,11 @@ def records(data: bytes) -> list[Piece]:
     """All records of a file."""
     assert data[:8] == data[-8:] == MAGIC
     return pieces(data, 8, len(data) - 8)
+
+
+def of(data: bytes, opcode: int) -> list[Piece]:
+    """The records of a kind."""
+    return [piece for piece in records(data) if piece.opcode == opcode]
 
 
 def parsed(kind: type, piece: Piece):

@@ -14,7 +14,8 @@ from google.protobuf.descriptor_pb2 import FileDescriptorProto
 from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.message_factory import GetMessageClass
 from import_cases import mapping
-from mcap_bytes import CHUNK, records
+from mcap.opcode import Opcode
+from mcap_bytes import of
 
 from twin.errors import InputError
 from twin.importers import import_log
@@ -226,7 +227,7 @@ force = {column = "/drive.f[1]", unit = "N"}
 """
     assert_signals(imported(tmp_path, "a.mcap", text))
     intact = (tmp_path / "a.mcap").read_bytes()
-    chunk = [r.start for r in records(intact) if r.opcode == CHUNK][2]
+    chunk = [r.start for r in of(intact, Opcode.CHUNK)][2]
     # A record of an unknown kind is passed over, so that a chunk may be gone without a word.
     for place, bit, why in ((chunk + 60, 1, "chunk at byte"), (chunk, 128, "messages where")):
         data = bytearray(intact)

@@ -13,40 +13,10 @@ import numpy as np
 import pytest
 import zstandard
 from log_cases import assert_same_log, two_axes, write_together
+from mcap import records as kinds
+from mcap.opcode import Opcode
 from mcap.reader import NonSeekingReader, make_reader
-from mcap.records import (
-    AttachmentIndex,
-    Channel,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    MessageIndex,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
-from mcap_bytes import (
-    ATTACHMENT,
-    ATTACHMENT_INDEX,
-    CHANNEL,
-    CHUNK,
-    CHUNK_INDEX,
-    DATA_END,
-    FOOTER,
-    HEADER,
-    MESSAGE_INDEX,
-    METADATA,
-    METADATA_INDEX,
-    SCHEMA,
-    STATISTICS,
-    SUMMARY_OFFSET,
-    parsed,
-    parsed_message,
-    pieces,
-    records,
-)
+from mcap_bytes import of, parsed, parsed_message, pieces, records
 from mcap_protobuf.decoder import DecoderFactory
 
 from twin.logs import FIELDS, ROTARY_UNITS, AxisLog, Log, read_log, write_log
@@ -83,17 +53,13 @@ def data(tmp_path_factory) -> bytes:
     return path.read_bytes()
 
 
-def of(data: bytes, opcode: int):
-    return [p for p in records(data) if p.opcode == opcode]
-
-
-def payload(chunk: Chunk) -> bytes:
+def payload(chunk: kinds.Chunk) -> bytes:
     return zstandard.ZstdDecompressor().decompress(chunk.data)
 
 
 def in_chunks(data: bytes) -> list[list]:
     """The records in every chunk, chunk by chunk."""
-    contents = [payload(parsed(Chunk, p)) for p in of(data, CHUNK)]
+    contents = [payload(parsed(kinds.Chunk, p)) for p in of(data, Opcode.CHUNK)]
     return [pieces(content, 0, len(content)) for content in contents]
 
 
@@ -104,42 +70,44 @@ def exact(k: int, rate: float) -> int:
 def test_the_sections_follow_each_other_with_the_checksums_of_their_bytes(data):
     count = -(-COUNT // PER_CHUNK)
     assert [p.opcode for p in records(data)] == [
-        HEADER, METADATA, *[ATTACHMENT] * 3, *[CHUNK, MESSAGE_INDEX] * count * 4, DATA_END,
-        *[SCHEMA] * 3, *[CHANNEL] * 4, STATISTICS, *[CHUNK_INDEX] * count * 4,
-        *[ATTACHMENT_INDEX] * 3, METADATA_INDEX, *[SUMMARY_OFFSET] * 6, FOOTER,
+        Opcode.HEADER, Opcode.METADATA, *[Opcode.ATTACHMENT] * 3,
+        *[Opcode.CHUNK, Opcode.MESSAGE_INDEX] * count * 4, Opcode.DATA_END, *[Opcode.SCHEMA] * 3,
+        *[Opcode.CHANNEL] * 4, Opcode.STATISTICS, *[Opcode.CHUNK_INDEX] * count * 4,
+        *[Opcode.ATTACHMENT_INDEX] * 3, Opcode.METADATA_INDEX, *[Opcode.SUMMARY_OFFSET] * 6,
+        Opcode.FOOTER,
     ]  # fmt: skip
-    end, behind = of(data, DATA_END)[0], of(data, FOOTER)[0]
-    footer = parsed(Footer, behind)
-    assert parsed(DataEnd, end).data_section_crc == zlib.crc32(data[: end.start]) != 0
+    end, behind = of(data, Opcode.DATA_END)[0], of(data, Opcode.FOOTER)[0]
+    footer = parsed(kinds.Footer, behind)
+    assert parsed(kinds.DataEnd, end).data_section_crc == zlib.crc32(data[: end.start]) != 0
     assert footer.summary_crc == zlib.crc32(data[end.end : behind.end - 4]) != 0
-    for body in (p.body for p in of(data, ATTACHMENT)):
+    for body in (p.body for p in of(data, Opcode.ATTACHMENT)):
         assert int.from_bytes(body[-4:], "little") == zlib.crc32(body[:-4])
     place = footer.summary_start
     assert place == end.end
-    for offset in (parsed(SummaryOffset, p) for p in of(data, SUMMARY_OFFSET)):
+    for offset in (parsed(kinds.SummaryOffset, p) for p in of(data, Opcode.SUMMARY_OFFSET)):
         assert offset.group_start == place
         place += offset.group_length
         assert {p.opcode for p in pieces(data, offset.group_start, place)} == {offset.group_opcode}
-    assert place == footer.summary_offset_start == of(data, SUMMARY_OFFSET)[0].start
+    assert place == footer.summary_offset_start == of(data, Opcode.SUMMARY_OFFSET)[0].start
 
 
 def test_every_chunk_holds_one_topic_can_be_read_alone_and_is_indexed(data):
     """The axes come last of each stretch: what a killed run leaves is seldom some axes alone."""
-    schemas = {parsed(Schema, p).id: p.body for p in of(data, SCHEMA)}
-    channels = {parsed(Channel, p).id: p.body for p in of(data, CHANNEL)}
+    schemas = {parsed(kinds.Schema, p).id: p.body for p in of(data, Opcode.SCHEMA)}
+    channels = {parsed(kinds.Channel, p).id: p.body for p in of(data, Opcode.CHANNEL)}
     everything, order = records(data), []
-    indexes = [parsed(ChunkIndex, p) for p in of(data, CHUNK_INDEX)]
-    for index, piece, content in zip(indexes, of(data, CHUNK), in_chunks(data), strict=True):
-        chunk, (schema, channel, *sent) = parsed(Chunk, piece), content
+    indexes = [parsed(kinds.ChunkIndex, p) for p in of(data, Opcode.CHUNK_INDEX)]
+    for index, piece, content in zip(indexes, of(data, Opcode.CHUNK), in_chunks(data), strict=True):
+        chunk, (schema, channel, *sent) = parsed(kinds.Chunk, piece), content
         assert chunk.uncompressed_crc == zlib.crc32(payload(chunk)) != 0
         messages = [parsed_message(p) for p in sent]
         (number,) = {m.channel_id for m in messages}
         assert channel.body == channels[number]
-        assert schema.body == schemas[parsed(Channel, channel).schema_id]
+        assert schema.body == schemas[parsed(kinds.Channel, channel).schema_id]
         behind = everything[everything.index(piece) + 1]
         times = chunk.message_start_time, chunk.message_end_time
         assert times == (messages[0].log_time, messages[-1].log_time)
-        assert index == ChunkIndex(
+        assert index == kinds.ChunkIndex(
             chunk_length=piece.end - piece.start, chunk_start_offset=piece.start,
             compression=chunk.compression, compressed_size=len(chunk.data),
             message_start_time=times[0], message_end_time=times[1],
@@ -148,7 +116,7 @@ def test_every_chunk_holds_one_topic_can_be_read_alone_and_is_indexed(data):
             uncompressed_size=len(payload(chunk)),
         )  # fmt: skip
         entries = [(m.log_time, p.start) for m, p in zip(messages, sent, strict=True)]
-        assert parsed(MessageIndex, behind) == MessageIndex(number, entries)
+        assert parsed(kinds.MessageIndex, behind) == kinds.MessageIndex(number, entries)
         order.append((number, len(messages)))
     full = [(number, PER_CHUNK) for number in (4, 3, 2, 1)] * (COUNT // PER_CHUNK)
     assert order == full + [(number, COUNT % PER_CHUNK) for number in (4, 3, 2, 1)]
@@ -169,14 +137,14 @@ def test_every_message_has_its_number_exact_time_and_each_value_in_its_own_field
         found[channel.topic].append((message.sequence, message.log_time, message.publish_time))
     rows = [(k, exact(k, RATE), exact(k, RATE)) for k in range(COUNT)]
     assert found == dict.fromkeys(wanted, rows)
-    channels = [parsed(Channel, p) for p in of(data, CHANNEL)]
+    channels = [parsed(kinds.Channel, p) for p in of(data, Opcode.CHANNEL)]
     assert [(c.id, c.schema_id, c.topic) for c in channels] == [
         (k, of, topic) for k, of, topic in zip((1, 2, 3, 4), (1, 2, 2, 3), wanted, strict=True)
     ]
-    assert parsed(Statistics, of(data, STATISTICS)[0]) == Statistics(
+    assert parsed(kinds.Statistics, of(data, Opcode.STATISTICS)[0]) == kinds.Statistics(
         attachment_count=3, channel_count=4,
         channel_message_counts=dict.fromkeys(range(1, 5), COUNT),
-        chunk_count=len(of(data, CHUNK)), message_count=4 * COUNT, metadata_count=1,
+        chunk_count=len(of(data, Opcode.CHUNK)), message_count=4 * COUNT, metadata_count=1,
         message_end_time=exact(COUNT - 1, RATE), message_start_time=0, schema_count=3,
     )  # fmt: skip
 
@@ -188,13 +156,13 @@ def test_metadata_attachments_and_channels_say_what_the_log_holds(data):
     assert {(a.log_time, a.create_time) for a in attachments} == {(0, 0)}
     types = [a.media_type for a in attachments]
     assert types == ["application/toml", "application/xml", "application/octet-stream"]
-    assert [parsed(AttachmentIndex, p) for p in of(data, ATTACHMENT_INDEX)] == [
-        AttachmentIndex(p.start, p.end - p.start, 0, 0, len(a.data), a.name, a.media_type)
-        for p, a in zip(of(data, ATTACHMENT), attachments, strict=True)
+    assert [parsed(kinds.AttachmentIndex, p) for p in of(data, Opcode.ATTACHMENT_INDEX)] == [
+        kinds.AttachmentIndex(p.start, p.end - p.start, 0, 0, len(a.data), a.name, a.media_type)
+        for p, a in zip(of(data, Opcode.ATTACHMENT), attachments, strict=True)
     ]
-    place = of(data, METADATA)[0]
-    assert [parsed(MetadataIndex, p) for p in of(data, METADATA_INDEX)] == [
-        MetadataIndex(place.start, place.end - place.start, "twin")
+    place = of(data, Opcode.METADATA)[0]
+    assert [parsed(kinds.MetadataIndex, p) for p in of(data, Opcode.METADATA_INDEX)] == [
+        kinds.MetadataIndex(place.start, place.end - place.start, "twin")
     ]
     (entries,) = [m.metadata for m in reader.iter_metadata()]
     proof = entries.pop("checksum")
@@ -204,7 +172,7 @@ def test_metadata_attachments_and_channels_say_what_the_log_holds(data):
     texts = [text.encode() for entry in sorted(entries.items()) for text in entry]
     stated = b"".join(len(text).to_bytes(8, "little") + text for text in texts)
     assert proof == f"{zlib.crc32(stated):08x}"
-    channels = [parsed(Channel, p).metadata for p in of(data, CHANNEL)]
+    channels = [parsed(kinds.Channel, p).metadata for p in of(data, Opcode.CHANNEL)]
     assert channels[1] == {
         "axis": "y", "sample_rate_hz": "3000.0", "unit.position": "m", "unit.current": "A",
         "force_constant": "3.5",
@@ -223,7 +191,7 @@ def test_stock_readers_accept_every_checksum_and_find_samples_by_time(data):
 def test_the_size_of_the_chunks_changes_no_sample(tmp_path, rows):
     """Of one row at least, though it is larger than a chunk."""
     write_log(LOG, tmp_path / "a.mcap", chunk_bytes=int(rows * ROW))
-    chunks = of((tmp_path / "a.mcap").read_bytes(), CHUNK)
+    chunks = of((tmp_path / "a.mcap").read_bytes(), Opcode.CHUNK)
     assert len(chunks) == 4 * -(-COUNT // max(1, int(rows)))
     assert_same_log(read_log(tmp_path / "a.mcap"), LOG)
 

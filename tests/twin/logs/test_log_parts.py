@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from check_drive import drive
 from log_cases import assert_same_samples, two_axes, write_together
+from mcap.opcode import Opcode
 from mcap.records import ChunkIndex
-from mcap_bytes import CHUNK, CHUNK_INDEX, parsed, records
+from mcap_bytes import of, parsed
 
 from twin.checks import check_log
 from twin.checks.long import check_file, read_checked, read_measured
@@ -33,7 +34,7 @@ def path(tmp_path: Path) -> Path:
 def spoil(path: Path, *channels: int, after: int = -1, before: int = 1 << 62) -> None:
     """Flip a bit in every chunk of some channels that ends before a time or begins after it, ns."""
     data = bytearray(path.read_bytes())
-    for index in (parsed(ChunkIndex, p) for p in records(bytes(data)) if p.opcode == CHUNK_INDEX):
+    for index in (parsed(ChunkIndex, p) for p in of(bytes(data), Opcode.CHUNK_INDEX)):
         outside = index.message_start_time > after or index.message_end_time < before
         if outside and index.message_index_offsets.keys() <= set(channels):
             data[index.chunk_start_offset + index.chunk_length - 9] ^= 1
@@ -103,7 +104,7 @@ def test_a_log_read_in_parts_is_the_log(path, samples):
 
 def test_a_gap_between_parts_is_found(tmp_path, path):
     data = path.read_bytes()
-    chunk = [r for r in records(data) if r.opcode == CHUNK][5]  # of x, the second
+    chunk = of(data, Opcode.CHUNK)[5]  # of x, the second
     (tmp_path / "b.mcap").write_bytes(data[: chunk.start] + data[chunk.end :])
     with pytest.raises(InputError):
         list(read_parts(tmp_path / "b.mcap", 1))

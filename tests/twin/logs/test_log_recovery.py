@@ -29,8 +29,9 @@ from damage_cases import (
     written,
 )
 from log_cases import assert_same_log, assert_same_samples, two_axes, write_together
+from mcap.opcode import Opcode
 from mcap.records import Attachment, ChunkIndex
-from mcap_bytes import ATTACHMENT, CHUNK, CHUNK_INDEX, METADATA, parsed, records
+from mcap_bytes import of, parsed
 
 from twin.errors import InputError
 from twin.files import UNFINISHED
@@ -103,7 +104,7 @@ def test_a_bit_flipped_in_any_kind_of_record_is_told_and_costs_its_chunk_at_most
     """The opcode, bytes of the length and of the content, of a record of each kind; the magic."""
     first_of = {r.opcode: r for r in reversed(intact.records)}
     for record in (*first_of.values(), intact.chunks[2]):
-        size, chunk = record.end - record.start, record.opcode == CHUNK
+        size, chunk = record.end - record.start, record.opcode == Opcode.CHUNK
         every = (0, 1, 2, 4, 8, 9, 17, 25, 33, 37, 41, size // 2, size - 1)
         for at in every if chunk else (0, 1, 8, 9, size - 1):
             data = flipped(intact.data, record.start + at, mask=1 << at % 8)
@@ -119,13 +120,13 @@ def test_a_bit_flipped_in_any_kind_of_record_is_told_and_costs_its_chunk_at_most
 
 
 def test_each_extra_that_is_damaged_is_named_and_the_others_are_kept(tmp_path, intact):
-    attachment = next(r for r in intact.records if r.opcode == ATTACHMENT)
+    attachment = next(r for r in intact.records if r.opcode == Opcode.ATTACHMENT)
     place = intact.data.index(parsed(Attachment, attachment).data)
     log, recovery = recovered(tmp_path / "a.mcap", flipped(intact.data, place))
     assert not log.attachments
     assert log.metadata["source"] == "a test"
     assert any(f"attachment at byte {attachment.start}: wrong checksum" in s for s in recovery.lost)
-    metadata = next(r for r in intact.records if r.opcode == METADATA)
+    metadata = next(r for r in intact.records if r.opcode == Opcode.METADATA)
     for word in (b"a test", b"500.0"):  # a rate that the chunks deny gives way
         place = intact.data.index(word, metadata.start)
         log, recovery = recovered(tmp_path / "a.mcap", flipped(intact.data, place))
@@ -220,7 +221,7 @@ def test_what_damage_did_not_touch_comes_back_whatever_else_is_lost(tmp_path, se
     rng, path = np.random.default_rng(seed), tmp_path / "a.mcap"
     write_log(TWO, path, chunk_bytes=20_000)
     data, whole = bytearray(path.read_bytes()), {1: set(), 2: set(), 3: set()}
-    for index in [parsed(ChunkIndex, p) for p in records(bytes(data)) if p.opcode == CHUNK_INDEX]:
+    for index in [parsed(ChunkIndex, p) for p in of(bytes(data), Opcode.CHUNK_INDEX)]:
         (channel,) = index.message_index_offsets
         if rng.random() < 0.2:
             place = index.chunk_start_offset + index.chunk_length - 1 - int(rng.integers(20))
@@ -256,7 +257,7 @@ def test_what_is_written_piece_by_piece_is_what_is_read_as_a_whole(tmp_path, lay
         write_log(log, path, chunk_bytes=200_000)
     else:
         write_together(path, log)
-    ends = [r.end for r in records(path.read_bytes()) if r.opcode == CHUNK]
+    ends = [r.end for r in of(path.read_bytes(), Opcode.CHUNK)]
     path.write_bytes(flipped(path.read_bytes(), ends[4] - 50, ends[5] - 50))
     log, wanted = recover_log(path)
     recovery, files = recover_file(path, tmp_path / "good.mcap")
@@ -277,7 +278,7 @@ def test_a_recovery_takes_little_memory(tmp_path):
     noise = np.random.default_rng(1).standard_normal((2, 1_000_000))
     path = tmp_path / "a.mcap"
     write_log(Log(1e4, {"x": AxisLog({"position": noise[0], "force": noise[1]})}), path)
-    ends = [r.end for r in records(path.read_bytes()) if r.opcode == CHUNK]
+    ends = [r.end for r in of(path.read_bytes(), Opcode.CHUNK)]
     path.write_bytes(flipped(path.read_bytes(), ends[20] - 50))
     tracemalloc.start()
     recover_file(path, tmp_path / "b.mcap")
@@ -292,11 +293,11 @@ def test_a_chunk_is_found_wherever_it_lies(tmp_path):
     for border in (1 << 16, 1 << 18):
         for before in range(-20, 80, 7):
             write_log(Log(RATE, log.axes, attachments={"a": bytes(border - 300)}), path)
-            start = next(r.start for r in records(path.read_bytes()) if r.opcode == CHUNK)
+            start = of(path.read_bytes(), Opcode.CHUNK)[0].start
             size = border - 300 + border - before - start
             write_log(Log(RATE, log.axes, attachments={"a": bytes(size)}), path)
             data = path.read_bytes()
-            chunk = next(r for r in records(data) if r.opcode == CHUNK)
+            chunk = of(data, Opcode.CHUNK)[0]
             assert chunk.start == border - before
             path.write_bytes(flipped(data, chunk.start + 5))  # its length
             assert_same_samples(recover_log(path)[0], log)
@@ -305,7 +306,7 @@ def test_a_chunk_is_found_wherever_it_lies(tmp_path):
 def test_what_is_recovered_from_is_there_to_the_last(tmp_path):
     """Also where it bears the name of the recording that it becomes, but not of what is written."""
     write_log(TWO, tmp_path / "b.mcap", chunk_bytes=20_000)
-    ends = [r.end for r in records((tmp_path / "b.mcap").read_bytes()) if r.opcode == CHUNK]
+    ends = [r.end for r in of((tmp_path / "b.mcap").read_bytes(), Opcode.CHUNK)]
     source = (tmp_path / "b.mcap").rename(tmp_path / f"a.mcap{UNFINISHED}")
     source.write_bytes(flipped(source.read_bytes(), *(end - 50 for end in ends[12:15])))
     wanted, told = recover_log(source)
