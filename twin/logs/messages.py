@@ -8,7 +8,7 @@ a row of one of each channel, and a chunk is written and read column by column.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -166,27 +166,21 @@ class MessageLayout:
         return all(bool((records[name] == self.template[name]).all()) for name in names)
 
 
-@dataclass(frozen=True)
-class RowLayout:
-    """One message of each channel, in the order they are written for every sample."""
+def blocks_of(layouts: Sequence[MessageLayout], data: bytes, offset: int) -> list[Block] | None:
+    """The samples from ``offset`` on, as views: rows of one message of each channel.
 
-    messages: tuple[MessageLayout, ...]
-
-    @cached_property
-    def dtype(self) -> np.dtype:
-        """Packed structure of a row; its fields are the message records "0", "1", ..."""
-        return np.dtype([(str(i), m.dtype) for i, m in enumerate(self.messages)])
-
-    def blocks(self, data: bytes, offset: int) -> list[Block] | None:
-        """The samples from ``offset`` on, as views; None where they are not rows to the end."""
-        count, rest = divmod(len(data) - offset, self.dtype.itemsize)
-        if rest:
+    None where they are not such rows to the end.
+    """
+    row = np.dtype([(str(layout.channel), layout.dtype) for layout in layouts])
+    count, rest = divmod(len(data) - offset, row.itemsize)
+    if rest:
+        return None
+    rows = np.frombuffer(data, row, count, offset)
+    blocks = []
+    for layout in layouts:
+        records = rows[str(layout.channel)]
+        if not layout.matches(records):
             return None
-        rows = np.frombuffer(data, self.dtype, count, offset)
-        records = [rows[str(i)] for i in range(len(self.messages))]
-        if not all(m.matches(r) for m, r in zip(self.messages, records, strict=True)):
-            return None
-        return [
-            Block(m.channel, r[".sequence"], r[".log_time"], {n: r[n] for n in m.numbers})
-            for m, r in zip(self.messages, records, strict=True)
-        ]
+        columns = {name: records[name] for name in layout.numbers}
+        blocks.append(Block(layout.channel, records[".sequence"], records[".log_time"], columns))
+    return blocks

@@ -15,7 +15,7 @@ from mcap.records import Channel, Schema
 from twin.errors import InputError, at
 from twin.logs.container import RECORD_HEAD, Damaged, parse, record_at
 from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS
-from twin.logs.messages import Block, MessageLayout, RowLayout, field_numbers
+from twin.logs.messages import Block, MessageLayout, blocks_of, field_numbers
 
 AXIS_PREFIX = "/axis/"
 TRUTH_PREFIX = "/truth/"
@@ -117,7 +117,6 @@ class Topics:
     channels: dict[int, Channel] = field(default_factory=dict)
     _topics: dict[int, Topic | None] = field(default_factory=dict)
     _seen: set[bytes] = field(default_factory=set)
-    _layouts: dict[tuple[int, ...], RowLayout] = field(default_factory=dict)
 
     def register(self, opcode: int, content: bytes) -> None:
         """Take a schema or channel record; every chunk may repeat them."""
@@ -157,26 +156,6 @@ class Topics:
 
         The messages of a chunk must all be laid out as the first ones, as this program writes them.
         """
-        offset = self._register_leading(data)
-        if offset == len(data):
-            return []
-        channels = tuple(self._row(data, offset))
-        if self.topic(channels[0]) is None:
-            return []
-        topics = [self.topic(channel) for channel in channels]
-        if None not in topics:
-            if channels not in self._layouts:
-                self._layouts[channels] = RowLayout(tuple(t.layout for t in topics if t))
-            blocks = self._layouts[channels].blocks(data, offset)
-            if blocks is not None:
-                return blocks
-        raise InputError(
-            "its messages are not laid out as this program writes them; convert the log with: "
-            "twin import"
-        )
-
-    def _register_leading(self, data: bytes) -> int:
-        """Take the schemas and channels that a chunk begins with; where its messages begin."""
         offset = registered = 0
         while offset < len(data):
             opcode, content, end = record_at(data, offset)
@@ -187,7 +166,19 @@ class Topics:
                 raise Damaged(f"more than {MOST_DEFINITIONS} schemas and channels in one chunk")
             self.register(opcode, content)
             offset = end
-        return offset
+        if offset == len(data):
+            return []
+        channels = list(self._row(data, offset))
+        if self.topic(channels[0]) is None:
+            return []
+        layouts = [topic.layout for channel in channels if (topic := self.topic(channel))]
+        blocks = blocks_of(layouts, data, offset) if len(layouts) == len(channels) else None
+        if blocks is not None:
+            return blocks
+        raise InputError(
+            "its messages are not laid out as this program writes them; convert the log with: "
+            "twin import"
+        )
 
     def _row(self, data: bytes, offset: int) -> Iterator[int]:
         """The channels of the messages up to the one whose channel comes a second time."""

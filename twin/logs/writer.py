@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import struct
 import zlib
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from itertools import chain
@@ -49,6 +49,7 @@ _COMPRESSION = zstandard.ZstdCompressionParameters(
     strategy=zstandard.STRATEGY_DFAST, window_log=17, hash_log=8, chain_log=8, search_log=1,
     min_match=4,
 )  # fmt: skip
+_INDEX_HEAD = struct.Struct("<BQHI")  # opcode, length of what follows, channel, bytes of entries
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _MEDIA_TYPES = {".toml": "application/toml", ".xml": "application/xml"}
 
@@ -132,11 +133,11 @@ def _written(
         writer.add_attachment(name, data)
     most = max(1, chunk_bytes // outline.row_bytes)
 
-    def chunk(stretch: tuple[Planned, int, Mapping[str, Array]]) -> PackedChunk:
-        return _packed(*stretch, outline.sample_rate)
+    def chunk(stretch: tuple[Planned, int, Mapping[str, Array]]) -> tuple[int, Chunk, np.ndarray]:
+        return stretch[0].channel.id, *_packed(*stretch, outline.sample_rate)
 
     for packed in _ordered(chunk, _stretches(outline, topics_of, parts, most)):
-        writer.add_chunk(packed)
+        writer.add_chunk(*packed)
     return writer.finish(outline.topics)
 
 
@@ -167,22 +168,12 @@ def _sound(outline: Outline, topics_of: Topics, parts: Iterable[Log]) -> Iterato
         first += len(part)
 
 
-@dataclass(frozen=True)
-class PackedChunk:
-    """A chunk of ``count`` messages of a channel and their index, ready to be written."""
-
-    chunk: Chunk
-    index: bytes
-    channel: int
-    count: int
-
-
 def _packed(
     topic: Planned, first: int, columns: Mapping[str, Array], sample_rate: float
-) -> PackedChunk:
-    """The chunk of a topic's samples from number ``first`` on; takes most of the time of writing.
+) -> tuple[Chunk, np.ndarray]:
+    """The chunk of a topic's samples from number ``first`` on, and its index, entries (n,).
 
-    May run on any thread.
+    It takes most of the time of writing, and may run on any thread.
     """
     head, layout = encoded([topic.schema, topic.channel]), topic.layout
     times = sample_times(first, len(next(iter(columns.values()))), sample_rate)
@@ -206,18 +197,7 @@ def _packed(
     index = np.empty(len(times), _INDEX_ENTRY)
     index["time"] = times
     index["offset"] = len(head) + size * np.arange(len(times))
-    return PackedChunk(chunk, _message_index(topic.channel.id, index), topic.channel.id, len(times))
-
-
-def _message_index(channel: int, entries: np.ndarray) -> bytes:
-    # mcap.records.MessageIndex takes a list of tuples, which costs more than all the rest
-    builder = RecordBuilder()
-    builder.start_record(Opcode.MESSAGE_INDEX)
-    builder.write2(channel)
-    builder.write4(entries.nbytes)
-    builder.write(entries.tobytes())
-    builder.finish_record()
-    return builder.end()
+    return chunk, index
 
 
 def _ordered(function: Callable[[S], T], items: Iterable[S]) -> Iterator[T]:
@@ -265,12 +245,13 @@ class McapWriter:
         offset, length = self._write(encoded([Attachment(0, 0, name, media_type, data)]))
         self._attachments.append(AttachmentIndex(offset, length, 0, 0, len(data), name, media_type))
 
-    def add_chunk(self, packed: PackedChunk) -> None:
-        """Write a chunk and its message index."""
-        chunk = packed.chunk
+    def add_chunk(self, channel: int, chunk: Chunk, index: np.ndarray) -> None:
+        """Write a chunk of messages of a channel, and their index."""
         start, length = self._write(encoded([chunk]))
-        index_start, index_length = self._write(packed.index)
-        self._counts[packed.channel] += packed.count
+        # mcap.records.MessageIndex takes a list of tuples, which costs more than all the rest
+        head = _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + index.nbytes, channel, index.nbytes)
+        index_start, index_length = self._write(head + index.tobytes())
+        self._counts[channel] += len(index)
         self._chunks.append(
             ChunkIndex(
                 chunk_length=length,
@@ -279,7 +260,7 @@ class McapWriter:
                 compressed_size=len(chunk.data),
                 message_end_time=chunk.message_end_time,
                 message_index_length=index_length,
-                message_index_offsets={packed.channel: index_start},
+                message_index_offsets={channel: index_start},
                 message_start_time=chunk.message_start_time,
                 uncompressed_size=chunk.uncompressed_size,
             )
